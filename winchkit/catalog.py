@@ -1,0 +1,51 @@
+"""Finds devices, profiles and simulated benches by name or path, installed or in a checkout."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+from winchkit.errors import FileError
+from winchkit.units import suggest
+
+__all__ = ["Kind", "find", "folder", "names"]
+
+Kind = Literal["devices", "profiles", "sim"]
+
+
+def folder(kind: Kind) -> Path:
+    """The folder of shipped declarations: inside the wheel, else the checkout's sibling."""
+    package = Path(str(files("winchkit")))
+    shipped = package / "_data" / kind
+    return shipped if shipped.is_dir() else package.parent / kind
+
+
+def names(kind: Kind) -> list[str]:
+    """Names that :func:`find` knows for a kind, sorted."""
+    if kind == "devices":
+        return sorted(path.parent.name for path in folder(kind).glob("*/device.toml"))
+    return sorted(path.stem for path in folder(kind).glob("*.toml"))
+
+
+def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
+    """Path of a declaration by shipped name or by path (relative ones also ``beside`` a file).
+
+    Raises FileError naming what is known when nothing is there.
+    """
+    leaf = "device.toml" if kind == "devices" else ""
+    base = Path(beside).parent if beside else Path()
+    for candidate in (base / name, base / f"{name}.toml", Path(name)):
+        if candidate.is_file():
+            return candidate
+        if leaf and (candidate / leaf).is_file():
+            return candidate / leaf
+    shipped = folder(kind) / name / leaf if leaf else folder(kind) / f"{name}.toml"
+    if shipped.is_file():
+        return shipped
+    known = names(kind)
+    singular = {"devices": "device", "profiles": "profile", "sim": "simulated bench"}[kind]
+    raise FileError(
+        f"no {singular} '{name}': not a file, and not one of {', '.join(known) or 'none'}"
+        + suggest(name, known)
+    )

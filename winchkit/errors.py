@@ -1,0 +1,106 @@
+"""Every error that winchkit raises, in one tree.
+
+    WinchkitError                      exit code
+      UsageError                       2  the command or call itself is wrong
+      FileError                        3  a file is wrong: every fault of it, with its place
+        RunError                       3  a run lacks a column, a unit, a sample
+      ConnectionLost (OSError)         4  a bus or a device cannot be reached
+        NoReply (TimeoutError)         4  a device did not answer in time
+      MotionError                      5  a drive or a limit refuses to move
+        DriveFault                     5  the drive reports a fault
+        LimitTripped                   5  a supervised limit tripped; latched until reset
+        NotPermitted                   5  a safety condition for motion is not met
+
+A message says what, where, the value, the limit, and what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+__all__ = [
+    "ConnectionLost",
+    "DriveFault",
+    "Fault",
+    "FileError",
+    "LimitTripped",
+    "MotionError",
+    "NoReply",
+    "NotPermitted",
+    "RunError",
+    "UsageError",
+    "WinchkitError",
+]
+
+
+class WinchkitError(Exception):
+    """The root of the tree. ``exit_code`` is what a command returns for it."""
+
+    exit_code = 1
+
+
+class UsageError(WinchkitError, ValueError):
+    """A call or a command line that cannot be meant: an unknown name, a value out of range."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of a file: where it stands and what is wrong."""
+
+    message: str
+    path: str = ""
+    line: int | None = None
+    key: str = ""
+
+    def __str__(self) -> str:
+        place = self.path if self.line is None else f"{self.path}:{self.line}"
+        return ": ".join(part for part in (place, self.key, self.message) if part)
+
+
+class FileError(WinchkitError, ValueError):
+    """A file that cannot be used; carries every fault found in it, not only the first."""
+
+    exit_code = 3
+
+    def __init__(self, faults: Sequence[Fault] | Fault | str) -> None:
+        if isinstance(faults, str):
+            faults = Fault(faults)
+        self.faults: tuple[Fault, ...] = (
+            (faults,) if isinstance(faults, Fault) else tuple(faults)
+        )
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+
+class RunError(FileError):
+    """A run that cannot answer the question: a missing column, a unit that does not fit."""
+
+
+class ConnectionLost(WinchkitError, OSError):
+    """A bus or device cannot be reached, e.g. an unplugged adapter."""
+
+    exit_code = 4
+
+
+class NoReply(ConnectionLost, TimeoutError):
+    """A device did not answer in time, e.g. a load cell that is switched off."""
+
+
+class MotionError(WinchkitError, RuntimeError):
+    """Something refuses to move, or stopped moving."""
+
+    exit_code = 5
+
+
+class DriveFault(MotionError):
+    """The drive reports a fault, e.g. following error 8611h."""
+
+
+class LimitTripped(MotionError):
+    """A supervised limit tripped, e.g. tension above its high limit. Latched until reset."""
+
+
+class NotPermitted(MotionError):
+    """A condition for motion is not met, e.g. no drive-side watchdog."""

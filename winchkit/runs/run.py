@@ -1,0 +1,111 @@
+"""A run: named channels over one time base, with units, metadata and what is missing counted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.errors import Fault, RunError
+from winchkit.units import parse, suggest
+
+__all__ = ["CHANNEL_DIMENSIONS", "Channel", "Run"]
+
+Array = NDArray[np.float64]
+
+CHANNEL_DIMENSIONS: dict[str, str] = {
+    "motor_angle": "angle",
+    "motor_velocity": "angular speed",
+    "motor_torque": "torque",
+    "tension": "force",
+    "load": "force",
+    "cable_length": "length",
+    "temperature": "temperature",
+}
+"""Dimension of every channel of a winch run that the model knows."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One signal: values in SI where the model knows its name, else as in the file."""
+
+    values: Array
+    """Shape (n,); NaN where there is no value."""
+    unit: str
+    column: int | None = None
+    """Column in the file, counted from 1."""
+
+    @property
+    def missing(self) -> int:
+        """How many samples are NaN."""
+        return int(np.count_nonzero(np.isnan(self.values)))
+
+
+@dataclass(frozen=True)
+class Run:
+    """Channels of one recording, all of shape (n,) on ``time``, and its metadata."""
+
+    name: str
+    time: Array
+    """Seconds, strictly increasing, shape (n,)."""
+    channels: Mapping[str, Channel]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    path: str = ""
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.channels
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.channels)
+
+    def __getitem__(self, name: str) -> Array:
+        """Values of a channel; RunError names the columns there are."""
+        try:
+            return self.channels[name].values
+        except KeyError:
+            known = ["time", *self.channels]
+            message = f"no column '{name}'; it has {', '.join(known)}" + suggest(name, known)
+            raise RunError(Fault(message, self.path or self.name)) from None
+
+    @property
+    def load_mass(self) -> float | None:
+        """The known weight on the rope, kg, from the metadata ``load_mass``."""
+        text = self.metadata.get("load_mass")
+        return None if text is None else parse(text, "mass")
+
+    @property
+    def length_zeroed(self) -> bool:
+        """Whether the length instrument was zeroed at the reference: no offset to fit."""
+        return self.metadata.get("length_zeroed", "").strip().lower() in {"true", "yes", "1"}
+
+    @property
+    def interval(self) -> float:
+        """Median time between samples, s."""
+        return float(np.median(np.diff(self.time)))
+
+    @property
+    def gaps(self) -> int:
+        """How often the time jumps by more than 1.5 sampling intervals."""
+        return int(np.count_nonzero(np.diff(self.time) > 1.5 * self.interval))
+
+    def winches(self) -> list[str]:
+        """Names of the winches in it: of ``A.motor_angle`` columns; ``[""]`` for a plain run."""
+        prefixed = [name.rpartition(".")[0] for name in self.channels if
+                    name.rpartition(".")[2] == "motor_angle"]
+        return prefixed or [""]
+
+    def of_winch(self, winch: str) -> Run:
+        """The run of one winch: its columns without prefix, the shared ones kept."""
+        if not winch:
+            return self
+        own = {
+            name.removeprefix(f"{winch}."): channel
+            for name, channel in self.channels.items()
+            if name.startswith(f"{winch}.") or "." not in name
+        }
+        return replace(self, name=f"{self.name}:{winch}", channels=own)

@@ -1,0 +1,98 @@
+"""The types of file fields: a quantity with its unit in the file, an SI float in the dataclass.
+
+``winding_radius: Length`` reads ``"60 mm"`` and holds ``0.06``. The marker carries what a reader
+needs (dimension and range); pydantic is imported only when a file is read, and nothing is
+checked when code builds a dataclass from SI numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from winchkit.errors import UsageError
+from winchkit.units import UNITS, parse
+
+if TYPE_CHECKING:
+    from pydantic_core import CoreSchema
+
+__all__ = [
+    "Acceleration",
+    "Angle",
+    "Count",
+    "Duration",
+    "Force",
+    "Frequency",
+    "Inertia",
+    "Length",
+    "LinearDensity",
+    "Mass",
+    "Number",
+    "PositiveAcceleration",
+    "PositiveDuration",
+    "PositiveForce",
+    "PositiveLength",
+    "PositiveMass",
+    "PositiveNumber",
+    "PositiveSpeed",
+    "Quantity",
+    "Speed",
+    "Temperature",
+    "Torque",
+]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Marks a float field as a quantity of ``dimension`` within ``[low, high]`` (SI).
+
+    With ``above`` the low end itself is excluded.
+    """
+
+    dimension: str
+    low: float = float("-inf")
+    high: float = float("inf")
+    above: bool = False
+
+    def read(self, raw: object) -> float:
+        """Turn a value of a file into SI; raises ValueError with the reason."""
+        value = parse(raw, self.dimension)
+        unit = next(iter(UNITS[self.dimension]))
+        if value < self.low or (self.above and value == self.low):
+            word = "above" if self.above else "at least"
+            raise UsageError(f"'{raw}' must be {word} {self.low:g} {unit}")
+        if value > self.high:
+            raise UsageError(f"'{raw}' must be at most {self.high:g} {unit}")
+        return value
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: Callable[[Any], CoreSchema]
+    ) -> CoreSchema:
+        """Let pydantic read the field through :meth:`read`."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+Length = Annotated[float, Quantity("length")]
+PositiveLength = Annotated[float, Quantity("length", 0.0, above=True)]
+Speed = Annotated[float, Quantity("speed")]
+PositiveSpeed = Annotated[float, Quantity("speed", 0.0, above=True)]
+Acceleration = Annotated[float, Quantity("acceleration")]
+PositiveAcceleration = Annotated[float, Quantity("acceleration", 0.0, above=True)]
+Angle = Annotated[float, Quantity("angle")]
+Duration = Annotated[float, Quantity("time", 0.0)]
+PositiveDuration = Annotated[float, Quantity("time", 0.0, above=True)]
+Frequency = Annotated[float, Quantity("frequency", 0.0, above=True)]
+Force = Annotated[float, Quantity("force")]
+PositiveForce = Annotated[float, Quantity("force", 0.0, above=True)]
+Torque = Annotated[float, Quantity("torque")]
+Mass = Annotated[float, Quantity("mass", 0.0)]
+PositiveMass = Annotated[float, Quantity("mass", 0.0, above=True)]
+LinearDensity = Annotated[float, Quantity("mass per length", 0.0)]
+Inertia = Annotated[float, Quantity("inertia", 0.0)]
+Temperature = Annotated[float, Quantity("temperature")]
+Number = Annotated[float, Quantity("ratio")]
+PositiveNumber = Annotated[float, Quantity("ratio", 0.0, above=True)]
+Count = Annotated[float, Quantity("ratio", 0.0)]

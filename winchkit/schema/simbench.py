@@ -1,0 +1,72 @@
+"""What a simulated bench declares: what is wired, what is true, what goes wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.quantity import Duration, PositiveMass, Temperature
+
+__all__ = ["FaultSpec", "HiddenSpec", "NoiseSpec", "SimBench", "WinchTruth"]
+
+
+@dataclass(frozen=True)
+class HiddenSpec:
+    """A piece of the simulator's own physics; ``answers`` is for scoring only."""
+
+    physics: str
+    """Name in the simulator's own table of physics, which is not the catalogue of effects."""
+    numbers: Mapping[str, Any]
+    answers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class WinchTruth:
+    """What is true of one winch and its profile does not say."""
+
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    """Dotted profile keys with their true values, e.g. ``{"drum.winding_radius": "60.4 mm"}``."""
+    hidden: tuple[HiddenSpec, ...] = ()
+    load_mass: PositiveMass = 20.0
+    """The weight that hangs there until a programme asks for another, kg."""
+    temperature: Temperature = 20.0
+    temperature_drift: float = 0.0
+    """K per hour."""
+
+
+@dataclass(frozen=True)
+class NoiseSpec:
+    """Standard deviations of the instruments' noise, SI."""
+
+    cable_length: float = 0.0
+    tension: float = 0.0
+    motor_torque: float = 0.0
+    load: float = 0.0
+    temperature: float = 0.0
+    colour: float = 0.0
+    """Share of the variance that is first-order coloured noise, 0 to 1."""
+    colour_time: Duration = 1.0
+
+
+@dataclass(frozen=True)
+class FaultSpec:
+    """Something that goes wrong at a time."""
+
+    time: Duration
+    kind: str
+    target: str
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SimBench:
+    """A simulated bench: a bench and its truth, winch by winch."""
+
+    name: str
+    bench: BenchSpec
+    truth: Mapping[str, WinchTruth]
+    noise: NoiseSpec = field(default_factory=NoiseSpec)
+    fault: tuple[FaultSpec, ...] = ()
+    description: str = ""

@@ -1,0 +1,106 @@
+"""Unit strings to SI floats and back: ``parse("60 mm", "length") == 0.06``.
+
+A dimension is a name (``"length"``) with a table of units; the first unit of a table is the
+SI one. Temperature is kept in degrees Celsius, the one exception, as the field measures it.
+"""
+
+from __future__ import annotations
+
+import math
+from difflib import get_close_matches
+
+from winchkit.errors import UsageError
+
+__all__ = ["UNITS", "convert", "dimension_of", "factor", "format_quantity", "parse", "suggest"]
+
+_TURN = 2 * math.pi
+_DEG = math.pi / 180
+
+UNITS: dict[str, dict[str, float]] = {
+    "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "km": 1e3},
+    "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "m/min": 1 / 60},
+    "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3},
+    "jerk": {"m/s^3": 1.0, "mm/s^3": 1e-3},
+    "angle": {"rad": 1.0, "deg": _DEG, "turn": _TURN, "mrad": 1e-3},
+    "angular speed": {"rad/s": 1.0, "deg/s": _DEG, "rpm": _TURN / 60},
+    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEG},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3},
+    "torque": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3, "kN m": 1e3},
+    "mass": {"kg": 1.0, "g": 1e-3, "t": 1e3},
+    "mass per length": {"kg/m": 1.0, "g/m": 1e-3},
+    "inertia": {"kg m^2": 1.0, "kg cm^2": 1e-4, "g cm^2": 1e-7},
+    "stiffness": {"N/m": 1.0, "N/mm": 1e3, "kN/m": 1e3, "kN/mm": 1e6},
+    "viscosity": {"N s/m": 1.0, "kN s/m": 1e3},
+    "rotational viscosity": {"N m s": 1.0, "mN m s": 1e-3},
+    "force per time": {"N/s": 1.0, "N/min": 1 / 60, "N/h": 1 / 3600},
+    "force per temperature": {"N/K": 1.0, "mN/K": 1e-3},
+    "expansion": {"1/K": 1.0, "1/degC": 1.0},
+    "current": {"A": 1.0, "mA": 1e-3},
+    "voltage": {"V": 1.0, "mV": 1e-3},
+    "power": {"W": 1.0, "kW": 1e3},
+    "pressure": {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9},
+    "temperature": {"degC": 1.0, "K": 1.0},
+    "ratio": {"1": 1.0, "%": 1e-2},
+}
+_ZERO_CELSIUS = 273.15
+
+
+def suggest(word: str, known: list[str]) -> str:
+    """``; did you mean 'x'?`` when a known word is close, else nothing."""
+    close = get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def dimension_of(unit: str) -> str | None:
+    """Name the dimension of a unit string, or None where it is unknown."""
+    return next((name for name, table in UNITS.items() if unit in table), None)
+
+
+def factor(unit: str, dimension: str) -> float:
+    """SI value of one ``unit``; raises UsageError naming the units that would do."""
+    table = UNITS[dimension]
+    if unit not in table:
+        raise UsageError(
+            f"unknown {dimension} unit '{unit}'; use one of {', '.join(table)}"
+            + suggest(unit, list(table))
+        )
+    return table[unit]
+
+
+def convert(value: float, unit: str, dimension: str) -> float:
+    """Bring ``value`` from ``unit`` to SI (degrees Celsius for a temperature)."""
+    shift = -_ZERO_CELSIUS if unit == "K" and dimension == "temperature" else 0.0
+    return value * factor(unit, dimension) + shift
+
+
+def parse(text: object, dimension: str) -> float:
+    """Read ``"60 mm"`` as an SI float; a bare number is refused unless it has no dimension."""
+    if isinstance(text, int | float) and not isinstance(text, bool):
+        if dimension == "ratio":
+            return float(text)
+        si = next(iter(UNITS[dimension]))
+        raise UsageError(f"{text} has no unit; write a {dimension} as \"{text} {si}\"")
+    if not isinstance(text, str):
+        raise UsageError(f"expected a {dimension} with its unit, not {type(text).__name__}")
+    number, _, unit = text.strip().partition(" ")
+    try:
+        value = float(number)
+    except ValueError:
+        raise UsageError(f"'{text}' does not start with a number") from None
+    if math.isnan(value):
+        raise UsageError(f"'{text}' is not a number")
+    unit = unit.strip()
+    if not unit and dimension != "ratio":
+        raise UsageError(f"'{text}' has no unit; use one of {', '.join(UNITS[dimension])}")
+    return convert(value, unit or "1", dimension)
+
+
+def format_quantity(value: float, unit: str, digits: int = 6) -> str:
+    """Write an SI value in ``unit``, e.g. ``format_quantity(0.06, "mm") == "60 mm"``."""
+    dimension = dimension_of(unit)
+    if dimension is None:
+        raise UsageError(f"unknown unit '{unit}'")
+    number = f"{value / UNITS[dimension][unit]:.{digits}g}"
+    return number if unit == "1" else f"{number} {unit}"
