@@ -46,6 +46,7 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
     known = names(kind)
     singular = {"devices": "device", "profiles": "profile", "sim": "simulated bench"}[kind]
     raise FileError(
-        f"no {singular} '{name}': not a file, and not one of {', '.join(known) or 'none'}"
+        f"there is no {singular} '{name}', neither as a file nor shipped"
+        + (f" ({', '.join(known)})" if known else "")
         + suggest(name, known)
     )

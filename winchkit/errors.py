@@ -6,6 +6,7 @@
         RunError                       3  a run lacks a column, a unit, a sample
       ConnectionLost (OSError)         4  a bus or a device cannot be reached
         NoReply (TimeoutError)         4  a device did not answer in time
+        DeviceRefused                  4  a device answered, and refused
       MotionError                      5  a drive or a limit refuses to move
         DriveFault                     5  the drive reports a fault
         LimitTripped                   5  a supervised limit tripped; latched until reset
@@ -21,6 +22,7 @@ from dataclasses import dataclass
 
 __all__ = [
     "ConnectionLost",
+    "DeviceRefused",
     "DriveFault",
     "Fault",
     "FileError",
@@ -68,9 +70,7 @@ class FileError(WinchkitError, ValueError):
     def __init__(self, faults: Sequence[Fault] | Fault | str) -> None:
         if isinstance(faults, str):
             faults = Fault(faults)
-        self.faults: tuple[Fault, ...] = (
-            (faults,) if isinstance(faults, Fault) else tuple(faults)
-        )
+        self.faults: tuple[Fault, ...] = (faults,) if isinstance(faults, Fault) else tuple(faults)
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 
@@ -86,6 +86,10 @@ class ConnectionLost(WinchkitError, OSError):
 
 class NoReply(ConnectionLost, TimeoutError):
     """A device did not answer in time, e.g. a load cell that is switched off."""
+
+
+class DeviceRefused(ConnectionLost):
+    """A device answered and refused, e.g. an SDO abort 06090030h or a Modbus exception."""
 
 
 class MotionError(WinchkitError, RuntimeError):

@@ -1,17 +1,28 @@
 """Unit strings to SI floats and back: ``parse("60 mm", "length") == 0.06``.
 
 A dimension is a name (``"length"``) with a table of units; the first unit of a table is the
-SI one. Temperature is kept in degrees Celsius, the one exception, as the field measures it.
+SI one. Temperature is kept in degrees Celsius and its drift per hour, the two exceptions, as the
+field measures them.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from difflib import get_close_matches
 
 from winchkit.errors import UsageError
 
-__all__ = ["UNITS", "convert", "dimension_of", "factor", "format_quantity", "parse", "suggest"]
+__all__ = [
+    "UNITS",
+    "article",
+    "convert",
+    "dimension_of",
+    "factor",
+    "format_quantity",
+    "parse",
+    "suggest",
+]
 
 _TURN = 2 * math.pi
 _DEG = math.pi / 180
@@ -42,8 +53,11 @@ UNITS: dict[str, dict[str, float]] = {
     "power": {"W": 1.0, "kW": 1e3},
     "pressure": {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9},
     "temperature": {"degC": 1.0, "K": 1.0},
+    "temperature difference": {"K": 1.0, "degC": 1.0},
+    "temperature drift": {"K/h": 1.0, "K/min": 60.0, "K/s": 3600.0},
     "ratio": {"1": 1.0, "%": 1e-2},
 }
+_QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf)\s*(.*)", re.ASCII)
 _ZERO_CELSIUS = 273.15
 
 
@@ -51,6 +65,11 @@ def suggest(word: str, known: list[str]) -> str:
     """``; did you mean 'x'?`` when a known word is close, else nothing."""
     close = get_close_matches(word, known, n=1, cutoff=0.6)
     return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def article(noun: str) -> str:
+    """``an angle``, ``a length``."""
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
 
 
 def dimension_of(unit: str) -> str | None:
@@ -81,17 +100,13 @@ def parse(text: object, dimension: str) -> float:
         if dimension == "ratio":
             return float(text)
         si = next(iter(UNITS[dimension]))
-        raise UsageError(f"{text} has no unit; write a {dimension} as \"{text} {si}\"")
+        raise UsageError(f'{text} has no unit; write {article(dimension)} as "{text} {si}"')
     if not isinstance(text, str):
-        raise UsageError(f"expected a {dimension} with its unit, not {type(text).__name__}")
-    number, _, unit = text.strip().partition(" ")
-    try:
-        value = float(number)
-    except ValueError:
-        raise UsageError(f"'{text}' does not start with a number") from None
-    if math.isnan(value):
-        raise UsageError(f"'{text}' is not a number")
-    unit = unit.strip()
+        raise UsageError(f"expected {article(dimension)} with its unit, not {type(text).__name__}")
+    found = _QUANTITY.fullmatch(text.strip())
+    if not found:
+        raise UsageError(f"'{text}' is not a number with its unit")
+    value, unit = float(found[1]), found[2]
     if not unit and dimension != "ratio":
         raise UsageError(f"'{text}' has no unit; use one of {', '.join(UNITS[dimension])}")
     return convert(value, unit or "1", dimension)

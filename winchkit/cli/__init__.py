@@ -1,1 +1,57 @@
-"""TODO."""
+"""The command line. One command a file; this table is all that ``--help`` needs."""
+
+from __future__ import annotations
+
+from typing import Any, NoReturn
+
+import click
+
+from winchkit import __version__
+from winchkit.cli.lazy import At, LazyGroup
+from winchkit.cli.outcome import finish
+
+__all__ = ["main"]
+
+COMMANDS: dict[str, At] = {
+    "demo": At("winchkit.cli.demo", "Find a hidden effect on a simulated bench, start to end."),
+    "check": At("winchkit.cli.check", "Check files of any kind and list every fault."),
+    "effects": At("winchkit.cli.effects", "List the physical effects, or show one's card."),
+    "compare": At("winchkit.cli.compare", "Compare runs with a model: where does it fail?"),
+    "diagnose": At("winchkit.cli.diagnose", "Name the physical effect that the model lacks."),
+    "add": At("winchkit.cli.add", "Fit an effect and write it into a profile."),
+    "export": At("winchkit.cli.export", "Convert a run between CSV and MCAP."),
+    "sim": At("winchkit.cli.sim", "Simulated benches: record, serve, list."),
+    "jog": At("winchkit.cli.jog", "Move a winch by hand."),
+    "run": At("winchkit.cli.run", "Execute a motion programme and log it."),
+    "log": At("winchkit.cli.log", "Log a bench to a file."),
+    "monitor": At("winchkit.cli.monitor", "Show a bench live."),
+    "stop": At("winchkit.cli.stop", "Stop every winch of a bench, now."),
+    "tare": At("winchkit.cli.tare", "Tare a load cell."),
+}
+
+
+class _Main(LazyGroup):
+    """The root group, which turns errors into exit codes."""
+
+    def main(self, *args: Any, **options: Any) -> NoReturn:
+        """Run the command line and leave the process."""
+        options["standalone_mode"] = False
+        finish(lambda: super(_Main, self).main(*args, **options))
+
+
+@click.group(
+    cls=_Main,
+    table=COMMANDS,
+    context_settings={
+        "auto_envvar_prefix": "WINCHKIT",
+        "help_option_names": ["-h", "--help"],
+    },
+)
+@click.version_option(__version__, prog_name="winchkit")
+def main() -> None:
+    """Move winches, measure tension, and learn which physical effect the model lacks.
+
+    Every option is also an environment variable: --json of check is WINCHKIT_CHECK_JSON. Results
+    go to stdout, everything else to stderr. Exit codes: 0 done, 1 the check failed, 2 usage,
+    3 bad file, 4 bus or device unreachable, 5 drive fault or limit, 130 interrupted.
+    """

@@ -1,1 +1,18 @@
-"""TODO."""
+"""One file per physical effect, and what binds them to a profile."""
+
+from winchkit.effects.bind import Term, check_profile, line_of, modifiers_of, terms_of
+from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.effect import Effect, Parameter, Values
+
+__all__ = [
+    "Catalogue",
+    "Effect",
+    "Parameter",
+    "Term",
+    "Values",
+    "check_profile",
+    "line_of",
+    "load_catalogue",
+    "modifiers_of",
+    "terms_of",
+]

@@ -23,8 +23,9 @@ CHANNEL_DIMENSIONS: dict[str, str] = {
     "load": "force",
     "cable_length": "length",
     "temperature": "temperature",
+    "swivel": "angle",
 }
-"""Dimension of every channel of a winch run that the model knows."""
+"""Dimension of every channel of a winch that the model knows."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,8 @@ class Run:
     channels: Mapping[str, Channel]
     metadata: Mapping[str, str] = field(default_factory=dict)
     path: str = ""
+    notes: tuple[str, ...] = ()
+    """What the reader noticed that is no fault, e.g. a column that it had to leave out."""
 
     def __len__(self) -> int:
         return len(self.time)
@@ -85,8 +88,8 @@ class Run:
 
     @property
     def interval(self) -> float:
-        """Median time between samples, s."""
-        return float(np.median(np.diff(self.time)))
+        """Median time between samples, s; NaN with fewer than two."""
+        return float(np.median(np.diff(self.time))) if len(self) > 1 else float("nan")
 
     @property
     def gaps(self) -> int:
@@ -95,14 +98,22 @@ class Run:
 
     def winches(self) -> list[str]:
         """Names of the winches in it: of ``A.motor_angle`` columns; ``[""]`` for a plain run."""
-        prefixed = [name.rpartition(".")[0] for name in self.channels if
-                    name.rpartition(".")[2] == "motor_angle"]
-        return prefixed or [""]
+        prefixes = [
+            name.rpartition(".")[0]
+            for name in self.channels
+            if name.rpartition(".")[2] == "motor_angle"
+        ]
+        return prefixes or [""]
 
     def of_winch(self, winch: str) -> Run:
         """The run of one winch: its columns without prefix, the shared ones kept."""
         if not winch:
             return self
+        if winch not in self.winches():
+            known = [name for name in self.winches() if name]
+            there = f"its winches are {', '.join(known)}" if known else "its columns name no winch"
+            message = f"no winch '{winch}' in it; {there}" + suggest(winch, known)
+            raise RunError(Fault(message, self.path or self.name))
         own = {
             name.removeprefix(f"{winch}."): channel
             for name, channel in self.channels.items()

@@ -1,1 +1,1 @@
-"""TODO."""
+"""What files declare, as frozen dataclasses in SI; :mod:`winchkit.schema.read` reads them."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from winchkit.schema.quantity import (
+    Flag,
     Force,
     Length,
     PositiveAcceleration,
@@ -15,13 +16,23 @@ from winchkit.schema.quantity import (
     PositiveMass,
     PositiveSpeed,
     Quantity,
+    Whole,
+    WholeNumber,
 )
+from winchkit.schema.table import Rule, Table
 
 __all__ = ["BenchSpec", "BusSpec", "DeviceRef", "LimitSpec", "WinchWiring"]
 
+NEEDED_BY_BUS: dict[str, tuple[str, ...]] = {
+    "can": ("interface", "channel"),
+    "modbus-rtu": ("port",),
+    "modbus-tcp": ("host", "port"),
+    "serial": ("port",),
+}
+
 
 @dataclass(frozen=True)
-class BusSpec:
+class BusSpec(Table):
     """One bus; which keys count depends on ``kind``."""
 
     kind: Literal["can", "modbus-rtu", "modbus-tcp", "serial"]
@@ -29,33 +40,41 @@ class BusSpec:
     interface: str | None = None
     """Any python-can interface name."""
     channel: str | None = None
-    bitrate: int = 1_000_000
-    node: int = 127
+    bitrate: WholeNumber = 1_000_000
+    node: Annotated[int, Whole(1, 127)] = 127
     """Node id of the host, for its heartbeat."""
     heartbeat: PositiveDuration = 0.05
-    # serial and modbus-rtu
+    # serial, modbus-rtu and modbus-tcp
     port: str | int | None = None
     """Device path of a serial port; TCP or UDP port number for network buses."""
-    baudrate: int = 115_200
+    baudrate: WholeNumber = 115_200
     parity: Literal["N", "E", "O"] = "N"
     stopbits: Literal[1, 2] = 1
     # modbus-tcp
     host: str | None = None
     timeout: PositiveDuration = 0.2
 
+    def rules(self) -> Iterator[Rule]:
+        """Each kind of bus needs its own keys."""
+        for key in NEEDED_BY_BUS[self.kind]:
+            if getattr(self, key) is None:
+                yield key, f"missing; a {self.kind} bus needs it"
+        if self.kind == "modbus-tcp" and isinstance(self.port, str):
+            yield "port", f"'{self.port}' is no TCP port; write a number such as 502"
+
 
 @dataclass(frozen=True)
-class DeviceRef:
+class DeviceRef(Table):
     """A device of ``devices/`` on a bus: a servo by ``node``, a Modbus device by ``unit``."""
 
     device: str
     bus: str
-    node: int | None = None
-    unit: int | None = None
+    node: Annotated[int, Whole(1, 127)] | None = None
+    unit: Annotated[int, Whole(0, 255)] | None = None
 
 
 @dataclass(frozen=True)
-class LimitSpec:
+class LimitSpec(Table):
     """What the supervisor enforces on one winch, SI."""
 
     speed: PositiveSpeed
@@ -65,9 +84,18 @@ class LimitSpec:
     tension_slack: Force | None = None
     tension_rate: Annotated[float, Quantity("force per time", 0.0, above=True)] | None = None
 
+    def rules(self) -> Iterator[Rule]:
+        """Lower limits lie below upper ones."""
+        if self.length is not None and self.length[0] >= self.length[1]:
+            low, high = self.length
+            yield "length", f"the lower limit {low:g} m is not below the upper limit {high:g} m"
+        slack, high_tension = self.tension_slack, self.tension_high
+        if slack is not None and high_tension is not None and slack >= high_tension:
+            yield "tension_slack", f"{slack:g} N is not below tension_high, {high_tension:g} N"
+
 
 @dataclass(frozen=True)
-class WinchWiring:
+class WinchWiring(Table):
     """One winch: its profile, its servo, its sensors, its limits."""
 
     profile: str
@@ -78,11 +106,16 @@ class WinchWiring:
     load_mass: PositiveMass | None = None
     length: DeviceRef | None = None
     temperature: DeviceRef | None = None
-    brake: bool = False
+    brake: Flag = False
+
+    def rules(self) -> Iterator[Rule]:
+        """The tension at the platform end is either measured or known."""
+        if self.load is not None and self.load_mass is not None:
+            yield "load_mass", "given beside a load cell 'load'; keep one of them"
 
 
 @dataclass(frozen=True)
-class BenchSpec:
+class BenchSpec(Table):
     """A bench as wired."""
 
     name: str

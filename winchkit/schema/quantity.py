@@ -7,12 +7,14 @@ checked when code builds a dataclass from SI numbers.
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from winchkit.errors import UsageError
-from winchkit.units import UNITS, parse
+from winchkit.units import UNITS, article, parse
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
@@ -22,11 +24,13 @@ __all__ = [
     "Angle",
     "Count",
     "Duration",
+    "Flag",
     "Force",
     "Frequency",
     "Inertia",
     "Length",
     "LinearDensity",
+    "Marker",
     "Mass",
     "Number",
     "PositiveAcceleration",
@@ -40,11 +44,35 @@ __all__ = [
     "Speed",
     "Temperature",
     "Torque",
+    "Truth",
+    "Whole",
+    "WholeNumber",
 ]
 
 
+class Marker(ABC):
+    """Says within ``Annotated`` how a field is read from a file, and in words what is expected."""
+
+    @property
+    @abstractmethod
+    def wanted(self) -> str:
+        """What is expected in the file, in words."""
+
+    @abstractmethod
+    def read(self, raw: object) -> object:
+        """Turn a value of a file into the field's; raises UsageError with the reason."""
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: Callable[[Any], CoreSchema]
+    ) -> CoreSchema:
+        """Let pydantic read the field through :meth:`read`."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
 @dataclass(frozen=True)
-class Quantity:
+class Quantity(Marker):
     """Marks a float field as a quantity of ``dimension`` within ``[low, high]`` (SI).
 
     With ``above`` the low end itself is excluded.
@@ -56,23 +84,64 @@ class Quantity:
     above: bool = False
 
     def read(self, raw: object) -> float:
-        """Turn a value of a file into SI; raises ValueError with the reason."""
+        """Turn a value of a file into SI; raises UsageError with the reason."""
         value = parse(raw, self.dimension)
-        unit = next(iter(UNITS[self.dimension]))
+        unit = next(iter(UNITS[self.dimension])) if self.dimension != "ratio" else ""
+        if math.isinf(value):
+            raise UsageError(f"'{raw}' must be finite; leave the key out where there is no value")
         if value < self.low or (self.above and value == self.low):
             word = "above" if self.above else "at least"
-            raise UsageError(f"'{raw}' must be {word} {self.low:g} {unit}")
+            raise UsageError(f"'{raw}' must be {word} {self.low:g} {unit}".rstrip())
         if value > self.high:
-            raise UsageError(f"'{raw}' must be at most {self.high:g} {unit}")
+            raise UsageError(f"'{raw}' must be at most {self.high:g} {unit}".rstrip())
         return value
 
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: Callable[[Any], CoreSchema]
-    ) -> CoreSchema:
-        """Let pydantic read the field through :meth:`read`."""
-        from pydantic_core import core_schema
+    @property
+    def wanted(self) -> str:
+        """What is expected in the file, in words."""
+        if self.dimension == "ratio":
+            return "a number"
+        unit = next(iter(UNITS[self.dimension]))
+        return f'{article(self.dimension)} with its unit, such as "1 {unit}"'
 
-        return core_schema.no_info_plain_validator_function(self.read)
+
+@dataclass(frozen=True)
+class Whole(Marker):
+    """Marks an int field as a whole number within ``[low, high]``."""
+
+    low: int
+    high: int | None = None
+
+    @property
+    def wanted(self) -> str:
+        """What is expected in the file, in words."""
+        if self.high is None:
+            return f"a whole number of at least {self.low}"
+        return f"a whole number from {self.low} to {self.high}"
+
+    def read(self, raw: object) -> int:
+        """Check a value of a file; raises UsageError with the range."""
+        if isinstance(raw, int) and not isinstance(raw, bool):
+            if self.low <= raw <= (raw if self.high is None else self.high):
+                return raw
+            raise UsageError(f"{raw} is out of range; expected {self.wanted}")
+        raise UsageError(f"expected {self.wanted}, not {raw!r}")
+
+
+@dataclass(frozen=True)
+class Truth(Marker):
+    """Marks a bool field: ``true`` or ``false``, and neither ``1`` nor ``"yes"``."""
+
+    @property
+    def wanted(self) -> str:
+        """What is expected in the file, in words."""
+        return "true or false"
+
+    def read(self, raw: object) -> bool:
+        """Check a value of a file."""
+        if isinstance(raw, bool):
+            return raw
+        raise UsageError(f"expected {self.wanted}, not {raw!r}")
 
 
 Length = Annotated[float, Quantity("length")]
@@ -96,3 +165,5 @@ Temperature = Annotated[float, Quantity("temperature")]
 Number = Annotated[float, Quantity("ratio")]
 PositiveNumber = Annotated[float, Quantity("ratio", 0.0, above=True)]
 Count = Annotated[float, Quantity("ratio", 0.0)]
+WholeNumber = Annotated[int, Whole(1)]
+Flag = Annotated[bool, Truth()]

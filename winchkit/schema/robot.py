@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Literal
 
-from winchkit.schema.quantity import Angle, Length, Mass, Number
+from winchkit.schema.quantity import Angle, Length, Mass, Number, PositiveLength, Quantity
+from winchkit.schema.table import Rule, Table
 from winchkit.schema.winch import EffectTable, WinchProfile
 
-__all__ = ["HomeSpec", "LineSpec", "PlatformSpec", "RobotProfile"]
+__all__ = ["HomeSpec", "LineSpec", "PlatformSpec", "PriorSpec", "RobotProfile"]
 
 Point = tuple[Length, Length, Length]
 
+PriorName = Literal["exit_point", "anchor_point", "winding_radius", "swivel_radius", "layer_growth"]
+
 
 @dataclass(frozen=True)
-class PlatformSpec:
+class PriorSpec(Table):
+    """What is believed of a parameter before calibration; a bare quantity is ``std``."""
+
+    std: PositiveLength
+    """Standard deviation, m."""
+    bounds: tuple[Length, Length] | None = None
+
+    def rules(self) -> Iterator[Rule]:
+        """The lower bound lies below the upper one."""
+        if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
+            yield "bounds", "the lower bound is not below the upper one"
+
+
+@dataclass(frozen=True)
+class PlatformSpec(Table):
     """The moving platform."""
 
     mass: Mass = 0.0
@@ -23,7 +40,7 @@ class PlatformSpec:
 
 
 @dataclass(frozen=True)
-class HomeSpec:
+class HomeSpec(Table):
     """The pose at which every line has its reference motor angle."""
 
     position: Point
@@ -32,25 +49,38 @@ class HomeSpec:
 
 
 @dataclass(frozen=True)
-class LineSpec:
+class LineSpec(Table):
     """One line: its winch, exit point, anchor point and swivel pulley."""
 
     name: str
     exit_point: Point
     anchor_point: Point
     winch: str | WinchProfile
-    swivel_radius: Length = 0.0
+    swivel_radius: Annotated[float, Quantity("length", 0.0)] = 0.0
     swivel_axis: tuple[Number, Number, Number] = (0.0, 0.0, 1.0)
+
+    def rules(self) -> Iterator[Rule]:
+        """A direction has a length."""
+        if not any(self.swivel_axis):
+            yield "swivel_axis", "is zero; it is the direction of the rope at the pulley"
 
 
 @dataclass(frozen=True)
-class RobotProfile:
+class RobotProfile(Table):
     """A cable robot as declared; frozen, SI."""
 
     name: str
     home: HomeSpec
     line: tuple[LineSpec, ...]
     platform: PlatformSpec = field(default_factory=PlatformSpec)
-    prior: Mapping[str, Any] = field(default_factory=dict)
+    prior: Mapping[PriorName, PriorSpec] = field(default_factory=dict)
     effect: tuple[EffectTable, ...] = ()
     description: str = ""
+
+    def rules(self) -> Iterator[Rule]:
+        """A robot has lines, each by its own name."""
+        if not self.line:
+            yield "line", "a robot needs at least one [[line]]"
+        names = [line.name for line in self.line]
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            yield "line", f"{names.count(name)} lines are named '{name}'"

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.quantity import Duration, PositiveMass, Temperature
+from winchkit.schema.quantity import Duration, PositiveDuration, PositiveMass, Quantity, Temperature
+from winchkit.schema.table import Table
 
 __all__ = ["FaultSpec", "HiddenSpec", "NoiseSpec", "SimBench", "WinchTruth"]
 
 
 @dataclass(frozen=True)
-class HiddenSpec:
+class HiddenSpec(Table):
     """A piece of the simulator's own physics; ``answers`` is for scoring only."""
 
     physics: str
@@ -23,7 +24,7 @@ class HiddenSpec:
 
 
 @dataclass(frozen=True)
-class WinchTruth:
+class WinchTruth(Table):
     """What is true of one winch and its profile does not say."""
 
     overrides: Mapping[str, Any] = field(default_factory=dict)
@@ -32,26 +33,26 @@ class WinchTruth:
     load_mass: PositiveMass = 20.0
     """The weight that hangs there until a programme asks for another, kg."""
     temperature: Temperature = 20.0
-    temperature_drift: float = 0.0
+    temperature_drift: Annotated[float, Quantity("temperature drift")] = 0.0
     """K per hour."""
 
 
 @dataclass(frozen=True)
-class NoiseSpec:
+class NoiseSpec(Table):
     """Standard deviations of the instruments' noise, SI."""
 
-    cable_length: float = 0.0
-    tension: float = 0.0
-    motor_torque: float = 0.0
-    load: float = 0.0
-    temperature: float = 0.0
-    colour: float = 0.0
+    cable_length: Annotated[float, Quantity("length", 0.0)] = 0.0
+    tension: Annotated[float, Quantity("force", 0.0)] = 0.0
+    motor_torque: Annotated[float, Quantity("torque", 0.0)] = 0.0
+    load: Annotated[float, Quantity("force", 0.0)] = 0.0
+    temperature: Annotated[float, Quantity("temperature difference", 0.0)] = 0.0
+    colour: Annotated[float, Quantity("ratio", 0.0, 1.0)] = 0.0
     """Share of the variance that is first-order coloured noise, 0 to 1."""
-    colour_time: Duration = 1.0
+    colour_time: PositiveDuration = 1.0
 
 
 @dataclass(frozen=True)
-class FaultSpec:
+class FaultSpec(Table):
     """Something that goes wrong at a time."""
 
     time: Duration
@@ -61,7 +62,7 @@ class FaultSpec:
 
 
 @dataclass(frozen=True)
-class SimBench:
+class SimBench(Table):
     """A simulated bench: a bench and its truth, winch by winch."""
 
     name: str

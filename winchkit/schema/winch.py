@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import pi
 from typing import Annotated, Any, Literal
@@ -17,8 +17,11 @@ from winchkit.schema.quantity import (
     PositiveNumber,
     Quantity,
 )
+from winchkit.schema.table import Rule, Table
 
 __all__ = [
+    "LAYERED",
+    "SHORTHANDS",
     "CableSpec",
     "DrumSpec",
     "EffectTable",
@@ -30,9 +33,19 @@ __all__ = [
     "WinchProfile",
 ]
 
+LAYERED = frozenset({"spiral", "archimedean"})
+"""Drum kinds that wind in layers."""
+
+SHORTHANDS: dict[str, str] = {
+    "cable.axial_stiffness": "cable-elongation-linear",
+    "cable.mass_per_length": "cable-weight",
+    "gearbox.efficiency": "gear-efficiency",
+}
+"""Profile keys that say the same as an effect."""
+
 
 @dataclass(frozen=True)
-class DrumSpec:
+class DrumSpec(Table):
     """The drum; which of the optional numbers count depends on ``kind``."""
 
     kind: Literal["spiral", "archimedean", "grooved", "squared"]
@@ -44,9 +57,22 @@ class DrumSpec:
     build_up: Annotated[float, Quantity("length", 0.0)] | None = None
     """k of r² = r0² + k L (squared): an area per length, m."""
 
+    def rules(self) -> Iterator[Rule]:
+        """A grooved drum needs its pitch, a squared one its build-up."""
+        needed = {"grooved": "groove_pitch", "squared": "build_up"}.get(self.kind)
+        if needed and getattr(self, needed) is None:
+            yield needed, f"missing; a {self.kind} drum needs it"
+        if self.build_up is not None and self.kind != "squared":
+            yield "build_up", f"belongs to a squared drum, not to a {self.kind} one"
+        if self.layer_growth is not None and self.kind not in LAYERED:
+            yield (
+                "layer_growth",
+                f"belongs to a layered drum, not to a {self.kind} one",
+            )
+
 
 @dataclass(frozen=True)
-class CableSpec:
+class CableSpec(Table):
     """The rope."""
 
     diameter: PositiveLength | None = None
@@ -59,7 +85,7 @@ class CableSpec:
 
 
 @dataclass(frozen=True)
-class PathSpec:
+class PathSpec(Table):
     """Where the free rope runs."""
 
     inclination: Angle = pi / 2
@@ -67,7 +93,7 @@ class PathSpec:
 
 
 @dataclass(frozen=True)
-class GearboxSpec:
+class GearboxSpec(Table):
     """The gearbox between motor and drum."""
 
     ratio: PositiveNumber
@@ -78,7 +104,7 @@ class GearboxSpec:
 
 
 @dataclass(frozen=True)
-class GuideSpec:
+class GuideSpec(Table):
     """The lead-screw guide that lays the rope on the drum."""
 
     screw_lead: PositiveLength
@@ -89,7 +115,7 @@ class GuideSpec:
 
 
 @dataclass(frozen=True)
-class PulleySpec:
+class PulleySpec(Table):
     """One pulley on the rope's way, in order from the drum to the platform."""
 
     radius: PositiveLength
@@ -98,7 +124,7 @@ class PulleySpec:
 
 
 @dataclass(frozen=True)
-class ReferenceSpec:
+class ReferenceSpec(Table):
     """The state that every angle and length is counted from."""
 
     motor_angle: Angle = 0.0
@@ -119,7 +145,7 @@ class EffectTable:
 
 
 @dataclass(frozen=True)
-class WinchProfile:
+class WinchProfile(Table):
     """A winch as declared; frozen, SI."""
 
     name: str
@@ -132,3 +158,17 @@ class WinchProfile:
     pulley: tuple[PulleySpec, ...] = ()
     effect: tuple[EffectTable, ...] = ()
     description: str = ""
+
+    def rules(self) -> Iterator[Rule]:
+        """Layers grow by the rope's diameter unless told; a number is given in one place."""
+        drum = self.drum
+        if drum.kind in LAYERED and drum.layer_growth is None and self.cable.diameter is None:
+            yield (
+                "drum.layer_growth",
+                f"missing; a {drum.kind} drum needs it, or cable.diameter as its default",
+            )
+        effects = {table.id for table in self.effect}
+        for key, effect in SHORTHANDS.items():
+            part, _, name = key.partition(".")
+            if getattr(getattr(self, part), name) is not None and effect in effects:
+                yield key, f"is shorthand for the effect {effect}, which is given too; keep one"

@@ -1,0 +1,203 @@
+"""One winch in the control loop: which wish and target its drive gets in each cycle."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from winchkit.bench.motion import MotionSource, RunDown, Target
+from winchkit.bench.rope import RopeMap
+from winchkit.bench.snapshot import Phase
+from winchkit.drivers.can.axis import AxisFeedback
+from winchkit.drivers.can.cia402 import State, Wish
+from winchkit.drivers.can.heartbeat import HeartbeatWatch
+from winchkit.schema.bench import LimitSpec
+
+__all__ = ["AxisPort", "Controller"]
+
+_ENABLE_TIME = 2.0
+_RESET_TIME = 1.0
+_RUN_DOWN_MARGIN = 1.0
+_ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
+
+
+class AxisPort(Protocol):
+    """What the loop needs of an axis; ``Cia402Axis`` is one."""
+
+    heartbeat: HeartbeatWatch
+
+    @property
+    def feedback(self) -> AxisFeedback | None:
+        """Newest feedback."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the motor stands still."""
+
+    @property
+    def operational(self) -> bool:
+        """Whether its PDOs run."""
+
+    @property
+    def mode_kept(self) -> bool:
+        """Whether it is still in its mode."""
+
+    @property
+    def fault_text(self) -> str:
+        """Its fault in words."""
+
+    def begin_cycle(self, sync: int, now: float) -> None:
+        """Note a SYNC."""
+
+    def send(self, wish: Wish, *, velocity: float = 0.0, angle: float | None = None) -> int:
+        """Send a command."""
+
+
+class Controller:
+    """Phases from disabled over moving back to disabled.
+
+    ``begin``, ``run_down`` and ``stop`` may be called from any thread; they take effect in the
+    next ``step``.
+    """
+
+    def __init__(self, axis: AxisPort, rope: RopeMap, limits: LimitSpec) -> None:
+        self.axis = axis
+        self.rope = rope
+        self.limits = limits
+        self.phase = Phase.DISABLED
+        self.source: MotionSource | None = None
+        self.done = True
+        """Whether the last source has finished."""
+        self.failure = ""
+        """Why the last source did not start."""
+        self.commanded = 0.0
+        """Rope speed commanded last, m/s."""
+        self._wanted: MotionSource | None = None
+        self._ordered: Phase | None = None
+        self._down = RunDown(rope, limits, 0.0, 0.0)
+        self._angle = 0.0
+        self._since = 0.0
+
+    def begin(self, source: MotionSource) -> None:
+        """Start a source, enabling the drive first where needed; replaces the one before."""
+        self.done = False
+        self.failure = ""
+        self._ordered = None
+        self._wanted = source
+
+    def run_down(self) -> None:
+        """Ramp to rest, then disable."""
+        self._order(Phase.RUN_DOWN)
+
+    def stop(self) -> None:
+        """Quick stop, then disable."""
+        self._order(Phase.STOPPING)
+
+    def reset(self) -> None:
+        """Clear a drive's fault; it stays disabled."""
+        self._order(Phase.RESETTING)
+
+    def step(self, now: float) -> None:
+        """Send this cycle's command."""
+        self._take_orders(now)
+        feedback = self.axis.feedback
+        if feedback is None:
+            return
+        {
+            Phase.DISABLED: self._stay_disabled,
+            Phase.ENABLING: self._enable,
+            Phase.MOVING: self._move,
+            Phase.RUN_DOWN: self._slow_down,
+            Phase.STOPPING: self._stop,
+            Phase.RESETTING: self._reset,
+        }[self.phase](now, feedback)
+
+    def _order(self, phase: Phase) -> None:
+        self._wanted = None
+        if self._ordered is not Phase.STOPPING:
+            self._ordered = phase
+
+    def _take_orders(self, now: float) -> None:
+        ordered, self._ordered = self._ordered, None
+        wanted, self._wanted = self._wanted, None
+        if ordered is Phase.STOPPING:
+            self._enter(Phase.STOPPING, now)
+        elif ordered is Phase.RESETTING and self.phase is Phase.DISABLED:
+            self._enter(Phase.RESETTING, now)
+        elif ordered is Phase.RUN_DOWN and self.phase in (Phase.ENABLING, Phase.MOVING):
+            self._begin_run_down(now)
+        if wanted is None:
+            return
+        self.source = wanted
+        if self.phase is Phase.MOVING and self.axis.feedback is not None:
+            wanted.start(now, self.axis.feedback.angle)
+        elif self.phase is not Phase.ENABLING:
+            self._enter(Phase.ENABLING, now)
+
+    def _enter(self, phase: Phase, now: float) -> None:
+        self.phase, self._since = phase, now
+        if phase in (Phase.STOPPING, Phase.DISABLED, Phase.RESETTING):
+            self.source, self.commanded, self.done = None, 0.0, True
+
+    def _stay_disabled(self, now: float, feedback: AxisFeedback) -> None:
+        self.axis.send(Wish.DISABLE)
+        if feedback.state is State.OPERATION_ENABLED:
+            self._enter(Phase.STOPPING, now)
+
+    def _enable(self, now: float, feedback: AxisFeedback) -> None:
+        if feedback.state is State.OPERATION_ENABLED and self.source is not None:
+            self.source.start(now, feedback.angle)
+            self._angle = feedback.angle
+            self._enter(Phase.MOVING, now)
+            self._move(now, feedback)
+            return
+        self.axis.send(Wish.ENABLE)
+        if now - self._since > _ENABLE_TIME:
+            self.failure = f"the drive stays {feedback.state} for {_ENABLE_TIME:g} s"
+            self._enter(Phase.STOPPING, now)
+
+    def _move(self, now: float, feedback: AxisFeedback) -> None:
+        if self.source is None or feedback.state is not State.OPERATION_ENABLED:
+            self._enter(Phase.STOPPING, now)
+            self._stop(now, feedback)
+            return
+        target = self.source.target(now, feedback.angle)
+        self._follow(target, feedback)
+        if target.done:
+            self.done = True
+            if not self.source.holds:
+                self._begin_run_down(now)
+
+    def _follow(self, target: Target, feedback: AxisFeedback) -> None:
+        fastest = self.limits.speed / abs(self.rope.at(feedback.angle)[1])
+        velocity = max(-fastest, min(fastest, target.velocity))
+        self.commanded = target.speed
+        if target.angle is not None:
+            self._angle = target.angle
+        self.axis.send(Wish.ENABLE, velocity=velocity, angle=target.angle)
+
+    def _begin_run_down(self, now: float) -> None:
+        self._down = RunDown(self.rope, self.limits, self.commanded, self._angle)
+        self._down.start(now, self._angle)
+        self._enter(Phase.RUN_DOWN, now)
+        self.source, self.done = None, True
+
+    def _slow_down(self, now: float, feedback: AxisFeedback) -> None:
+        target = self._down.target(now, feedback.angle)
+        self.commanded = target.speed
+        late = now - self._since > self._down.duration + _RUN_DOWN_MARGIN
+        settled = target.done and self.axis.at_rest
+        if settled or late or feedback.state is not State.OPERATION_ENABLED:
+            self._enter(Phase.STOPPING, now)
+            self._stop(now, feedback)
+            return
+        self.axis.send(Wish.RUN_DOWN, velocity=target.velocity, angle=target.angle)
+
+    def _stop(self, now: float, feedback: AxisFeedback) -> None:
+        self.axis.send(Wish.DISABLE)
+        if feedback.state not in _ENABLED and self.axis.at_rest:
+            self._enter(Phase.DISABLED, now)
+
+    def _reset(self, now: float, feedback: AxisFeedback) -> None:
+        self.axis.send(Wish.RESET)
+        if feedback.state is not State.FAULT or now - self._since > _RESET_TIME:
+            self._enter(Phase.DISABLED, now)

@@ -1,0 +1,230 @@
+"""Motion sources: what asks a winch to move, evaluated once a cycle and free of any bus.
+
+Speeds are of the rope in m/s, positive winding in; angles are of the motor.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from winchkit.bench.rope import LineModel, RopeMap
+from winchkit.errors import NotPermitted
+from winchkit.model.trajectory import plan
+from winchkit.schema.bench import LimitSpec
+
+__all__ = ["DEAD_MAN", "FIRST_PRESS", "Jog", "Move", "MotionSource", "Ramp", "RunDown", "Target"]
+
+DEAD_MAN = 0.2
+"""A jog ends this long after its last refresh, s."""
+FIRST_PRESS = 0.7
+"""Hold of the first press of a key, whose repeat starts late, s."""
+
+JERK_TIME = 0.1
+"""Time in which a move's acceleration builds up, s."""
+_GAIN = 8.0
+"""Of the position loop around a speed-controlled drive, 1/s."""
+_MARGIN = 2e-3
+"""Of rope, kept to a length limit, m."""
+_SETTLED = 5e-4
+"""Of rope, from the target of a move that counts as done, m."""
+_SETTLE_TIME = 1.0
+"""A move counts as done this long after its end at the latest, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What a drive is to do in this cycle."""
+
+    velocity: float
+    """Of the motor, rad/s."""
+    angle: float | None
+    """Of the motor, for a position-controlled drive, rad."""
+    speed: float
+    """Of the rope, m/s."""
+    done: bool = False
+
+
+class MotionSource(Protocol):
+    """Says where to be at each cycle; ``done`` ends it."""
+
+    holds: bool
+    """Whether the winch stays enabled, holding its place, after the source is done."""
+
+    def start(self, now: float, angle: float) -> None:
+        """Begin at rest at a motor angle (rad)."""
+
+    def target(self, now: float, angle: float) -> Target:
+        """Target at ``now`` (s), the motor being at ``angle`` (rad)."""
+
+
+class Ramp:
+    """Speed that follows a wish with limited acceleration, in rope units."""
+
+    def __init__(self, acceleration: float) -> None:
+        self.speed = 0.0
+        self._acceleration = acceleration
+        self._time: float | None = None
+
+    def follow(self, wish: float, now: float) -> float:
+        """Speed at ``now``; the first call starts the clock."""
+        step = 0.0 if self._time is None else (now - self._time) * self._acceleration
+        self._time = now
+        self.speed += max(-step, min(step, wish - self.speed))
+        return self.speed
+
+
+class Jog:
+    """Moves at a speed while someone keeps saying so; silence brings it to rest."""
+
+    holds = False
+
+    def __init__(self, rope: RopeMap, limits: LimitSpec) -> None:
+        self._rope, self._limits = rope, limits
+        self._ramp = Ramp(limits.acceleration)
+        self._wish = 0.0
+        self._expires = -math.inf
+        self._angle: float | None = None
+        self._last: float | None = None
+
+    def refresh(self, speed: float, expires: float) -> None:
+        """Keep going at ``speed`` until ``expires`` (s on the bench's clock)."""
+        self._wish = max(-self._limits.speed, min(self._limits.speed, speed))
+        self._expires = expires
+
+    def start(self, now: float, angle: float) -> None:
+        """Begin at rest."""
+        self._ramp = Ramp(self._limits.acceleration)
+        self._angle, self._last = angle, now
+
+    def target(self, now: float, angle: float) -> Target:
+        """Follow the wish, slow down before a length limit, end once expired and at rest."""
+        live = now < self._expires
+        length, arm = self._rope.at(angle)
+        wish = self._within(self._wish, length) if live else 0.0
+        speed = self._ramp.follow(wish, now)
+        velocity = speed / arm
+        if self._angle is not None and self._last is not None:
+            self._angle += velocity * (now - self._last)
+        self._last = now
+        return Target(velocity, self._angle, speed, done=not live and speed == 0.0)
+
+    def _within(self, wish: float, length: float) -> float:
+        """The wish, no faster than what can still be braked before a length limit."""
+        if self._limits.length is None:
+            return wish
+        low, high = self._limits.length
+        room = length - low if wish > 0 else high - length
+        fastest = math.sqrt(2 * self._limits.acceleration * max(0.0, room - _MARGIN))
+        return math.copysign(min(abs(wish), fastest), wish)
+
+
+class RunDown:
+    """From a speed to rest with the winch's acceleration."""
+
+    holds = False
+
+    def __init__(self, rope: RopeMap, limits: LimitSpec, speed: float, angle: float) -> None:
+        """Begin at a rope speed (m/s) and a target angle of the motor (rad)."""
+        self.duration = abs(speed) / limits.acceleration
+        self._rope = rope
+        self._ramp = Ramp(limits.acceleration)
+        self._ramp.speed = speed
+        self._angle, self._last = angle, 0.0
+
+    def start(self, now: float, angle: float) -> None:
+        """Begin now, from the target that was in force."""
+        self._ramp.follow(0.0, now)
+        self._angle, self._last = angle, now
+
+    def target(self, now: float, angle: float) -> Target:
+        """Slower by one cycle's worth."""
+        before, speed = self._ramp.speed, self._ramp.follow(0.0, now)
+        arm = self._rope.at(angle)[1]
+        self._angle += (before + speed) / 2 / arm * (now - self._last)
+        self._last = now
+        return Target(speed / arm, self._angle, speed, done=speed == 0.0)
+
+
+class Move:
+    """A planned S-curve to a cable length; holds there when asked to."""
+
+    def __init__(
+        self,
+        line: LineModel,
+        limits: LimitSpec,
+        length: float,
+        *,
+        speed: float | None = None,
+        acceleration: float | None = None,
+        holds: bool = False,
+    ) -> None:
+        """Raise NotPermitted for a target or a speed beyond the winch's limits."""
+        self.holds = holds
+        self.length = length
+        self._line = line
+        self._limits = limits
+        self._speed = _within("speed", speed, limits.speed, "m/s")
+        self._acceleration = _within("acceleration", acceleration, limits.acceleration, "m/s^2")
+        if limits.length is not None and not limits.length[0] <= length <= limits.length[1]:
+            raise NotPermitted(
+                f"a cable length of {length:g} m is beyond the limits {limits.length[0]:g} m to "
+                f"{limits.length[1]:g} m; change winch.….limits.length only if the rope allows it"
+            )
+        if not math.isfinite(length):
+            raise NotPermitted("a cable length must be a finite number of metres")
+        self._start = 0.0
+        self._from = length
+        self._knots: list[float] = []
+
+    def prepare(self, angle: float) -> None:
+        """Plan from a motor angle (rad); called off the control thread, before ``start``."""
+        self._from = self._line.cable_length(angle)
+        jerk = self._acceleration / JERK_TIME
+        self._plan = plan(self.length - self._from, self._speed, self._acceleration, jerk)
+        count = max(2, math.ceil(abs(self.length - self._from) / 0.02) + 1)
+        step = (self.length - self._from) / (count - 1)
+        self._knots = [self._line.motor_angle(self._from + k * step) for k in range(count)]
+
+    @property
+    def duration(self) -> float:
+        """Time of the planned move, s."""
+        return self._plan.duration
+
+    def start(self, now: float, angle: float) -> None:
+        """Begin now; plans anew where the winch has moved since ``prepare``."""
+        if not self._knots or abs(self._knots[0] - angle) > 0.5:
+            self.prepare(angle)
+        self._start = now
+
+    def target(self, now: float, angle: float) -> Target:
+        """Where the plan is now, with the position loop's correction for speed control."""
+        time = now - self._start
+        position, speed, _ = (float(value) for value in self._plan.at(time))
+        planned, slope = self._angle_at(position)
+        velocity = speed * slope + _GAIN * (planned - angle)
+        late = time - self._plan.duration
+        arrived = late >= 0 and abs(planned - angle) <= _SETTLED * abs(slope)
+        return Target(velocity, planned, -speed, done=arrived or late >= _SETTLE_TIME)
+
+    def _angle_at(self, position: float) -> tuple[float, float]:
+        """Motor angle at a distance from the start, and its derivative by that distance."""
+        knots = self._knots
+        span = self._plan.distance / (len(knots) - 1)
+        if span == 0.0:
+            return knots[-1], 0.0
+        index = min(int(position / span), len(knots) - 2)
+        slope = (knots[index + 1] - knots[index]) / span
+        return knots[index] + slope * (position - index * span), slope
+
+
+def _within(name: str, asked: float | None, limit: float, unit: str) -> float:
+    """The asked value, or the limit; raises NotPermitted beyond it."""
+    if asked is None:
+        return limit
+    if not 0 < asked <= limit:
+        raise NotPermitted(
+            f"{name} {asked:g} {unit} is not within the winch's limit of {limit:g} {unit}"
+        )
+    return asked

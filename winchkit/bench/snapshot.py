@@ -1,0 +1,116 @@
+"""What crosses threads: immutable pictures of a bench at one control cycle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from enum import Enum, Flag
+from typing import Any
+
+__all__ = ["BenchSnapshot", "Direction", "Phase", "Trip", "WinchSnapshot", "to_dict"]
+
+
+class Direction(Flag):
+    """Directions of rope motion."""
+
+    NONE = 0
+    WIND_IN = 1
+    PAY_OUT = 2
+    BOTH = 3
+
+
+class Phase(Enum):
+    """What a winch is doing."""
+
+    DISABLED = "disabled"
+    ENABLING = "enabling"
+    MOVING = "moving"
+    RUN_DOWN = "running down"
+    STOPPING = "stopping"
+    RESETTING = "resetting"
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """Something that forbids motion, or stopped it."""
+
+    kind: str
+    winch: str
+    message: str
+    blocks: Direction = Direction.BOTH
+    latches: bool = False
+    """Whether it stays until a reset even if nothing moved when it came."""
+
+    def __str__(self) -> str:
+        return f"winch {self.winch}: {self.message}" if self.winch else self.message
+
+
+@dataclass(frozen=True, slots=True)
+class WinchSnapshot:
+    """One winch; SI, NaN where there is no valid value."""
+
+    phase: Phase
+    state: str
+    """Power state of the drive, in the words of CiA 402."""
+    time: float
+    """Of the SYNC at which the drive's values were sampled, s."""
+    motor_angle: float
+    motor_velocity: float
+    motor_torque: float
+    cable_length: float
+    """From the motor angle, by the profile."""
+    speed: float
+    """Of the rope, positive winds in, m/s."""
+    tension: float = math.nan
+    load: float = math.nan
+    length: float = math.nan
+    """From the length instrument."""
+    temperature: float = math.nan
+    quality: Mapping[str, str] | None = None
+    """Flags of each sensor's newest reading, ``stale`` included."""
+
+
+@dataclass(frozen=True, slots=True)
+class BenchSnapshot:
+    """All winches at one cycle."""
+
+    time: float
+    """On the bench's clock, s."""
+    cycle: int
+    winch: Mapping[str, WinchSnapshot]
+    tripped: tuple[Trip, ...] = ()
+    """Latched, until a reset."""
+    blocked: tuple[Trip, ...] = ()
+    """True now, and forbidding motion."""
+    overruns: int = 0
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether every drive is disabled and stands still."""
+        return all(item.phase is Phase.DISABLED for item in self.winch.values())
+
+
+def to_dict(snapshot: BenchSnapshot) -> dict[str, Any]:
+    """The snapshot as JSON has it: null for what is not a number."""
+    winches = {
+        name: {key: _plain(value) for key, value in asdict(item).items()}
+        for name, item in snapshot.winch.items()
+    }
+    return {
+        "schema": 1,
+        "time": snapshot.time,
+        "cycle": snapshot.cycle,
+        "overruns": snapshot.overruns,
+        "winch": winches,
+        "tripped": [str(trip) for trip in snapshot.tripped],
+        "blocked": [str(trip) for trip in snapshot.blocked],
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

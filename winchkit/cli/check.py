@@ -1,0 +1,125 @@
+"""``winchkit check``: read files of any kind and say everything that is wrong with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.output import echo_json
+from winchkit.errors import Fault, FileError, UsageError
+
+if TYPE_CHECKING:
+    from winchkit.schema.read import Declaration
+
+__all__ = ["command"]
+
+RUNS = (".csv", ".mcap")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a file turned out to be."""
+
+    path: str
+    kind: str
+    """Kind of declaration or ``run``; empty where the file does not get so far."""
+    name: str = ""
+    summary: str = ""
+    faults: tuple[Fault, ...] = ()
+    warnings: tuple[Fault, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether the file can be used."""
+        return not self.faults
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
+@click.pass_context
+def command(ctx: click.Context, files: tuple[str, ...], as_json: bool) -> None:
+    """Check files of any kind: profiles, benches, programmes, devices (.toml), runs (.csv, .mcap).
+
+    Every fault of a file is told with its line. Exits with 3 when a file has one.
+    """
+    verdicts = [_verdict(file) for file in files]
+    for verdict in verdicts:
+        for warning in verdict.warnings:
+            click.echo(f"{warning} (warning)", err=True)
+    if as_json:
+        echo_json({"schema": 1, "files": [_entry(verdict) for verdict in verdicts]})
+    else:
+        for verdict in verdicts:
+            _show(verdict)
+    ctx.exit(0 if all(verdict.ok for verdict in verdicts) else FileError.exit_code)
+
+
+def _verdict(file: str) -> Verdict:
+    try:
+        if Path(file).suffix.lower() in RUNS:
+            return _run(file)
+        return _declaration(file)
+    except FileError as error:
+        return Verdict(file, "", faults=error.faults)
+
+
+def _run(file: str) -> Verdict:
+    from winchkit.runs import read_run
+    from winchkit.runs.summary import summary_of
+
+    run = read_run(file)
+    notes = tuple(Fault(note, file) for note in run.notes)
+    return Verdict(file, "run", run.name, summary_of(run).text, warnings=notes)
+
+
+def _declaration(file: str) -> Verdict:
+    from winchkit.schema.read import load
+
+    declaration = load(file)
+    name = declaration.value.name
+    faults = tuple(_effect_faults(declaration))
+    return Verdict(file, declaration.kind, name, "", faults, declaration.warnings)
+
+
+def _effect_faults(declaration: Declaration) -> list[Fault]:
+    """What is wrong with the effects of a profile, and of the profiles within a robot."""
+    from winchkit.schema.robot import RobotProfile
+    from winchkit.schema.winch import WinchProfile
+
+    value = declaration.value
+    lines = value.line if isinstance(value, RobotProfile) else ()
+    inner = [line.winch for line in lines if isinstance(line.winch, WinchProfile)]
+    profiles = [value] if isinstance(value, WinchProfile) else inner
+    if not any(profile.effect for profile in profiles):
+        return []
+    from winchkit.effects import check_profile
+
+    try:
+        return [fault for profile in profiles for fault in check_profile(profile)]
+    except UsageError as error:
+        return [Fault(str(error))]
+
+
+def _show(verdict: Verdict) -> None:
+    for fault in verdict.faults:
+        click.echo(str(fault), err=True)
+    if verdict.ok:
+        called = f"{verdict.kind} '{verdict.name}'" + (
+            f", {verdict.summary}" if verdict.summary else ""
+        )
+        click.echo(f"{verdict.path}: ok ({called})")
+
+
+def _entry(verdict: Verdict) -> dict[str, object]:
+    return {
+        "path": verdict.path,
+        "ok": verdict.ok,
+        "kind": verdict.kind or None,
+        "name": verdict.name or None,
+        "faults": verdict.faults,
+        "warnings": verdict.warnings,
+    }

@@ -1,0 +1,58 @@
+"""A click group that imports a command only when it is run: ``--help`` stays fast."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, NamedTuple
+
+import click
+from click.shell_completion import CompletionItem
+
+__all__ = ["At", "LazyGroup"]
+
+
+class At(NamedTuple):
+    """Where a command is found, and its help in one line."""
+
+    module: str
+    help: str
+    name: str = "command"
+    """Of the click command within the module."""
+
+
+class LazyGroup(click.Group):
+    """A group whose commands stand in a table until one of them is called."""
+
+    def __init__(self, *args: Any, table: Mapping[str, At], **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.table = table
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in the order of the table."""
+        return list(self.table)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the command."""
+        entry = self.table.get(cmd_name)
+        if entry is None:
+            return None
+        if find_spec(entry.module) is None:
+            ctx.fail(f"'{cmd_name}' is not part of this installation.")
+        command: click.Command = getattr(import_module(entry.module), entry.name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands with the table's help, importing none."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, entry.help) for name, entry in self.table.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete a command's name, importing none."""
+        names = [
+            CompletionItem(name, help=entry.help)
+            for name, entry in self.table.items()
+            if name.startswith(incomplete)
+        ]
+        return names + click.Command.shell_complete(self, ctx, incomplete)

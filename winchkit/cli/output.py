@@ -1,0 +1,82 @@
+"""Results for machines: JSON with null where there is no number."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from datetime import date
+from enum import Enum
+from functools import singledispatch
+from os import PathLike, fspath
+from typing import Any
+
+import click
+
+__all__ = ["echo_json", "plain", "to_json"]
+
+
+def to_json(value: object) -> str:
+    """One line of JSON; NaN and infinity become null, dataclasses and arrays what they hold."""
+    return json.dumps(plain(value), ensure_ascii=False, allow_nan=False)
+
+
+def echo_json(value: object) -> None:
+    """Print a result as one line of JSON to stdout."""
+    click.echo(to_json(value))
+
+
+@singledispatch
+def plain(value: Any) -> Any:
+    """A value as dicts, lists, numbers, texts and None only; TypeError for anything else."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    raise TypeError(f"{type(value).__name__} has no form in JSON")
+
+
+@plain.register(type(None))
+@plain.register(bool)
+@plain.register(str)
+@plain.register(int)
+def _(value: Any) -> Any:
+    return plain(value.value) if isinstance(value, Enum) else value
+
+
+@plain.register
+def _(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+@plain.register
+def _(value: Enum) -> Any:
+    return plain(value.value)
+
+
+@plain.register(Mapping)
+def _(value: Mapping[Any, Any]) -> dict[str, Any]:
+    return {str(key): plain(item) for key, item in value.items()}
+
+
+@plain.register(list)
+@plain.register(tuple)
+def _(value: Any) -> list[Any]:
+    return [plain(item) for item in value]
+
+
+@plain.register(set)
+@plain.register(frozenset)
+def _(value: Any) -> list[Any]:
+    return [plain(item) for item in sorted(value)]
+
+
+@plain.register(PathLike)
+def _(value: PathLike[str]) -> str:
+    return fspath(value)
+
+
+@plain.register
+def _(value: date) -> str:
+    return value.isoformat()

@@ -1,0 +1,105 @@
+"""Whether runs can be compared with a profile at all; every fault with its file and column."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from winchkit.errors import Fault, RunError
+from winchkit.model.line import Line, Signals
+from winchkit.runs.run import Run
+from winchkit.schema.winch import WinchProfile
+
+__all__ = ["OUTPUTS", "OUTPUT_UNITS", "admit"]
+
+OUTPUTS = ("cable_length", "tension", "motor_torque")
+OUTPUT_UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
+_FEWEST = 50
+_SLOPE = 0.75, 1.3333
+_PARTIAL = 0.5
+
+
+def admit(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
+    """Notes on what is missing but no fault; raises RunError with every fault of every run."""
+    if not runs:
+        raise RunError("no run given")
+    faults = [fault for run in runs for fault in _faults(run)]
+    if not faults:
+        faults = [fault for run in runs for fault in _other_winch(run, profile)]
+    if faults:
+        raise RunError(faults)
+    return [note for run in runs for note in _notes(run)]
+
+
+def _faults(run: Run) -> list[Fault]:
+    where = run.path or run.name
+    faults = []
+    if "motor_angle" not in run:
+        known = ", ".join(["time", *run])
+        return [Fault(f"no column 'motor_angle [rad]'; it has {known}", where)]
+    if len(run) < _FEWEST:
+        faults.append(Fault(f"only {len(run)} samples; at least {_FEWEST} are needed", where))
+        return faults
+    if not any(output in run for output in OUTPUTS):
+        message = f"no column to compare; it needs at least one of {', '.join(OUTPUTS)}"
+        faults.append(Fault(message, where))
+    for name in ("motor_angle", "load", *OUTPUTS):
+        if name not in run:
+            continue
+        values = run[name]
+        finite = values[np.isfinite(values)]
+        key = f"column '{name}'"
+        if len(finite) < _PARTIAL * len(values):
+            message = f"{len(values) - len(finite)} of {len(values)} samples are NaN; remove it"
+            faults.append(Fault(message, where, key=key))
+        elif np.ptp(finite) == 0:
+            if name == "motor_angle":
+                message = f"constant at {finite[0]:g} rad: nothing moves in this run"
+            elif name == "load":
+                continue
+            else:
+                message = (
+                    f"constant at {finite[0]:g} in all {len(values)} samples: the instrument "
+                    "did not measure; remove the column"
+                )
+            faults.append(Fault(message, where, key=key))
+    return faults
+
+
+def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
+    """Whether the run was plainly recorded on another winch than the profile's."""
+    where = run.path or run.name
+    named = run.metadata.get("profile")
+    if named and named != profile.name:
+        message = f"recorded with profile '{named}', compared with '{profile.name}'"
+        return [Fault(message + "; give the profile of this winch", where, key="metadata profile")]
+    if "cable_length" not in run:
+        return []
+    good = np.isfinite(run["motor_angle"]) & np.isfinite(run["cable_length"])
+    line = Line(profile)
+    signals = Signals(run.time[good], run["motor_angle"][good])
+    predicted = line.predict(line.motion(signals))["cable_length"]
+    measured = run["cable_length"][good]
+    if np.ptp(predicted) < 0.01 * max(profile.drum.winding_radius, np.ptp(measured)):
+        return []
+    slope = float(np.polyfit(predicted - predicted.mean(), measured, 1)[0])
+    if _SLOPE[0] < slope < _SLOPE[1]:
+        return []
+    message = (
+        f"changes by {slope:.3g} times what profile '{profile.name}' predicts; this is another "
+        "winch, another ratio or another direction: check gearbox.ratio, gearbox.direction and "
+        "drum.winding_radius"
+    )
+    return [Fault(message, where, key="column 'cable_length'")]
+
+
+def _notes(run: Run) -> list[str]:
+    notes = []
+    missing = {name: channel.missing for name, channel in run.channels.items() if channel.missing}
+    if missing:
+        listed = ", ".join(f"{name} {count}" for name, count in missing.items())
+        notes.append(f"{run.name}: NaN samples not compared: {listed}")
+    if run.gaps:
+        notes.append(f"{run.name}: {run.gaps} gaps in time")
+    return notes

@@ -1,0 +1,102 @@
+"""Which effects the data cannot tell apart from the ones found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.gate import held_out
+from winchkit.diagnosis.inquiry import Inquiry
+from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.signature import Projected
+from winchkit.effects.bind import Term
+from winchkit.effects.coordinates import Coordinates
+
+__all__ = ["Confusion", "confusion_of"]
+
+Array = NDArray[np.float64]
+_RIVALS = 6
+_NEAR = 40.0
+_ALIKE = 6.0
+_SHARE = 0.5
+_LEVEL = 0.05
+_FLIPS = 2000
+
+
+@dataclass(frozen=True)
+class Confusion:
+    """One step: the set of effects that explain the data alike, the parsimonious one first."""
+
+    term: Term
+    effects: tuple[str, ...]
+    terms: tuple[Term, ...]
+    """Each member with its fitted values, in the same order."""
+    angles: dict[str, float]
+    """Angle between its signature and each rival's, rad."""
+
+
+def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Confusion:
+    """Refit the final model with each rival in place of one term, and compare block by block."""
+    own = final.hypothesis.terms[index]
+    base = inquiry.refit(final.hypothesis.without(index), noise)
+    scores = inquiry.scores(base, noise)
+    mine = next((s.gain for s in scores if s.atom.effect.id == own.effect.id), 0.0)
+    freedom = Coordinates(own.effect).freedom
+    rivals = [
+        s
+        for s in scores
+        if s.atom.effect.id != own.effect.id
+        and Coordinates(s.atom.effect).freedom <= freedom
+        and s.gain > mine - max(_NEAR, 0.1 * mine)
+    ][:_RIVALS]
+    blocks = inquiry.blocks
+    ours = held_out(inquiry.problem, final, noise, blocks)
+    members: list[tuple[int, float, Term]] = [(freedom, final.cost, own)]
+    for rival in rivals:
+        fitted = inquiry.trial(base, rival, noise).fit
+        theirs = held_out(inquiry.problem, fitted, noise, blocks)
+        if base.cost - fitted.cost < _SHARE * (base.cost - final.cost):
+            continue
+        alike = fitted.cost < final.cost + _ALIKE
+        if alike or _flip_chance(theirs - ours) > _LEVEL:
+            size = Coordinates(rival.atom.effect).freedom
+            members.append((size, fitted.cost, fitted.hypothesis.terms[-1]))
+    ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
+    projected = inquiry.projected(base, noise)
+    angles = {
+        term.effect.id: _angle(projected, own.effect.id, term.effect.id)
+        for term in ordered
+        if term.effect.id != own.effect.id
+    }
+    return Confusion(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
+
+
+def _flip_chance(worse: Array) -> float:
+    """Chance that a rival's blocks are worse by this much on average, by flipping signs."""
+    random = np.random.default_rng(1)
+    signs = random.choice([-1.0, 1.0], size=(_FLIPS, len(worse)))
+    return float(np.mean(signs @ worse >= worse.sum()))
+
+
+def _angle(projected: Projected, first: str, second: str) -> float:
+    """Smallest angle between the whitened, projected signatures of two effects, rad."""
+    best = 0.0
+    atoms = projected.found.atoms
+    for a in (atom for atom in atoms if atom.effect.id == first):
+        for b in (atom for atom in atoms if atom.effect.id == second):
+            best = max(best, _cosine(projected.inner, a.columns, b.columns))
+    return float(np.arccos(min(1.0, best)))
+
+
+def _cosine(inner: Array, a: slice, b: slice) -> float:
+    """Largest canonical correlation of two sets of columns."""
+    roots = []
+    for own in (a, b):
+        values, vectors = np.linalg.eigh(inner[own, own])
+        kept = values > 1e-12 * max(float(values[-1]), 1e-300)
+        roots.append(vectors[:, kept] / np.sqrt(values[kept]))
+    across = roots[0].T @ inner[a, b] @ roots[1]
+    return float(np.linalg.svd(across, compute_uv=False)[0]) if across.size else 0.0

@@ -1,0 +1,219 @@
+"""The diagnosis: compare, search, name what can be named, and say what cannot be known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from winchkit.diagnosis.admit import OUTPUT_UNITS
+from winchkit.diagnosis.compare import begin_hypothesis, signal_rms
+from winchkit.diagnosis.confusion import Confusion, confusion_of
+from winchkit.diagnosis.dataset import Dataset, prepare
+from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.follows import follows, harmonics
+from winchkit.diagnosis.gate import held_out, held_out_rms
+from winchkit.diagnosis.inquiry import Inquiry
+from winchkit.diagnosis.limits import what_runs_cannot_show
+from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.power import detectable
+from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.result import (
+    Candidate,
+    Diagnosis,
+    Estimate,
+    OutputFit,
+    Step,
+    Verdict,
+    Where,
+)
+from winchkit.diagnosis.search import Found, search
+from winchkit.diagnosis.uncertainty import estimates, unknown_std
+from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.coordinates import Coordinates
+from winchkit.runs.run import Run
+from winchkit.schema.winch import WinchProfile
+
+__all__ = ["Answer", "diagnose", "inquire"]
+
+_CANDIDATES_FITTED = 5
+_NEGLIGIBLE = 0.02
+_AT_NOISE = 1.1
+_WHERE = 6
+
+
+class Answer:
+    """A diagnosis with everything behind it, for reports and for adding effects."""
+
+    def __init__(self, inquiry: Inquiry, found: Found, diagnosis: Diagnosis) -> None:
+        self.inquiry = inquiry
+        self.found = found
+        self.diagnosis = diagnosis
+
+
+def diagnose(
+    runs: Sequence[Run],
+    profile: WinchProfile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+) -> Answer:
+    """Find which effect of the catalogue the profile lacks on these runs.
+
+    Raises RunError with every fault of every run, FileError for effects that do not bind.
+    """
+    catalogue = catalogue or load_catalogue()
+    inquiry = inquire(prepare(runs, profile, band), catalogue)
+    found = search(inquiry)
+    share = _unexplained(found)
+    verdict = _verdict(found, share)
+    outputs = _outputs(inquiry, found)
+    named = verdict != "unknown"
+    steps = _steps(inquiry, found) if named else ()
+    notes = (*inquiry.problem.dataset.notes, *what_runs_cannot_show(inquiry.problem))
+    diagnosis = Diagnosis(
+        verdict=verdict,
+        outputs=outputs,
+        steps=steps,
+        candidates=_candidates(inquiry, found),
+        detectable=detectable(found.scores, inquiry.price, found.threshold),
+        unexplained_share=share,
+        where=_where(inquiry, found) if verdict in {"unknown", "partly"} else (),
+        next_runs=(),
+        notes=notes,
+    )
+    return Answer(inquiry, found, diagnosis)
+
+
+def inquire(dataset: Dataset, catalogue: Catalogue) -> Inquiry:
+    """An inquiry that begins with the effects that the profile already has."""
+    problem = Problem(dataset)
+    begin = begin_hypothesis(dataset.profile, catalogue, problem)
+    return Inquiry(problem, begin, catalogue)
+
+
+def _unexplained(found: Found) -> float:
+    """Share of the excess over the noise that the final model leaves."""
+    if not found.alarmed or not found.noise.from_repeats:
+        return 0.0 if not found.still else 1.0
+    # Both in units of the final noise, so that a re-estimated noise does not shift the share.
+    scale = found.begin_noise.power / found.noise.power
+    before = float(np.sum(np.maximum(found.begin_presence.excess * scale, 0.0)))
+    after = float(np.sum(np.maximum(found.presence.excess, 0.0)[found.presence.rejected]))
+    return min(1.0, after / before) if before > 0 else 0.0
+
+
+def _verdict(found: Found, share: float) -> Verdict:
+    if not found.alarmed:
+        return "adequate"
+    grown = len(found.final.hypothesis.terms) > len(found.begin.hypothesis.terms)
+    if not grown:
+        return "unknown"
+    if not found.still or share < _NEGLIGIBLE or not found.noise.from_repeats:
+        return "explained"
+    return "unknown" if share > 0.5 else "partly"
+
+
+def _outputs(inquiry: Inquiry, found: Found) -> dict[str, OutputFit]:
+    problem, groups = inquiry.problem, inquiry.groups
+    before, after = _rms(problem, found.begin), _rms(problem, found.final)
+    held_before = held_out_rms(problem, found.begin, found.begin_noise, groups)
+    held_after = held_out_rms(problem, found.final, found.noise, groups)
+    source = "repeats" if found.noise.from_repeats else "saturated fit"
+    return {
+        output: OutputFit(
+            unit=OUTPUT_UNITS[output],
+            band=next(s.band.cut_off for s in problem.segments if s.output == output),
+            signal_rms=signal_rms(problem.dataset, output),
+            rms_before=before[output],
+            rms_after=after[output],
+            heldout_rms_before=held_before[output],
+            heldout_rms_after=held_after[output],
+            noise_rms=found.noise.rms[output],
+            noise_source=source,
+        )
+        for output in problem.dataset.outputs
+    }
+
+
+def _rms(problem: Problem, fitted: Fit) -> dict[str, float]:
+    out = {}
+    for output in problem.dataset.outputs:
+        own = [s for s in problem.segments if s.output == output]
+        total = sum(float(np.sum(fitted.residual[s.rows] ** 2)) for s in own)
+        out[output] = float(np.sqrt(total / sum(s.band.count for s in own)))
+    return out
+
+
+def _steps(inquiry: Inquiry, found: Found) -> tuple[Step, ...]:
+    """Every addition with its confusion set, values and held-out gain."""
+    final, noise = found.final, found.noise
+    added = range(inquiry.given, len(final.hypothesis.terms))
+    sets = [confusion_of(inquiry, final, noise, index) for index in added]
+    gains = _gains(inquiry, final, noise)
+    std = unknown_std(inquiry.problem, final, noise, inquiry.blocks)
+    own = estimates(inquiry.problem, final, std)
+    out = []
+    for confusion, gain, (term, values) in zip(sets, gains, own[inquiry.given :], strict=True):
+        parameters = {term.effect.id: values} | {
+            rival.effect.id: _values_only(rival.effect.id, confusion)
+            for rival in confusion.terms
+            if rival.effect.id != term.effect.id
+        }
+        ordered = {effect: parameters[effect] for effect in confusion.effects}
+        out.append(Step(confusion.effects, ordered, gain, confusion.angles))
+    return tuple(out)
+
+
+def _values_only(effect_id: str, confusion: Confusion) -> dict[str, Estimate]:
+    """Values of a rival; how sure they are is not worked out for it."""
+    term = next(t for t in confusion.terms if t.effect.id == effect_id)
+    names = {
+        p.name for p in (*Coordinates(term.effect).amplitudes, *Coordinates(term.effect).shapes)
+    }
+    return {
+        p.name: Estimate(term.values[p.name], float("nan"), p.unit)
+        for p in term.effect.parameters
+        if p.name in names or p.whole
+    }
+
+
+def _gains(inquiry: Inquiry, final: Fit, noise: Noise) -> list[float]:
+    """Held-out gain of each step in the order in which the model grew."""
+    hypothesis = final.hypothesis
+    squares = []
+    for count in range(inquiry.given, len(hypothesis.terms) + 1):
+        partial = Hypothesis(hypothesis.terms[:count], hypothesis.offset, hypothesis.starts[:count])
+        fitted = final if count == len(hypothesis.terms) else inquiry.refit(partial, noise)
+        squares.append(float(np.sum(held_out(inquiry.problem, fitted, noise, inquiry.groups))))
+    return [1 - after / before for before, after in pairwise(squares)]
+
+
+def _candidates(inquiry: Inquiry, found: Found) -> tuple[Candidate, ...]:
+    out = []
+    for rank, item in enumerate(found.scores):
+        rms: dict[str, float] = {}
+        if found.alarmed and rank < _CANDIDATES_FITTED and item.value > 0:
+            fitted = inquiry.trial(found.begin, item, found.begin_noise).fit
+            rms = held_out_rms(inquiry.problem, fitted, found.begin_noise, inquiry.groups)
+        out.append(Candidate(item.atom.effect.id, item.value, rms))
+    return tuple(out)
+
+
+def _where(inquiry: Inquiry, found: Found) -> tuple[Where, ...]:
+    """Where the rest lives: angles with an order, other variables, and the loudest band."""
+    problem = inquiry.problem
+    fitted = found.final if found.still else found.begin
+    if len(found.final.hypothesis.terms) > len(found.begin.hypothesis.terms):
+        named = _verdict(found, _unexplained(found)) == "partly"
+        fitted = found.final if named else found.begin
+    places = [*harmonics(problem, fitted.residual), *follows(problem, fitted.residual)]
+    out = [Where(f.output, f.variable, f.share, f.order) for f in places]
+    excess = found.presence.excess
+    if excess.size and excess.max() > 0:
+        loudest = int(np.argmax(excess))
+        output, low, high = problem.bands[loudest]
+        middle = low if not np.isfinite(high) else (low + high) / 2
+        share = float(excess[loudest] / np.sum(np.maximum(excess, 0)))
+        out.append(Where(output, "time", share, frequency=middle))
+    return tuple(sorted(out, key=lambda w: -w.share)[:_WHERE])

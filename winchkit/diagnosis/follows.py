@@ -1,0 +1,131 @@
+"""What a residual follows: the share of it that each variable's bins explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.dataset import Recording
+from winchkit.diagnosis.problem import Problem
+from winchkit.model.recurrence import play
+
+__all__ = ["Followed", "follows", "harmonics", "variables_of"]
+
+Array = NDArray[np.float64]
+_BINS = 16
+_ORDERS = 40
+_WORTH = 0.02
+_CREEP = 1e-4
+
+
+@dataclass(frozen=True)
+class Followed:
+    """One variable and the share of an output's residual power that it explains."""
+
+    output: str
+    variable: str
+    share: float
+    order: int | None = None
+    """Periods per turn of the variable, where it is an angle."""
+    frequency: float | None = None
+
+
+def variables_of(recording: Recording) -> dict[str, Array]:
+    """The variables that a residual may follow along one run, (n,) each."""
+    at = recording.raw.at
+    out = {
+        "drum_angle": at.drum_angle,
+        "motor_angle": at.motor_angle,
+        "speed": at.speed,
+        "direction": np.sign(np.where(np.abs(at.speed) > _CREEP, at.speed, 0.0)),
+        "cable_length": at.free_length,
+        "time": at.time,
+        "reversal_distance": _reversal_distance(at.free_length),
+    }
+    if recording.raw.load is not None:
+        out["load"] = recording.smooth.at.tension
+    elif recording.raw.drum_tension is not None:
+        out["tension"] = recording.smooth.at.tension
+    if recording.signals.temperature is not None:
+        out["temperature"] = recording.smooth.at.temperature
+    return out
+
+
+def _reversal_distance(length: Array) -> Array:
+    """Logarithm (base 10) of the distance run since the last change of direction, m."""
+    # A play of twice the creep length keeps encoder noise at standstill from counting as turns.
+    moved = np.diff(play(length, 2 * _CREEP), prepend=length[:1])
+    index = np.arange(len(moved))
+    sign = np.sign(moved)
+    held = sign[np.maximum.accumulate(np.where(sign != 0, index, 0))]
+    turned = np.maximum.accumulate(np.where(np.diff(held, prepend=held[:1]) != 0, index, 0))
+    travelled = np.cumsum(np.abs(moved))
+    return np.asarray(np.log10(np.maximum(travelled - travelled[turned], 1e-5)))
+
+
+def follows(problem: Problem, residual: Array) -> list[Followed]:
+    """Per output the variables that its residual follows, largest share first."""
+    times = problem.in_time(residual)
+    out: list[Followed] = []
+    known = [variables_of(recording) for recording in problem.dataset.recordings]
+    for output in problem.dataset.outputs:
+        own = [(s, t) for s, t in zip(problem.segments, times, strict=True) if s.output == output]
+        valid = [problem.dataset.recordings[s.run].valid[output] for s, _ in own]
+        error = np.concatenate([t[v] for (_, t), v in zip(own, valid, strict=True)])
+        found = []
+        for name in known[own[0][0].run]:
+            if any(name not in known[s.run] for s, _ in own):
+                continue
+            values = [known[s.run][name][v] for (s, _), v in zip(own, valid, strict=True)]
+            share = _binned_share(np.concatenate(values), error)
+            if share > _WORTH:
+                found.append(Followed(output, name, share))
+        out += sorted(found, key=lambda f: -f.share)
+    return out
+
+
+def harmonics(problem: Problem, residual: Array) -> list[Followed]:
+    """Per output and angle the order whose sine takes most of the residual."""
+    times = problem.in_time(residual)
+    out = []
+    for output in problem.dataset.outputs:
+        own = [(s, t) for s, t in zip(problem.segments, times, strict=True) if s.output == output]
+        error = np.concatenate([t for _, t in own])
+        for name in ("drum_angle", "motor_angle"):
+            angle = np.concatenate(
+                [getattr(problem.dataset.recordings[s.run].raw.at, name) for s, _ in own]
+            )
+            shares = [_harmonic_share(angle * order, error) for order in range(1, _ORDERS + 1)]
+            best = int(np.argmax(shares))
+            if shares[best] > _WORTH:
+                out.append(Followed(output, name, shares[best], order=best + 1))
+    return sorted(out, key=lambda f: -f.share)
+
+
+def _binned_share(variable: Array, error: Array) -> float:
+    """Share of the error's power in its means over bins of the variable, less what chance gives."""
+    total = float(error @ error)
+    if total == 0.0 or np.ptp(variable) == 0.0:
+        return 0.0
+    edges = np.unique(np.quantile(variable, np.linspace(0, 1, _BINS + 1)[1:-1]))
+    bins = np.searchsorted(edges, variable, side="right")
+    count = np.bincount(bins)
+    sums = np.bincount(bins, weights=error)
+    used = count > 0
+    between = float(np.sum(sums[used] ** 2 / count[used]))
+    chance = total * np.count_nonzero(used) / len(error)
+    return max(0.0, (between - chance) / total)
+
+
+def _harmonic_share(angle: Array, error: Array) -> float:
+    total = float(error @ error)
+    if total == 0.0:
+        return 0.0
+    columns = np.column_stack([np.cos(angle), np.sin(angle)])
+    gradient = columns.T @ error
+    normal = columns.T @ columns
+    if np.linalg.cond(normal) > 1e6:
+        return 0.0
+    return float(gradient @ np.linalg.solve(normal, gradient)) / total

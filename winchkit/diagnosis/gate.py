@@ -1,0 +1,149 @@
+"""Whether an improvement holds out of sample: block by block, and on whole groups of runs.
+
+Everything is linearised at a fit: leaving a part of the data out changes the unknowns by a
+linear solve, so that cross-validation needs no fit of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import wilcoxon
+
+from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.problem import Problem
+
+__all__ = [
+    "Folds",
+    "blocks_of",
+    "confidence",
+    "groups_of",
+    "held_out",
+    "held_out_rms",
+    "left_out_steps",
+]
+
+Array = NDArray[np.float64]
+_BLOCKS = 48
+_TOUCHED = 0.02
+
+
+@dataclass(frozen=True)
+class Folds:
+    """A partition of every sample in time: per segment a fold number per sample."""
+
+    of: tuple[NDArray[np.intp], ...]
+    count: int
+
+
+def blocks_of(problem: Problem, wanted: int = _BLOCKS) -> Folds:
+    """Contiguous blocks of time, equally long within a run, the same for all its outputs."""
+    total = sum(len(r.signals.time) for r in problem.dataset.recordings)
+    first, starts, counts = 0, [], []
+    for recording in problem.dataset.recordings:
+        share = max(2, round(wanted * len(recording.signals.time) / total))
+        starts.append(first)
+        counts.append(share)
+        first += share
+    of = tuple(
+        starts[s.run] + (np.arange(s.band.count) * counts[s.run]) // s.band.count
+        for s in problem.segments
+    )
+    return Folds(of, first)
+
+
+def groups_of(problem: Problem, fewest_blocks: int = 5) -> Folds:
+    """Whole groups of programme and load; with one group only, five blocks of time."""
+    groups = problem.dataset.repeats
+    if len(groups) < 2:
+        blocks = blocks_of(problem)
+        merged = tuple((b * fewest_blocks) // blocks.count for b in blocks.of)
+        return Folds(merged, fewest_blocks)
+    of_run = {run: index for index, group in enumerate(groups) for run in group.runs}
+    of = tuple(np.full(s.band.count, of_run[s.run], dtype=np.intp) for s in problem.segments)
+    return Folds(of, len(groups))
+
+
+def held_out(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Array:
+    """Whitened squares of every fold, predicted with unknowns fitted without it; (folds,)."""
+    weight = noise.weight(problem)
+    residual = np.concatenate(problem.in_time(fit.residual * weight))
+    columns = _in_time(problem, fit.jacobian * weight[:, None])
+    fold = np.concatenate(folds.of)
+    left = _left_out(residual, columns, fold, folds.count)
+    return np.asarray(np.bincount(fold, weights=left**2, minlength=folds.count), dtype=float)
+
+
+def left_out_steps(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Array:
+    """Change of the unknowns when each fold is left out, linearised; (folds, unknowns)."""
+    weight = noise.weight(problem)
+    residual = np.concatenate(problem.in_time(fit.residual * weight))
+    columns = _in_time(problem, fit.jacobian * weight[:, None])
+    return _steps(residual, columns, np.concatenate(folds.of), folds.count)
+
+
+def held_out_rms(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+    """Held-out error per output, rms in SI."""
+    steps = left_out_steps(problem, fit, noise, folds)
+    plain = np.concatenate(problem.in_time(fit.residual))
+    plain_columns = _in_time(problem, fit.jacobian)
+    fold = np.concatenate(folds.of)
+    left = plain - np.einsum("ij,ij->i", plain_columns, steps[fold])
+    out, at = {}, 0
+    squares: dict[str, list[float]] = {}
+    for segment in problem.segments:
+        part = left[at : at + segment.band.count]
+        at += segment.band.count
+        squares.setdefault(segment.output, []).extend([float(part @ part), len(part)])
+    for output, sums in squares.items():
+        out[output] = float(np.sqrt(sum(sums[::2]) / sum(sums[1::2])))
+    return out
+
+
+def confidence(before: Array, after: Array) -> float:
+    """Chance (one-sided rank test) that per-fold squares fell from ``before`` to ``after`` by luck.
+
+    Only folds that the change touches at all take part: an effect may live in a few fast ones.
+    """
+    change = before - after
+    size = np.abs(change)
+    touched = change[size > _TOUCHED * size.max()] if size.max() > 0 else change[:0]
+    if len(touched) < 5:
+        return 1.0 if np.sum(change) <= 0 else 0.05
+    return float(wilcoxon(touched, alternative="greater").pvalue)
+
+
+def _in_time(problem: Problem, columns: Array) -> Array:
+    """Columns back in time, (samples, k)."""
+    samples = sum(s.band.count for s in problem.segments)
+    out = np.empty((samples, columns.shape[1]))
+    for index, column in enumerate(columns.T):
+        out[:, index] = np.concatenate(problem.in_time(column))
+    return out
+
+
+def _left_out(residual: Array, columns: Array, fold: NDArray[np.intp], count: int) -> Array:
+    steps = _steps(residual, columns, fold, count)
+    return np.asarray(residual - np.einsum("ij,ij->i", columns, steps[fold]))
+
+
+def _steps(residual: Array, columns: Array, fold: NDArray[np.intp], count: int) -> Array:
+    """Change of the unknowns when a fold is left out, (folds, unknowns)."""
+    k = columns.shape[1]
+    normal, gradient = np.zeros((count, k, k)), np.zeros((count, k))
+    for index in range(count):
+        inside = fold == index
+        normal[index] = columns[inside].T @ columns[inside]
+        gradient[index] = columns[inside].T @ residual[inside]
+    whole, pull = normal.sum(axis=0), gradient.sum(axis=0)
+    size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    out = np.empty((count, k))
+    for index in range(count):
+        rest = (whole - normal[index]) / np.outer(size, size)
+        out[index] = (
+            np.linalg.pinv(rest, rcond=1e-9, hermitian=True) @ ((pull - gradient[index]) / size)
+        ) / size
+    return out

@@ -1,0 +1,176 @@
+"""One inquiry: a problem, its candidates, and the moves of a search among hypotheses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.fit import Fit, fit
+from winchkit.diagnosis.gate import Folds, blocks_of, groups_of
+from winchkit.diagnosis.noise import (
+    Noise,
+    Presence,
+    noise_from_repeats,
+    noise_saturated,
+    presence,
+)
+from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.signature import Projected, Score, Signatures, score, signatures
+from winchkit.effects.bind import Term
+from winchkit.effects.coordinates import Coordinates
+from winchkit.effects.effect import Effect
+
+__all__ = ["Inquiry", "Trial"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate fitted beside the present terms, all refitted, and its criterion."""
+
+    effect: Effect
+    fit: Fit
+    criterion: float
+    """Whitened squares and the price of all added degrees of freedom: lower is better."""
+
+
+class Inquiry:
+    """What stays the same through a search: data, candidates, folds, the model it began with."""
+
+    def __init__(self, problem: Problem, begin: Hypothesis, candidates: Iterable[Effect]) -> None:
+        self.problem = problem
+        self.begin = begin
+        self.given = len(begin.terms)
+        self._candidates = tuple(candidates)
+        self.signatures = self._signatures(begin)
+
+    def _signatures(self, present: Hypothesis) -> Signatures:
+        there = {t.effect.id for t in self.begin.terms if not t.effect.repeatable}
+        absent = (effect for effect in self._candidates if effect.id not in there)
+        return signatures(self.problem, present, absent)
+
+    def look_again(self, present: Hypothesis) -> None:
+        """Draw the signatures anew beside a grown model: a lag acts on what is there."""
+        self.signatures = self._signatures(present)
+
+    @property
+    def price(self) -> float:
+        """Whitened squares that one degree of freedom must save."""
+        return float(np.log(self.problem.rows))
+
+    @cached_property
+    def blocks(self) -> Folds:
+        """Blocks of time for gates and comparisons."""
+        return blocks_of(self.problem)
+
+    @cached_property
+    def groups(self) -> Folds:
+        """Whole groups of programme and load, to be held out."""
+        return groups_of(self.problem)
+
+    @property
+    def _known(self) -> Array:
+        """Signatures that may differ between repeats for a reason that is measured."""
+        warm = [
+            index
+            for atom in self.signatures.atoms
+            if "temperature" in atom.effect.needs
+            for index in range(atom.columns.start, atom.columns.stop)
+        ]
+        return self.signatures.columns[:, warm]
+
+    def noise(self, residual: Array, jacobian: Array) -> Noise:
+        """Noise under a present model, from repeats where there are any."""
+        if self.problem.dataset.repeated:
+            return noise_from_repeats(self.problem, residual, self._known)
+        columns = np.hstack([jacobian, self.signatures.columns])
+        return noise_saturated(self.problem, residual, columns)
+
+    def settle(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
+        """Fit, with the noise re-estimated from what the fit leaves."""
+        if noise is None:
+            vector = self.problem.vector(start)
+            jacobian = self.problem.jacobian(vector, start)
+            noise = self.noise(self.problem.residual(start), jacobian)
+        first = fit(self.problem, start, noise.weight(self.problem))
+        noise = self.noise(first.residual, first.jacobian)
+        return fit(self.problem, first.hypothesis, noise.weight(self.problem)), noise
+
+    def presence(self, present: Fit, noise: Noise) -> Presence:
+        """Whether a fit leaves more than noise."""
+        return presence(self.problem, present.residual, present.jacobian, noise)
+
+    def projected(self, present: Fit, noise: Noise) -> Projected:
+        """Signatures with a fit's unknowns projected out."""
+        return Projected(self.problem, self.signatures, present.jacobian, noise)
+
+    def scores(self, present: Fit, noise: Noise) -> list[Score]:
+        """Candidates beside a fit, best first, one point of its grid each; none that is there."""
+        ranked = score(self.projected(present, noise), present.residual, self.problem.rows)
+        out: list[Score] = []
+        seen: set[str] = set()
+        for item in ranked:
+            effect = item.atom.effect
+            if effect.id in seen or _stands_there(effect, item, present.hypothesis):
+                continue
+            seen.add(effect.id)
+            out.append(item)
+        return out
+
+    def criterion(self, fitted: Fit) -> float:
+        """Whitened squares and the price of everything that was added."""
+        added = fitted.hypothesis.terms[self.given :]
+        freedom = sum(Coordinates(term.effect).freedom for term in added)
+        return fitted.cost + self.price * freedom
+
+    def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
+        """Fit a candidate beside the present terms; those that it contains give way to it."""
+        effect = item.atom.effect
+        hypothesis = present.hypothesis
+        for index in reversed(range(self.given, len(hypothesis.terms))):
+            if hypothesis.terms[index].effect.id in effect.contains:
+                hypothesis = hypothesis.without(index)
+        begun = hypothesis.with_term(Term(effect, _starting_values(item)), self.problem.runs)
+        fitted = fit(self.problem, begun, noise.weight(self.problem))
+        return Trial(effect, fitted, self.criterion(fitted))
+
+    def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
+        """Fit a hypothesis under a given noise."""
+        return fit(self.problem, hypothesis, noise.weight(self.problem))
+
+
+def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
+    """Whether the effect, or one that contains it, is in the hypothesis already."""
+    for term in hypothesis.terms:
+        if effect.id in term.effect.contains:
+            return True
+        if term.effect.id == effect.id:
+            orders = [p.name for p in effect.parameters if p.whole]
+            if not effect.repeatable or all(
+                term.values[name] == item.atom.shape.get(name) for name in orders
+            ):
+                return True
+    return False
+
+
+def _starting_values(item: Score) -> dict[str, float]:
+    """Values at which a fit of an atom begins: its linear amplitudes, within bounds."""
+    atom = item.atom
+    coordinates = Coordinates(atom.effect)
+    base = {**atom.effect.null, **atom.shape}
+    usual = [{**base, **secant} for secant in atom.secants]
+    if atom.effect.probes:
+        best = int(np.argmax(np.abs(item.amplitudes)))
+        return usual[best]
+    null = coordinates.vector(base)
+    vector = null + sum(
+        amplitude * (coordinates.vector(values) - null)
+        for amplitude, values in zip(item.amplitudes, usual, strict=True)
+    )
+    low, high = coordinates.bounds()
+    return coordinates.values(np.clip(vector, low, high), base)

@@ -1,0 +1,238 @@
+"""The noise of the instruments, from repeats; and whether anything else is there.
+
+Differences of two repeats' residuals hold noise only; their mean holds noise and whatever the
+model lacks. Per band of frequency the two powers are compared (F test), after what differs
+between repeats for known reasons, such as the temperature, is taken out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+from scipy.stats import f as f_distribution
+
+from winchkit.diagnosis.denoise import contrasts
+from winchkit.diagnosis.problem import Problem
+
+__all__ = ["Noise", "Presence", "noise_from_repeats", "noise_saturated", "presence"]
+
+Array = NDArray[np.float64]
+_KNOWN_DIFFERENCES = 6
+_NOTICEABLE = 0.02
+_REWEIGHTED = 3
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Power of the noise per band, and how well it is known."""
+
+    power: Array
+    """Variance of a coefficient, (bands,)."""
+    freedom: Array
+    """Degrees of freedom of each estimate, (bands,)."""
+    rms: dict[str, float]
+    """Per output, in time, SI."""
+    from_repeats: bool
+
+    def weight(self, problem: Problem) -> Array:
+        """1/σ of every row."""
+        return np.asarray(1 / np.sqrt(self.power[problem.band_of_row]))
+
+
+@dataclass(frozen=True)
+class Presence:
+    """Whether the residual holds more than noise, and in which bands."""
+
+    p_value: float
+    """After Bonferroni over all bands; NaN without repeats."""
+    excess: Array
+    """Power beyond the noise, in units of one coefficient's noise power, (bands,)."""
+    rejected: NDArray[np.bool_]
+    """Bands in which noise alone is refused at 5 % over all."""
+
+
+@dataclass(frozen=True)
+class _Split:
+    """One vector over all repeats: differences and means with their bands."""
+
+    difference: Array
+    difference_band: NDArray[np.intp]
+    mean: Array
+    mean_band: NDArray[np.intp]
+
+
+def noise_from_repeats(problem: Problem, residual: Array, known: Array) -> Noise:
+    """Noise power from differences of repeats.
+
+    ``known`` (rows, k) are signatures that may differ between repeats; their differences are
+    projected out where they are noticeable.
+    """
+    split = _split(problem, residual)
+    count = len(problem.bands)
+    freedom = _sums(np.ones_like(split.difference), split.difference_band, count)
+    power = _power(problem, split.difference, split.difference_band, freedom)
+    difference = split.difference
+    if known.size:
+        weight = 1 / np.sqrt(power[split.difference_band])
+        basis = _noticeable(problem, known, weight)
+        if basis.shape[1]:
+            whitened = difference * weight
+            difference = (whitened - basis @ (basis.T @ whitened)) / weight
+            freedom = freedom - _sums(np.sum(basis**2, axis=1), split.difference_band, count)
+            power = _power(problem, difference, split.difference_band, np.maximum(freedom, 1.0))
+    return Noise(power, np.maximum(freedom, 1.0), _rms(problem, power), from_repeats=True)
+
+
+def noise_saturated(problem: Problem, residual: Array, columns: Array) -> Noise:
+    """Noise power as what no effect of the catalogue can explain: without repeats.
+
+    It begins with even weights: weights from the residual itself would trust least the very
+    frequencies in which something is missing. An effect outside the catalogue is taken for noise
+    here, so that it cannot be excluded.
+    """
+    count = len(problem.bands)
+    bands = problem.band_of_row
+    total = _sums(np.ones(problem.rows), bands, count)
+    power = _even(problem, residual)
+    for _ in range(_REWEIGHTED):
+        weight = 1 / np.sqrt(power[bands])
+        basis = _orthonormal(columns * weight[:, None])
+        whitened = residual * weight
+        left = (whitened - basis @ (basis.T @ whitened)) / weight
+        freedom = np.maximum(total - _sums(np.sum(basis**2, axis=1), bands, count), 1.0)
+        power = _power(problem, left, bands, freedom)
+    return Noise(power, freedom, _rms(problem, power), from_repeats=False)
+
+
+def presence(problem: Problem, residual: Array, jacobian: Array, noise: Noise) -> Presence:
+    """F test of the repeats' mean against the noise, band by band."""
+    count = len(problem.bands)
+    if not noise.from_repeats:
+        nothing = np.zeros(count)
+        return Presence(float("nan"), nothing, nothing.astype(bool))
+    split = _split(problem, residual)
+    total = _sums(split.mean**2, split.mean_band, count)
+    freedom = _sums(np.ones_like(split.mean), split.mean_band, count)
+    basis = _orthonormal(jacobian * noise.weight(problem)[:, None])
+    # Each fitted unknown takes one degree of freedom from where it has leverage.
+    taken = _sums(np.sum(basis**2, axis=1), problem.band_of_row, count)
+    freedom = np.maximum(freedom - taken, 1.0)
+    ratio = total / freedom / noise.power
+    p = np.asarray(f_distribution.sf(ratio, freedom, noise.freedom))
+    tested = max(count, 1)
+    worst = float(min(1.0, p.min() * tested)) if count else 1.0
+    return Presence(worst, total / noise.power - freedom, p * tested < 0.05)
+
+
+def _split(problem: Problem, rows: Array) -> _Split:
+    """Differences and means of repeats, transformed anew on their common samples."""
+    times = dict(
+        zip(((s.run, s.output) for s in problem.segments), problem.in_time(rows), strict=True)
+    )
+    edges = _edges(problem)
+    parts: tuple[list[Array], list[Array]] = ([], [])
+    bands: tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]] = ([], [])
+    for group in problem.dataset.repeated:
+        for output in problem.dataset.outputs:
+            if any((run, output) not in times for run in group.runs):
+                continue
+            aligned = np.array(
+                [
+                    times[run, output][index]
+                    for run, index in zip(group.runs, group.rows, strict=True)
+                ]
+            )
+            mean, differences = contrasts(aligned)
+            band = problem.dataset.recordings[group.runs[0]].bands[output]
+            frequency = np.arange(len(mean)) * band.rate / (2 * len(mean))
+            kept = frequency <= (np.inf if band.cut_off is None else band.cut_off)
+            first, own = edges[output]
+            ids = first + np.searchsorted(own, frequency[kept], side="right") - 1
+            spectra = np.asarray(dct(differences, type=2, norm="ortho", axis=1))[:, kept]
+            parts[0].append(spectra.ravel())
+            bands[0].append(np.tile(ids, len(spectra)))
+            parts[1].append(np.asarray(dct(mean, type=2, norm="ortho"))[kept])
+            bands[1].append(ids)
+    return _Split(
+        np.concatenate(parts[0]),
+        np.concatenate(bands[0]),
+        np.concatenate(parts[1]),
+        np.concatenate(bands[1]),
+    )
+
+
+def _edges(problem: Problem) -> dict[str, tuple[int, Array]]:
+    """Per output the number of its first band, and its edges from minus to plus infinity."""
+    out: dict[str, tuple[int, Array]] = {}
+    for output in problem.dataset.outputs:
+        own = [i for i, band in enumerate(problem.bands) if band[0] == output]
+        inner = [problem.bands[i][1] for i in own[1:]]
+        out[output] = own[0], np.array([-np.inf, *inner, np.inf])
+    return out
+
+
+def _noticeable(problem: Problem, known: Array, weight: Array) -> Array:
+    """Orthonormal directions in which known signatures differ between repeats."""
+    different = []
+    for column in known.T:
+        split = _split(problem, column)
+        whitened = split.difference * weight
+        mean = split.mean / np.sqrt(_nearest(weight, split))
+        if whitened @ whitened > _NOTICEABLE * float(mean @ mean):
+            different.append(whitened / np.sqrt(whitened @ whitened))
+    if not different:
+        return np.zeros((len(weight), 0))
+    left, size, _ = np.linalg.svd(np.array(different).T, full_matrices=False)
+    return np.asarray(left[:, :_KNOWN_DIFFERENCES][:, size[:_KNOWN_DIFFERENCES] > 0.1])
+
+
+def _nearest(weight: Array, split: _Split) -> Array:
+    """Noise power of the mean's rows, from that of the differences' bands."""
+    count = int(max(split.mean_band.max(), split.difference_band.max())) + 1
+    power = np.ones(count)
+    power[split.difference_band] = 1 / weight**2
+    return power[split.mean_band]
+
+
+def _orthonormal(columns: Array) -> Array:
+    """Orthonormal basis of columns, those that add nothing left out; (rows, rank)."""
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    scaled = columns[:, size > 0] / size[size > 0]
+    if not scaled.shape[1]:
+        return np.zeros((len(columns), 0))
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    kept = values > 1e-8 * values[-1]
+    return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
+
+
+def _sums(values: Array, bands: NDArray[np.intp], count: int) -> Array:
+    return np.asarray(np.bincount(bands, weights=values, minlength=count))
+
+
+def _even(problem: Problem, residual: Array) -> Array:
+    """One power per output, the same in all its bands."""
+    out = np.empty(len(problem.bands))
+    for output in problem.dataset.outputs:
+        rows = np.concatenate([residual[s.rows] for s in problem.segments if s.output == output])
+        own = [band[0] == output for band in problem.bands]
+        out[own] = np.mean(rows**2)
+    return np.maximum(out, problem.floor)
+
+
+def _power(problem: Problem, values: Array, bands: NDArray[np.intp], freedom: Array) -> Array:
+    """Mean square per band; noise-free data get a floor far below what instruments resolve."""
+    power = _sums(values**2, bands, len(freedom)) / np.maximum(freedom, 1.0)
+    return np.maximum(power, problem.floor)
+
+
+def _rms(problem: Problem, power: Array) -> dict[str, float]:
+    """Root mean square of the noise per output, in time."""
+    out = {}
+    for output in problem.dataset.outputs:
+        own = [s for s in problem.segments if s.output == output]
+        total = sum(float(np.sum(power[problem.band_of_row[s.rows]])) for s in own)
+        out[output] = float(np.sqrt(total / sum(s.band.count for s in own)))
+    return out

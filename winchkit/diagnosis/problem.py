@@ -1,0 +1,255 @@
+"""A dataset as one regression: the residual vector of a hypothesis, in frequency.
+
+Rows are the kept cosine coefficients of every output of every run. A hypothesis is a tuple of
+terms with one length offset and, for effects with memory, one initial state per run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.dataset import Dataset
+from winchkit.diagnosis.spectrum import Band, band_edges, to_frequency, to_time
+from winchkit.effects.bind import Term, modifiers_of
+from winchkit.effects.coordinates import Coordinates
+from winchkit.model.line import Line
+
+__all__ = ["Hypothesis", "Problem", "Segment"]
+
+Array = NDArray[np.float64]
+_START = "start"
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Where one output of one run stands in the rows."""
+
+    run: int
+    output: str
+    rows: slice
+    band: Band
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Terms with their values, the length instrument's offset, and initial states."""
+
+    terms: tuple[Term, ...] = ()
+    offset: float = 0.0
+    starts: tuple[tuple[float, ...], ...] = ()
+    """Per term: one initial state per run where it has memory, else nothing."""
+
+    def with_term(self, term: Term, runs: int) -> Hypothesis:
+        """With one term more."""
+        remembers = term.effect.memory and _START in term.values
+        start = (0.0,) * runs if remembers else ()
+        return replace(self, terms=(*self.terms, term), starts=(*self.starts, start))
+
+    def without(self, index: int) -> Hypothesis:
+        """With one term less."""
+        keep = [i for i in range(len(self.terms)) if i != index]
+        return replace(
+            self,
+            terms=tuple(self.terms[i] for i in keep),
+            starts=tuple(self.starts[i] for i in keep),
+        )
+
+
+class Problem:
+    """Residuals of hypotheses on a dataset, and how hypotheses become vectors to fit."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        self.dataset = dataset
+        self.runs = len(dataset.recordings)
+        self.segments = _segments(dataset)
+        self.rows = self.segments[-1].rows.stop
+        self.base = self._base()
+        self.offset_column = self._offset_column()
+
+    @property
+    def fits_offset(self) -> bool:
+        """Whether the length instrument's offset is among the unknowns."""
+        return bool(np.any(self.offset_column))
+
+    @cached_property
+    def band_of_row(self) -> NDArray[np.intp]:
+        """Noise band of every row; bands are numbered through all outputs."""
+        return self._bands[0]
+
+    @cached_property
+    def bands(self) -> list[tuple[str, float, float]]:
+        """Output and frequency range of every noise band."""
+        return self._bands[1]
+
+    @cached_property
+    def floor(self) -> Array:
+        """Least noise power that is believed per band, a 10⁻⁸ of what the output measures."""
+        size = {
+            output: max(
+                float(np.std(r.measured[output]))
+                for r in self.dataset.recordings
+                if output in r.measured
+            )
+            for output in self.dataset.outputs
+        }
+        return np.array([(1e-8 * size[output]) ** 2 or 1e-300 for output, _, _ in self.bands])
+
+    def change(self, hypothesis: Hypothesis) -> Array:
+        """What the terms add to the nominal prediction, rows."""
+        if not hypothesis.terms:
+            return np.zeros(self.rows)
+        predicted = [
+            Line(self.dataset.profile, modifiers_of(_started(hypothesis, run))).predict(
+                recording.smooth
+            )
+            for run, recording in enumerate(self.dataset.recordings)
+        ]
+        out = np.zeros(self.rows)
+        for segment in self.segments:
+            recording = self.dataset.recordings[segment.run]
+            moved = predicted[segment.run][segment.output]
+            moved = moved - recording.nominal_smooth[segment.output]
+            out[segment.rows] = self._masked(segment, moved)
+        return out
+
+    def residual(self, hypothesis: Hypothesis) -> Array:
+        """Measured minus predicted, rows."""
+        return self.base - self.change(hypothesis) - hypothesis.offset * self.offset_column
+
+    def in_time(self, rows: Array) -> list[Array]:
+        """Rows back in time, one array per segment."""
+        return [to_time(rows[s.rows], s.band) for s in self.segments]
+
+    def vector(self, hypothesis: Hypothesis) -> Array:
+        """Everything to fit: offset, coordinates of the terms, initial states."""
+        parts = [np.array([hypothesis.offset])] if self.fits_offset else []
+        parts += [Coordinates(t.effect).vector(t.values) for t in hypothesis.terms]
+        parts += [np.array(start) for start in hypothesis.starts]
+        return np.concatenate([np.zeros(0), *parts])
+
+    def hypothesis(self, vector: Array, like: Hypothesis) -> Hypothesis:
+        """A hypothesis of the same terms at a vector."""
+        at = 1 if self.fits_offset else 0
+        offset = float(vector[0]) if at else 0.0
+        terms, starts = [], []
+        for term in like.terms:
+            coordinates = Coordinates(term.effect)
+            part = vector[at : at + len(coordinates)]
+            terms.append(Term(term.effect, coordinates.values(part, term.values)))
+            at += len(coordinates)
+        for start in like.starts:
+            starts.append(tuple(vector[at : at + len(start)].tolist()))
+            at += len(start)
+        return Hypothesis(tuple(terms), offset, tuple(starts))
+
+    def bounds(self, like: Hypothesis) -> tuple[Array, Array]:
+        """Lower and upper ends of the vector."""
+        pairs = [Coordinates(t.effect).bounds() for t in like.terms]
+        low = [np.full(int(self.fits_offset), -np.inf), *(pair[0] for pair in pairs)]
+        high = [np.full(int(self.fits_offset), np.inf), *(pair[1] for pair in pairs)]
+        for term, start in zip(like.terms, like.starts, strict=True):
+            if start:
+                parameter = term.effect.parameter(_START)
+                low.append(np.full(len(start), parameter.low))
+                high.append(np.full(len(start), parameter.high))
+        return np.concatenate(low), np.concatenate(high)
+
+    def jacobian(self, vector: Array, like: Hypothesis) -> Array:
+        """Derivative of the prediction by the vector, by differences; (rows, len)."""
+        here = self.change(self.hypothesis(vector, like))
+        _, high = self.bounds(like)
+        out = np.empty((self.rows, len(vector)))
+        states = sum(len(start) for start in like.starts)
+        for index in range(len(vector) - states):
+            if index == 0 and self.fits_offset:
+                out[:, 0] = self.offset_column
+                continue
+            step = 1e-3 * max(1.0, abs(vector[index]))
+            if vector[index] + step > high[index]:
+                step = -step
+            moved = vector.copy()
+            moved[index] += step
+            out[:, index] = (self.change(self.hypothesis(moved, like)) - here) / step
+        self._by_states(out, vector, like, here, len(vector) - states)
+        return out
+
+    def _by_states(
+        self, out: Array, vector: Array, like: Hypothesis, here: Array, first: int
+    ) -> None:
+        """Columns of initial states: each touches one run only, so one evaluation serves all."""
+        for start in like.starts:
+            if not start:
+                continue
+            steps = np.where(vector[first : first + len(start)] > 0, -1e-3, 1e-3)
+            moved = vector.copy()
+            moved[first : first + len(start)] += steps
+            difference = self.change(self.hypothesis(moved, like)) - here
+            out[:, first : first + len(start)] = 0.0
+            for segment in self.segments:
+                out[segment.rows, first + segment.run] = (
+                    difference[segment.rows] / steps[segment.run]
+                )
+            first += len(start)
+
+    def _masked(self, segment: Segment, signal: Array) -> Array:
+        valid = self.dataset.recordings[segment.run].valid[segment.output]
+        return to_frequency(np.where(valid, signal, 0.0), segment.band)
+
+    def _base(self) -> Array:
+        out = np.zeros(self.rows)
+        for segment in self.segments:
+            recording = self.dataset.recordings[segment.run]
+            error = recording.measured[segment.output] - recording.nominal[segment.output]
+            out[segment.rows] = self._masked(segment, error)
+        return out
+
+    def _offset_column(self) -> Array:
+        out = np.zeros(self.rows)
+        for segment in self.segments:
+            recording = self.dataset.recordings[segment.run]
+            if segment.output == "cable_length" and not recording.zeroed:
+                out[segment.rows] = self._masked(segment, np.ones(segment.band.count))
+        return out
+
+    @cached_property
+    def _bands(self) -> tuple[NDArray[np.intp], list[tuple[str, float, float]]]:
+        repeated = self.dataset.repeated
+        copies = max(1, sum(len(group.runs) - 1 for group in repeated))
+        ids = np.zeros(self.rows, dtype=np.intp)
+        bands: list[tuple[str, float, float]] = []
+        for output in self.dataset.outputs:
+            own = [s for s in self.segments if s.output == output]
+            longest = max(own, key=lambda s: s.band.count)
+            edges = band_edges(longest.band.frequency, copies)
+            for segment in own:
+                inside = np.searchsorted(edges, segment.band.frequency, side="right") - 1
+                ids[segment.rows] = len(bands) + inside
+            bands += [(output, max(0.0, float(low)), float(high)) for low, high in pairwise(edges)]
+        return ids, bands
+
+
+def _segments(dataset: Dataset) -> list[Segment]:
+    segments, at = [], 0
+    for output in dataset.outputs:
+        for run, recording in enumerate(dataset.recordings):
+            if output in recording.measured:
+                band = recording.bands[output]
+                kept = len(band.frequency)
+                segments.append(Segment(run, output, slice(at, at + kept), band))
+                at += kept
+    return segments
+
+
+def _started(hypothesis: Hypothesis, run: int) -> Sequence[Term]:
+    """Terms with the initial states of one run."""
+    out = []
+    for term, start in zip(hypothesis.terms, hypothesis.starts, strict=True):
+        values: Mapping[str, float] = term.values
+        out.append(Term(term.effect, {**values, _START: start[run]}) if start else term)
+    return out

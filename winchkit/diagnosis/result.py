@@ -1,0 +1,191 @@
+"""What a comparison and a diagnosis say, as frozen dataclasses and as JSON (DESIGN's promises)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+__all__ = [
+    "Candidate",
+    "Comparison",
+    "Detectable",
+    "Diagnosis",
+    "Estimate",
+    "NextRun",
+    "OutputError",
+    "OutputFit",
+    "Step",
+    "Where",
+]
+
+Verdict = Literal["adequate", "explained", "partly", "unknown"]
+
+
+@dataclass(frozen=True)
+class OutputError:
+    """How far one output is from its prediction, SI."""
+
+    unit: str
+    samples: int
+    band: float | None
+    signal_rms: float
+    rms: float
+    max: float
+    bias: float
+    noise_rms: float | None
+    """From differences of repeats; None without any."""
+    follows: tuple[tuple[str, float], ...]
+    """Variables and the share of the error that each explains."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As the command prints it."""
+        plain = {k: v for k, v in vars(self).items() if k != "follows"}
+        follows = [{"variable": name, "share": share} for name, share in self.follows]
+        return {**plain, "follows": follows}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A profile against measured runs, only the length offset fitted."""
+
+    outputs: Mapping[str, OutputError]
+    offset: float | None
+    """Fitted offset of the length instrument, m."""
+    notes: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``winchkit compare --json`` prints it."""
+        outputs = {name: error.to_json() for name, error in self.outputs.items()}
+        return {
+            "schema": 1,
+            "outputs": outputs,
+            "length_offset": self.offset,
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter's value with its standard deviation, SI."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class OutputFit:
+    """One output before and after, SI."""
+
+    unit: str
+    band: float | None
+    signal_rms: float
+    rms_before: float
+    rms_after: float
+    heldout_rms_before: float
+    heldout_rms_after: float
+    noise_rms: float | None
+    noise_source: str = "repeats"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One addition to the model: the effects that the data cannot tell apart there."""
+
+    effects: tuple[str, ...]
+    parameters: Mapping[str, Mapping[str, Estimate]]
+    heldout_gain: float
+    angles: Mapping[str, float] = field(default_factory=dict)
+    """Between the first effect's signature and the others', rad."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As the command prints it."""
+        parameters = {
+            effect: {name: vars(estimate) for name, estimate in values.items()}
+            for effect, values in self.parameters.items()
+        }
+        return {
+            "effects": list(self.effects),
+            "parameters": parameters,
+            "heldout_gain": self.heldout_gain,
+            "angles": dict(self.angles),
+        }
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect of the catalogue, scored beside the model that the runs were compared with."""
+
+    effect: str
+    score: float
+    heldout_rms: Mapping[str, float]
+    """With it added; empty where its score did not earn a fit."""
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """The smallest size of an effect that these runs could have shown."""
+
+    effect: str
+    parameter: str
+    smallest: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where an unexplained rest lives."""
+
+    output: str
+    variable: str
+    share: float
+    order: int | None = None
+    frequency: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """As the command prints it: order or frequency only where it has one."""
+        return {key: value for key, value in vars(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
+class NextRun:
+    """A motion programme that would tell two effects apart."""
+
+    separates: tuple[str, str]
+    programme: str
+    power: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer: what is missing, how sure that is, and what these runs cannot show."""
+
+    verdict: Verdict
+    outputs: Mapping[str, OutputFit]
+    steps: tuple[Step, ...]
+    candidates: tuple[Candidate, ...]
+    detectable: tuple[Detectable, ...]
+    unexplained_share: float
+    where: tuple[Where, ...]
+    next_runs: tuple[NextRun, ...]
+    notes: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``winchkit diagnose --json`` prints it."""
+        return {
+            "schema": 1,
+            "verdict": self.verdict,
+            "outputs": {name: vars(output) for name, output in self.outputs.items()},
+            "steps": [step.to_json() for step in self.steps],
+            "candidates": [vars(c) | {"heldout_rms": dict(c.heldout_rms)} for c in self.candidates],
+            "detectable": [vars(d) for d in self.detectable],
+            "unexplained": {
+                "share": self.unexplained_share,
+                "where": [where.to_json() for where in self.where],
+            },
+            "next_runs": [
+                {**vars(run), "separates": list(run.separates)} for run in self.next_runs
+            ],
+            "notes": list(self.notes),
+        }

@@ -1,0 +1,141 @@
+"""The search: one effect at a time, everything refitted, gated out of sample, then reconsidered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.gate import confidence, held_out
+from winchkit.diagnosis.inquiry import Inquiry, Trial
+from winchkit.diagnosis.noise import Noise, Presence
+from winchkit.diagnosis.signature import Score, chance_level
+from winchkit.effects.coordinates import Coordinates
+
+__all__ = ["Found", "search"]
+
+Array = NDArray[np.float64]
+_MOST_STEPS = 6
+_SHORT_LIST = 5
+_PRESENCE_LEVEL = 0.04
+_SCORE_LEVEL = 0.99
+_GATE_LEVEL = 0.02
+_BETTER = 2.0
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a search ended."""
+
+    begin: Fit
+    """The model it began with, fitted."""
+    begin_noise: Noise
+    begin_presence: Presence
+    alarmed: bool
+    """Whether anything beyond noise was there at the start."""
+    final: Fit
+    noise: Noise
+    presence: Presence
+    still: bool
+    """Whether anything beyond noise is left at the end."""
+    scores: tuple[Score, ...]
+    """Of all candidates at the start, best first."""
+    threshold: float
+    """Score that noise alone reaches in one case of a hundred."""
+
+
+def search(inquiry: Inquiry) -> Found:
+    """Grow the model while something is missing and an effect holds out of sample."""
+    present, noise = inquiry.settle(inquiry.begin)
+    begin, begin_noise = present, noise
+    begin_presence = inquiry.presence(present, noise)
+    begin_scores, threshold = _evidence(inquiry, present, noise)
+    alarmed = still = _anything(begin_presence, begin_scores, threshold)
+    scores, level = begin_scores, threshold
+    for _ in range(_MOST_STEPS):
+        if not still or not scores or scores[0].value <= max(level, 0.0):
+            break
+        grown = _grow(inquiry, present, noise, scores)
+        if grown is None:
+            break
+        inquiry.look_again(grown.hypothesis)
+        present, noise = inquiry.settle(grown.hypothesis, noise)
+        present, noise = _reconsider(inquiry, present, noise)
+        scores, level = _evidence(inquiry, present, noise)
+        still = _anything(inquiry.presence(present, noise), scores, level)
+    return Found(
+        begin=begin,
+        begin_noise=begin_noise,
+        begin_presence=begin_presence,
+        alarmed=alarmed,
+        final=present,
+        noise=noise,
+        presence=inquiry.presence(present, noise),
+        still=still,
+        scores=tuple(begin_scores),
+        threshold=threshold,
+    )
+
+
+def _evidence(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[list[Score], float]:
+    """Scores of the candidates, and what noise alone would score at most."""
+    scores = inquiry.scores(present, noise)
+    chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
+    return scores, float(np.quantile(chance, _SCORE_LEVEL))
+
+
+def _anything(presence: Presence, scores: list[Score], threshold: float) -> bool:
+    """Whether the residual holds more than noise."""
+    by_score = bool(scores) and scores[0].value > max(threshold, 0.0)
+    return by_score or presence.p_value < _PRESENCE_LEVEL
+
+
+def _grow(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> Fit | None:
+    """The best of the short list that passes the gate, all refitted; None where none does."""
+    listed = [item for item in scores if item.value > 0][:_SHORT_LIST]
+    trials = [inquiry.trial(present, item, noise) for item in listed]
+    before = inquiry.criterion(present)
+    for trial in sorted(trials, key=lambda t: t.criterion):
+        if trial.criterion < before - _BETTER and _holds(inquiry, present, trial, noise):
+            return trial.fit
+    return None
+
+
+def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
+    """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum."""
+    problem = inquiry.problem
+    blocks = inquiry.blocks
+    before = held_out(problem, present, noise, blocks)
+    after = held_out(problem, trial.fit, noise, blocks)
+    if np.sum(before - after) <= 0 or confidence(before, after) > _GATE_LEVEL:
+        return False
+    groups = inquiry.groups
+    gain = held_out(problem, present, noise, groups) - held_out(problem, trial.fit, noise, groups)
+    return bool(np.sum(gain) > 0)
+
+
+def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+    """Drop what is no longer needed, and replace what another effect explains better."""
+    present = _without_the_needless(inquiry, present, noise)
+    for index in range(inquiry.given, len(present.hypothesis.terms)):
+        own = present.hypothesis.terms[index].effect
+        base = inquiry.refit(present.hypothesis.without(index), noise)
+        rivals = [s for s in inquiry.scores(base, noise) if s.atom.effect.id != own.id][:2]
+        trials = [inquiry.trial(base, item, noise) for item in rivals if item.value > 0]
+        best = min(trials, key=lambda t: t.criterion, default=None)
+        if best is not None and best.criterion < inquiry.criterion(present) - _BETTER:
+            present = best.fit
+    present = _without_the_needless(inquiry, present, noise)
+    return inquiry.settle(present.hypothesis, noise)
+
+
+def _without_the_needless(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
+    for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
+        effect = present.hypothesis.terms[index].effect
+        without = inquiry.refit(present.hypothesis.without(index), noise)
+        worth = without.cost - present.cost
+        if worth < inquiry.price * Coordinates(effect).freedom:
+            present = without
+    return present

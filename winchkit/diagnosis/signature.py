@@ -1,0 +1,257 @@
+"""What every candidate effect would look like in the data, and how well the residual fits it.
+
+A signature is a set of columns: what the prediction gains from a usual size of the effect, by
+secants and not by tangents, since a radius jumps at layers and some effects have no gradient at
+their null. Only their inner products per noise band are needed to score, so that scoring again
+with another noise, or simulating what noise alone would score, costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.effects.bind import Term
+from winchkit.effects.coordinates import Coordinates
+from winchkit.effects.effect import Effect
+
+__all__ = [
+    "Atom",
+    "Projected",
+    "Score",
+    "Signatures",
+    "chance_level",
+    "is_candidate",
+    "score",
+    "signatures",
+]
+
+Array = NDArray[np.float64]
+_NOTHING = 1e-12
+_SIMULATIONS = 400
+_PERIODS = 2
+_UNIDENTIFIABLE = 1e-7
+
+
+@dataclass(frozen=True)
+class Atom:
+    """One effect at one point of its shape grid: its columns, and where a fit would start."""
+
+    effect: Effect
+    shape: dict[str, float]
+    columns: slice
+    secants: tuple[dict[str, float], ...]
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom that choosing it costs."""
+        return Coordinates(self.effect).freedom
+
+
+@dataclass(frozen=True)
+class Signatures:
+    """Columns of all candidates, and their inner products per noise band."""
+
+    atoms: tuple[Atom, ...]
+    columns: Array
+    """(rows, p)."""
+    gram: Array
+    """(bands, p, p)."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """How much of the residual's whitened squares an atom would take, and its chance level."""
+
+    atom: Atom
+    gain: float
+    value: float
+    """Gain less the price of its degrees of freedom."""
+    amplitudes: Array
+    """In units of the secants."""
+    strength: float
+    """λ for one usual size: noncentrality of its whitened, projected signature."""
+
+
+def is_candidate(effect: Effect, problem: Problem) -> bool:
+    """Whether its part and its channels are there."""
+    dataset = problem.dataset
+    profile, recordings = dataset.profile, dataset.recordings
+    if not set(effect.outputs) & set(dataset.outputs):
+        return False
+    cable = profile.cable
+    have = {
+        "cable": bool(
+            cable.diameter
+            or cable.dead_length
+            or profile.pulley
+            or profile.reference.cable_length is not None
+        ),
+        "layers": profile.drum.kind in {"spiral", "archimedean"},
+        "guide": profile.guide is not None,
+        "pulley": bool(profile.pulley),
+        "temperature": all(r.signals.temperature is not None for r in recordings),
+        "load": any(r.raw.load is not None for r in recordings),
+        "rope_force": any(bool(r.raw.at.tension.any()) for r in recordings),
+        "gearing": True,
+    }
+    return all(have[need] for need in effect.needs)
+
+
+def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect]) -> Signatures:
+    """Columns and inner products of every candidate among ``effects`` beside a present model."""
+    here = problem.change(present)
+    atoms: list[Atom] = []
+    columns: list[Array] = []
+    for effect in effects:
+        if not is_candidate(effect, problem):
+            continue
+        coordinates = Coordinates(effect)
+        added = partial(_column, problem, present, here, effect)
+        for shape in coordinates.grid():
+            if not _turns_enough(problem, effect, shape):
+                continue
+            own = [
+                (secant, added({**effect.null, **shape, **secant}))
+                for secant in coordinates.secants()
+            ]
+            own = [(secant, column) for secant, column in own if column @ column > 0]
+            if own:
+                place = slice(len(columns), len(columns) + len(own))
+                atoms.append(Atom(effect, shape, place, tuple(secant for secant, _ in own)))
+                columns += [column for _, column in own]
+    stacked = np.array(columns).T if columns else np.zeros((problem.rows, 0))
+    return Signatures(tuple(atoms), stacked, _gram(problem, stacked))
+
+
+def _turns_enough(problem: Problem, effect: Effect, shape: dict[str, float]) -> bool:
+    """Whether the motor turns through two periods of an order in some run."""
+    orders = [shape[p.name] for p in effect.parameters if p.whole and p.name in shape]
+    stroke = max(float(np.ptp(r.signals.motor_angle)) for r in problem.dataset.recordings)
+    return all(order * stroke >= _PERIODS * 2 * np.pi for order in orders)
+
+
+def _column(
+    problem: Problem, present: Hypothesis, here: Array, effect: Effect, values: dict[str, float]
+) -> Array:
+    """What the prediction gains from an effect beside the present model, rows."""
+    column = problem.change(present.with_term(Term(effect, values), problem.runs)) - here
+    return column if np.isfinite(column).all() else np.zeros_like(column)
+
+
+def _gram(problem: Problem, columns: Array) -> Array:
+    """Inner products per noise band, (bands, p, p)."""
+    out = np.zeros((len(problem.bands), columns.shape[1], columns.shape[1]))
+    for band, rows in _pieces(problem):
+        out[band] += columns[rows].T @ columns[rows]
+    return out
+
+
+class Projected:
+    """Signatures with the present model's unknowns projected out, under one noise."""
+
+    def __init__(self, problem: Problem, found: Signatures, jacobian: Array, noise: Noise) -> None:
+        self.found = found
+        self._jacobian = jacobian
+        self._weight2 = noise.weight(problem) ** 2
+        self._freedom = noise.freedom
+        cross, normal = _cross(problem, jacobian, found.columns)
+        share = 1 / noise.power
+        self._through = -np.linalg.pinv(
+            np.tensordot(share, normal, axes=1), rcond=1e-12, hermitian=True
+        ) @ np.tensordot(share, cross, axes=1)
+        mixed = cross.transpose(0, 2, 1) @ self._through
+        own = self._through.T @ normal @ self._through
+        self._parts = share[:, None, None] * (found.gram + mixed + mixed.transpose(0, 2, 1) + own)
+        self.inner = self._parts.sum(axis=0)
+        """Inner products of the whitened, projected columns, (p, p)."""
+        plain = np.einsum("b,bii->i", share, found.gram)
+        self._roots = [self._root(atom, plain) for atom in found.atoms]
+
+    def products(self, residual: Array) -> Array:
+        """Inner products of the whitened residual with the projected columns, (p,)."""
+        weighted = residual * self._weight2
+        own = self.found.columns.T @ weighted
+        return np.asarray(own + self._through.T @ (self._jacobian.T @ weighted))
+
+    def gains(self, products: Array) -> Array:
+        """Whitened squares that each atom takes; products (p,) or (p, samples)."""
+        return np.array(
+            [
+                np.sum((root.T @ products[atom.columns]) ** 2, axis=0)
+                for atom, root in zip(self.found.atoms, self._roots, strict=True)
+            ]
+        )
+
+    def amplitudes(self, index: int, products: Array) -> Array:
+        """Amplitudes of one atom in units of its secants."""
+        root = self._roots[index]
+        atom = self.found.atoms[index]
+        return np.asarray(root @ (root.T @ products[atom.columns]))
+
+    def simulated(self, samples: int = _SIMULATIONS) -> Array:
+        """Products that noise alone would give, its power known only so well; (p, samples)."""
+        random = np.random.default_rng(0)
+        out = np.zeros((len(self.inner), samples))
+        for part, freedom in zip(self._parts, self._freedom, strict=True):
+            values, vectors = np.linalg.eigh(part)
+            root = vectors * np.sqrt(np.maximum(values, 0.0))
+            factor = np.sqrt(freedom / random.chisquare(freedom, samples))
+            out += root @ (random.standard_normal((len(part), samples)) * factor)
+        return out
+
+    def _root(self, atom: Atom, plain: Array) -> Array:
+        """R with R Rᵀ the inverse of an atom's inner products, where they can be identified."""
+        inner = self.inner[atom.columns, atom.columns]
+        size = np.sqrt(np.maximum(plain[atom.columns], _NOTHING))
+        values, vectors = np.linalg.eigh(inner / np.outer(size, size))
+        kept = values > _UNIDENTIFIABLE
+        return np.asarray((vectors[:, kept] / np.sqrt(values[kept])) / size[:, None])
+
+
+def _cross(problem: Problem, jacobian: Array, columns: Array) -> tuple[Array, Array]:
+    """Per band: inner products of unknowns with columns, and among unknowns."""
+    count, q = len(problem.bands), jacobian.shape[1]
+    cross, normal = np.zeros((count, q, columns.shape[1])), np.zeros((count, q, q))
+    for band, rows in _pieces(problem):
+        cross[band] += jacobian[rows].T @ columns[rows]
+        normal[band] += jacobian[rows].T @ jacobian[rows]
+    return cross, normal
+
+
+def _pieces(problem: Problem) -> Iterator[tuple[int, slice]]:
+    """Runs of rows that lie in one noise band."""
+    for segment in problem.segments:
+        ids = problem.band_of_row[segment.rows]
+        edges = np.flatnonzero(np.diff(ids, prepend=-1, append=-1))
+        for low, high in pairwise(edges.tolist()):
+            yield int(ids[low]), slice(segment.rows.start + low, segment.rows.start + high)
+
+
+def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
+    """Scores of all atoms, best first: gain less (degrees of freedom) · ln(rows)."""
+    products = projected.products(residual)
+    out = []
+    for index, gain in enumerate(projected.gains(products).tolist()):
+        atom = projected.found.atoms[index]
+        value = gain - atom.freedom * float(np.log(rows))
+        strength = float(projected.inner[atom.columns.start, atom.columns.start])
+        out.append(Score(atom, gain, value, projected.amplitudes(index, products), strength))
+    return sorted(out, key=lambda s: -s.value)
+
+
+def chance_level(projected: Projected, rows: int) -> Array:
+    """Largest score over all atoms that noise alone gives, simulated, sorted; (samples,)."""
+    atoms = projected.found.atoms
+    if not atoms:
+        return np.zeros(1)
+    price = np.array([atom.freedom * np.log(rows) for atom in atoms])
+    gains = projected.gains(projected.simulated())
+    return np.asarray(np.sort((gains - price[:, None]).max(axis=0)))

@@ -1,0 +1,92 @@
+"""Signals in frequency: an orthonormal cosine transform, the torque's low-pass, noise bands.
+
+The cosine transform (DCT-II) extends a run evenly at its ends, so a trend makes no jump there;
+for stationary noise its coefficients are independent, with the noise's spectrum as variance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct, idct
+
+__all__ = ["Band", "band_edges", "low_pass", "to_frequency", "to_time", "torque_band"]
+
+Array = NDArray[np.float64]
+_BUTTERWORTH_ORDER = 4
+_TORQUE_BAND = 20.0
+_BANDS = 14
+_FEWEST = 8
+
+
+def torque_band(rate: float) -> float:
+    """Cut-off of the torque's low-pass: 20 Hz or a tenth of the sampling rate, Hz (DESIGN)."""
+    return min(_TORQUE_BAND, rate / 10)
+
+
+@dataclass(frozen=True)
+class Band:
+    """What of one output of one run is kept in frequency."""
+
+    count: int
+    """Samples of the run."""
+    rate: float
+    """Samples per second."""
+    cut_off: float | None = None
+    """Low-pass, Hz; None keeps all."""
+
+    @property
+    def frequency(self) -> Array:
+        """Of every kept coefficient, Hz, shape (kept,)."""
+        frequency = np.arange(self.count) * self.rate / (2 * self.count)
+        return frequency if self.cut_off is None else frequency[frequency <= self.cut_off]
+
+    @property
+    def gain(self) -> Array:
+        """Of a Butterworth filter run forward and backward, shape (kept,)."""
+        frequency = self.frequency
+        if self.cut_off is None:
+            return np.ones_like(frequency)
+        return 1 / (1 + (frequency / self.cut_off) ** (2 * _BUTTERWORTH_ORDER))
+
+
+def to_frequency(signal: Array, band: Band) -> Array:
+    """Coefficients of a signal within its band, shape (kept,)."""
+    full: Array = np.asarray(dct(signal, type=2, norm="ortho"))
+    gain = band.gain
+    return full[: len(gain)] * gain
+
+
+def to_time(coefficients: Array, band: Band) -> Array:
+    """Signal of coefficients, shape (band.count,)."""
+    full = np.zeros(band.count)
+    full[: len(coefficients)] = coefficients
+    return np.asarray(idct(full, type=2, norm="ortho"))
+
+
+def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
+    """Zero-phase 4th-order Butterworth low-pass of a signal without gaps, shape (n,)."""
+    full = np.asarray(dct(signal, type=2, norm="ortho"))
+    frequency = np.arange(len(signal)) * rate / (2 * len(signal))
+    gain = 1 / (1 + (frequency / cut_off) ** (2 * _BUTTERWORTH_ORDER))
+    return np.asarray(idct(full * gain, type=2, norm="ortho"))
+
+
+def band_edges(frequency: Array, copies: int) -> Array:
+    """Edges of about 14 logarithmic bands that each hold enough of ``frequency`` (Hz, sorted).
+
+    ``copies`` is how many independent spectra are pooled. Returns shape (bands + 1,), open ends.
+    """
+    positive = frequency[frequency > 0]
+    if len(positive) < 2 * _FEWEST:
+        return np.array([-np.inf, np.inf])
+    wanted = np.geomspace(positive[0], positive[-1], _BANDS + 1)[1:-1]
+    edges = [-np.inf]
+    for edge in wanted:
+        inside = np.count_nonzero((frequency >= edges[-1]) & (frequency < edge)) * copies
+        beyond = np.count_nonzero(frequency >= edge) * copies
+        if inside >= _FEWEST and beyond >= _FEWEST:
+            edges.append(float(edge))
+    return np.array([*edges, np.inf])

@@ -1,0 +1,1 @@
+"""CANopen: the bus, SDO nodes, PDO codec, heartbeats, emergencies and the CiA 402 axis."""

@@ -1,0 +1,154 @@
+"""The power state machine of CiA 402-2 as tables, and the control word for a wish.
+
+Pure: nothing here talks to a bus. Every way to stop uses quick stop (02h) and disable voltage
+(00h) only and can therefore never energise a drive, whatever state it is in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+__all__ = [
+    "DISABLE_VOLTAGE",
+    "ENABLE_OPERATION",
+    "FAULT_RESET",
+    "HALT",
+    "QUICK_STOP",
+    "SHUTDOWN",
+    "SWITCH_ON",
+    "TRANSITIONS",
+    "State",
+    "StatusBit",
+    "Transition",
+    "Wish",
+    "control_word",
+    "state_of",
+]
+
+
+class State(IntEnum):
+    """States of the power state machine; UNKNOWN is a status word that fits none."""
+
+    UNKNOWN = -1
+    NOT_READY_TO_SWITCH_ON = 0
+    SWITCH_ON_DISABLED = 1
+    READY_TO_SWITCH_ON = 2
+    SWITCHED_ON = 3
+    OPERATION_ENABLED = 4
+    QUICK_STOP_ACTIVE = 5
+    FAULT_REACTION_ACTIVE = 6
+    FAULT = 7
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+class StatusBit(IntEnum):
+    """Bits of the status word 6041h beside the state."""
+
+    VOLTAGE_ENABLED = 1 << 4
+    WARNING = 1 << 7
+    REMOTE = 1 << 9
+    TARGET_REACHED = 1 << 10
+    INTERNAL_LIMIT = 1 << 11
+    FOLLOWS_COMMAND = 1 << 12
+    """In cyclic modes."""
+
+
+class Wish(Enum):
+    """What the bench wants of the drive's power state."""
+
+    ENABLE = "enable"
+    RUN_DOWN = "run down"
+    """Stay enabled while a ramp brings it to rest; quick stop when that is not certain."""
+    HALT = "halt"
+    STOP = "stop"
+    """Quick stop; stays there."""
+    DISABLE = "disable"
+    """Quick stop, and switch on disabled once at rest."""
+    RESET = "reset"
+    """Clear a fault; stays disabled."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """A row of the standard's table; ``control`` is the word that commands it, if any."""
+
+    number: int
+    source: State
+    target: State
+    control: int | None
+
+
+SHUTDOWN = 0x06
+SWITCH_ON = 0x07
+ENABLE_OPERATION = 0x0F
+QUICK_STOP = 0x02
+DISABLE_VOLTAGE = 0x00
+FAULT_RESET = 0x80
+HALT = 0x100
+
+TRANSITIONS: tuple[Transition, ...] = (
+    Transition(1, State.NOT_READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED, None),
+    Transition(2, State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, SHUTDOWN),
+    Transition(3, State.READY_TO_SWITCH_ON, State.SWITCHED_ON, SWITCH_ON),
+    Transition(4, State.SWITCHED_ON, State.OPERATION_ENABLED, ENABLE_OPERATION),
+    Transition(5, State.OPERATION_ENABLED, State.SWITCHED_ON, SWITCH_ON),
+    Transition(6, State.SWITCHED_ON, State.READY_TO_SWITCH_ON, SHUTDOWN),
+    Transition(7, State.READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
+    Transition(8, State.OPERATION_ENABLED, State.READY_TO_SWITCH_ON, SHUTDOWN),
+    Transition(9, State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
+    Transition(10, State.SWITCHED_ON, State.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
+    Transition(11, State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, QUICK_STOP),
+    Transition(12, State.QUICK_STOP_ACTIVE, State.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
+    Transition(14, State.FAULT_REACTION_ACTIVE, State.FAULT, None),
+    Transition(15, State.FAULT, State.SWITCH_ON_DISABLED, FAULT_RESET),
+    Transition(16, State.QUICK_STOP_ACTIVE, State.OPERATION_ENABLED, ENABLE_OPERATION),
+)
+"""Transition 13, from any state into fault reaction, has no row: no word commands it."""
+
+_STATUS: tuple[tuple[int, int, State], ...] = (
+    (0x4F, 0x00, State.NOT_READY_TO_SWITCH_ON),
+    (0x4F, 0x40, State.SWITCH_ON_DISABLED),
+    (0x6F, 0x21, State.READY_TO_SWITCH_ON),
+    (0x6F, 0x23, State.SWITCHED_ON),
+    (0x6F, 0x27, State.OPERATION_ENABLED),
+    (0x6F, 0x07, State.QUICK_STOP_ACTIVE),
+    (0x4F, 0x0F, State.FAULT_REACTION_ACTIVE),
+    (0x4F, 0x08, State.FAULT),
+)
+
+_ENABLING = {
+    row.source: row.control for row in TRANSITIONS if row.number in (2, 3, 4) and row.control
+} | {State.OPERATION_ENABLED: ENABLE_OPERATION}
+_STAYING = {Wish.RUN_DOWN: ENABLE_OPERATION, Wish.HALT: ENABLE_OPERATION | HALT}
+
+
+def state_of(status: int) -> State:
+    """Power state that a status word 6041h says."""
+    for mask, value, state in _STATUS:
+        if status & mask == value:
+            return state
+    return State.UNKNOWN
+
+
+def control_word(
+    state: State, wish: Wish, *, previous: int = 0, fresh: bool = True, at_rest: bool = False
+) -> int:
+    """Control word 6040h that leads from ``state`` towards ``wish``.
+
+    Where nothing else is certain it is quick stop, which leads down from every state and, unlike
+    disable voltage, never lets a moving drive coast.
+
+    ``previous`` is the word sent last (a fault reset is an edge of bit 7), ``fresh`` whether the
+    state comes from a status word of this SYNC, ``at_rest`` whether the motor stands still.
+    """
+    if wish is Wish.ENABLE and state in _ENABLING:
+        return _ENABLING[state]
+    if fresh and state is State.OPERATION_ENABLED and wish in _STAYING:
+        return _STAYING[wish]
+    if fresh and state is State.FAULT and wish is Wish.RESET and not previous & FAULT_RESET:
+        return FAULT_RESET
+    leaves = wish in (Wish.DISABLE, Wish.ENABLE) and fresh and at_rest
+    return DISABLE_VOLTAGE if leaves and state is State.QUICK_STOP_ACTIVE else QUICK_STOP

@@ -1,0 +1,66 @@
+"""Heartbeats: those we listen to and the one we send, both told the time by their caller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+__all__ = ["HeartbeatProducer", "HeartbeatWatch", "NmtState"]
+
+
+class NmtState(IntEnum):
+    """State byte of a heartbeat."""
+
+    BOOT_UP = 0
+    STOPPED = 4
+    OPERATIONAL = 5
+    PRE_OPERATIONAL = 127
+
+
+@dataclass
+class HeartbeatWatch:
+    """Listens to one node; like a drive's own consumer it arms on the first heartbeat."""
+
+    timeout: float
+    """s."""
+    state: int | None = None
+    boot_ups: int = 0
+    last: float | None = None
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take a frame of 700h + node."""
+        if not data:
+            return
+        self.state = data[0] & 0x7F
+        self.last = now
+        if self.state == NmtState.BOOT_UP:
+            self.boot_ups += 1
+
+    def age(self, now: float) -> float | None:
+        """Seconds since the last heartbeat; None before the first."""
+        return None if self.last is None else now - self.last
+
+    def lost(self, now: float) -> bool:
+        """Whether an armed watch has waited longer than its timeout."""
+        return self.last is not None and now - self.last > self.timeout
+
+
+@dataclass
+class HeartbeatProducer:
+    """Says when the host's heartbeat is due.
+
+    The control loop asks once a cycle, so the beat stops when the loop hangs.
+    """
+
+    period: float
+    """s."""
+    _next: float = float("-inf")
+
+    def due(self, now: float) -> bool:
+        """Whether to send one now; then counts on to the next."""
+        if now < self._next:
+            return False
+        self._next = (
+            now + self.period if now - self._next > self.period else self._next + self.period
+        )
+        return True

@@ -1,0 +1,75 @@
+"""Writes PDO parameters in the order that the standard asks for, and reads them back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.pdo import PdoCodec, parse_object
+from winchkit.schema.device import PdoSpec
+
+__all__ = ["Direction", "cob_id", "codecs", "set_up"]
+
+Direction = Literal["tpdo", "rpdo"]
+
+_INVALID = 1 << 31
+_NO_RTR = 1 << 30
+_COMMUNICATION = {"tpdo": 0x1800, "rpdo": 0x1400}
+_MAPPING = {"tpdo": 0x1A00, "rpdo": 0x1600}
+_FIRST_COB = {"tpdo": 0x180, "rpdo": 0x200}
+_PREDEFINED = range(1, 5)
+
+
+def cob_id(direction: Direction, number: int, node: int) -> int:
+    """Identifier of the predefined connection set."""
+    return _FIRST_COB[direction] + 0x100 * (number - 1) + node
+
+
+def codecs(node: SdoNode, specs: Iterable[PdoSpec]) -> tuple[PdoCodec, ...]:
+    """Codecs of the PDOs of a device file, typed by the EDS."""
+    return tuple(
+        PdoCodec(spec, [node.mapped(*parse_object(text)) for text in spec.objects])
+        for spec in specs
+    )
+
+
+def set_up(node: SdoNode, direction: Direction, wanted: tuple[PdoCodec, ...]) -> None:
+    """Map ``wanted`` and switch every other predefined PDO of this direction off.
+
+    The node must be pre-operational. Raises NoReply, DeviceRefused.
+    """
+    by_number = {codec.spec.number: codec for codec in wanted}
+    for number in _PREDEFINED:
+        record = _COMMUNICATION[direction] + number - 1
+        codec = by_number.get(number)
+        if codec is not None:
+            _map(node, direction, codec)
+            continue
+        identifier = node.read_if_there(record, 1)
+        if identifier is not None and not identifier & _INVALID:
+            node.write(record, 1, identifier | _INVALID)
+
+
+def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
+    number = codec.spec.number
+    record = _COMMUNICATION[direction] + number - 1
+    mapping = _MAPPING[direction] + number - 1
+    identifier = cob_id(direction, number, node.node)
+    if direction == "tpdo":
+        identifier |= _NO_RTR
+    node.write(record, 1, identifier | _INVALID)
+    node.write_verified(record, 2, codec.spec.transmission)
+    node.write(mapping, 0, 0)
+    for position, item in enumerate(codec.objects, start=1):
+        node.write_verified(mapping, position, item.entry)
+    node.write_verified(mapping, 0, len(codec.objects))
+    node.write(record, 1, identifier)
+    _verify_identifier(node, record, identifier)
+
+
+def _verify_identifier(node: SdoNode, record: int, identifier: int) -> None:
+    """Compare the COB-ID, letting a device keep its own mind about the RTR bit."""
+    kept = node.read(record, 1)
+    if (kept ^ identifier) & ~_NO_RTR:
+        node.write_verified(record, 1, identifier)

@@ -1,0 +1,129 @@
+"""Binds effects to a profile: ``[[effect]]`` tables and shorthands become terms with values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.effect import Effect, Parameter
+from winchkit.errors import Fault, FileError, UsageError
+from winchkit.model.line import At, Line, Modifier
+from winchkit.schema.winch import EffectTable, WinchProfile
+from winchkit.units import dimension_of, parse, suggest
+
+__all__ = ["Term", "check_profile", "line_of", "modifiers_of", "terms_of"]
+
+_BESIDE_PARAMETERS = {"id", "fitted"}
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect with its values, as one profile or one hypothesis has it."""
+
+    effect: Effect
+    values: Mapping[str, float]
+
+    @property
+    def label(self) -> str:
+        """Its id, with the order where it has one."""
+        orders = [f"{self.values[p.name]:g}" for p in self.effect.parameters if p.whole]
+        return self.effect.id + (f"[{', '.join(orders)}]" if orders else "")
+
+    def modifier(self) -> Modifier:
+        """The term ready to act on a line."""
+        apply = partial(_act, self.effect, self.values)
+        return Modifier(self.effect.stage, apply, self.effect.order)
+
+
+def _act(effect: Effect, values: Mapping[str, float], value: Any, at: At) -> Any:
+    return effect.apply(value, at, values)
+
+
+def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:
+    """Modifiers of several terms."""
+    return tuple(term.modifier() for term in terms)
+
+
+def line_of(profile: WinchProfile, catalogue: Catalogue | None = None) -> Line:
+    """The line that a profile declares, its effects included."""
+    return Line(profile, modifiers_of(terms_of(profile, catalogue)))
+
+
+def terms_of(profile: WinchProfile, catalogue: Catalogue | None = None) -> tuple[Term, ...]:
+    """Terms of a profile, shorthands first. Raises FileError with every fault."""
+    terms, faults = _bind(profile, catalogue or load_catalogue())
+    if faults:
+        raise FileError(faults)
+    return tuple(terms)
+
+
+def check_profile(profile: WinchProfile, catalogue: Catalogue | None = None) -> list[Fault]:
+    """Every fault of the effects that a profile declares."""
+    return _bind(profile, catalogue or load_catalogue())[1]
+
+
+def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list[Fault]]:
+    terms = [_shorthand(catalogue[effect_id], values) for effect_id, values in _short(profile)]
+    faults: list[Fault] = []
+    for table in profile.effect:
+        if table.id not in catalogue:
+            known = [effect.id for effect in catalogue]
+            message = f"no effect '{table.id}'{suggest(table.id, known)}"
+            faults.append(Fault(message, table.path, table.line, "effect.id"))
+            continue
+        effect = catalogue[table.id]
+        if not effect.repeatable and any(term.effect.id == effect.id for term in terms):
+            message = "stands twice; it has no order, so once is enough"
+            faults.append(Fault(message, table.path, table.line, f"effect {table.id}"))
+        values, wrong = _values(effect, table)
+        faults.extend(wrong)
+        terms.append(Term(effect, values))
+    return terms, faults
+
+
+def _short(profile: WinchProfile) -> list[tuple[str, dict[str, float]]]:
+    """Shorthand keys of a profile as effects."""
+    cable, efficiency = profile.cable, profile.gearbox.efficiency
+    short: list[tuple[str, dict[str, float]]] = []
+    if cable.axial_stiffness is not None:
+        short.append(("cable-elongation-linear", {"axial_stiffness": cable.axial_stiffness}))
+    if cable.mass_per_length is not None:
+        short.append(("cable-weight", {"mass_per_length": cable.mass_per_length}))
+    if efficiency is not None:
+        short.append(("gear-efficiency", {"efficiency": efficiency}))
+    return short
+
+
+def _shorthand(effect: Effect, values: Mapping[str, float]) -> Term:
+    return Term(effect, effect.null | dict(values))
+
+
+def _values(effect: Effect, table: EffectTable) -> tuple[dict[str, float], list[Fault]]:
+    """Values of a table in SI, missing ones at their null, and what is wrong with them."""
+    values, faults = dict(effect.null), []
+    names = [p.name for p in effect.parameters]
+    for key, raw in table.values.items():
+        if key in _BESIDE_PARAMETERS:
+            continue
+        place = f"effect {effect.id}.{key}"
+        if key not in names:
+            message = f"unknown key; it has {', '.join(names)}{suggest(key, names)}"
+            faults.append(Fault(message, table.path, table.line, place))
+            continue
+        try:
+            values[key] = _quantity(raw, effect.parameter(key))
+        except UsageError as error:
+            faults.append(Fault(str(error), table.path, table.line, place))
+    return values, faults
+
+
+def _quantity(raw: object, parameter: Parameter) -> float:
+    value = parse(raw, dimension_of(parameter.unit) or "ratio")
+    if not parameter.low <= value <= parameter.high:
+        raise UsageError(
+            f"'{raw}' lies outside {parameter.low:g} to {parameter.high:g} {parameter.unit}"
+        )
+    return value

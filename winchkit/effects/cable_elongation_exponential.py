@@ -1,0 +1,48 @@
+"""cable-elongation-exponential: a rope that is soft when slack and stiff when tight."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(length: Array, at: At, values: Values) -> Array:
+    """Length with the strain k ln(1 + T/F0); a slack rope has none."""
+    tight = np.log1p(np.maximum(at.tension, 0.0) / values["force_scale"])
+    return length + at.stressed_length * values["strain_scale"] * tight
+
+
+EFFECT = Effect(
+    id="cable-elongation-exponential",
+    stage=Stage.ROPE,
+    parameters=(
+        Parameter("strain_scale", "1", null=0.0, typical=1e-3, low=0.0, high=0.2),
+        Parameter(
+            "force_scale",
+            "N",
+            null=200.0,
+            typical=200.0,
+            low=1.0,
+            high=1e6,
+            role="shape",
+            grid=(30.0, 100.0, 300.0, 1e3, 3e3),
+        ),
+    ),
+    apply=apply,
+    outputs=("cable_length",),
+    what="The rope's stiffness grows in proportion to its tension.",
+    formula="ℓ + ℓ_s k ln(1 + T/F0), hence T = F0 (exp(ε/k) − 1)",
+    source="IPAnema 3 paper, Eq. 6, re-based to zero strain at zero tension",
+    looks_like="Much stretch at low tension, little more at high tension.",
+    confused_with=(
+        "cable-elongation-linear",
+        "cable-elongation-quartic",
+        "cell-nonlinearity",
+    ),
+    told_apart="At least four loads, the lowest near slack.",
+    family="rope law",
+    needs=("rope_force",),
+)

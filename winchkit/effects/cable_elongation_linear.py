@@ -1,0 +1,35 @@
+"""cable-elongation-linear: the rope stretches under its tension."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(length: Array, at: At, values: Values) -> Array:
+    """Length with the strain T/EA over free and dead length."""
+    return length + at.stressed_length * at.tension / values["axial_stiffness"]
+
+
+EFFECT = Effect(
+    id="cable-elongation-linear",
+    stage=Stage.ROPE,
+    parameters=(
+        Parameter(
+            "axial_stiffness", "N", null=np.inf, typical=2e5, low=1e3, high=np.inf, reciprocal=True
+        ),
+    ),
+    apply=apply,
+    outputs=("cable_length",),
+    what="The rope is elastic: it is longer by its strain times its stressed length.",
+    formula="ℓ + ℓ_s T / EA, ℓ_s = ℓ + dead length",
+    source="Hooke; IPAnema 3 paper, Eq. 4; steel EA = 50–105 GPa × fill × area",
+    looks_like="A length error in proportion to tension times length.",
+    confused_with=("frame-compliance", "cable-elongation-quartic", "cable-elongation-exponential"),
+    told_apart="The same load at several lengths; several loads over the full stroke.",
+    family="rope law",
+    needs=("rope_force",),
+)

@@ -1,0 +1,86 @@
+"""cable-elongation-quartic: a rope whose stiffness changes with its strain."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+_SOFTEST = 0.1
+_TABLE = 513
+_NEWTON_STEPS = 4
+_HALVINGS = 60
+
+
+def apply(length: Array, at: At, values: Values) -> Array:
+    """Length with the strain of the quartic law; a slack rope has none."""
+    force = np.maximum(at.tension, 0.0) / values["k1"]
+    bend = (values["b2"], values["b3"], values["b4"])
+    strain = _solve(force, Polynomial([0.0, 1.0, *bend])) if any(bend) else force
+    return length + at.stressed_length * strain
+
+
+def _solve(force: Array, law: Polynomial) -> Array:
+    """Strain ε ≥ 0 with law(ε) = ``force`` (T/k1): a table, then Newton from there."""
+    slope = law.deriv()
+    end = _soft_end(slope)
+
+    def reach(strain: Array) -> tuple[Array, Array]:
+        inner = np.minimum(strain, end)
+        rate = np.maximum(slope(inner), _SOFTEST)
+        return law(inner) + rate * (strain - inner), rate
+
+    table = np.linspace(0.0, _largest(reach, float(np.max(force, initial=0.0))), _TABLE)
+    strain = np.interp(force, reach(table)[0], table)
+    for _ in range(_NEWTON_STEPS):
+        value, rate = reach(strain)
+        strain = strain - (value - force) / rate
+    return strain
+
+
+def _soft_end(slope: Polynomial) -> float:
+    """Strain from which the law goes on straight, so that every force has one strain."""
+    roots = (slope - _SOFTEST).roots()
+    real = roots.real[(np.abs(roots.imag) < 1e-12) & (roots.real > 0)]
+    return float(np.min(real, initial=1.0))
+
+
+def _largest(reach: Callable[[Array], tuple[Array, Array]], force: float) -> float:
+    """A strain just above that of the largest force, by halving."""
+    low, high = 0.0, force / _SOFTEST
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if reach(np.array(middle))[0] > force else (middle, high)
+    return high
+
+
+EFFECT = Effect(
+    id="cable-elongation-quartic",
+    stage=Stage.ROPE,
+    parameters=(
+        Parameter("k1", "N", null=np.inf, typical=2e5, low=1e3, high=np.inf, reciprocal=True),
+        Parameter("b2", "1", null=0.0, typical=100.0, low=-1e4, high=1e5, role="shape"),
+        Parameter("b3", "1", null=0.0, typical=3e4, low=-1e7, high=1e8, role="shape"),
+        Parameter("b4", "1", null=0.0, typical=1e7, low=-1e10, high=1e11, role="shape"),
+    ),
+    apply=apply,
+    outputs=("cable_length",),
+    what="The rope is stiffer (or softer) the more it is stretched: strands bed in.",
+    formula="ℓ + ℓ_s ε with T/k1 = ε + b2 ε² + b3 ε³ + b4 ε⁴, straight where softer than k1/10",
+    source="IPAnema 3 paper, Eq. 5, re-based to zero strain at zero tension",
+    looks_like="A length error over the tension that is curved, in proportion to the length.",
+    confused_with=(
+        "cable-elongation-linear",
+        "cable-elongation-exponential",
+        "cell-nonlinearity",
+    ),
+    told_apart="At least four loads over the whole range; the torque shows a curved cell.",
+    family="rope law",
+    contains=("cable-elongation-linear",),
+    needs=("rope_force",),
+    probes=({"k1": 2e5}, {"k1": 2e5, "b2": 100.0}, {"k1": 2e5, "b3": 3e4}),
+)

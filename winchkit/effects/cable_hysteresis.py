@@ -1,0 +1,47 @@
+"""cable-hysteresis: strands rub, so that the strain depends on where the tension came from."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.friction import dahl
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+_STUCK = 0.5
+
+
+def apply(length: Array, at: At, values: Values) -> Array:
+    """Length less the strain that the rope's inner friction holds back.
+
+    The friction takes half of a change of tension from rest and all of it right after a full
+    reversal, where the rope of that stiffness is stuck.
+    """
+    if values["fraction"] == 0.0:
+        return length
+    limit = values["fraction"] * np.abs(at.tension)
+    held = dahl(at.tension, limit, _STUCK, start=values["start"])
+    return length - at.stressed_length * held / values["stiffness"]
+
+
+EFFECT = Effect(
+    id="cable-hysteresis",
+    stage=Stage.ROPE,
+    parameters=(
+        Parameter("stiffness", "N", null=2e5, typical=2e5, low=1e3, high=1e9, role="shape"),
+        Parameter("fraction", "1", null=0.0, typical=0.05, low=0.0, high=0.9),
+        Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed"),
+    ),
+    apply=apply,
+    outputs=("cable_length",),
+    what="Friction between strands holds back strain: loading and unloading differ.",
+    formula="ℓ − ℓ_s F/EA, dF/dT = ½ (1 − s F/F_c), F_c = fraction·T; start: F/F_c at the start",
+    source="Dahl friction (Cable-winding device, Eq. 25) over the tension, the loop alone",
+    looks_like="A loop of the length error over the tension, whatever the rate.",
+    confused_with=("cable-creep", "drum-winding-tension", "gear-backlash"),
+    told_apart="The same tension cycle at two rates: creep changes its loop, hysteresis not.",
+    needs=("rope_force",),
+    order=1,
+    memory=True,
+    probes=({"fraction": 0.02}, {"fraction": 0.1}),
+)

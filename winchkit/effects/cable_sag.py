@@ -1,0 +1,42 @@
+"""cable-sag: the rope hangs through, so that its chord is shorter than the rope."""
+
+from math import cos
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import GRAVITY, At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(length: Array, at: At, values: Values) -> Array:
+    """Length less w² ℓ³ cos²(inclination) / 24 T².
+
+    The parabola holds while the tension exceeds the rope's weight across the chord; below, that
+    weight stands for the tension.
+    """
+    weight = values["mass_per_length"] * GRAVITY * np.abs(at.free_length)
+    across = weight * abs(cos(at.profile.path.inclination))
+    tension = np.maximum(at.tension, across)
+    ratio: Array = np.divide(across, tension, out=np.zeros_like(across), where=tension > 0)
+    return length - at.free_length * ratio**2 / 24
+
+
+EFFECT = Effect(
+    id="cable-sag",
+    stage=Stage.ROPE,
+    parameters=(Parameter("mass_per_length", "kg/m", null=0.0, typical=0.14, low=0.0, high=50.0),),
+    apply=apply,
+    outputs=("cable_length",),
+    what="The rope's own weight bends it; the straight distance is shorter than the rope.",
+    formula="ℓ − w² ℓ³ cos²(inclination) / 24 T², w = mass_per_length·g",
+    source="parabola for a shallow catenary (Irvine, Cable Structures)",
+    looks_like="A length error only near slack and on long ropes, in proportion to ℓ³/T².",
+    confused_with=("cable-elongation-linear", "cable-elongation-exponential"),
+    told_apart="Low tension over the full stroke; a hanging rope does not sag.",
+    needs=("rope_force",),
+    order=4,
+    probes=({"mass_per_length": 0.14},),
+)

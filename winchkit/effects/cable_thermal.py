@@ -1,0 +1,33 @@
+"""cable-thermal: the rope grows with its temperature."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+_AT_DECLARED_LENGTH = 20.0
+
+
+def apply(length: Array, at: At, values: Values) -> Array:
+    """Length with the strain α (temperature − 20 °C) over free and dead length."""
+    warmer = at.temperature - _AT_DECLARED_LENGTH
+    return length + at.stressed_length * (values["expansion"] * warmer)
+
+
+EFFECT = Effect(
+    id="cable-thermal",
+    stage=Stage.ROPE,
+    parameters=(Parameter("expansion", "1/K", null=0.0, typical=1.1e-5, low=-1e-4, high=1e-4),),
+    apply=apply,
+    outputs=("cable_length",),
+    what="The rope expands (steel) or shrinks (HMPE) as it warms.",
+    formula="ℓ + ℓ_s α (temperature − 20 °C)",
+    source="linear thermal expansion; steel 1.1e-5 1/K, HMPE −1.2e-5 1/K",
+    looks_like="A length error in proportion to temperature times length.",
+    confused_with=("cable-creep",),
+    told_apart="Temperature up and down at constant load.",
+    needs=("temperature",),
+    order=3,
+)

@@ -1,0 +1,33 @@
+"""cable-weight: the rope hangs on itself."""
+
+from math import sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import GRAVITY, At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Tension with the weight of the free rope along its direction on it."""
+    along = GRAVITY * sin(at.profile.path.inclination)
+    return tension + values["mass_per_length"] * along * at.free_length
+
+
+EFFECT = Effect(
+    id="cable-weight",
+    stage=Stage.ROPE_WEIGHT,
+    parameters=(Parameter("mass_per_length", "kg/m", null=0.0, typical=0.14, low=0.0, high=50.0),),
+    apply=apply,
+    outputs=("tension", "motor_torque"),
+    what="The free rope's own weight adds to the tension on the way up to the winch.",
+    formula="T + m g ℓ sin(inclination)",
+    source="statics; 6 mm steel rope 0.14 kg/m",
+    looks_like="A tension error in proportion to the free length, whatever the load.",
+    confused_with=("cell-offset", "cell-drift"),
+    told_apart="The full stroke, up and down.",
+    needs=("load",),
+)

@@ -1,0 +1,203 @@
+"""An effect's card: its words, its parameters, and its signature drawn from its own code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf, isfinite
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.bind import Term
+from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
+from winchkit.model.line import Line
+
+__all__ = ["Signature", "card", "card_data", "signature", "sparkline", "usual_values"]
+
+Array = NDArray[np.float64]
+_UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
+_BARS = "▁▂▃▄▅▆▇█"
+_WIDTH = 64
+_SAMPLES = 400
+_COLUMNS = 100
+_MARGIN = 15
+_FLAT = 1e-9
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What an effect of usual size changes along the standard motion; arrays (n,), SI."""
+
+    values: Mapping[str, float]
+    time: Array
+    cable_length: Array
+    """Of the bare line, for orientation, m."""
+    changes: Mapping[str, Array]
+    """By output, only those that change."""
+
+
+def usual_values(effect: Effect) -> dict[str, float]:
+    """Values of a usual size: amplitudes at their typical, shapes at their default."""
+    sizes = {p.name: p.typical for p in effect.parameters if p.role == "amplitude"}
+    return effect.null | sizes | dict(effect.probes[-1] if effect.probes else {})
+
+
+def signature(effect: Effect) -> Signature:
+    """Signature of an effect on the standard motion."""
+    motion = standard_motion()
+    values = usual_values(effect)
+    bare = Line(STANDARD_PROFILE).predict(motion)
+    changed = Line(STANDARD_PROFILE, (Term(effect, values).modifier(),)).predict(motion)
+    changes = {name: changed[name] - bare[name] for name in bare}
+    return Signature(
+        values=values,
+        time=motion.at.time,
+        cable_length=bare["cable_length"],
+        changes={name: change for name, change in changes.items() if np.any(change != 0)},
+    )
+
+
+def sparkline(values: Array, width: int = _WIDTH) -> str:
+    """Values as ``width`` bars from their lowest to their highest; a gap where all are NaN.
+
+    Each bar is the value of its stretch that lies farthest from the median, so that spikes show.
+    """
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return " " * width
+    low, span, middle = float(finite.min()), float(np.ptp(finite)), float(np.median(finite))
+    if span <= _FLAT * float(np.max(np.abs(finite))):
+        return _BARS[len(_BARS) // 2] * width
+    bars = ""
+    for stretch in np.array_split(values, width):
+        here = stretch[np.isfinite(stretch)]
+        if len(here):
+            farthest = float(here[np.argmax(np.abs(here - middle))])
+            bars += _BARS[round((farthest - low) / span * (len(_BARS) - 1))]
+        else:
+            bars += " "
+    return bars
+
+
+def card(effect: Effect) -> str:
+    """The card as text of at most 100 columns."""
+    paragraphs = [
+        ("What", effect.what),
+        ("Formula", effect.formula),
+        ("Source", effect.source),
+        ("Changes", ", ".join(effect.outputs)),
+        ("Needs", ", ".join(effect.needs) or "nothing beside the motor angle"),
+        ("Family", effect.family),
+        ("Contains", ", ".join(effect.contains)),
+        ("Looks like", effect.looks_like),
+        ("Confused with", ", ".join(effect.confused_with)),
+        ("Told apart by", effect.told_apart),
+    ]
+    lines = [effect.id, ""]
+    lines += [_paragraph(title, text) for title, text in paragraphs if text]
+    lines += ["", "Parameters", *_table(effect), "", *_drawing(effect)]
+    return "\n".join(lines)
+
+
+def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
+    """The card as data for JSON; infinities and NaN are None, SI units."""
+    drawn = signature(effect)
+    return {
+        "id": effect.id,
+        "what": effect.what,
+        "formula": effect.formula,
+        "source": effect.source,
+        "outputs": list(effect.outputs),
+        "needs": list(effect.needs),
+        "family": effect.family,
+        "contains": list(effect.contains),
+        "looks_like": effect.looks_like,
+        "confused_with": list(effect.confused_with),
+        "told_apart": effect.told_apart,
+        "parameters": [_parameter_data(p) for p in effect.parameters],
+        "signature": {
+            "values": {name: _finite(x) for name, x in drawn.values.items()},
+            "time": _listed(drawn.time, width),
+            "cable_length": _listed(drawn.cable_length, width),
+            "changes": {
+                name: {"unit": _UNITS[name], "values": _listed(change, width)}
+                for name, change in drawn.changes.items()
+            },
+        },
+    }
+
+
+def _paragraph(title: str, text: str) -> str:
+    return fill(
+        text,
+        width=_COLUMNS,
+        initial_indent=f"{title:<{_MARGIN}}",
+        subsequent_indent=" " * _MARGIN,
+    )
+
+
+def _table(effect: Effect) -> list[str]:
+    rows = [("name", "unit", "vanishes at", "typical", "range", "kind")]
+    for p in effect.parameters:
+        gone = f"{p.null:g}" if p.role == "amplitude" else f"(default {p.null:g})"
+        rows.append((p.name, p.unit, gone, f"{p.typical:g}", _range(p), _kind(p)))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return [
+        "  " + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _kind(parameter: Parameter) -> str:
+    return "whole order" if parameter.whole else parameter.role
+
+
+def _range(parameter: Parameter) -> str:
+    if parameter.low == -inf and parameter.high == inf:
+        return "any"
+    if parameter.high == inf:
+        return f"from {parameter.low:g}"
+    return f"{parameter.low:g} to {parameter.high:g}"
+
+
+def _drawing(effect: Effect) -> list[str]:
+    """The signature over time, one line per output that changes."""
+    drawn = signature(effect)
+    usual = ", ".join(f"{name} {x:g}" for name, x in drawn.values.items() if isfinite(x))
+    lines = [
+        f"Signature over {drawn.time[-1]:.0f} s of the standard motion"
+        " (fast and slow stroke under 15 kg, then 45 kg), with",
+        f"  {usual}",
+        f"  {'moves':<13}{sparkline(drawn.cable_length)}  cable_length",
+    ]
+    for name, change in drawn.changes.items():
+        low, high = float(np.nanmin(change)), float(np.nanmax(change))
+        lines.append(f"  {name:<13}{sparkline(change)}  {low:+.3g} to {high:+.3g} {_UNITS[name]}")
+    return lines if drawn.changes else [*lines, "  no change on this motion"]
+
+
+def _listed(values: Array, width: int) -> list[float | None]:
+    """``width`` of the values at most, evenly spaced."""
+    index = np.linspace(0, len(values) - 1, min(width, len(values))).round().astype(int)
+    return [_finite(x) for x in values[index].tolist()]
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _parameter_data(parameter: Parameter) -> dict[str, Any]:
+    return {
+        "name": parameter.name,
+        "unit": parameter.unit,
+        "null": _finite(parameter.null),
+        "typical": parameter.typical,
+        "low": _finite(parameter.low),
+        "high": _finite(parameter.high),
+        "role": parameter.role,
+        "whole": parameter.whole,
+    }

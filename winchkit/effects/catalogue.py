@@ -1,0 +1,102 @@
+"""The catalogue: every effect of this package, of entry points and of a user's own files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from pkgutil import iter_modules
+
+from winchkit.effects.effect import Effect
+from winchkit.errors import Fault, FileError, UsageError
+from winchkit.units import dimension_of, suggest
+
+__all__ = ["Catalogue", "load_catalogue"]
+
+_MECHANISM = {"effect", "catalogue", "bind", "coordinates", "empirical", "card", "standard"}
+
+
+class Catalogue:
+    """Effects by id, in a fixed order: simple ones first."""
+
+    def __init__(self, effects: Iterable[Effect]) -> None:
+        self._by_id = {effect.id: effect for effect in effects}
+
+    def __iter__(self) -> Iterator[Effect]:
+        return iter(self._by_id.values())
+
+    def __len__(self) -> int:
+        return len(self._by_id)
+
+    def __contains__(self, effect_id: object) -> bool:
+        return effect_id in self._by_id
+
+    def __getitem__(self, effect_id: str) -> Effect:
+        try:
+            return self._by_id[effect_id]
+        except KeyError:
+            raise UsageError(
+                f"no effect '{effect_id}'{suggest(effect_id, list(self._by_id))}"
+                " ('winchkit effects' lists them)"
+            ) from None
+
+
+def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:
+    """All effects: the package's own, entry points ``winchkit.effects``, then ``files``.
+
+    Raises FileError where a user's file cannot be loaded or holds no effect.
+    """
+    found: list[Effect] = []
+    package = import_module("winchkit.effects")
+    for module in iter_modules(package.__path__):
+        if module.name not in _MECHANISM:
+            found.append(import_module(f"winchkit.effects.{module.name}").EFFECT)
+    for point in entry_points(group="winchkit.effects"):
+        found.extend(_effects_in(point.load(), point.name))
+    for file in files:
+        found.extend(_from_file(Path(file)))
+    for effect in found:
+        _check(effect)
+    return Catalogue(sorted(found, key=lambda effect: (len(effect.parameters), effect.id)))
+
+
+def _from_file(path: Path) -> list[Effect]:
+    """Effects of a user's Python file: its module-level ``Effect`` objects."""
+    if not path.is_file():
+        raise FileError(Fault("no such file of effects", str(path)))
+    spec = spec_from_file_location(f"winchkit_user_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise FileError(Fault("not a Python file (.py)", str(path)))
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        line = getattr(error, "lineno", None)
+        raise FileError(Fault(f"cannot be run: {error!r}", str(path), line)) from error
+    return _effects_in(module, str(path))
+
+
+def _effects_in(thing: object, where: str) -> list[Effect]:
+    """Effects in a module, or the effect itself."""
+    if isinstance(thing, Effect):
+        return [thing]
+    effects = [value for value in vars(thing).values() if isinstance(value, Effect)]
+    if not effects:
+        raise FileError(Fault("holds no winchkit.effects.effect.Effect", where))
+    return effects
+
+
+def _check(effect: Effect) -> None:
+    """Refuse an effect whose declaration contradicts itself."""
+    for parameter in effect.parameters:
+        if dimension_of(parameter.unit) is None:
+            raise FileError(
+                f"effect '{effect.id}': {parameter.name}: unknown unit '{parameter.unit}'"
+            )
+        if not parameter.low <= parameter.null <= parameter.high:
+            raise FileError(
+                f"effect '{effect.id}': {parameter.name}: null {parameter.null:g} lies outside "
+                f"[{parameter.low:g}, {parameter.high:g}]"
+            )

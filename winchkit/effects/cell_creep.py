@@ -1,0 +1,48 @@
+"""cell-creep: the reading goes on changing after a step of the load."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+from winchkit.model.recurrence import first_order_lag
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Reading with a creeping share of it on top; creep starts at zero."""
+    begun = values["start"] * float(tension[0])
+    crept = first_order_lag(tension, at.time, values["time_constant"], begun)
+    return tension + values["fraction"] * crept
+
+
+EFFECT = Effect(
+    id="cell-creep",
+    stage=Stage.CELL,
+    parameters=(
+        Parameter("fraction", "1", null=0.0, typical=1e-3, low=-0.1, high=0.1),
+        Parameter(
+            "time_constant",
+            "s",
+            null=600.0,
+            typical=600.0,
+            low=1.0,
+            high=1e5,
+            role="shape",
+            grid=(30.0, 120.0, 600.0, 1800.0),
+        ),
+        Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=2.0, role="fixed"),
+    ),
+    apply=apply,
+    outputs=("tension",),
+    what="The spring element of the cell settles under load and recovers without.",
+    formula="T + f c, c' = (T − c)/τ; start: c/T at the run's start",
+    source="creep of load cells, OIML R60: about 0.03 % in 30 min",
+    looks_like="The reading drifts after a load step, and again after unloading.",
+    confused_with=("cell-drift", "cable-creep"),
+    told_apart="Hold after a load step, then unload; cable-creep moves the length instead.",
+    needs=("load",),
+    order=4,
+    memory=True,
+)

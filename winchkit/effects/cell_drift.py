@@ -1,0 +1,31 @@
+"""cell-drift: the load cell's zero moves with time."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Reading T + d t, t from the run's start."""
+    return tension + values["drift"] * at.time
+
+
+EFFECT = Effect(
+    id="cell-drift",
+    stage=Stage.CELL,
+    parameters=(Parameter("drift", "N/s", null=0.0, typical=0.02, low=-100.0, high=100.0),),
+    apply=apply,
+    outputs=("tension",),
+    what="The zero of the amplifier or the cell wanders, evenly in time.",
+    formula="T + d t, t from the run's start",
+    source="load-cell practice",
+    looks_like="A tension error that grows with the time, whatever the load.",
+    confused_with=("cell-thermal", "cell-creep", "cell-offset"),
+    told_apart="Temperature up and down; a repeat that starts anew.",
+    needs=("load",),
+    order=5,
+)

@@ -1,0 +1,32 @@
+"""cell-gain: the load cell's span is off."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Reading (1 + g) T."""
+    return tension * (1.0 + values["gain_error"])
+
+
+EFFECT = Effect(
+    id="cell-gain",
+    stage=Stage.CELL,
+    parameters=(Parameter("gain_error", "1", null=0.0, typical=0.01, low=-0.9, high=10.0),),
+    apply=apply,
+    outputs=("tension",),
+    what="The cell's span is wrong: calibration, mounting angle, a side path for the force.",
+    formula="(1 + g) T",
+    source="load-cell practice",
+    looks_like="A tension error in proportion to the tension, alike in both directions.",
+    confused_with=("pulley-coulomb", "pulley-capstan", "cell-nonlinearity", "torque-constant"),
+    told_apart="Several loads in both directions; the torque tells it from a wrong load.",
+    family="cell static",
+    needs=("load",),
+    order=0,
+)

@@ -1,0 +1,41 @@
+"""cell-hysteresis: the load cell reads less while loaded up than while unloaded."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.friction import dahl
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+_REACH = 0.1
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Reading less a Dahl loop of fraction·T that builds up over a tenth of the tension."""
+    fraction = values["fraction"]
+    if fraction == 0.0:
+        return tension
+    limit = fraction * np.abs(tension)
+    return tension - dahl(tension, limit, fraction / _REACH, start=values["start"])
+
+
+EFFECT = Effect(
+    id="cell-hysteresis",
+    stage=Stage.CELL,
+    parameters=(
+        Parameter("fraction", "1", null=0.0, typical=2e-3, low=0.0, high=0.2),
+        Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed"),
+    ),
+    apply=apply,
+    outputs=("tension",),
+    what="Micro-slip in the cell and its mounting: loading and unloading read differently.",
+    formula="T − F, dF/dT = 10 f (1 − s F/F_c), F_c = f T; start: F/F_c at the run's start",
+    source="Dahl loop over the tension; combined error of data sheets",
+    looks_like="A loop of the tension error over the tension, whatever the motion.",
+    confused_with=("pulley-dahl", "pulley-coulomb"),
+    told_apart="Static weights up and down, without motion.",
+    needs=("load",),
+    order=3,
+    memory=True,
+)

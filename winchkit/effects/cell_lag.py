@@ -1,0 +1,32 @@
+"""cell-lag: the amplifier of the load cell filters."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+from winchkit.model.recurrence import first_order_lag
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Reading after a first-order filter that starts at the first value."""
+    return first_order_lag(tension, at.time, values["time_constant"])
+
+
+EFFECT = Effect(
+    id="cell-lag",
+    stage=Stage.CELL,
+    parameters=(Parameter("time_constant", "s", null=0.0, typical=0.05, low=0.0, high=10.0),),
+    apply=apply,
+    outputs=("tension",),
+    what="The cell's amplifier filters its reading: it comes late and rounded.",
+    formula="τ T_m' + T_m = T",
+    source="first-order filter, exact for a signal linear between samples",
+    looks_like="A tension error in proportion to how fast the tension changes.",
+    confused_with=("pulley-inertia", "pulley-dahl"),
+    told_apart="Fast moves under two loads, and a step of the load.",
+    needs=("load",),
+    order=7,
+)

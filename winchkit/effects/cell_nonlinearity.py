@@ -1,0 +1,33 @@
+"""cell-nonlinearity: the load cell's characteristic is bent."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+_UNIT_TENSION = 500.0
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Reading T + q (T/500 N)²."""
+    return tension + values["quadratic"] * (tension / _UNIT_TENSION) ** 2
+
+
+EFFECT = Effect(
+    id="cell-nonlinearity",
+    stage=Stage.CELL,
+    parameters=(Parameter("quadratic", "N", null=0.0, typical=5.0, low=-1e4, high=1e4),),
+    apply=apply,
+    outputs=("tension",),
+    what="The cell's sensitivity changes with the load: overload, side force, a wrong mounting.",
+    formula="T + q (T/500 N)²",
+    source="second-order characteristic of a load cell",
+    looks_like="A tension error that is curved over the tension.",
+    confused_with=("cell-gain", "cable-elongation-quartic"),
+    told_apart="At least three loads over the cell's range.",
+    family="cell static",
+    needs=("load",),
+    order=2,
+)

@@ -1,0 +1,32 @@
+"""cell-thermal: the load cell's zero moves with temperature."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+_AT_CALIBRATION = 20.0
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Reading T + k (temperature − 20 °C)."""
+    return tension + values["sensitivity"] * (at.temperature - _AT_CALIBRATION)
+
+
+EFFECT = Effect(
+    id="cell-thermal",
+    stage=Stage.CELL,
+    parameters=(Parameter("sensitivity", "N/K", null=0.0, typical=0.5, low=-1e3, high=1e3),),
+    apply=apply,
+    outputs=("tension",),
+    what="The zero of the cell follows its temperature.",
+    formula="T + k (temperature − 20 °C)",
+    source="temperature effect on zero, as data sheets give it",
+    looks_like="A tension error that follows the temperature, whatever the load.",
+    confused_with=("cell-drift", "cell-offset"),
+    told_apart="Temperature up and down.",
+    needs=("load", "temperature"),
+    order=6,
+)

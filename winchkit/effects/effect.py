@@ -1,0 +1,83 @@
+"""What an effect is: a stage, parameters, a pure function, and words.
+
+A user's own effect is one such object in a Python file (``--effects mine.py``) or behind the
+entry point group ``winchkit.effects``; it takes part in everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from winchkit.model.line import At, Stage
+
+__all__ = ["Effect", "Need", "Parameter", "Values"]
+
+Values = Mapping[str, float]
+Need = Literal["cable", "layers", "guide", "pulley", "temperature", "load", "rope_force", "gearing"]
+Output = Literal["cable_length", "tension", "motor_torque"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect, as files give it."""
+
+    name: str
+    unit: str
+    null: float
+    """Value at which the effect vanishes; for a shape, the default."""
+    typical: float
+    """Size that is usual, in ``unit``: prior scale and secant step."""
+    low: float = float("-inf")
+    high: float = float("inf")
+    role: Literal["amplitude", "shape", "fixed"] = "amplitude"
+    """A shape says how an effect looks, an amplitude how large it is; a fixed one is not fitted."""
+    reciprocal: bool = False
+    """Fitted as 1/value, since the null is infinite (stiffnesses)."""
+    grid: tuple[float, ...] = ()
+    """Coarse values of a shape to score at."""
+    whole: bool = False
+    """A whole number (an order): scanned over the grid, never refined."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical phenomenon that a model lacks or has."""
+
+    id: str
+    stage: Stage
+    parameters: tuple[Parameter, ...]
+    apply: Callable[[Any, At, Values], Any]
+    """Value of the stage with the effect: pure, exactly the value given at the null."""
+    outputs: tuple[Output, ...]
+    """Outputs that it changes."""
+    what: str
+    formula: str
+    source: str
+    looks_like: str
+    told_apart: str
+    """Which run separates it from what it is confused with."""
+    confused_with: tuple[str, ...] = ()
+    family: str = ""
+    contains: tuple[str, ...] = ()
+    """Effects that are special cases of it and must not stand beside it."""
+    needs: tuple[Need, ...] = ()
+    order: int = 0
+    polar: tuple[str, str] | None = None
+    """Amplitude and phase fitted as a pair of cosine and sine amplitudes."""
+    memory: bool = False
+    """Starts in a state that a run may fit: parameter ``start`` of role ``fixed``, null 0."""
+    repeatable: bool = False
+    """May stand several times, with other orders."""
+    probes: tuple[Mapping[str, float], ...] = field(default=())
+    """Values whose secants make the signature where single parameters have no gradient."""
+
+    def parameter(self, name: str) -> Parameter:
+        """A parameter by name."""
+        return next(p for p in self.parameters if p.name == name)
+
+    @property
+    def null(self) -> dict[str, float]:
+        """The values at which it vanishes."""
+        return {p.name: p.null for p in self.parameters}

@@ -1,0 +1,42 @@
+"""encoder-slip: the coupling of the encoder slips once, and the drum angle is off for good."""
+
+import numpy as np
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Path, Stage
+
+_DURATION = 0.4
+
+
+def apply(path: Path, at: At, values: Values) -> Path:
+    """Drum angle with a step that begins at t0 and takes 0.4 s."""
+    slipped = np.clip((at.time - values["time"]) / _DURATION, 0.0, 1.0)
+    return Path(path.value + values["step"] * slipped, path.slope)
+
+
+EFFECT = Effect(
+    id="encoder-slip",
+    stage=Stage.DRUM_ANGLE,
+    parameters=(
+        Parameter("step", "rad", null=0.0, typical=0.02, low=-7.0, high=7.0),
+        Parameter(
+            "time",
+            "s",
+            null=60.0,
+            typical=90.0,
+            low=0.0,
+            high=86400.0,
+            role="shape",
+            grid=(2, 6, 12, 20, 30, 45, 60, 80, 100, 125, 150, 180),
+        ),
+    ),
+    apply=apply,
+    outputs=("cable_length", "motor_torque"),
+    what="A coupling or a belt slipped: from then on drum and encoder disagree.",
+    formula="φ + Δφ ramp((t − t0) / 0.4 s), t from the run's start",
+    source="field experience; a step is spread so that a fit can find its time",
+    looks_like="A step of the length at one moment that does not return.",
+    confused_with=("cable-creep", "gear-backlash"),
+    told_apart="Return to the same place at the end of the run: creep recovers, a slip stays.",
+    order=3,
+)

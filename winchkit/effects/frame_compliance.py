@@ -1,0 +1,34 @@
+"""frame-compliance: the frame gives under the rope's force."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(length: Array, at: At, values: Values) -> Array:
+    """Length with T/k on it."""
+    return length + at.tension / values["stiffness"]
+
+
+EFFECT = Effect(
+    id="frame-compliance",
+    stage=Stage.FRAME,
+    parameters=(
+        Parameter(
+            "stiffness", "N/m", null=np.inf, typical=2e5, low=100.0, high=np.inf, reciprocal=True
+        ),
+    ),
+    apply=apply,
+    outputs=("cable_length",),
+    what="Mast, pulley brackets and exit point move towards the load.",
+    formula="ℓ + T/k",
+    source="Hooke",
+    looks_like="A length error in proportion to the tension, the same at every length.",
+    confused_with=("cable-elongation-linear",),
+    told_apart="The same load at several lengths; several loads over the full stroke.",
+    needs=("rope_force",),
+)

@@ -1,0 +1,30 @@
+"""gear-efficiency: the gearbox loses a share of the power."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque τ η^(−s): more winding in, less paying out."""
+    return torque * values["efficiency"] ** -at.direction
+
+
+EFFECT = Effect(
+    id="gear-efficiency",
+    stage=Stage.GEARBOX,
+    parameters=(Parameter("efficiency", "1", null=1.0, typical=0.9, low=0.05, high=1.0),),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="Tooth friction in proportion to the load: the motor gives more and gets less back.",
+    formula="τ/η winding in, τ η paying out, smooth between",
+    source="Cable-winding device, Eq. 10: 0.68 over six bearings and a belt",
+    looks_like="A step of the torque error with the direction, in proportion to the load.",
+    confused_with=("torque-constant", "motor-coulomb", "pulley-coulomb"),
+    told_apart="Two loads in both directions.",
+    needs=("rope_force", "gearing"),
+)

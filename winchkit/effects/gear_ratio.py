@@ -1,0 +1,26 @@
+"""gear-ratio: the gearbox turns the drum a little more or less than the profile says."""
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Path, Stage
+
+
+def apply(path: Path, at: At, values: Values) -> Path:
+    """Drum angle and its slope with the ratio i (1 + e)."""
+    share = 1.0 + values["ratio_error"]
+    return Path(path.value / share, path.slope / share)
+
+
+EFFECT = Effect(
+    id="gear-ratio",
+    stage=Stage.DRUM_ANGLE,
+    parameters=(Parameter("ratio_error", "1", null=0.0, typical=5e-3, low=-0.5, high=1.0),),
+    apply=apply,
+    outputs=("cable_length", "motor_torque"),
+    what="The gearbox or belt has another ratio than the profile: a rounded or wrong number.",
+    formula="φ = θ / (i (1 + e))",
+    source="kinematics of a gearbox",
+    looks_like="A length error in proportion to the motor angle, whatever the tension.",
+    confused_with=("drum-radius", "layer-thickness"),
+    told_apart="An encoder on the drum; on a layered drum a stroke over several layers.",
+    needs=("gearing",),
+)

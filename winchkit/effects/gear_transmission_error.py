@@ -1,0 +1,46 @@
+"""gear-transmission-error: the gear does not turn evenly, in a whole order of the motor turn."""
+
+import numpy as np
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Path, Stage
+
+
+def apply(path: Path, at: At, values: Values) -> Path:
+    """Drum angle with a sin(kθ + p) on it, and its derivative by the motor angle."""
+    size, order = values["amplitude"], values["order"]
+    turned = order * at.motor_angle + values["phase"]
+    return Path(path.value + size * np.sin(turned), path.slope + size * order * np.cos(turned))
+
+
+EFFECT = Effect(
+    id="gear-transmission-error",
+    stage=Stage.DRUM_ANGLE,
+    parameters=(
+        Parameter("amplitude", "rad", null=0.0, typical=2e-4, low=0.0, high=0.05),
+        Parameter("phase", "rad", null=0.0, typical=1.0),
+        Parameter(
+            "order",
+            "1",
+            null=1.0,
+            typical=2.0,
+            low=1.0,
+            high=1000.0,
+            role="shape",
+            grid=(1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 18, 24, 36),
+            whole=True,
+        ),
+    ),
+    apply=apply,
+    outputs=("cable_length", "motor_torque"),
+    what="Teeth and shafts run out: the drum leads and lags within each motor turn.",
+    formula="φ + a sin(k θ + p), k whole per motor turn",
+    source="static transmission error of gears, one harmonic",
+    looks_like="A ripple over the motor angle: in length, and in torque in proportion to the load.",
+    confused_with=("motor-cogging", "drum-eccentricity"),
+    told_apart="A scan of the orders under two loads: cogging does not grow with the load.",
+    needs=("gearing",),
+    order=1,
+    polar=("amplitude", "phase"),
+    repeatable=True,
+)

@@ -1,0 +1,30 @@
+"""layer-thickness: each layer adds more or less radius than the profile says."""
+
+from dataclasses import replace
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.drum import Archimedean, Drum, Spiral
+from winchkit.model.line import At, Stage
+
+
+def apply(drum: Drum, at: At, values: Values) -> Drum:
+    """A layered drum with growth g + δ; other drums have no layers and stay as they are."""
+    if isinstance(drum, Spiral | Archimedean):
+        return replace(drum, growth=drum.growth + values["thickness_error"])
+    return drum
+
+
+EFFECT = Effect(
+    id="layer-thickness",
+    stage=Stage.DRUM,
+    parameters=(Parameter("thickness_error", "m", null=0.0, typical=1e-4, low=-0.005, high=0.005),),
+    apply=apply,
+    outputs=("cable_length", "motor_torque"),
+    what="Layers grow by another amount than the profile: the rope flattens or nests.",
+    formula="W(Φ; g + δ)",
+    source="CABTIVE paper, Eq. 2 with d_c as a parameter (Table 4: 0.42 to 0.54 mm)",
+    looks_like="A parabola of the length error over the drum angle; torque follows the radius.",
+    confused_with=("guide-offset", "drum-radius"),
+    told_apart="The torque at constant weight over the full stroke: the guide moves it far less.",
+    needs=("layers",),
+)

@@ -1,0 +1,45 @@
+"""motor-cogging: the magnets pull the rotor to the teeth, in a whole order of the motor turn."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque with a sin(kθ + p) on it."""
+    return torque + values["amplitude"] * np.sin(values["order"] * at.motor_angle + values["phase"])
+
+
+EFFECT = Effect(
+    id="motor-cogging",
+    stage=Stage.MOTOR,
+    parameters=(
+        Parameter("amplitude", "N m", null=0.0, typical=0.01, low=0.0, high=1e6),
+        Parameter("phase", "rad", null=0.0, typical=1.0),
+        Parameter(
+            "order",
+            "1",
+            null=1.0,
+            typical=2.0,
+            low=1.0,
+            high=1000.0,
+            role="shape",
+            grid=(1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 18, 24, 36),
+            whole=True,
+        ),
+    ),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="Slots and poles give a torque that depends on the angle alone.",
+    formula="τ + a sin(k θ + p), k from poles, slots and their multiples",
+    source="cogging torque of permanent-magnet motors",
+    looks_like="A ripple of the torque over the motor angle, the same at every load.",
+    confused_with=("gear-transmission-error",),
+    told_apart="A scan of the orders under two loads: a gear's ripple grows with the load.",
+    polar=("amplitude", "phase"),
+    repeatable=True,
+)

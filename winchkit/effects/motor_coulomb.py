@@ -1,0 +1,30 @@
+"""motor-coulomb: dry friction of the motor."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque with s c on it."""
+    return torque + values["torque"] * at.motor_direction
+
+
+EFFECT = Effect(
+    id="motor-coulomb",
+    stage=Stage.MOTOR,
+    parameters=(Parameter("torque", "N m", null=0.0, typical=0.02, low=0.0, high=1e6),),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="Bearings, seals and gears rub, whatever the load.",
+    formula="τ + s c",
+    source="Coulomb friction",
+    looks_like="A step of the torque error with the direction, the same at every load.",
+    confused_with=("gear-efficiency", "motor-stribeck", "motor-viscous"),
+    told_apart="Two loads in both directions; a ladder of speeds.",
+    family="motor friction",
+)

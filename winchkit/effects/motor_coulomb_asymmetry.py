@@ -1,0 +1,30 @@
+"""motor-coulomb-asymmetry: friction differs between the two directions."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque with an offset on it."""
+    return torque + values["offset"]
+
+
+EFFECT = Effect(
+    id="motor-coulomb-asymmetry",
+    stage=Stage.MOTOR,
+    parameters=(Parameter("offset", "N m", null=0.0, typical=0.01, low=-1e6, high=1e6),),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="Friction is larger one way than the other, or the torque signal has an offset.",
+    formula="τ + o, o = (c₊ − c₋)/2",
+    source="Coulomb friction, one value a direction",
+    looks_like="A constant torque error.",
+    confused_with=("torque-constant", "motor-coulomb"),
+    told_apart="Two loads: a wrong torque constant grows with them.",
+    family="motor friction",
+)

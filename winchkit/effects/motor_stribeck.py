@@ -1,0 +1,44 @@
+"""motor-stribeck: the motor holds harder at creep speed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque with s b exp(−(θ'/ω_s)²) on it."""
+    return torque + values["torque"] * at.motor_direction * np.exp(
+        -((at.motor_rate / values["stribeck_speed"]) ** 2)
+    )
+
+
+EFFECT = Effect(
+    id="motor-stribeck",
+    stage=Stage.MOTOR,
+    parameters=(
+        Parameter("torque", "N m", null=0.0, typical=0.02, low=0.0, high=1e6),
+        Parameter(
+            "stribeck_speed",
+            "rad/s",
+            null=5.0,
+            typical=5.0,
+            low=0.05,
+            high=1e3,
+            role="shape",
+            grid=(1.0, 4.0, 15.0, 50.0),
+        ),
+    ),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="Bearings and seals rub more at creep speed, before a film carries.",
+    formula="τ + s b exp(−(θ'/ω_s)²)",
+    source="Stribeck curve (Armstrong-Hélouvry et al. 1994)",
+    looks_like="Extra torque against the motion at creep speed only.",
+    confused_with=("motor-coulomb", "pulley-stribeck"),
+    told_apart="Very slow ramps at several speeds.",
+    family="motor friction",
+)

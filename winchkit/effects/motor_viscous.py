@@ -1,0 +1,30 @@
+"""motor-viscous: friction of the motor that grows with its speed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque with b θ' on it."""
+    return torque + values["viscosity"] * at.motor_rate
+
+
+EFFECT = Effect(
+    id="motor-viscous",
+    stage=Stage.MOTOR,
+    parameters=(Parameter("viscosity", "N m s", null=0.0, typical=1e-3, low=0.0, high=1e6),),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="Grease, eddy currents and windage drag in proportion to the speed.",
+    formula="τ + b θ'",
+    source="viscous friction",
+    looks_like="A torque error that is odd and linear in the motor's speed.",
+    confused_with=("motor-coulomb", "pulley-viscous"),
+    told_apart="A ladder of speeds in both directions.",
+    family="motor friction",
+)

@@ -1,0 +1,31 @@
+"""pulley-capstan: the rope slides around a pulley that does not turn."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Tension after a wrap with Euler-Eytelwein friction."""
+    return tension * np.exp(at.direction * values["friction"] * at.wrap)
+
+
+EFFECT = Effect(
+    id="pulley-capstan",
+    stage=Stage.PULLEY,
+    parameters=(Parameter("friction", "1", null=0.0, typical=0.02, low=0.0, high=1.0),),
+    apply=apply,
+    outputs=("tension", "motor_torque"),
+    what="A stuck pulley or an eyelet: friction grows with the angle of wrap.",
+    formula="T1 = T0 exp(s μ α)",
+    source="Euler-Eytelwein; Cable-winding device, Eq. 19",
+    looks_like="A step of the tension error with the direction, in proportion to the tension.",
+    confused_with=("pulley-coulomb",),
+    told_apart="Change a wrap angle; at fixed wraps the two are the same.",
+    family="pulley friction",
+    needs=("pulley", "load"),
+)

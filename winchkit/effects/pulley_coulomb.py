@@ -1,0 +1,32 @@
+"""pulley-coulomb: dry friction of each pulley's bearing."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.friction import coulomb_ratio
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Tension after a pulley with friction μ N against the rope's motion."""
+    return tension * coulomb_ratio(at.direction * values["friction"], at.wrap)
+
+
+EFFECT = Effect(
+    id="pulley-coulomb",
+    stage=Stage.PULLEY,
+    parameters=(Parameter("friction", "1", null=0.0, typical=0.02, low=0.0, high=0.5),),
+    apply=apply,
+    outputs=("tension", "motor_torque"),
+    what="Bearings rub in proportion to the force on them, on every pulley alike.",
+    formula="T1 = T0 + s μ N, N = √(T0² − 2 T0 T1 cos α + T1²)",
+    source="Cable-winding device, Eq. 20–23, solved in closed form; about 0.02 per sheave",
+    looks_like="A step of the tension error with the direction, in proportion to the tension.",
+    confused_with=("pulley-capstan", "pulley-dahl", "pulley-stribeck", "gear-efficiency"),
+    told_apart="Change a wrap angle (capstan); very slow ramps and short reversals (the others).",
+    family="pulley friction",
+    needs=("pulley", "load"),
+)

@@ -1,0 +1,53 @@
+"""pulley-dahl: pulley friction that builds up with distance after a reversal (presliding)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.friction import coulomb_ratio, dahl
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Tension after a pulley with Dahl friction whose limit is the Coulomb friction there."""
+    friction = values["friction"]
+    if friction == 0.0:
+        return tension
+    limit = np.abs(tension) * (float(coulomb_ratio(np.asarray(friction), at.wrap)) - 1.0)
+    wound_in = -at.free_length
+    return tension + dahl(wound_in, limit, values["stiffness"], values["shape"], values["start"])
+
+
+EFFECT = Effect(
+    id="pulley-dahl",
+    stage=Stage.PULLEY,
+    parameters=(
+        Parameter("friction", "1", null=0.0, typical=0.02, low=0.0, high=0.5),
+        Parameter(
+            "stiffness",
+            "N/m",
+            null=2e3,
+            typical=2e3,
+            low=10.0,
+            high=1e7,
+            role="shape",
+            grid=(300.0, 1e3, 3e3, 1e4),
+        ),
+        Parameter("shape", "1", null=1.0, typical=1.0, low=0.0, high=3.0, role="fixed"),
+        Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed"),
+    ),
+    apply=apply,
+    outputs=("tension", "motor_torque"),
+    what="Rope and bearing give elastically before they slide, on every pulley alike.",
+    formula="dF/dx = σ |1 − s F/F_c|^β sgn(1 − s F/F_c), F_c = μ N; start: F/F_c at the start",
+    source="Cable-winding device, Eq. 25 with absolute value; exact step for any β",
+    looks_like="Friction that lags behind after a reversal, by distance and not by time.",
+    confused_with=("pulley-coulomb", "pulley-stribeck", "gear-backlash"),
+    told_apart="Short reversals of a few millimetres at two speeds.",
+    family="pulley friction",
+    contains=("pulley-coulomb", "pulley-capstan"),
+    needs=("pulley", "load"),
+    memory=True,
+)

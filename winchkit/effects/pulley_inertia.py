@@ -1,0 +1,31 @@
+"""pulley-inertia: the rope must turn every pulley faster or slower."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Tension with m_eq dv/dt on it."""
+    return tension + values["equivalent_mass"] * np.gradient(at.speed, at.time)
+
+
+EFFECT = Effect(
+    id="pulley-inertia",
+    stage=Stage.PULLEY,
+    parameters=(Parameter("equivalent_mass", "kg", null=0.0, typical=0.5, low=0.0, high=1e4),),
+    apply=apply,
+    outputs=("tension", "motor_torque"),
+    what="Pulleys, all alike, have inertia that the rope must accelerate.",
+    formula="T1 = T0 + m_eq dv/dt, m_eq = J/r²",
+    source="Newton",
+    looks_like="A tension error in proportion to the rope's acceleration.",
+    confused_with=("cell-lag", "rotor-inertia"),
+    told_apart="Fast moves under two loads: a lag's error grows with the load's change.",
+    needs=("pulley", "load"),
+    order=2,
+)

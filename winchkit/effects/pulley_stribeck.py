@@ -1,0 +1,48 @@
+"""pulley-stribeck: a pulley holds harder at creep speed than when it runs."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.friction import coulomb_ratio
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Tension after a pulley whose friction falls from μs to μc with the speed."""
+    static = np.exp(-((at.speed / values["stribeck_speed"]) ** 2))
+    friction = values["coulomb"] * (1 - static) + values["static"] * static
+    return tension * coulomb_ratio(at.direction * friction, at.wrap)
+
+
+EFFECT = Effect(
+    id="pulley-stribeck",
+    stage=Stage.PULLEY,
+    parameters=(
+        Parameter("coulomb", "1", null=0.0, typical=0.02, low=0.0, high=0.5),
+        Parameter("static", "1", null=0.0, typical=0.03, low=0.0, high=0.5),
+        Parameter(
+            "stribeck_speed",
+            "m/s",
+            null=0.02,
+            typical=0.02,
+            low=1e-4,
+            high=1.0,
+            role="shape",
+            grid=(3e-3, 0.01, 0.03, 0.1),
+        ),
+    ),
+    apply=apply,
+    outputs=("tension", "motor_torque"),
+    what="Bearings rub more at creep speed, before a film of grease carries.",
+    formula="T1 = T0 + s N (μc + (μs − μc) exp(−(v/vs)²))",
+    source="Stribeck curve (Armstrong-Hélouvry et al. 1994) with Eq. 22 for N",
+    looks_like="Friction with an extra at creep speed, in proportion to the tension.",
+    confused_with=("pulley-dahl", "pulley-coulomb"),
+    told_apart="Very slow ramps, at several speeds from 1 to 100 mm/s.",
+    family="pulley friction",
+    contains=("pulley-coulomb", "pulley-capstan"),
+    needs=("pulley", "load"),
+)

@@ -1,0 +1,31 @@
+"""pulley-viscous: grease drags in proportion to the speed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(tension: Array, at: At, values: Values) -> Array:
+    """Tension with c v on it."""
+    return tension + values["viscosity"] * at.speed
+
+
+EFFECT = Effect(
+    id="pulley-viscous",
+    stage=Stage.PULLEY,
+    parameters=(Parameter("viscosity", "N s/m", null=0.0, typical=10.0, low=0.0, high=1e6),),
+    apply=apply,
+    outputs=("tension", "motor_torque"),
+    what="Grease and seals of every pulley drag in proportion to the rope's speed.",
+    formula="T1 = T0 + c v",
+    source="viscous friction",
+    looks_like="A tension error that is odd and linear in the speed, whatever the load.",
+    confused_with=("pulley-coulomb", "pulley-stribeck"),
+    told_apart="A ladder of speeds in both directions.",
+    needs=("pulley", "load"),
+    order=1,
+)

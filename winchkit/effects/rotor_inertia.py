@@ -1,0 +1,29 @@
+"""rotor-inertia: the motor must accelerate its own rotor."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque with J θ'' on it."""
+    return torque + values["inertia"] * at.motor_acceleration
+
+
+EFFECT = Effect(
+    id="rotor-inertia",
+    stage=Stage.MOTOR,
+    parameters=(Parameter("inertia", "kg m^2", null=0.0, typical=1e-4, low=0.0),),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="Rotor, brake, coupling and gearbox input must be accelerated.",
+    formula="τ + J θ''",
+    source="Newton",
+    looks_like="Torque in proportion to the motor's acceleration, whatever the load.",
+    confused_with=("torque-lag", "pulley-inertia"),
+    told_apart="Fast and slow moves without load.",
+)

@@ -1,0 +1,30 @@
+"""torque-constant: the drive's torque scale is off."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque (1 + g) τ."""
+    return torque * (1.0 + values["gain_error"])
+
+
+EFFECT = Effect(
+    id="torque-constant",
+    stage=Stage.TORQUE_CONSTANT,
+    parameters=(Parameter("gain_error", "1", null=0.0, typical=0.03, low=-0.9, high=10.0),),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="The drive's torque constant or rated torque is wrong, or the magnets are warm.",
+    formula="(1 + g) τ",
+    source="motor data sheets give ±10 %",
+    looks_like="A torque error in proportion to the load, alike in both directions.",
+    confused_with=("gear-efficiency", "cell-gain", "drum-radius"),
+    told_apart="Several loads in both directions; the length tells it from the drum's radius.",
+    needs=("rope_force",),
+)

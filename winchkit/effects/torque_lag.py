@@ -1,0 +1,30 @@
+"""torque-lag: the drive filters the torque that it reports."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.line import At, Stage
+from winchkit.model.recurrence import first_order_lag
+
+Array = NDArray[np.float64]
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque signal after a first-order filter that starts at the first value."""
+    return first_order_lag(torque, at.time, values["time_constant"])
+
+
+EFFECT = Effect(
+    id="torque-lag",
+    stage=Stage.TORQUE_SIGNAL,
+    parameters=(Parameter("time_constant", "s", null=0.0, typical=0.02, low=0.0, high=10.0),),
+    apply=apply,
+    outputs=("motor_torque",),
+    what="The drive filters its torque signal: it comes late and rounded.",
+    formula="τ_f m' + m = τ",
+    source="first-order filter, exact for a signal linear between samples",
+    looks_like="A torque error in proportion to how fast the torque changes.",
+    confused_with=("rotor-inertia", "motor-coulomb"),
+    told_apart="Fast moves under two loads.",
+)

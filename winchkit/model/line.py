@@ -1,0 +1,310 @@
+"""The line: one winch and its rope, from motor angle to cable length and from load to torque.
+
+Two chains run through the same parts (DESIGN, "The line model"). Each has stages at which a
+modifier, made by an effect, may act; without modifiers the line is the nominal profile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.model.drum import Drum, drum_of
+from winchkit.schema.winch import WinchProfile
+
+__all__ = ["GRAVITY", "At", "Line", "Modifier", "Motion", "Path", "Signals", "Stage"]
+
+Array = NDArray[np.float64]
+GRAVITY = 9.80665
+_CREEP_SPEED = 1e-3
+_CREEP_RATE = 0.5
+_CREEP_SHARE = 0.02
+_LOAD_SPAN = 0.02
+_NEWTON_STEPS = 4
+
+
+class Stage(IntEnum):
+    """Where a modifier acts, in the order in which the physics happens."""
+
+    DRUM_ANGLE = 1
+    """Value: :class:`Path` of the drum angle over the motor angle."""
+    DRUM = 2
+    """Value: the :class:`~winchkit.model.drum.Drum`."""
+    WOUND = 3
+    """Value: :class:`Path` of the wound length over the drum angle."""
+    ROPE = 4
+    """Value: length with the rope's strain, m."""
+    FRAME = 5
+    """Value: length at the exit point, m."""
+    LENGTH_INSTRUMENT = 6
+    """Value: length as the instrument shows it, m."""
+    ROPE_WEIGHT = 7
+    """Value: tension at the last pulley, N."""
+    PULLEY = 8
+    """Value: tension after one pulley, N; once per pulley, ``At.wrap`` and ``At.pulley`` set."""
+    CELL = 9
+    """Value: tension as the cell shows it, N."""
+    GEARBOX = 10
+    """Value: torque of the rope at the motor, N m."""
+    TORQUE_CONSTANT = 11
+    """Value: as before, in the drive's units."""
+    MOTOR = 12
+    """Value: torque with the motor's own terms, N m."""
+    TORQUE_SIGNAL = 13
+    """Value: torque as the drive reports it, N m."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A coordinate and its derivative by the one before it, so that torque follows length."""
+
+    value: Array
+    slope: Array
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What was measured on one line; arrays of shape (n,), SI, None where not measured."""
+
+    time: Array
+    motor_angle: Array
+    load: Array | None = None
+    load_mass: float | None = None
+    tension: Array | None = None
+    temperature: Array | None = None
+
+
+@dataclass(frozen=True)
+class At:
+    """What a modifier may look at besides the value passing through; arrays (n,), SI."""
+
+    profile: WinchProfile
+    time: Array
+    """Since the run's start, s."""
+    motor_angle: Array
+    motor_rate: Array
+    motor_acceleration: Array
+    motor_direction: Array
+    """Tanh(θ'/0.5 rad/s): smooth at standstill; see :func:`_direction`."""
+    drum_angle: Array
+    wound_angle: Array
+    speed: Array
+    """Winding-in speed of the rope, m/s."""
+    direction: Array
+    """Tanh(v/1 mm/s)."""
+    free_length: Array
+    """Unstrained, from exit point to attachment, m."""
+    tension: Array
+    """In the rope: the load, else the cell's, else zero, N."""
+    temperature: Array
+    """NaN where not measured, degrees Celsius."""
+    pulley: int = -1
+    wrap: float = 0.0
+
+    @property
+    def stressed_length(self) -> Array:
+        """Free length and the stressed rope on the machine, m."""
+        return self.free_length + self.profile.cable.dead_length
+
+
+@dataclass(frozen=True)
+class Modifier:
+    """One effect with its values, ready to act at its stage; lower ``order`` acts first."""
+
+    stage: Stage
+    apply: Callable[[Any, At], Any]
+    order: int = 0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The nominal line along one run, computed once: what modifiers look at, and the load."""
+
+    at: At
+    load: Array | None
+    """Tension at the platform end, N, where measured or known."""
+    drum_tension: Array | None
+    """The cell's reading, which stands in for the drum-side tension without a load, N."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A profile with modifiers: predicts what the instruments of a winch should show."""
+
+    profile: WinchProfile
+    modifiers: Sequence[Modifier] = ()
+
+    @cached_property
+    def _stages(self) -> dict[Stage, list[Modifier]]:
+        ordered = sorted(self.modifiers, key=lambda m: (m.stage, m.order))
+        return {stage: [m for m in ordered if m.stage is stage] for stage in Stage}
+
+    def _through(self, stage: Stage, value: Any, at: At) -> Any:
+        for modifier in self._stages[stage]:
+            value = modifier.apply(value, at)
+        return value
+
+    @cached_property
+    def _drum(self) -> Drum:
+        return drum_of(self.profile)
+
+    @property
+    def _reference_wound(self) -> float:
+        return 2 * np.pi * self.profile.reference.wound_turns
+
+    def _nominal_length(self, motor_angle: Array) -> tuple[Array, Array]:
+        """Drum angle and free length of the bare profile."""
+        drum_angle = self._gear(motor_angle).value
+        phi = self._reference_wound
+        wound = self._drum.wound(phi + drum_angle) - self._drum.wound(np.asarray(phi))
+        return drum_angle, (self.profile.reference.cable_length or 0.0) - wound
+
+    def _gear(self, motor_angle: Array) -> Path:
+        gearbox = self.profile.gearbox
+        slope = gearbox.direction / gearbox.ratio
+        turned = (motor_angle - self.profile.reference.motor_angle) * slope
+        return Path(turned, np.full_like(turned, slope))
+
+    def motion(self, signals: Signals) -> Motion:
+        """Derivatives, directions and rope force along a run, by central differences."""
+        time, angle = signals.time, signals.motor_angle
+        rate = np.gradient(angle, time)
+        drum_angle, length = self._nominal_length(angle)
+        speed = -np.gradient(length, time)
+        load = signals.load
+        if load is None and signals.load_mass is not None:
+            load = signals.load_mass * (GRAVITY - _second_derivative(length, time))
+        tension = load if load is not None else signals.tension
+        missing = np.full_like(time, np.nan)
+        at = At(
+            profile=self.profile,
+            time=time - time[0],
+            motor_angle=angle,
+            motor_rate=rate,
+            motor_acceleration=np.gradient(rate, time),
+            motor_direction=_direction(rate, _CREEP_RATE),
+            drum_angle=drum_angle,
+            wound_angle=self._reference_wound + drum_angle,
+            speed=speed,
+            direction=_direction(speed, _CREEP_SPEED),
+            free_length=length,
+            tension=np.zeros_like(time) if tension is None else tension,
+            temperature=missing if signals.temperature is None else signals.temperature,
+        )
+        return Motion(at, load, signals.tension if load is None else None)
+
+    def predict(self, motion: Motion) -> dict[str, Array]:
+        """``cable_length``, ``motor_torque`` and, where a load is known, ``tension``."""
+        length, path = self._length(motion.at)
+        out = {"cable_length": length}
+        if motion.load is not None:
+            drum_side = self._drum_side(motion.load, motion.at)
+            out["tension"] = self._through(Stage.CELL, drum_side, motion.at)
+        elif motion.drum_tension is not None:
+            drum_side = motion.drum_tension
+        else:
+            drum_side = np.zeros_like(motion.at.time)
+        out["motor_torque"] = self._torque(drum_side, path, motion.at)
+        return out
+
+    def _length(self, at: At) -> tuple[Array, Path]:
+        """Cable length, and the wound length over the motor angle, m and m/rad."""
+        turned = self._through(Stage.DRUM_ANGLE, self._gear(at.motor_angle), at)
+        at = replace(at, drum_angle=turned.value, wound_angle=self._reference_wound + turned.value)
+        drum = self._through(Stage.DRUM, self._drum, at)
+        wound = drum.wound(at.wound_angle) - drum.wound(np.asarray(self._reference_wound))
+        path = self._through(Stage.WOUND, Path(wound, drum.arm(at.wound_angle)), at)
+        free = (self.profile.reference.cable_length or 0.0) - path.value
+        at = replace(at, free_length=free)
+        length = self._through(Stage.ROPE, free, at)
+        length = self._through(Stage.FRAME, length, at)
+        length = self._through(Stage.LENGTH_INSTRUMENT, length, at)
+        return length, Path(path.value, path.slope * turned.slope)
+
+    def _drum_side(self, load: Array, at: At) -> Array:
+        """Tension at the drum: from the load up the rope and back over the pulleys."""
+        tension = self._through(Stage.ROPE_WEIGHT, load, at)
+        if self._stages[Stage.PULLEY]:
+            for index in reversed(range(len(self.profile.pulley))):
+                here = replace(at, pulley=index, wrap=self.profile.pulley[index].wrap)
+                tension = self._through(Stage.PULLEY, tension, here)
+        return np.asarray(tension)
+
+    def _torque(self, drum_side: Array, path: Path, at: At) -> Array:
+        """Virtual work: rope force times the derivative of the wound length."""
+        torque: Array = drum_side * path.slope
+        for stage in (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL):
+            torque = self._through(stage, torque, at)
+        return torque
+
+    def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
+        """Cable length at rest at a motor angle under a tension, effects included, m."""
+        return float(self._length(self._at_rest(motor_angle, tension))[0][0])
+
+    def arm(self, motor_angle: float) -> float:
+        """Rope wound in per motor angle, signed by the gearbox's direction, m/rad."""
+        return float(self._length(self._at_rest(motor_angle, 0.0))[1].slope[0])
+
+    def motor_angle(self, cable_length: float, tension: float = 0.0) -> float:
+        """Motor angle at which the rope has ``cable_length`` under a tension, rad.
+
+        Closed form for the nominal line; with effects a few Newton steps from there.
+        """
+        profile = self.profile
+        phi = self._reference_wound
+        wound = (profile.reference.cable_length or 0.0) - cable_length
+        total = self._drum.angle(self._drum.wound(np.asarray(phi)) + wound)
+        gear = profile.gearbox
+        turned = gear.direction * gear.ratio * (float(total) - phi)
+        angle = profile.reference.motor_angle + turned
+        for _ in range(_NEWTON_STEPS if self.modifiers else 0):
+            excess = self.cable_length(angle, tension) - cable_length
+            angle += excess / self.arm(angle)
+        return angle
+
+    def _at_rest(self, motor_angle: float, tension: float) -> At:
+        """One sample standing still, at 20 degrees Celsius."""
+        angle, zero = np.array([motor_angle]), np.zeros(1)
+        drum_angle, length = self._nominal_length(angle)
+        return At(
+            profile=self.profile,
+            time=zero,
+            motor_angle=angle,
+            motor_rate=zero,
+            motor_acceleration=zero,
+            motor_direction=zero,
+            drum_angle=drum_angle,
+            wound_angle=self._reference_wound + drum_angle,
+            speed=zero,
+            direction=zero,
+            free_length=length,
+            tension=np.array([tension]),
+            temperature=np.array([20.0]),
+        )
+
+
+def _direction(rate: Array, creep: float) -> Array:
+    """Sign of a rate, smooth below ``creep``; narrower on a machine that is slow altogether.
+
+    A drive that never turns faster than the smoothing would have no direction at all.
+    """
+    fastest = float(np.max(np.abs(rate)))
+    width = min(creep, _CREEP_SHARE * fastest)
+    return np.tanh(rate / width) if width > 0 else np.zeros_like(rate)
+
+
+def _second_derivative(x: Array, time: Array) -> Array:
+    """Central second difference over at least ±20 ms, so that encoder noise stays small."""
+    step = max(1, round(_LOAD_SPAN / float(np.median(np.diff(time)))))
+    if len(x) <= 2 * step:
+        return np.zeros_like(x)
+    before, after = time[step:-step] - time[: -2 * step], time[2 * step :] - time[step:-step]
+    slope = (x[2 * step :] - x[step:-step]) / after - (x[step:-step] - x[: -2 * step]) / before
+    inner = 2 * slope / (before + after)
+    return np.concatenate([np.zeros(step), inner, np.zeros(step)])

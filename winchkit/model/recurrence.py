@@ -1,0 +1,70 @@
+"""What has memory, vectorised: recurrences solved by a scan of log₂ n passes instead of a loop.
+
+Each step of a recurrence is a small map y → f_k(y); maps of one kind compose into the same kind,
+so that all partial compositions follow from doubling (Hillis and Steele, 1986).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["first_order_lag", "linear", "play"]
+
+Array = NDArray[np.float64]
+_FORGOTTEN = 1e-18
+
+
+def linear(decay: Array, drive: Array, start: float) -> Array:
+    """Solve y_k = decay_k y_{k−1} + drive_k with y_{−1} = ``start``; shapes (n,), |decay| ≤ 1."""
+    a = decay.astype(float, copy=True)
+    b = drive.astype(float, copy=True)
+    if len(b):
+        b[0] += a[0] * start
+        a[0] = 0.0
+    step = 1
+    while step < len(b):
+        b[step:] += a[step:] * b[:-step].copy()
+        a[step:] *= a[:-step].copy()
+        if np.max(np.abs(a)) < _FORGOTTEN:
+            break
+        step *= 2
+    return b
+
+
+def play(x: Array, gap: float, start: float = 0.0) -> Array:
+    """Follow ``x`` through a play of ``gap``; shape (n,), same unit.
+
+    ``start`` is where in the gap it begins, −½ to ½ of it, 0 in the middle.
+    """
+    low = x - gap / 2
+    high = x + gap / 2
+    if len(x):
+        low[0] = high[0] = x[0] + gap * np.clip(start, -0.5, 0.5)
+    step = 1
+    while step < len(x):
+        # A clamp after a clamp is a clamp.
+        earlier_low, earlier_high = low[:-step].copy(), high[:-step].copy()
+        low[step:], high[step:] = (
+            np.clip(earlier_low, low[step:], high[step:]),
+            np.clip(earlier_high, low[step:], high[step:]),
+        )
+        step *= 2
+    return low
+
+
+def first_order_lag(
+    x: Array, time: Array, time_constant: float, start: float | None = None
+) -> Array:
+    """First-order filter of ``x`` with ``time_constant`` (s), exact for x linear between samples.
+
+    Starts at ``start``, by default at the first value. Zero gives x itself.
+    """
+    if time_constant <= 0 or not len(x):
+        return x.copy()
+    h = np.diff(time) / time_constant
+    decay = np.exp(-h)
+    mean = -np.expm1(-h) / h
+    drive = (mean - decay) * x[:-1] + (1 - mean) * x[1:]
+    y0 = x[0] if start is None else start
+    return np.concatenate([[y0], linear(decay, drive, y0)])

@@ -1,0 +1,162 @@
+"""Makes a run of columns as a file holds them: SI units, one time base, every fault collected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.errors import Fault, RunError, UsageError
+from winchkit.runs.columns import POSE_DIMENSIONS, column_dimension, near_miss, unit_fault
+from winchkit.runs.run import Channel, Run
+from winchkit.units import UNITS, convert, factor, parse, suggest
+
+__all__ = ["Recording", "assemble", "refuse"]
+
+Array = NDArray[np.float64]
+_SHOWN = 20
+
+
+@dataclass
+class Recording:
+    """A file's columns before they are a run; ``line_of`` says where row ``i`` stands."""
+
+    path: str
+    header: Sequence[tuple[str, str]]
+    """Name and unit of each column."""
+    columns: Sequence[Array | None]
+    """Values in the file's units; None for an unknown column that holds text."""
+    line_of: Callable[[int], int | None]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    metadata_lines: Mapping[str, int] = field(default_factory=dict)
+    header_line: int | None = None
+    notes: Sequence[str] = ()
+    faults: Sequence[Fault] = ()
+    """What was wrong with single cells."""
+
+    @property
+    def rows(self) -> int:
+        """Number of samples."""
+        return next((len(values) for values in self.columns if values is not None), 0)
+
+
+def refuse(faults: Sequence[Fault]) -> None:
+    """Raise RunError with the first faults and the number of the others, if there are any."""
+    if not faults:
+        return
+    shown = list(faults[:_SHOWN])
+    if len(faults) > _SHOWN:
+        shown.append(Fault(f"and {len(faults) - _SHOWN} more faults", faults[0].path))
+    raise RunError(shown)
+
+
+def assemble(recording: Recording) -> Run:
+    """Convert and check a recording; raises RunError with every fault of it."""
+    names = [name for name, _ in recording.header]
+    early = [*_header_faults(recording, names), *_metadata_faults(recording), *recording.faults]
+    refuse(sorted(early, key=lambda fault: fault.line or 0))
+    metadata, notes = dict(recording.metadata), [*recording.notes, *_near_misses(names)]
+    channels: dict[str, Channel] = {}
+    faults: list[Fault] = []
+    for number, ((name, unit), values) in enumerate(
+        zip(recording.header, recording.columns, strict=True), start=1
+    ):
+        if values is None:
+            notes.append(f"column {number} '{name}' holds text and is left out")
+            continue
+        channels[name] = _channel(name, unit, values, number)
+        if column_dimension(name) is not None:
+            faults += _infinite(recording, name, values)
+    time = channels.pop("time", None)
+    if time is None:
+        metadata.setdefault("time", "row number")
+        notes.append("there is no column 'time'; rows are counted instead")
+        time = Channel(np.arange(recording.rows, dtype=np.float64), "s")
+    refuse([*faults, *_time_faults(recording, time.values)])
+    path = recording.path
+    return Run(Path(path).stem, time.values, channels, metadata, path, tuple(notes))
+
+
+def _header_faults(recording: Recording, names: list[str]) -> Iterator[Fault]:
+    path, line = recording.path, recording.header_line
+    for name in dict.fromkeys(names):
+        if names.count(name) > 1:
+            places = ", ".join(str(n) for n, other in enumerate(names, 1) if other == name)
+            yield Fault(f"{names.count(name)} columns are called '{name}': {places}", path, line)
+    for name, unit in dict.fromkeys(recording.header):
+        dimension = column_dimension(name)
+        if dimension is not None and (reason := unit_fault(name, unit, dimension)):
+            yield Fault(reason, path, line)
+    is_poses = _is_poses(names)
+    if "time" not in names and not is_poses:
+        yield _missing("time [s]", names, recording)
+    if not any(name.rpartition(".")[2] == "motor_angle" for name in names):
+        yield _missing("motor_angle [rad]", names, recording)
+    rows, needed = recording.rows, 1 if is_poses else 2
+    if rows < needed:
+        there = "has no rows after its header" if rows == 0 else "has one row only"
+        yield Fault(f"the run {there}; it needs at least {needed}", path)
+
+
+def _is_poses(names: list[str]) -> bool:
+    """Whether a row is a pose of a robot, which needs no time."""
+    return any(name in POSE_DIMENSIONS or name.endswith(".motor_angle") for name in names)
+
+
+def _missing(column: str, names: list[str], recording: Recording) -> Fault:
+    known = f"; it has {', '.join(names)}" if names else ""
+    message = f"there is no column '{column}'{known}" + suggest(column.split(maxsplit=1)[0], names)
+    return Fault(message, recording.path, recording.header_line)
+
+
+def _metadata_faults(recording: Recording) -> Iterator[Fault]:
+    metadata = recording.metadata
+    reasons = {}
+    if "load_mass" in metadata:
+        try:
+            if parse(metadata["load_mass"], "mass") < 0:
+                reasons["load_mass"] = f"'{metadata['load_mass']}' is below zero"
+        except UsageError as error:
+            reasons["load_mass"] = str(error)
+    zeroed = metadata.get("length_zeroed", "false").strip().lower()
+    if zeroed not in {"true", "false", "yes", "no", "1", "0"}:
+        reasons["length_zeroed"] = f"'{zeroed}' is neither true nor false"
+    for key, reason in reasons.items():
+        yield Fault(reason, recording.path, recording.metadata_lines.get(key), key)
+
+
+def _near_misses(names: list[str]) -> Iterator[str]:
+    for name in names:
+        if column_dimension(name) is None and (close := near_miss(name)):
+            yield f"column '{name}' is kept and not used; did you mean '{close}'?"
+
+
+def _channel(name: str, unit: str, values: Array, number: int) -> Channel:
+    dimension = column_dimension(name)
+    if dimension is None:
+        return Channel(values, unit, number)
+    unit = unit or "1"
+    si, shift = factor(unit, dimension), convert(0.0, unit, dimension)
+    if si != 1.0 or shift != 0.0:
+        values = values * si + shift
+    return Channel(values, next(iter(UNITS[dimension])), number)
+
+
+def _infinite(recording: Recording, name: str, values: Array) -> Iterator[Fault]:
+    for row in np.flatnonzero(np.isinf(values)):
+        message = f"column '{name}' is infinite; leave the cell empty where there is no value"
+        yield Fault(message, recording.path, recording.line_of(int(row)))
+
+
+def _time_faults(recording: Recording, time: Array) -> Iterator[Fault]:
+    """Every sample has a time, later than the one before it."""
+    for row in np.flatnonzero(np.isnan(time)):
+        yield Fault("time is missing here", recording.path, recording.line_of(int(row)))
+    for row in np.flatnonzero(np.diff(time) <= 0) + 1:
+        earlier, later = time[row - 1], time[row]
+        word = "stands still at" if later == earlier else f"goes back from {earlier:.9g} s to"
+        message = f"time {word} {later:.9g} s; rows must come in order of time, each once"
+        yield Fault(message, recording.path, recording.line_of(int(row)))

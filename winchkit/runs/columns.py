@@ -1,0 +1,59 @@
+"""What the columns of a run are called, which dimension each has, and how a header is read."""
+
+from __future__ import annotations
+
+import re
+from difflib import get_close_matches
+
+from winchkit.runs.run import CHANNEL_DIMENSIONS
+from winchkit.units import UNITS, dimension_of, suggest
+
+__all__ = ["POSE_DIMENSIONS", "column_dimension", "header_of", "near_miss", "unit_fault"]
+
+POSE_DIMENSIONS: dict[str, str] = {
+    **dict.fromkeys(("platform_x", "platform_y", "platform_z"), "length"),
+    **dict.fromkeys(("platform_qw", "platform_qx", "platform_qy", "platform_qz"), "ratio"),
+    **dict.fromkeys(("platform_roll", "platform_pitch", "platform_yaw"), "angle"),
+}
+"""Dimension of every channel of a robot's platform."""
+
+_HEADER = re.compile(r"\s*([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
+
+
+def header_of(text: str) -> tuple[str, str] | None:
+    """Name and unit of a header cell ``name [unit]``; None where it is neither."""
+    found = _HEADER.fullmatch(text)
+    return (found[1], found[2] or "") if found and found[1] else None
+
+
+def column_dimension(name: str) -> str | None:
+    """Dimension of a column, with or without a winch's prefix; None for one we do not know."""
+    if name == "time":
+        return "time"
+    return POSE_DIMENSIONS.get(name) or CHANNEL_DIMENSIONS.get(name.rpartition(".")[2])
+
+
+def near_miss(name: str) -> str | None:
+    """A name that we know and that an unknown one all but spells."""
+    known = ["time", *CHANNEL_DIMENSIONS, *POSE_DIMENSIONS]
+    return next(iter(get_close_matches(name.rpartition(".")[2], known, n=1, cutoff=0.75)), None)
+
+
+def unit_fault(name: str, unit: str, dimension: str) -> str | None:
+    """Why a unit does not fit a column; None where it does."""
+    units = UNITS[dimension]
+    if unit in units or (dimension == "ratio" and not unit):
+        return None
+    known = f"use one of {', '.join(units)}"
+    if not unit:
+        return f"column '{name}' has no unit; write '{name} [{next(iter(units))}]'"
+    other = dimension_of(unit)
+    if dimension == "force" and other == "mass":
+        return (
+            f"column '{name}' is in [{unit}], a mass, and a force is needed: multiply by "
+            "g = 9.80665 m/s^2 and write [N]; a known weight goes into the metadata, "
+            "# load_mass: 15 kg"
+        )
+    if other is not None:
+        return f"column '{name}' is in [{unit}], a unit of {other}, not of {dimension}; {known}"
+    return f"column '{name}' has the unknown unit [{unit}]; {known}" + suggest(unit, list(units))

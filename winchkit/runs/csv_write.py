@@ -1,0 +1,32 @@
+"""Writes a run as CSV: metadata lines, one header line, numbers that read back exactly."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+
+from winchkit.runs.run_writer import RunWriter
+
+__all__ = ["CsvWriter"]
+
+
+class CsvWriter(RunWriter):
+    """A CSV file in UTF-8; no value is an empty cell."""
+
+    flush_interval = 0.5
+
+    def _begin(self, metadata: Mapping[str, str]) -> None:
+        lines = [f"# {key}: {value}\n" for key, value in metadata.items()]
+        header = io.StringIO()
+        cells = [f"{name} [{unit}]" if unit else name for name, unit in self.columns]
+        csv.writer(header, lineterminator="\n").writerow(cells)
+        self._stream.write("".join([*lines, header.getvalue()]).encode())
+
+    def _row(self, values: Sequence[float]) -> None:
+        # NaN is the one number that differs from itself.
+        cells = [repr(float(value)) if value == value else "" for value in values]  # noqa: PLR0124
+        self._stream.write((",".join(cells) + "\n").encode())
+
+    def _end(self) -> None:
+        """Nothing follows the last row."""

@@ -1,0 +1,98 @@
+"""What writers of runs have in common: rows in, flushed in time, one error for a full disk."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from winchkit.errors import Fault, FileError, UsageError
+from winchkit.units import suggest
+
+__all__ = ["Clock", "Columns", "RunWriter"]
+
+Columns = Sequence[tuple[str, str]]
+"""Names and units of the columns, in order."""
+Clock = Callable[[], float]
+
+
+class RunWriter(ABC):
+    """A run being written; a context manager that closes it."""
+
+    flush_interval: float
+
+    def __init__(
+        self, path: Path, columns: Columns, metadata: Mapping[str, str], clock: Clock
+    ) -> None:
+        self.path = path
+        self.columns = tuple(columns)
+        self._names = [name for name, _ in columns]
+        self._clock = clock
+        self._flushed = clock()
+        if "time" not in self._names:
+            raise UsageError(f"{path}: a run needs a column 'time'")
+        with self._writing():
+            self._stream = path.open("wb")
+            self._begin({key: " ".join(value.split()) for key, value in metadata.items()})
+        self.flush()
+
+    def append(self, row: Mapping[str, float]) -> None:
+        """Add a row; a column that it lacks has no value there. UsageError for an unknown one."""
+        for name in row:
+            if name not in self._names:
+                known = f"no column '{name}' in {self.path}; it has {', '.join(self._names)}"
+                raise UsageError(known + suggest(name, self._names))
+        self.append_values([row.get(name, math.nan) for name in self._names])
+
+    def append_values(self, values: Iterable[float]) -> None:
+        """Add a row in the order of the columns; what is not finite is written as no value."""
+        with self._writing():
+            self._row([value if math.isfinite(value) else math.nan for value in values])
+        now = self._clock()
+        if now - self._flushed >= self.flush_interval:
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand what was appended to the operating system, so that it outlives this process."""
+        with self._writing():
+            self._stream.flush()
+        self._flushed = self._clock()
+
+    def close(self) -> None:
+        """Finish the file; closing twice does no harm."""
+        if not self._stream.closed:
+            with self._writing():
+                self._end()
+                self._stream.close()
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            message = f"cannot be written: {error.strerror}"
+            raise FileError(Fault(message, str(self.path))) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @abstractmethod
+    def _begin(self, metadata: Mapping[str, str]) -> None: ...
+
+    @abstractmethod
+    def _row(self, values: Sequence[float]) -> None: ...
+
+    @abstractmethod
+    def _end(self) -> None: ...

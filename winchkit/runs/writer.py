@@ -1,0 +1,73 @@
+"""Writes runs: row by row while they are recorded, or whole.
+
+    with open_writer("lift.mcap", [("time", "s"), ("tension", "N")], {"load_mass": "15 kg"}) as log:
+        log.append({"time": 0.0, "tension": 147.1})
+
+While rows keep coming, none waits in this process for longer than 0.5 s (CSV) or 0.25 s (MCAP);
+call ``flush`` before a pause.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from winchkit.errors import UsageError
+from winchkit.runs.csv_write import CsvWriter
+from winchkit.runs.read import SUFFIXES
+from winchkit.runs.run import Run
+from winchkit.runs.run_writer import Clock, Columns, RunWriter
+
+__all__ = ["RunWriter", "open_writer", "write_csv", "write_mcap", "write_run"]
+
+
+def open_writer(
+    path: str | Path,
+    columns: Columns,
+    metadata: Mapping[str, str] | None = None,
+    clock: Clock = time.monotonic,
+) -> RunWriter:
+    """Start a run in a file, in the format of its suffix; a file that is there is replaced.
+
+    ``columns`` are names and units in order; values are written as they come, in these units.
+    Raises FileError where the file cannot be written, UsageError for a suffix that is no format.
+    """
+    return _kind_for(path)(Path(path), columns, metadata or {}, clock)
+
+
+def write_run(run: Run, path: str | Path) -> None:
+    """Write a run in the format of the file's suffix, channels in the units that they have."""
+    _write(run, path, _kind_for(path))
+
+
+def write_csv(run: Run, path: str | Path) -> None:
+    """Write a run as CSV, whatever the file is called."""
+    _write(run, path, CsvWriter)
+
+
+def write_mcap(run: Run, path: str | Path) -> None:
+    """Write a run as MCAP, whatever the file is called."""
+    from winchkit.runs.mcap_write import McapWriter
+
+    _write(run, path, McapWriter)
+
+
+def _write(run: Run, path: str | Path, kind: type[RunWriter]) -> None:
+    columns = [("time", "s"), *((name, channel.unit) for name, channel in run.channels.items())]
+    series = [run.time.tolist(), *(channel.values.tolist() for channel in run.channels.values())]
+    with kind(Path(path), columns, run.metadata, time.monotonic) as writer:
+        for row in zip(*series, strict=True):
+            writer.append_values(row)
+
+
+def _kind_for(path: str | Path) -> type[RunWriter]:
+    suffix = Path(path).suffix.lower()
+    if suffix == ".csv":
+        return CsvWriter
+    if suffix == ".mcap":
+        from winchkit.runs.mcap_write import McapWriter
+
+        return McapWriter
+    message = f"'{suffix}' is no format of a run; use one of {', '.join(SUFFIXES)}"
+    raise UsageError(f"{path}: {message}")

@@ -1,0 +1,209 @@
+"""Reads what users declare in TOML into frozen dataclasses in SI.
+
+    winch = read_winch("profiles/bench-spiral.toml")
+
+Every function raises FileError with all faults of the file at once, each with its line:
+``bench.toml:12: winch.A.limits.speed: unknown speed unit 'm/sec'; use one of m/s, mm/s``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from winchkit.errors import Fault, FileError
+from winchkit.schema import read_bench as benches
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.device import DeviceSpec
+from winchkit.schema.programme import Programme
+from winchkit.schema.read_lines import Key
+from winchkit.schema.read_parts import Reading
+from winchkit.schema.read_source import open_source
+from winchkit.schema.robot import RobotProfile
+from winchkit.schema.simbench import SimBench
+from winchkit.schema.winch import WinchProfile
+
+__all__ = [
+    "Declaration",
+    "load",
+    "read_any",
+    "read_bench",
+    "read_device",
+    "read_programme",
+    "read_robot",
+    "read_simbench",
+    "read_winch",
+]
+
+Declared = WinchProfile | RobotProfile | BenchSpec | Programme | SimBench | DeviceSpec
+T = TypeVar("T")
+PathLike = str | Path
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """A file of any kind as read, with what is doubtful in it but no fault."""
+
+    kind: str
+    """One of ``winch``, ``robot``, ``bench``, ``programme``, ``sim-bench``, ``device``."""
+    value: Declared
+    warnings: tuple[Fault, ...] = ()
+
+
+def read_winch(path: PathLike) -> WinchProfile:
+    """Read a winch's profile."""
+    return _read(path, "winch", WinchProfile)
+
+
+def read_robot(path: PathLike) -> RobotProfile:
+    """Read a robot's profile; lines that name a winch hold its profile, read as well."""
+    return _read(path, "robot", RobotProfile)
+
+
+def read_bench(path: PathLike) -> BenchSpec:
+    """Read a wiring file; its profiles and devices must exist and fit."""
+    return _read(path, "bench", BenchSpec)
+
+
+def read_programme(path: PathLike) -> Programme:
+    """Read a motion programme."""
+    return _read(path, "programme", Programme)
+
+
+def read_simbench(path: PathLike) -> SimBench:
+    """Read a simulated bench."""
+    return _read(path, "sim-bench", SimBench)
+
+
+def read_device(path: PathLike) -> DeviceSpec:
+    """Read a device file."""
+    return _read(path, "device", DeviceSpec)
+
+
+def read_any(path: PathLike) -> Declared:
+    """Read a declaration of whichever kind it says it is."""
+    return load(path).value
+
+
+def load(path: PathLike, kind: str | None = None) -> Declaration:
+    """Read a declaration with its warnings; of ``kind``, if one is asked for."""
+    reading = Reading(open_source(path))
+    found = reading.source.kind
+    if kind is not None and found != kind:
+        raise FileError(reading.source.fault(("kind",), f"is '{found}'; a '{kind}' is needed here"))
+    value = _READERS[found](reading, reading.source.tree)
+    reading.refuse_faults()
+    assert value is not None, "a reader that returns nothing has noted why"
+    return Declaration(found, value, _warnings(reading, value))
+
+
+def _read(path: PathLike, kind: str, expected: type[T]) -> T:
+    value = load(path, kind).value
+    assert isinstance(value, expected)
+    return value
+
+
+def _winch(reading: Reading, tree: dict[str, Any]) -> WinchProfile | None:
+    return reading.winch(tree, reading.stem)
+
+
+def _robot(reading: Reading, tree: dict[str, Any]) -> RobotProfile | None:
+    tree = {"name": reading.stem, **tree}
+    if "effect" in tree:
+        tree["effect"] = reading.effects(tree["effect"])
+    if isinstance(prior := tree.get("prior"), dict):
+        tree["prior"] = {
+            name: {"std": value} if isinstance(value, str) else value
+            for name, value in prior.items()
+        }
+    if isinstance(lines := tree.get("line"), list):
+        tree["line"] = [_line(reading, raw, ("line", n)) for n, raw in enumerate(lines)]
+    return reading.table(RobotProfile, tree)
+
+
+def _line(reading: Reading, raw: object, at: Key) -> object:
+    """A line with its winch's profile in place of a name or a table."""
+    if not isinstance(raw, dict) or "winch" not in raw:
+        return raw
+    winch, place = raw["winch"], (*at, "winch")
+    if isinstance(winch, dict):
+        profile = reading.winch(winch, str(raw.get("name", "")), place)
+    elif isinstance(winch, str):
+        profile = _named_winch(reading, winch, place)
+    else:
+        return raw
+    # A winch with faults, noted above, is not to be reported a second time.
+    return {**raw, "winch": profile or str(winch)}
+
+
+def _named_winch(reading: Reading, name: str, at: Key) -> WinchProfile | None:
+    path = reading.shipped("profiles", name, at)
+    if path is None:
+        return None
+    try:
+        return read_winch(path)
+    except FileError as error:
+        reading.faults += error.faults
+        return None
+
+
+def _bench(reading: Reading, tree: dict[str, Any]) -> BenchSpec | None:
+    return benches.bench(reading, tree, read_device)
+
+
+def _simbench(reading: Reading, tree: dict[str, Any]) -> SimBench | None:
+    return benches.sim_bench(reading, tree, read_device)
+
+
+def _programme(reading: Reading, tree: dict[str, Any]) -> Programme | None:
+    return reading.table(Programme, {"name": reading.stem, **tree})
+
+
+def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
+    if "path" in tree:
+        reading.fault(("path",), "unknown key")
+    device = reading.table(DeviceSpec, {**tree, "path": reading.source.path})
+    if device is not None and device.servo is not None:
+        eds = Path(reading.source.path).parent / device.servo.eds
+        if not eds.is_file():
+            reading.fault(("servo", "eds"), f"there is no file {eds}")
+    return device
+
+
+_READERS: dict[str, Callable[[Reading, dict[str, Any]], Declared | None]] = {
+    "winch": _winch,
+    "robot": _robot,
+    "bench": _bench,
+    "programme": _programme,
+    "sim-bench": _simbench,
+    "device": _device,
+}
+
+
+def _warnings(reading: Reading, value: Declared) -> tuple[Fault, ...]:
+    if isinstance(value, WinchProfile):
+        return _guide_warnings(reading, value, ())
+    if isinstance(value, RobotProfile):
+        inline = [
+            (line.winch, ("line", n, "winch"))
+            for n, line in enumerate(value.line)
+            if isinstance(line.winch, WinchProfile)
+        ]
+        return tuple(fault for winch, at in inline for fault in _guide_warnings(reading, winch, at))
+    return ()
+
+
+def _guide_warnings(reading: Reading, winch: WinchProfile, at: Key) -> tuple[Fault, ...]:
+    guide, pitch = winch.guide, winch.drum.groove_pitch
+    if guide is None or pitch is None:
+        return ()
+    travel = guide.screw_lead * guide.belt_ratio
+    if abs(travel - pitch) <= 1e-6 * pitch:
+        return ()
+    message = (
+        f"the guide moves {travel * 1e3:g} mm per drum turn, the groove {pitch * 1e3:g} mm "
+        "(screw_lead x belt_ratio should equal drum.groove_pitch)"
+    )
+    return (reading.source.fault((*at, "guide"), message),)

@@ -1,0 +1,167 @@
+"""Reads benches, real and simulated: tables, and that winches, buses and devices fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from winchkit.errors import FileError
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.device import DeviceSpec
+from winchkit.schema.read_lines import Key
+from winchkit.schema.read_parts import Reading
+from winchkit.schema.read_table import marker_at
+from winchkit.schema.simbench import FaultSpec, HiddenSpec, NoiseSpec, SimBench, WinchTruth
+from winchkit.schema.winch import WinchProfile
+from winchkit.units import suggest
+
+__all__ = ["bench", "sim_bench"]
+
+ROLES = ("servo", "cell", "load", "length", "temperature")
+DeviceReader = Callable[[str | Path], DeviceSpec]
+
+
+def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> BenchSpec | None:
+    """Read a bench and check what it refers to."""
+    if "path" in tree:
+        reading.fault(("path",), "unknown key")
+    _check_references(reading, tree, read_device)
+    named = {"name": reading.stem, **tree, "path": reading.source.path}
+    spec = reading.table(BenchSpec, named)
+    if spec is not None and not spec.winch:
+        reading.fault(("winch",), "a bench has at least one winch, in a table [winch.NAME]")
+    return spec
+
+
+def sim_bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> SimBench | None:
+    """Read a simulated bench: a bench, and what is true, hidden, noisy and faulty."""
+    tree = dict(tree)
+    noise = reading.table(NoiseSpec, tree.pop("noise", {}), ("noise",))
+    faults = tuple(_numbered(reading, FaultSpec, tree.pop("fault", []), ("fault",)))
+    truths = {}
+    winches = tree.get("winch")
+    if isinstance(winches, dict):
+        tree["winch"] = dict(winches)
+        for name, winch in winches.items():
+            if isinstance(winch, dict):
+                tree["winch"][name] = wiring = dict(winch)
+                truth = wiring.pop("truth", {})
+                truths[name] = _truth(reading, name, truth, wiring.pop("hidden", []))
+    wired = bench(reading, tree, read_device)
+    if wired is None or noise is None or None in truths.values():
+        return None
+    known = {name: truth for name, truth in truths.items() if truth is not None}
+    return SimBench(wired.name, wired, known, noise, faults, wired.description)
+
+
+def _truth(reading: Reading, name: str, raw: object, hidden: object) -> WinchTruth | None:
+    at: Key = ("winch", name, "truth")
+    if not isinstance(raw, dict):
+        reading.fault(at, f"expected a table, not {raw!r}")
+        return None
+    own = {key: raw[key] for key in ("load_mass", "temperature", "temperature_drift") if key in raw}
+    overrides = dict(_flat({key: value for key, value in raw.items() if key not in own}))
+    for key, value in overrides.items():
+        _check_override(reading, at, key, value)
+    pieces = tuple(_numbered(reading, HiddenSpec, hidden, ("winch", name, "hidden")))
+    return reading.table(WinchTruth, {**own, "overrides": overrides, "hidden": pieces}, at)
+
+
+def _flat(tree: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Tables within tables as dotted keys."""
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _check_override(reading: Reading, at: Key, key: str, value: object) -> None:
+    words: Key = tuple(int(word) if word.isdecimal() else word for word in key.split("."))
+    marker = marker_at(WinchProfile, words)
+    place: Key = (*at, key) if (*at, key) in reading.source.lines else (*at, *key.split("."))
+    if marker is None:
+        message = "is no number of a winch profile; write such as drum.winding_radius"
+        reading.fault(place, message)
+        return
+    try:
+        marker.read(value)
+    except ValueError as error:
+        reading.fault(place, str(error))
+
+
+def _numbered(
+    reading: Reading, kind: type[HiddenSpec] | type[FaultSpec], raw: object, at: Key
+) -> Iterator[Any]:
+    """Read ``[[hidden]]`` or ``[[fault]]`` tables; the keys that they do not know are numbers."""
+    if not isinstance(raw, list) or not all(isinstance(item, dict) for item in raw):
+        reading.fault(at, f"expected tables, each opened by [[{'.'.join(map(str, at))}]]")
+        return
+    own = set(kind.__dataclass_fields__) - {"numbers"}
+    for index, item in enumerate(raw):
+        known = {key: value for key, value in item.items() if key in own}
+        numbers = {key: value for key, value in item.items() if key not in own}
+        yield reading.table(kind, {**known, "numbers": numbers}, (*at, index))
+
+
+def _check_references(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> None:
+    """Profiles and devices exist, buses exist and fit, no two devices share an address."""
+    winches, buses = tree.get("winch"), tree.get("bus")
+    if not isinstance(winches, dict):
+        return
+    taken: dict[tuple[str, object], str] = {}
+    for name, winch in winches.items():
+        if not isinstance(winch, dict):
+            continue
+        at: Key = ("winch", name)
+        reading.shipped("profiles", winch.get("profile"), (*at, "profile"))
+        for role in ROLES:
+            if isinstance(raw := winch.get(role), dict):
+                place: Key = (*at, role)
+                _check_device(
+                    reading, raw, buses if isinstance(buses, dict) else {}, place, read_device
+                )
+                address = raw.get("node", raw.get("unit"))
+                user = taken.setdefault((str(raw.get("bus")), address), ".".join(map(str, place)))
+                if address is not None and user != ".".join(map(str, place)):
+                    key = "node" if "node" in raw else "unit"
+                    reading.fault((*place, key), f"{address} on this bus is taken by {user}")
+
+
+def _check_device(
+    reading: Reading,
+    raw: dict[str, Any],
+    buses: dict[str, Any],
+    at: Key,
+    read_device: DeviceReader,
+) -> None:
+    bus = raw.get("bus")
+    if isinstance(bus, str) and bus not in buses:
+        known = ", ".join(buses) or "none"
+        near = suggest(bus, list(buses))
+        reading.fault((*at, "bus"), f"there is no [bus.{bus}]; buses are {known}{near}")
+    path = reading.shipped("devices", raw.get("device"), (*at, "device"))
+    if path is None:
+        return
+    try:
+        device = read_device(path)
+    except FileError as error:
+        reading.faults += error.faults
+        return
+    servo = device.servo is not None
+    if servo != (at[-1] == "servo"):
+        what = "a servo drive" if servo else "an instrument"
+        reading.fault((*at, "device"), f"'{device.name}' is {what}, which does not fit here")
+        return
+    address, other = ("node", "unit") if servo else ("unit", "node")
+    if address not in raw:
+        reading.fault((*at, address), f"missing; '{device.name}' is reached by its {address}")
+    if other in raw:
+        reading.fault((*at, other), f"'{device.name}' has no {other}; it is reached by {address}")
+    wired = buses.get(str(bus))
+    kind = wired.get("kind") if isinstance(wired, dict) else None
+    fitting = ("can",) if servo else ("modbus-rtu", "modbus-tcp")
+    if kind is not None and kind not in fitting:
+        message = f"[bus.{bus}] is of kind {kind}; '{device.name}' needs {' or '.join(fitting)}"
+        reading.fault((*at, "bus"), message)

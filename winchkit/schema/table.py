@@ -1,0 +1,50 @@
+"""The base of every declared table: unknown keys are refused, and rules tie its keys together.
+
+The rules are checked when a file is read, never when code builds a dataclass from SI numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pydantic_core import CoreSchema
+
+__all__ = ["BrokenRules", "Rule", "Table"]
+
+Rule = tuple[str, str]
+"""A key of the table (empty for the table itself) and what is wrong with it."""
+
+
+class BrokenRules(ValueError):
+    """The rules that one table breaks; carries them from pydantic to the reader."""
+
+    def __init__(self, rules: tuple[Rule, ...]) -> None:
+        super().__init__(*rules)
+        self.rules = rules
+
+
+class Table:
+    """A table of a file; a dataclass that derives from it yields its broken :meth:`rules`."""
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - pydantic reads this very name
+
+    def rules(self) -> Iterator[Rule]:
+        """Yield what is wrong between keys that are each right."""
+        yield from ()
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: object, handler: Callable[[Any], CoreSchema]
+    ) -> CoreSchema:
+        """Let pydantic check the rules once the fields have been read."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_after_validator_function(_obey, handler(source))
+
+
+def _obey(table: Table) -> Table:
+    if broken := tuple(table.rules()):
+        raise BrokenRules(broken)
+    return table

@@ -1,0 +1,94 @@
+"""Simulated benches as a whole: their profiles, and what is hidden in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from random import Random
+
+from winchkit.catalog import find, names
+from winchkit.errors import FileError
+from winchkit.schema.simbench import HiddenSpec, SimBench
+from winchkit.schema.winch import WinchProfile
+from winchkit.sim.physics.table import build, scaled
+
+__all__ = ["choose_bench", "choose_hidden", "demo_names", "hiding", "listed_benches", "profiles_of"]
+
+_DEMO = "demo-"
+_SIZES = (0.8, 1.3)
+
+
+def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
+    """Read the declared profile of every winch on the bench."""
+    from winchkit.schema.read import read_winch
+
+    return {
+        name: read_winch(find("profiles", wiring.profile, beside=bench.bench.path or None))
+        for name, wiring in bench.bench.winch.items()
+    }
+
+
+def hiding(bench: SimBench, physics: Sequence[str]) -> SimBench:
+    """Hide the named physics on every winch instead of what is hidden there.
+
+    ``"elastic rope"`` has its typical size, ``"elastic rope, axial_stiffness=80 kN"`` its own
+    numbers, ``none`` hides nothing. Raises FileError naming what is known.
+    """
+    specs = tuple(_spec(text) for text in physics if text != "none")
+    build(specs)
+    truth = {name: replace(truth, hidden=specs) for name, truth in bench.truth.items()}
+    return replace(bench, truth=truth)
+
+
+def _spec(text: str) -> HiddenSpec:
+    name, *numbers = (part.strip() for part in text.split(","))
+    pairs = (number.partition("=") for number in numbers)
+    return HiddenSpec(name, {key.strip(): value.strip() for key, _, value in pairs})
+
+
+def demo_names() -> list[str]:
+    """Names of the simulated benches among which a demonstration chooses."""
+    return [name for name in names("sim") if name.startswith(_DEMO)]
+
+
+def listed_benches() -> list[dict[str, object]]:
+    """Every shipped simulated bench: name, description, and what it hides."""
+    from winchkit.schema.read import load
+
+    rows: list[dict[str, object]] = []
+    for name in names("sim"):
+        value = load(find("sim", name)).value
+        if isinstance(value, SimBench):
+            hidden = {
+                winch: [{"physics": spec.physics, "answers": spec.answers} for spec in truth.hidden]
+                for winch, truth in value.truth.items()
+            }
+            rows.append({"name": name, "description": value.description, "hidden": hidden})
+    return rows
+
+
+def choose_bench(seed: int) -> SimBench:
+    """The demonstration's bench for a seed: which effect it hides, and how large it is.
+
+    The same seed gives the same bench, seeds in a row go through all of them; sizes vary
+    between 0.8 and 1.3 of the declared ones.
+    """
+    from winchkit.schema.read import read_simbench
+
+    known = demo_names()
+    if not known:
+        raise FileError(f"no simulated bench named {_DEMO}… is installed; reinstall winchkit")
+    bench = read_simbench(find("sim", known[seed % len(known)]))
+    random = Random(f"demo/{seed}")
+    truth = {
+        name: replace(
+            truth, hidden=tuple(scaled(spec, random.uniform(*_SIZES)) for spec in truth.hidden)
+        )
+        for name, truth in bench.truth.items()
+    }
+    return replace(bench, truth=truth)
+
+
+def choose_hidden(seed: int) -> dict[str, tuple[HiddenSpec, ...]]:
+    """What :func:`choose_bench` hides for a seed, by winch; an empty tuple is nothing."""
+    return {name: truth.hidden for name, truth in choose_bench(seed).truth.items()}

@@ -1,0 +1,220 @@
+"""The object dictionary of a simulated CANopen device: types, access, limits and present values."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+from winchkit.errors import FileError
+
+__all__ = ["Abort", "Entry", "Key", "ObjectDictionary", "Value", "read_eds"]
+
+Key = tuple[int, int]
+"""Index and sub-index."""
+Value = int | bytes
+"""Numbers are ints, everything else bytes."""
+Guard = Callable[[int, int], "Abort | None"]
+Watcher = Callable[[int, int], None]
+
+_FORMATS = {0x02: "b", 0x03: "h", 0x04: "i", 0x05: "B", 0x06: "H", 0x07: "I", 0x15: "q", 0x1B: "Q"}
+_BOOLEAN = 0x01
+_SAVE = 0x65766173
+_LOAD = 0x64616F6C
+
+
+class Abort(IntEnum):
+    """SDO abort codes of CiA 301."""
+
+    TOGGLE = 0x05030000
+    COMMAND = 0x05040001
+    WRITE_ONLY = 0x06010001
+    READ_ONLY = 0x06010002
+    NO_OBJECT = 0x06020000
+    NOT_MAPPABLE = 0x06040041
+    PDO_LENGTH = 0x06040042
+    INCOMPATIBLE = 0x06040043
+    LENGTH = 0x06070010
+    NO_SUB_INDEX = 0x06090011
+    RANGE = 0x06090030
+    SIGNATURE = 0x08000020
+    STATE = 0x08000022
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One object as the EDS declares it."""
+
+    name: str
+    format: str
+    """Letter of :mod:`struct`; empty for strings and domains."""
+    access: str
+    """ro, rw, wo, const, rwr or rww."""
+    default: Value
+    low: int | None = None
+    high: int | None = None
+    mappable: bool = False
+
+    @property
+    def size(self) -> int:
+        """In bytes; 0 where it varies."""
+        return struct.calcsize(self.format) if self.format else 0
+
+    @property
+    def readable(self) -> bool:
+        """Whether it can be read."""
+        return self.access != "wo"
+
+    @property
+    def writable(self) -> bool:
+        """Whether it can be written."""
+        return self.access not in ("ro", "const")
+
+    def pack(self, value: Value) -> bytes:
+        """Bytes on the wire, little end first."""
+        return value if isinstance(value, bytes) else struct.pack("<" + self.format, value)
+
+    def unpack(self, data: bytes) -> Value | Abort:
+        """Value of bytes on the wire, or why they are none."""
+        if not self.format:
+            return data
+        if len(data) != self.size:
+            return Abort.LENGTH
+        return int(struct.unpack("<" + self.format, data)[0])
+
+
+class ObjectDictionary:
+    """Entries with their present values.
+
+    ``guards`` may refuse a new number before it is stored, ``watchers`` hear of it afterwards;
+    both are kept by index. Storing (1010h) and restoring (1011h) take effect at ``reset``.
+    """
+
+    def __init__(self, entries: Mapping[Key, Entry]) -> None:
+        self._entries = dict(entries)
+        self._indices = {index for index, _ in entries}
+        self._values: dict[Key, Value] = {}
+        self._stored: dict[Key, Value] = {}
+        self.guards: dict[int, Guard] = {0x1010: self._store, 0x1011: self._restore}
+        self.watchers: dict[int, Watcher] = {}
+        self.reset()
+
+    def __contains__(self, key: Key) -> bool:
+        return key in self._entries
+
+    def __iter__(self) -> Iterator[Key]:
+        return iter(self._entries)
+
+    def entry(self, key: Key) -> Entry | Abort:
+        """Look up a declaration, or the abort code that says what does not exist."""
+        found = self._entries.get(key)
+        if found is not None:
+            return found
+        return Abort.NO_SUB_INDEX if key[0] in self._indices else Abort.NO_OBJECT
+
+    def reset(self) -> None:
+        """Take the stored values, else the defaults, as after power-on."""
+        defaults = {key: entry.default for key, entry in self._entries.items()}
+        self._values = {**defaults, **self._stored}
+
+    def number(self, index: int, sub: int = 0) -> int:
+        """Present value of a numeric object; KeyError where the EDS does not declare it."""
+        value = self._values[index, sub]
+        return value if isinstance(value, int) else int.from_bytes(value, "little")
+
+    def put(self, index: int, sub: int, value: int) -> None:
+        """Set a value from the device's inside: no access rights, guards or watchers."""
+        if (index, sub) in self._entries:
+            self._values[index, sub] = value
+
+    def read(self, key: Key) -> bytes | Abort:
+        """Read as a client does."""
+        entry = self.entry(key)
+        if isinstance(entry, Abort):
+            return entry
+        return entry.pack(self._values[key]) if entry.readable else Abort.WRITE_ONLY
+
+    def refusal(self, key: Key) -> Abort | None:
+        """Why a client could not write here whatever the value; None where it could."""
+        entry = self.entry(key)
+        if isinstance(entry, Abort):
+            return entry
+        return None if entry.writable else Abort.READ_ONLY
+
+    def write(self, key: Key, data: bytes) -> Abort | None:
+        """Write as a client does; None when it was taken."""
+        entry = self.entry(key)
+        if isinstance(entry, Abort):
+            return entry
+        if not entry.writable:
+            return Abort.READ_ONLY
+        value = entry.unpack(data)
+        if isinstance(value, Abort):
+            return value
+        if isinstance(value, int):
+            refused = self._check(key, entry, value)
+            if refused is not None:
+                return refused
+        self._values[key] = value
+        watcher = self.watchers.get(key[0])
+        if watcher is not None and isinstance(value, int):
+            watcher(key[1], value)
+        return None
+
+    def _check(self, key: Key, entry: Entry, value: int) -> Abort | None:
+        if entry.low is not None and value < entry.low:
+            return Abort.RANGE
+        if entry.high is not None and value > entry.high:
+            return Abort.RANGE
+        guard = self.guards.get(key[0])
+        return None if guard is None else guard(key[1], value)
+
+    def _store(self, sub: int, signature: int) -> Abort | None:
+        if signature != _SAVE:
+            return Abort.SIGNATURE
+        self._stored = {
+            key: value for key, value in self._values.items() if self._entries[key].access == "rw"
+        }
+        return None
+
+    def _restore(self, sub: int, signature: int) -> Abort | None:
+        if signature != _LOAD:
+            return Abort.SIGNATURE
+        self._stored = {}
+        return None
+
+
+def read_eds(path: Path, node: int) -> ObjectDictionary:
+    """Object dictionary of an EDS or DCF file for a node id; FileError where it cannot be read."""
+    import canopen
+
+    try:
+        declared = canopen.import_od(str(path), node)
+    except (OSError, ValueError, KeyError) as error:
+        raise FileError(f"{path}: cannot be read as an EDS: {error}") from error
+    entries: dict[Key, Entry] = {}
+    for thing in declared.values():
+        members = [thing] if not hasattr(thing, "subindices") else thing.subindices.values()
+        entries.update({(one.index, one.subindex): _entry(one) for one in members})
+    return ObjectDictionary({key: entry for key, entry in entries.items() if key[0] >= 0x1000})
+
+
+def _entry(variable: Any) -> Entry:
+    letter = "B" if variable.data_type == _BOOLEAN else _FORMATS.get(variable.data_type, "")
+    default = variable.default if variable.value is None else variable.value
+    if letter:
+        default = int(default or 0)
+    elif not isinstance(default, bytes):
+        default = str(default or "").encode()
+    return Entry(
+        variable.name,
+        letter,
+        variable.access_type,
+        default,
+        variable.min if letter else None,
+        variable.max if letter else None,
+        bool(variable.pdo_mappable),
+    )

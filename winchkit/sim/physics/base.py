@@ -1,0 +1,128 @@
+"""What a piece of the simulator's physics is: numbers, and hooks on the winch's two chains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import tanh
+from typing import Annotated, ClassVar
+
+from winchkit.schema.quantity import Quantity
+from winchkit.schema.winch import WinchProfile
+from winchkit.sim.state import State
+
+__all__ = [
+    "HOOKS",
+    "Expansion",
+    "ForceDrift",
+    "Physics",
+    "RotationalViscosity",
+    "Stiffness",
+    "ThermalForce",
+    "Viscosity",
+    "motor_direction",
+    "rope_direction",
+]
+
+Stiffness = Annotated[float, Quantity("stiffness", 0.0, above=True)]
+Viscosity = Annotated[float, Quantity("viscosity")]
+RotationalViscosity = Annotated[float, Quantity("rotational viscosity")]
+Expansion = Annotated[float, Quantity("expansion")]
+ForceDrift = Annotated[float, Quantity("force per time")]
+ThermalForce = Annotated[float, Quantity("force per temperature")]
+
+_ROPE_STANDSTILL = 1e-3
+_MOTOR_STANDSTILL = 0.5
+
+
+def rope_direction(state: State) -> float:
+    """Direction of the rope, +1 winding in, smooth within about 1 mm/s of standstill."""
+    return tanh(state.rope_speed / _ROPE_STANDSTILL)
+
+
+def motor_direction(state: State) -> float:
+    """Direction of the motor, smooth within about 0.5 rad/s of standstill."""
+    return tanh(state.motor_speed / _MOTOR_STANDSTILL)
+
+
+@dataclass
+class Physics:
+    """One piece of physics; its fields are the numbers a file may give, with typical defaults.
+
+    A hook that a class does not override costs nothing: the plant calls only overridden ones,
+    in the order of the table of physics. Objects may keep state; a plant has its own.
+    """
+
+    size: ClassVar[str] = ""
+    """The field that scales how strongly it shows."""
+    inverse: ClassVar[bool] = False
+    """Whether a larger ``size`` shows less (a stiffness)."""
+
+    def reshape(self, profile: WinchProfile) -> WinchProfile:
+        """Give the profile that is true instead; called once."""
+        return profile
+
+    def begin(self, profile: WinchProfile) -> None:
+        """Note what is needed of the true profile; called once, after every ``reshape``."""
+
+    def rotor_inertia(self) -> float:
+        """Inertia that the motor accelerates besides the load, kg m²."""
+        return 0.0
+
+    def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
+        """Angle added to the drum's, its slope by the drum angle, and its rate in time."""
+        raise NotImplementedError
+
+    def wound_length(self, state: State) -> tuple[float, float]:
+        """Length added to what is wound, and its slope by the drum angle, m and m/rad."""
+        raise NotImplementedError
+
+    def compliance(self, state: State) -> float:
+        """Stretch per tension at the platform, m/N."""
+        raise NotImplementedError
+
+    def stretch(self, state: State, dt: float) -> float:
+        """Length added to the rope that is no linear spring, m."""
+        raise NotImplementedError
+
+    def weight(self, state: State) -> float:
+        """Tension added on the way from the platform to the pulleys, N."""
+        raise NotImplementedError
+
+    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+        """Tension added by one pulley, wrap in rad, to that on its platform side, N."""
+        raise NotImplementedError
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """What the load cell makes of a reading, N."""
+        raise NotImplementedError
+
+    def gear(self, state: State, torque: float) -> float:
+        """Torque at the motor that carries ``torque`` of the rope, N m."""
+        raise NotImplementedError
+
+    def motor(self, state: State) -> float:
+        """Torque that the motor spends on itself, N m."""
+        raise NotImplementedError
+
+    def torque_signal(self, state: State, reading: float, dt: float) -> float:
+        """What the drive reports for a torque, N m."""
+        raise NotImplementedError
+
+    def length_signal(self, state: State, reading: float, dt: float) -> float:
+        """What the length instrument makes of a reading, m."""
+        raise NotImplementedError
+
+
+HOOKS = (
+    "drum_angle",
+    "wound_length",
+    "compliance",
+    "stretch",
+    "weight",
+    "pulley",
+    "cell",
+    "gear",
+    "motor",
+    "torque_signal",
+    "length_signal",
+)

@@ -1,0 +1,132 @@
+"""Physics that no catalogue of effects has: what a diagnosis must call unknown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, exp, pi, sin
+from typing import Annotated, ClassVar
+
+from winchkit.schema.quantity import (
+    Force,
+    Length,
+    PositiveDuration,
+    PositiveForce,
+    PositiveLength,
+    PositiveNumber,
+    Quantity,
+)
+from winchkit.sim.physics.base import Physics, Stiffness, rope_direction
+from winchkit.sim.state import State
+
+__all__ = [
+    "ClippingCell",
+    "FiveCornerDrum",
+    "GivingJoint",
+    "StickyPlace",
+    "TemperatureCrosstalk",
+    "TorqueCrosstalk",
+    "WanderingLength",
+]
+
+
+@dataclass
+class FiveCornerDrum(Physics):
+    """The drum has corners: a wave of a higher order per drum turn."""
+
+    amplitude: Length = 0.0003
+    order: PositiveNumber = 5.0
+    size: ClassVar[str] = "amplitude"
+
+    def wound_length(self, state: State) -> tuple[float, float]:
+        """Sine of a multiple of the drum angle."""
+        angle = self.order * state.drum_angle
+        return self.amplitude * sin(angle), self.amplitude * self.order * cos(angle)
+
+
+@dataclass
+class TorqueCrosstalk(Physics):
+    """The motor's current leaks into the cell's wires, with the sign of its motion."""
+
+    per_torque: Annotated[float, Quantity("ratio")] = 8.0
+    """N per N m of motor torque."""
+    wave: PositiveNumber = 3.0
+    """Waves per motor torque of 1 N m: the leak rectifies in lobes."""
+    size: ClassVar[str] = "per_torque"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Add the leak."""
+        return reading + self.per_torque * sin(2 * pi * self.wave * state.motor_torque)
+
+
+@dataclass
+class TemperatureCrosstalk(Physics):
+    """The cell's zero swings with temperature, back and forth."""
+
+    swing: Force = 3.0
+    period: Annotated[float, Quantity("ratio", 0.0, above=True)] = 1.5
+    """K per swing."""
+    size: ClassVar[str] = "swing"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Add a sine of the temperature."""
+        return reading + self.swing * sin(2 * pi * state.temperature / self.period)
+
+
+@dataclass
+class StickyPlace(Physics):
+    """Something rubs at one place of the stroke."""
+
+    force: Force = 12.0
+    at: Length = 2.4
+    """Cable length where it rubs, m."""
+    width: PositiveLength = 0.1
+    size: ClassVar[str] = "force"
+
+    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+        """Rub at the first pulley of the drum, against the motion, around the place."""
+        if index != 0:
+            return 0.0
+        where = (state.unstrained - self.at) / self.width
+        return rope_direction(state) * self.force * exp(-where * where)
+
+
+@dataclass
+class GivingJoint(Physics):
+    """A joint opens above a load."""
+
+    above: PositiveForce = 150.0
+    stiffness: Stiffness = 20e3
+    size: ClassVar[str] = "stiffness"
+    inverse: ClassVar[bool] = True
+    _opening: float = 0.0
+    _SETTLE: ClassVar[float] = 0.01
+
+    def stretch(self, state: State, dt: float) -> float:
+        """Open with the excess of tension, settling within hundredths of a second."""
+        goal = max(0.0, state.load - self.above) / self.stiffness
+        self._opening += (goal - self._opening) * (1.0 - exp(-dt / self._SETTLE))
+        return self._opening
+
+
+@dataclass
+class WanderingLength(Physics):
+    """The length instrument wanders slowly, up and down."""
+
+    amplitude: Length = 0.0015
+    period: PositiveDuration = 7.0
+    size: ClassVar[str] = "amplitude"
+
+    def length_signal(self, state: State, reading: float, dt: float) -> float:
+        """Add a slow sine of time."""
+        return reading + self.amplitude * sin(2 * pi * state.time / self.period)
+
+
+@dataclass
+class ClippingCell(Physics):
+    """The cell's amplifier saturates."""
+
+    limit: PositiveForce = 195.0
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Cut off above the limit."""
+        return min(reading, self.limit)

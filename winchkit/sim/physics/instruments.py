@@ -1,0 +1,120 @@
+"""Physics of the load cell and of the length instrument."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from math import exp
+from typing import ClassVar
+
+from winchkit.schema.quantity import Force, Number, PositiveDuration
+from winchkit.sim.physics.base import ForceDrift, Physics, ThermalForce
+from winchkit.sim.state import State
+
+__all__ = [
+    "BentCell",
+    "DriftingCell",
+    "LateLength",
+    "ShiftedCell",
+    "SlowCell",
+    "StretchedCell",
+    "WarmCell",
+]
+
+
+@dataclass
+class StretchedCell(Physics):
+    """The cell's gain is wrong."""
+
+    gain_error: Number = 0.02
+    size: ClassVar[str] = "gain_error"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Scale the reading."""
+        return reading * (1.0 + self.gain_error)
+
+
+@dataclass
+class ShiftedCell(Physics):
+    """The cell's zero is wrong."""
+
+    offset: Force = 4.0
+    size: ClassVar[str] = "offset"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Shift the reading."""
+        return reading + self.offset
+
+
+@dataclass
+class BentCell(Physics):
+    """The cell's curve is bent: ``quadratic`` N at 500 N."""
+
+    quadratic: Force = 25.0
+    size: ClassVar[str] = "quadratic"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Add a square of the tension."""
+        return reading + self.quadratic * (state.tension / 500.0) ** 2
+
+
+@dataclass
+class DriftingCell(Physics):
+    """The cell's zero wanders off with time."""
+
+    drift: ForceDrift = 0.4
+    size: ClassVar[str] = "drift"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Add a ramp since the start."""
+        return reading + self.drift * state.time
+
+
+@dataclass
+class WarmCell(Physics):
+    """The cell's zero moves with temperature above 20 degC."""
+
+    sensitivity: ThermalForce = 0.5
+    size: ClassVar[str] = "sensitivity"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Add the thermal shift."""
+        return reading + self.sensitivity * (state.temperature - 20.0)
+
+
+@dataclass
+class SlowCell(Physics):
+    """The amplifier's low-pass, first order."""
+
+    time_constant: PositiveDuration = 0.1
+    size: ClassVar[str] = "time_constant"
+    _value: float | None = None
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """First-order lag, stepped exactly for a held input."""
+        if self._value is None:
+            self._value = reading
+        self._value += (reading - self._value) * (1.0 - exp(-dt / self.time_constant))
+        return self._value
+
+
+@dataclass
+class LateLength(Physics):
+    """The length instrument reports what was ``delay`` ago."""
+
+    delay: PositiveDuration = 0.003
+    size: ClassVar[str] = "delay"
+    _past: deque[tuple[float, float]] = field(default_factory=deque)
+
+    def length_signal(self, state: State, reading: float, dt: float) -> float:
+        """Interpolate the past; before it began, the first value."""
+        past = self._past
+        past.append((state.time, reading))
+        wanted = state.time - self.delay
+        while len(past) > 2 and past[1][0] <= wanted:
+            past.popleft()
+        (t0, x0) = past[0]
+        if wanted <= t0 or len(past) == 1:
+            return x0
+        (t1, x1) = past[1]
+        return x0 + (x1 - x0) * (wanted - t0) / (t1 - t0)

@@ -1,0 +1,147 @@
+"""Physics of the gearbox's losses, of the motor and of its torque signal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, sin
+from typing import Annotated, ClassVar
+
+from winchkit.schema.quantity import (
+    Angle,
+    Inertia,
+    Number,
+    PositiveDuration,
+    PositiveNumber,
+    Quantity,
+    Torque,
+)
+from winchkit.sim.physics.base import (
+    Physics,
+    RotationalViscosity,
+    motor_direction,
+    rope_direction,
+)
+from winchkit.sim.state import State
+
+__all__ = [
+    "Cogging",
+    "HeavyRotor",
+    "LossyGear",
+    "MotorDrag",
+    "MotorGrease",
+    "MotorStiction",
+    "SlowTorque",
+    "WeakMotor",
+]
+
+AngularSpeed = Annotated[float, Quantity("angular speed", 0.0, above=True)]
+Efficiency = Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)]
+
+
+@dataclass
+class LossyGear(Physics):
+    """The gearbox takes its share: more torque to wind in, less to hold while paying out."""
+
+    efficiency: Efficiency = 0.94
+
+    def gear(self, state: State, torque: float) -> float:
+        """Divide by the efficiency winding in, multiply paying out."""
+        return float(torque * self.efficiency ** -rope_direction(state))
+
+
+@dataclass
+class MotorDrag(Physics):
+    """Dry friction of motor and seals, free of load."""
+
+    torque: Torque = 0.025
+    size: ClassVar[str] = "torque"
+
+    def motor(self, state: State) -> float:
+        """Coulomb friction."""
+        return motor_direction(state) * self.torque
+
+
+@dataclass
+class MotorGrease(Physics):
+    """Viscous friction of the motor."""
+
+    viscosity: RotationalViscosity = 1.5e-4
+    size: ClassVar[str] = "viscosity"
+
+    def motor(self, state: State) -> float:
+        """Torque proportional to speed."""
+        return self.viscosity * state.motor_speed
+
+
+@dataclass
+class MotorStiction(Physics):
+    """Friction of the motor that is there only at creep speed (Stribeck)."""
+
+    torque: Torque = 0.03
+    stribeck_speed: AngularSpeed = 20.0
+    size: ClassVar[str] = "torque"
+
+    def motor(self, state: State) -> float:
+        """Falls off with the square of speed."""
+        fall = exp(-((state.motor_speed / self.stribeck_speed) ** 2))
+        return motor_direction(state) * self.torque * fall
+
+
+@dataclass
+class Cogging(Physics):
+    """Torque that poles and slots ask for, a whole number of waves per motor turn."""
+
+    amplitude: Torque = 0.015
+    order: PositiveNumber = 4.0
+    phase: Angle = 0.3
+    size: ClassVar[str] = "amplitude"
+
+    def motor(self, state: State) -> float:
+        """Sine of the motor angle."""
+        return self.amplitude * sin(self.order * state.motor_angle + self.phase)
+
+
+@dataclass
+class HeavyRotor(Physics):
+    """Inertia of rotor and gearbox, seen at the motor."""
+
+    inertia: Inertia = 1e-4
+    size: ClassVar[str] = "inertia"
+
+    def rotor_inertia(self) -> float:
+        """The inertia itself."""
+        return self.inertia
+
+    def motor(self, state: State) -> float:
+        """Torque proportional to acceleration."""
+        return self.inertia * state.motor_acceleration
+
+
+@dataclass
+class WeakMotor(Physics):
+    """The drive's torque constant is wrong, so it reports another torque than there is."""
+
+    gain_error: Number = 0.05
+    size: ClassVar[str] = "gain_error"
+
+    def torque_signal(self, state: State, reading: float, dt: float) -> float:
+        """Scale the reported torque."""
+        return reading * (1.0 + self.gain_error)
+
+
+@dataclass
+class SlowTorque(Physics):
+    """The drive's filter of its torque signal, first order."""
+
+    time_constant: PositiveDuration = 0.08
+    size: ClassVar[str] = "time_constant"
+    _value: float | None = None
+
+    def torque_signal(self, state: State, reading: float, dt: float) -> float:
+        """First-order lag, stepped exactly for a held input."""
+        if dt == 0.0:
+            return reading
+        if self._value is None:
+            self._value = reading
+        self._value += (reading - self._value) * (1.0 - exp(-dt / self.time_constant))
+        return self._value

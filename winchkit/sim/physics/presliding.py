@@ -1,0 +1,37 @@
+"""Dahl's friction law, integrated in time."""
+
+from __future__ import annotations
+
+from math import ceil
+
+__all__ = ["relax"]
+
+_SMALL = 0.2
+
+
+def relax(force: float, travel: float, limit: float, slope: float, shape: float) -> float:
+    """Integrate dF/dx = slope·|1 − sF/limit|^shape·sgn(1 − sF/limit) over ``travel``.
+
+    ``limit`` is the sliding force, s the direction of travel. Classical Runge-Kutta in steps
+    that are small beside the distance over which the law relaxes.
+    """
+    if travel == 0.0 or limit <= 0.0:
+        return force if limit > 0.0 else 0.0
+    sign = 1.0 if travel > 0.0 else -1.0
+    load = 1.0 - sign * force / limit
+    if abs(load) < 1e-12:
+        return force
+    count = ceil(slope * abs(travel) / limit / _SMALL)
+    step = slope * abs(travel) / limit / count
+    for _ in range(count):
+        k1 = -_rate(load, shape)
+        k2 = -_rate(load + step * k1 / 2, shape)
+        k3 = -_rate(load + step * k2 / 2, shape)
+        k4 = -_rate(load + step * k3, shape)
+        load += step * (k1 + 2 * k2 + 2 * k3 + k4) / 6
+    return sign * limit * (1.0 - load)
+
+
+def _rate(load: float, shape: float) -> float:
+    """Rate of 1 − sF/limit by travel in units of limit/slope."""
+    return load if shape == 1.0 else abs(load) ** shape * (1.0 if load > 0.0 else -1.0)

@@ -1,0 +1,99 @@
+"""Physics of the pulleys: what they add to the tension between platform and drum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import cos, exp, sqrt
+from typing import ClassVar
+
+from winchkit.schema.quantity import Mass, Number, PositiveNumber, PositiveSpeed
+from winchkit.sim.physics.base import Physics, Stiffness, Viscosity, rope_direction
+from winchkit.sim.physics.presliding import relax
+from winchkit.sim.state import State
+
+__all__ = ["CreepPulleys", "HeavyPulleys", "PreslidingPulleys", "StickyPulleys", "ViscousPulleys"]
+
+
+def _pressure(before: float, after: float, wrap: float) -> float:
+    """Force on the axle of a pulley between two tensions, N (Eq. 22)."""
+    square = before * before - 2 * before * after * cos(wrap) + after * after
+    return sqrt(max(0.0, square))
+
+
+def _dragged(tension: float, wrap: float, friction: float) -> float:
+    """Friction force of an axle whose pressure holds that friction too (Eq. 23)."""
+    force = friction * _pressure(tension, tension, wrap)
+    for _ in range(2):
+        force = friction * _pressure(tension, tension + force, wrap)
+    return force
+
+
+@dataclass
+class StickyPulleys(Physics):
+    """Dry friction of the axles, odd in direction."""
+
+    friction: Number = 0.015
+    size: ClassVar[str] = "friction"
+
+    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+        """Coulomb friction of the axle's pressure."""
+        return _dragged(tension, wrap, rope_direction(state) * self.friction)
+
+
+@dataclass
+class PreslidingPulleys(Physics):
+    """Friction that gives elastically before it slides: Dahl, over the rope's travel."""
+
+    friction: Number = 0.02
+    stiffness: Stiffness = 800.0
+    shape: PositiveNumber = 1.0
+    size: ClassVar[str] = "friction"
+    _force: dict[int, float] = field(default_factory=dict)
+
+    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+        """Dahl force with the sliding force of the present pressure."""
+        force = self._force.get(index, 0.0)
+        limit = self.friction * _pressure(tension, tension + force, wrap)
+        force = relax(force, state.rope_speed * dt, limit, self.stiffness, self.shape)
+        self._force[index] = force
+        return force
+
+
+@dataclass
+class ViscousPulleys(Physics):
+    """Grease in the bearings, proportional to speed."""
+
+    viscosity: Viscosity = 8.0
+    size: ClassVar[str] = "viscosity"
+
+    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+        """Force proportional to speed."""
+        return self.viscosity * state.rope_speed
+
+
+@dataclass
+class CreepPulleys(Physics):
+    """Dry friction that is larger at creep speed (Stribeck)."""
+
+    coulomb: Number = 0.008
+    static: Number = 0.03
+    stribeck_speed: PositiveSpeed = 0.04
+    size: ClassVar[str] = "static"
+
+    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+        """Stribeck curve times the axle's pressure."""
+        fall = exp(-((state.rope_speed / self.stribeck_speed) ** 2))
+        friction = self.coulomb + (self.static - self.coulomb) * fall
+        return _dragged(tension, wrap, rope_direction(state) * friction)
+
+
+@dataclass
+class HeavyPulleys(Physics):
+    """Inertia of the sheaves, as a mass that moves with the rope."""
+
+    equivalent_mass: Mass = 1.0
+    size: ClassVar[str] = "equivalent_mass"
+
+    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+        """Force proportional to the rope's acceleration."""
+        return self.equivalent_mass * state.rope_acceleration

@@ -1,0 +1,140 @@
+"""The simulator's own table of physics: a plain name for each, in the order it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from winchkit.errors import Fault, FileError, UsageError
+from winchkit.schema.simbench import HiddenSpec
+from winchkit.schema.winch import WinchProfile
+from winchkit.sim.numbers import number_names, read_numbers, with_unit
+from winchkit.sim.physics import beyond, instruments, motor, pulley, rope, winding
+from winchkit.sim.physics.base import Physics
+from winchkit.units import suggest
+
+__all__ = ["PHYSICS", "build", "declared", "listed_physics", "scaled"]
+
+PHYSICS: dict[str, type[Physics]] = {
+    "fat drum": winding.FatDrum,
+    "wrong ratio": winding.WrongRatio,
+    "thick layers": winding.ThickLayers,
+    "slip": winding.Slip,
+    "wavy gear": winding.WavyGear,
+    "loose gear": winding.LooseGear,
+    "eccentric drum": winding.EccentricDrum,
+    "five-cornered drum": beyond.FiveCornerDrum,
+    "guide offset": winding.GuideOffset,
+    "elastic rope": rope.ElasticRope,
+    "soft frame": rope.SoftFrame,
+    "creeping rope": rope.CreepingRope,
+    "lagging rope": rope.LaggingRope,
+    "warm rope": rope.WarmRope,
+    "giving joint": beyond.GivingJoint,
+    "heavy rope": rope.HeavyRope,
+    "sticky pulleys": pulley.StickyPulleys,
+    "presliding pulleys": pulley.PreslidingPulleys,
+    "viscous pulleys": pulley.ViscousPulleys,
+    "creep-sticky pulleys": pulley.CreepPulleys,
+    "heavy pulleys": pulley.HeavyPulleys,
+    "sticky place": beyond.StickyPlace,
+    "stretched cell": instruments.StretchedCell,
+    "shifted cell": instruments.ShiftedCell,
+    "bent cell": instruments.BentCell,
+    "drifting cell": instruments.DriftingCell,
+    "warm cell": instruments.WarmCell,
+    "torque crosstalk": beyond.TorqueCrosstalk,
+    "temperature crosstalk": beyond.TemperatureCrosstalk,
+    "slow cell": instruments.SlowCell,
+    "clipping cell": beyond.ClippingCell,
+    "lossy gear": motor.LossyGear,
+    "motor drag": motor.MotorDrag,
+    "motor grease": motor.MotorGrease,
+    "motor stiction": motor.MotorStiction,
+    "cogging": motor.Cogging,
+    "heavy rotor": motor.HeavyRotor,
+    "weak motor": motor.WeakMotor,
+    "slow torque": motor.SlowTorque,
+    "late length": instruments.LateLength,
+    "wandering length": beyond.WanderingLength,
+}
+
+_ORDER = {kind: place for place, kind in enumerate(PHYSICS.values())}
+
+
+def build(hidden: Sequence[HiddenSpec]) -> list[Physics]:
+    """Make each named piece of physics, in the order in which they act.
+
+    Raises FileError with every fault: an unknown name, an unknown number, a wrong unit.
+    """
+    faults: list[Fault] = []
+    pieces: list[Physics] = []
+    for spec in hidden:
+        try:
+            pieces.append(_build_one(spec))
+        except FileError as error:
+            faults.extend(error.faults)
+    if faults:
+        raise FileError(faults)
+    return _in_order(pieces)
+
+
+def _build_one(spec: HiddenSpec) -> Physics:
+    kind = PHYSICS.get(spec.physics)
+    if kind is None:
+        known = list(PHYSICS)
+        raise FileError(
+            f"hidden.physics: unknown '{spec.physics}'{suggest(spec.physics, known)}"
+            f"; known are {', '.join(known)}"
+        )
+    return kind(**read_numbers(kind, spec.numbers, f"hidden '{spec.physics}'"))
+
+
+def _in_order(pieces: Iterable[Physics]) -> list[Physics]:
+    return sorted(pieces, key=lambda piece: _ORDER[type(piece)])
+
+
+def declared(profile: WinchProfile, pieces: Sequence[Physics]) -> list[Physics]:
+    """Add what the profile itself declares by shorthand: elastic rope, its weight, efficiency."""
+    own: list[Physics] = []
+    if profile.cable.axial_stiffness is not None:
+        own.append(rope.ElasticRope(profile.cable.axial_stiffness))
+    if profile.cable.mass_per_length is not None:
+        own.append(rope.HeavyRope(profile.cable.mass_per_length))
+    if profile.gearbox.efficiency is not None:
+        own.append(motor.LossyGear(profile.gearbox.efficiency))
+    for piece in own:
+        if any(type(other) is type(piece) for other in pieces):
+            name = next(name for name, kind in PHYSICS.items() if kind is type(piece))
+            raise UsageError(
+                f"'{name}' is hidden and {profile.name} declares it too; "
+                "change the declared number under truth instead"
+            )
+    return _in_order([*pieces, *own])
+
+
+def scaled(spec: HiddenSpec, factor: float) -> HiddenSpec:
+    """Show the same physics ``factor`` times as strongly, by the number that sets its size."""
+    piece = _build_one(spec)
+    if not piece.size:
+        return spec
+    value = getattr(piece, piece.size)
+    value = value / factor if piece.inverse else value * factor
+    return replace(
+        spec, numbers={**spec.numbers, piece.size: with_unit(type(piece), piece.size, value)}
+    )
+
+
+def listed_physics() -> list[dict[str, object]]:
+    """Every piece of physics: name, description, and its numbers of typical size."""
+    return [
+        {
+            "name": name,
+            "description": (kind.__doc__ or "").partition("\n")[0],
+            "numbers": {
+                number: with_unit(kind, number, getattr(kind(), number))
+                for number in number_names(kind)
+            },
+        }
+        for name, kind in PHYSICS.items()
+    ]

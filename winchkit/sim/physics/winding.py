@@ -1,0 +1,185 @@
+"""Physics of what turns: gearbox, drum, guide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, hypot, pi, sin
+from typing import ClassVar
+
+from winchkit.errors import UsageError
+from winchkit.schema.quantity import Angle, Duration, Length, Number, PositiveNumber, Torque
+from winchkit.schema.winch import WinchProfile
+from winchkit.sim.physics.base import Physics, motor_direction
+from winchkit.sim.state import State
+
+__all__ = [
+    "EccentricDrum",
+    "FatDrum",
+    "GuideOffset",
+    "LooseGear",
+    "Slip",
+    "ThickLayers",
+    "WavyGear",
+    "WrongRatio",
+]
+
+_SLIP_TIME = 0.4
+
+
+@dataclass
+class FatDrum(Physics):
+    """The drum's radius is larger than declared."""
+
+    radius_error: Length = 0.00015
+    size: ClassVar[str] = "radius_error"
+
+    def reshape(self, profile: WinchProfile) -> WinchProfile:
+        """Add the error to the winding radius."""
+        radius = profile.drum.winding_radius + self.radius_error
+        return replace(profile, drum=replace(profile.drum, winding_radius=radius))
+
+
+@dataclass
+class WrongRatio(Physics):
+    """The gearbox has another ratio than declared."""
+
+    ratio_error: Number = 0.004
+    size: ClassVar[str] = "ratio_error"
+
+    def reshape(self, profile: WinchProfile) -> WinchProfile:
+        """Scale the ratio."""
+        ratio = profile.gearbox.ratio * (1 + self.ratio_error)
+        return replace(profile, gearbox=replace(profile.gearbox, ratio=ratio))
+
+
+@dataclass
+class ThickLayers(Physics):
+    """Each turn on a layered drum lies higher than declared."""
+
+    growth_error: Length = 0.00005
+    size: ClassVar[str] = "growth_error"
+
+    def reshape(self, profile: WinchProfile) -> WinchProfile:
+        """Add the error to the layer growth; UsageError on a drum without layers."""
+        drum = profile.drum
+        growth = drum.layer_growth if drum.layer_growth is not None else profile.cable.diameter
+        if drum.kind not in ("spiral", "archimedean") or growth is None:
+            raise UsageError(f"a {drum.kind} drum has no layers that could be too thick")
+        return replace(profile, drum=replace(drum, layer_growth=growth + self.growth_error))
+
+
+@dataclass
+class EccentricDrum(Physics):
+    """The drum runs out of true: once per turn in length and torque arm."""
+
+    eccentricity: Length = 0.0005
+    phase: Angle = 0.7
+    size: ClassVar[str] = "eccentricity"
+
+    def wound_length(self, state: State) -> tuple[float, float]:
+        """Sine of the drum angle, zero at the reference."""
+        angle = state.drum_angle - self.phase
+        extra = self.eccentricity * (sin(angle) + sin(self.phase))
+        return extra, self.eccentricity * cos(angle)
+
+
+@dataclass
+class GuideOffset(Physics):
+    """The guide stands off the rope's place on the drum, so the rope takes a longer way."""
+
+    offset: Length = 0.03
+    mismatch: Length = 0.002
+    """Sideways per drum turn, m."""
+    size: ClassVar[str] = "mismatch"
+    _distance: float = 0.4
+
+    def begin(self, profile: WinchProfile) -> None:
+        """Take the guide's distance; UsageError without a guide."""
+        if profile.guide is None:
+            raise UsageError(f"{profile.name} has no guide that could stand off")
+        self._distance = profile.guide.distance
+
+    def wound_length(self, state: State) -> tuple[float, float]:
+        """Length of the slant over the straight way."""
+        per_radian = self.mismatch / (2 * pi)
+        aside = self.offset + per_radian * state.wound_angle
+        slant = hypot(self._distance, aside)
+        return slant - self._distance, aside / slant * per_radian
+
+
+@dataclass
+class WavyGear(Physics):
+    """Transmission error of the gearbox, a whole number of waves per motor turn."""
+
+    amplitude: Angle = 0.01
+    order: PositiveNumber = 1.0
+    phase: Angle = 0.4
+    size: ClassVar[str] = "amplitude"
+    _ratio: float = 1.0
+
+    def begin(self, profile: WinchProfile) -> None:
+        """Take the ratio."""
+        self._ratio = profile.gearbox.ratio * profile.gearbox.direction
+
+    def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
+        """Sine of the motor angle."""
+        angle = self.order * state.motor_angle + self.phase
+        slope = self.amplitude * self.order * cos(angle) * self._ratio
+        return self.amplitude * sin(angle), slope, 0.0
+
+
+@dataclass
+class Slip(Physics):
+    """The coupling behind the encoder slips once and does not return."""
+
+    step: Angle = 0.03
+    time: Duration = 5.0
+    size: ClassVar[str] = "step"
+
+    def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
+        """A smooth step that takes 0.4 s."""
+        x = (state.time - self.time) / _SLIP_TIME
+        if x <= 0.0:
+            return 0.0, 0.0, 0.0
+        if x >= 1.0:
+            return self.step, 0.0, 0.0
+        rate = self.step * 6 * x * (1 - x) / _SLIP_TIME
+        return self.step * x * x * (3 - 2 * x), 0.0, rate
+
+
+@dataclass
+class LooseGear(Physics):
+    """Backlash: the drum rests within the gap while its drag outweighs the load.
+
+    With a drag below the load's torque the teeth stay on one flank and nothing shows. The drag
+    itself costs the motor torque.
+    """
+
+    gap: Angle = 0.01
+    drag: Torque = 30.0
+    """Friction torque at the drum, N m."""
+    size: ClassVar[str] = "gap"
+    _ratio: float = 1.0
+    _drum: float | None = None
+
+    def begin(self, profile: WinchProfile) -> None:
+        """Take the ratio."""
+        self._ratio = profile.gearbox.ratio
+
+    def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
+        """Play between the gear's output angle and the drum."""
+        driven = state.drum_angle
+        half = self.gap / 2
+        if self._drum is None:
+            self._drum = driven
+        pull = state.tension * abs(state.arm) * self._ratio
+        low = high = driven - half
+        if pull <= self.drag:
+            high = driven + half
+        inside = low < self._drum < high
+        self._drum = min(max(self._drum, low), high)
+        return self._drum - driven, -1.0 if inside else 0.0, 0.0
+
+    def gear(self, state: State, torque: float) -> float:
+        """Add the drag."""
+        return torque + motor_direction(state) * self.drag / self._ratio

@@ -1,0 +1,159 @@
+"""A motion programme laid out in time: which run holds which moves under which load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from winchkit.errors import Fault, FileError
+from winchkit.schema.bench import LimitSpec
+from winchkit.schema.programme import Programme, Step
+from winchkit.sim.trajectory import SCurve, plan
+from winchkit.units import suggest
+
+__all__ = ["Leg", "RunPlan", "schedule"]
+
+_JERK_TIME = 0.4
+"""Over which an acceleration builds up where nothing else limits the jerk, s."""
+ASK_PAUSE = 20.0
+"""How long an operator takes to hang a load, s."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One step: moves of cable length that begin together, or a hold without any."""
+
+    duration: float
+    moves: Mapping[str, SCurve] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """One run: where it starts, what hangs there, what moves."""
+
+    start: Mapping[str, float]
+    """Cable length of every winch, m."""
+    load_mass: Mapping[str, float]
+    """Known weight on every winch, kg."""
+    legs: tuple[Leg, ...]
+    elapsed: float
+    """Since the programme began, pauses included, s."""
+
+    @property
+    def duration(self) -> float:
+        """Length of the run, s."""
+        return sum(leg.duration for leg in self.legs)
+
+
+class _Layout:
+    """Walks through the steps and notes where everything stands."""
+
+    def __init__(
+        self, limits: Mapping[str, LimitSpec], length: dict[str, float], load: dict[str, float]
+    ) -> None:
+        self.limits = limits
+        self.length = length
+        self.load = load
+        self.elapsed = 0.0
+        self.legs: list[Leg] = []
+        self.plans: list[RunPlan] = []
+        self._begin()
+
+    def _begin(self) -> None:
+        self._start = dict(self.length)
+        self.legs = []
+
+    def end_run(self) -> None:
+        """Close the run of the legs so far, if there are any."""
+        if self.legs:
+            run = RunPlan(self._start, dict(self.load), tuple(self.legs), self.elapsed)
+            self.plans.append(run)
+            self.elapsed += run.duration
+        self._begin()
+
+    def take(self, step: Step, winches: Sequence[str]) -> None:
+        """Lay out one step for the winches that it names."""
+        if step.load_mass is not None and any(
+            self.load[name] != step.load_mass for name in winches
+        ):
+            self.end_run()
+            self.load.update(dict.fromkeys(winches, step.load_mass))
+        if step.ask is not None:
+            self.elapsed += ASK_PAUSE
+        elif step.hold is not None:
+            self.legs.append(Leg(step.hold))
+        else:
+            self._move(step, winches)
+
+    def _move(self, step: Step, winches: Sequence[str]) -> None:
+        moves = {}
+        for name in winches:
+            here, limit = self.length[name], self.limits[name]
+            goal = step.to if step.to is not None else here + (step.by or 0.0)
+            speed = min(step.speed or limit.speed, limit.speed)
+            acceleration = min(step.acceleration or limit.acceleration, limit.acceleration)
+            moves[name] = plan(goal - here, speed, acceleration, acceleration / _JERK_TIME)
+            self.length[name] = goal
+        duration = max(move.duration for move in moves.values())
+        if duration > 0:
+            self.legs.append(Leg(duration, moves))
+
+
+def schedule(
+    programme: Programme,
+    limits: Mapping[str, LimitSpec],
+    length: Mapping[str, float],
+    load_mass: Mapping[str, float],
+) -> list[RunPlan]:
+    """Lay a programme out: every repeat, a new run at every change of load.
+
+    ``length`` and ``load_mass`` hold at its start by winch. The first run starts where a
+    repeat ends, so that all repeats are the same motion. Raises FileError for a step of an
+    unknown winch, or one that leaves a winch's length limits.
+    """
+    _check_names(programme, list(limits))
+    layout = _Layout(limits, dict(length), dict(load_mass))
+    for index, step in enumerate(programme.step):
+        layout.take(step, _winches(step, limits))
+        _check_place(programme, index, layout)
+    fixed = any(step.to is not None for step in programme.step)
+    layout = _Layout(limits, layout.length if fixed else dict(length), dict(load_mass))
+    for _ in range(programme.repeat):
+        for step in programme.step:
+            layout.take(step, _winches(step, limits))
+        layout.end_run()
+    return layout.plans
+
+
+def _winches(step: Step, limits: Mapping[str, LimitSpec]) -> list[str]:
+    return list(limits) if step.winch == "all" else [step.winch]
+
+
+def _check_names(programme: Programme, known: list[str]) -> None:
+    faults = [
+        Fault(
+            f"no winch '{step.winch}' on this bench; it has {', '.join(known)}"
+            + suggest(step.winch, known),
+            programme.name,
+            key=f"step[{index}].winch",
+        )
+        for index, step in enumerate(programme.step)
+        if step.winch != "all" and step.winch not in known
+    ]
+    if faults:
+        raise FileError(faults)
+
+
+def _check_place(programme: Programme, index: int, layout: _Layout) -> None:
+    for name, limit in layout.limits.items():
+        here = layout.length[name]
+        if limit.length is not None and not limit.length[0] <= here <= limit.length[1]:
+            low, high = limit.length
+            raise FileError(
+                Fault(
+                    f"winch {name} would be at {here:g} m, outside its limits {low:g} m to "
+                    f"{high:g} m; change the step or the bench's limits.length",
+                    programme.name,
+                    key=f"step[{index}]",
+                )
+            )

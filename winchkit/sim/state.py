@@ -1,0 +1,43 @@
+"""The true state of one simulated winch, which its physics reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["GRAVITY", "State"]
+
+GRAVITY = 9.80665
+
+
+@dataclass(slots=True)
+class State:
+    """What is true now; SI, mutable, owned by the plant."""
+
+    time: float = 0.0
+    temperature: float = 20.0
+    """degC."""
+    motor_angle: float = 0.0
+    motor_speed: float = 0.0
+    motor_acceleration: float = 0.0
+    drum_angle: float = 0.0
+    """Since the reference, positive winds in, rad."""
+    wound_angle: float = 0.0
+    """Total on the drum, rad."""
+    arm: float = 0.0
+    """Rope wound in per motor radian, m/rad, signed."""
+    rope_speed: float = 0.0
+    """Positive winds in, m/s."""
+    rope_acceleration: float = 0.0
+    unstrained: float = 0.0
+    """Free rope as it comes off the drum, before it stretches, m."""
+    dead_length: float = 0.0
+    inclination: float = 0.0
+    cable_length: float = 0.0
+    """From the exit point to the attachment, m."""
+    load_mass: float = 0.0
+    load: float = 0.0
+    """Tension at the platform, N."""
+    tension: float = 0.0
+    """Tension between the pulleys and the drum, N."""
+    motor_torque: float = 0.0
+    """True torque of the motor, N m."""
