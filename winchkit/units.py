@@ -63,7 +63,8 @@ _ZERO_CELSIUS = 273.15
 
 def suggest(word: str, known: list[str]) -> str:
     """``; did you mean 'x'?`` when a known word is close, else nothing."""
-    close = get_close_matches(word, known, n=1, cutoff=0.6)
+    close = [name for name in known if name.casefold() == word.casefold()]
+    close = close or get_close_matches(word, known, n=1, cutoff=0.6)
     return f"; did you mean '{close[0]}'?" if close else ""
 
 

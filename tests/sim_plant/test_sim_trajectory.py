@@ -1,5 +1,7 @@
 """The S-curve keeps its limits and arrives, whatever it is asked."""
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +15,9 @@ limits = st.floats(0.01, 10)
 
 @settings(max_examples=200, deadline=None)
 @given(distances, limits, limits, st.floats(0.01, 100))
-def test_keeps_limits_and_arrives(distance, speed, acceleration, jerk):
+def test_keeps_limits_and_arrives(
+    distance: float, speed: float, acceleration: float, jerk: float
+) -> None:
     move = plan(distance, speed, acceleration, jerk)
     assert move.at(-1.0) == (0.0, 0.0)
     assert move.at(move.duration) == (distance, 0.0)
@@ -24,15 +28,17 @@ def test_keeps_limits_and_arrives(distance, speed, acceleration, jerk):
     rows = [move.at(i * dt) for i in range(n + 1)]
     assert max(abs(v) for _, v in rows) <= speed * (1 + 1e-9)
     if move.duration > 1e-3:
-        steps = [(b[1] - a[1]) / dt for a, b in zip(rows, rows[1:], strict=False)]
+        steps = [(b[1] - a[1]) / dt for a, b in pairwise(rows)]
         assert max(map(abs, steps)) <= acceleration * (1 + 1e-6)
-        jerks = [(b - a) / dt for a, b in zip(steps, steps[1:], strict=False)]
+        jerks = [(b - a) / dt for a, b in pairwise(steps)]
         assert max(map(abs, jerks)) <= jerk * (1 + 1e-6) + 1e-6
 
 
 @given(distances.filter(lambda d: abs(d) > 1e-3), limits, limits, st.floats(0.01, 100))
 @settings(max_examples=100, deadline=None)
-def test_speed_is_the_derivative_of_distance(distance, speed, acceleration, jerk):
+def test_speed_is_the_derivative_of_distance(
+    distance: float, speed: float, acceleration: float, jerk: float
+) -> None:
     move = plan(distance, speed, acceleration, jerk)
     h = move.duration * 1e-5
     for share in (0.03, 0.2, 0.4, 0.5, 0.77, 0.95):
@@ -50,15 +56,15 @@ def test_speed_is_the_derivative_of_distance(distance, speed, acceleration, jerk
         (100.0, 100.0, 4.0, 4 * (1.0 / 8.0) ** (1 / 3)),
     ],
 )
-def test_duration_by_hand(speed, acceleration, jerk, duration):
+def test_duration_by_hand(speed: float, acceleration: float, jerk: float, duration: float) -> None:
     assert plan(1.0, speed, acceleration, jerk).duration == pytest.approx(duration)
 
 
 @pytest.mark.parametrize("bad", [(0, 1, 1), (1, -1, 1), (1, 1, float("nan"))])
-def test_a_limit_must_be_positive(bad):
+def test_a_limit_must_be_positive(bad: tuple[float, float, float]) -> None:
     with pytest.raises(UsageError, match="must be positive"):
         plan(1.0, *bad)
 
 
-def test_no_distance_takes_no_time():
+def test_no_distance_takes_no_time() -> None:
     assert plan(0.0, 1.0, 1.0, 1.0).duration == 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Protocol
 
 from winchkit.bench.motion import MotionSource, RunDown, Target
@@ -73,16 +74,17 @@ class Controller:
         """Rope speed commanded last, m/s."""
         self._wanted: MotionSource | None = None
         self._ordered: Phase | None = None
-        self._down = RunDown(rope, limits, 0.0, 0.0)
+        self._lock = threading.Lock()
+        self._down = RunDown(rope, limits)
         self._angle = 0.0
         self._since = 0.0
 
     def begin(self, source: MotionSource) -> None:
         """Start a source, enabling the drive first where needed; replaces the one before."""
-        self.done = False
-        self.failure = ""
-        self._ordered = None
-        self._wanted = source
+        with self._lock:
+            self.done = False
+            self.failure = ""
+            self._wanted = source
 
     def run_down(self) -> None:
         """Ramp to rest, then disable."""
@@ -112,31 +114,49 @@ class Controller:
         }[self.phase](now, feedback)
 
     def _order(self, phase: Phase) -> None:
-        self._wanted = None
-        if self._ordered is not Phase.STOPPING:
-            self._ordered = phase
+        with self._lock:
+            if self._wanted is not None or (self.source is not None and not self.done):
+                self.failure = "the motion was stopped before its end"
+            self._wanted = None
+            if self._ordered is not Phase.STOPPING:
+                self._ordered = phase
 
     def _take_orders(self, now: float) -> None:
-        ordered, self._ordered = self._ordered, None
-        wanted, self._wanted = self._wanted, None
+        with self._lock:
+            ordered, self._ordered = self._ordered, None
+            wanted, self._wanted = self._wanted, None
         if ordered is Phase.STOPPING:
             self._enter(Phase.STOPPING, now)
         elif ordered is Phase.RESETTING and self.phase is Phase.DISABLED:
             self._enter(Phase.RESETTING, now)
         elif ordered is Phase.RUN_DOWN and self.phase in (Phase.ENABLING, Phase.MOVING):
             self._begin_run_down(now)
-        if wanted is None:
+        if wanted is not None:
+            self._take(wanted, now)
+
+    def _take(self, wanted: MotionSource, now: float) -> None:
+        """Start a source now where that is smooth, else get ready for it and keep it."""
+        feedback = self.axis.feedback
+        if feedback is not None and self.phase in (Phase.MOVING, Phase.RUN_DOWN):
+            if wanted.joins or self.commanded == 0.0:
+                wanted.start(now, feedback.angle, self.commanded)
+                self.source, self.done = wanted, False
+                self.phase, self._since = Phase.MOVING, now
+                return
+            if self.phase is Phase.MOVING:
+                self._begin_run_down(now)
+        elif self.phase in (Phase.DISABLED, Phase.ENABLING):
+            self.phase, self.source, self._since = Phase.ENABLING, wanted, now
             return
-        self.source = wanted
-        if self.phase is Phase.MOVING and self.axis.feedback is not None:
-            wanted.start(now, self.axis.feedback.angle)
-        elif self.phase is not Phase.ENABLING:
-            self._enter(Phase.ENABLING, now)
+        with self._lock:
+            self._wanted = self._wanted or wanted
+            self.done = False
 
     def _enter(self, phase: Phase, now: float) -> None:
         self.phase, self._since = phase, now
         if phase in (Phase.STOPPING, Phase.DISABLED, Phase.RESETTING):
-            self.source, self.commanded, self.done = None, 0.0, True
+            self.source, self.commanded = None, 0.0
+            self.done = self._wanted is None
 
     def _stay_disabled(self, now: float, feedback: AxisFeedback) -> None:
         self.axis.send(Wish.DISABLE)
@@ -145,7 +165,7 @@ class Controller:
 
     def _enable(self, now: float, feedback: AxisFeedback) -> None:
         if feedback.state is State.OPERATION_ENABLED and self.source is not None:
-            self.source.start(now, feedback.angle)
+            self.source.start(now, feedback.angle, 0.0)
             self._angle = feedback.angle
             self._enter(Phase.MOVING, now)
             self._move(now, feedback)
@@ -157,6 +177,7 @@ class Controller:
 
     def _move(self, now: float, feedback: AxisFeedback) -> None:
         if self.source is None or feedback.state is not State.OPERATION_ENABLED:
+            self.failure = f"the drive went to {feedback.state} by itself"
             self._enter(Phase.STOPPING, now)
             self._stop(now, feedback)
             return
@@ -176,8 +197,8 @@ class Controller:
         self.axis.send(Wish.ENABLE, velocity=velocity, angle=target.angle)
 
     def _begin_run_down(self, now: float) -> None:
-        self._down = RunDown(self.rope, self.limits, self.commanded, self._angle)
-        self._down.start(now, self._angle)
+        self._down = RunDown(self.rope, self.limits)
+        self._down.start(now, self._angle, self.commanded)
         self._enter(Phase.RUN_DOWN, now)
         self.source, self.done = None, True
 
@@ -185,7 +206,7 @@ class Controller:
         target = self._down.target(now, feedback.angle)
         self.commanded = target.speed
         late = now - self._since > self._down.duration + _RUN_DOWN_MARGIN
-        settled = target.done and self.axis.at_rest
+        settled = target.done and self.axis.at_rest and self._wanted is None
         if settled or late or feedback.state is not State.OPERATION_ENABLED:
             self._enter(Phase.STOPPING, now)
             self._stop(now, feedback)

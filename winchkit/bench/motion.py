@@ -14,7 +14,7 @@ from winchkit.errors import NotPermitted
 from winchkit.model.trajectory import plan
 from winchkit.schema.bench import LimitSpec
 
-__all__ = ["DEAD_MAN", "FIRST_PRESS", "Jog", "Move", "MotionSource", "Ramp", "RunDown", "Target"]
+__all__ = ["DEAD_MAN", "FIRST_PRESS", "Jog", "MotionSource", "Move", "Ramp", "RunDown", "Target"]
 
 DEAD_MAN = 0.2
 """A jog ends this long after its last refresh, s."""
@@ -51,9 +51,11 @@ class MotionSource(Protocol):
 
     holds: bool
     """Whether the winch stays enabled, holding its place, after the source is done."""
+    joins: bool
+    """Whether it can take over a rope that moves."""
 
-    def start(self, now: float, angle: float) -> None:
-        """Begin at rest at a motor angle (rad)."""
+    def start(self, now: float, angle: float, speed: float) -> None:
+        """Begin at a motor angle (rad) and a rope speed (m/s)."""
 
     def target(self, now: float, angle: float) -> Target:
         """Target at ``now`` (s), the motor being at ``angle`` (rad)."""
@@ -62,8 +64,8 @@ class MotionSource(Protocol):
 class Ramp:
     """Speed that follows a wish with limited acceleration, in rope units."""
 
-    def __init__(self, acceleration: float) -> None:
-        self.speed = 0.0
+    def __init__(self, acceleration: float, speed: float = 0.0) -> None:
+        self.speed = speed
         self._acceleration = acceleration
         self._time: float | None = None
 
@@ -79,6 +81,7 @@ class Jog:
     """Moves at a speed while someone keeps saying so; silence brings it to rest."""
 
     holds = False
+    joins = True
 
     def __init__(self, rope: RopeMap, limits: LimitSpec) -> None:
         self._rope, self._limits = rope, limits
@@ -93,9 +96,9 @@ class Jog:
         self._wish = max(-self._limits.speed, min(self._limits.speed, speed))
         self._expires = expires
 
-    def start(self, now: float, angle: float) -> None:
-        """Begin at rest."""
-        self._ramp = Ramp(self._limits.acceleration)
+    def start(self, now: float, angle: float, speed: float) -> None:
+        """Begin with the speed that the rope has."""
+        self._ramp = Ramp(self._limits.acceleration, speed)
         self._angle, self._last = angle, now
 
     def target(self, now: float, angle: float) -> Target:
@@ -124,18 +127,19 @@ class RunDown:
     """From a speed to rest with the winch's acceleration."""
 
     holds = False
+    joins = True
 
-    def __init__(self, rope: RopeMap, limits: LimitSpec, speed: float, angle: float) -> None:
-        """Begin at a rope speed (m/s) and a target angle of the motor (rad)."""
-        self.duration = abs(speed) / limits.acceleration
-        self._rope = rope
-        self._ramp = Ramp(limits.acceleration)
-        self._ramp.speed = speed
-        self._angle, self._last = angle, 0.0
+    def __init__(self, rope: RopeMap, limits: LimitSpec) -> None:
+        self.duration = 0.0
+        self._rope, self._acceleration = rope, limits.acceleration
+        self._ramp = Ramp(self._acceleration)
+        self._angle = self._last = 0.0
 
-    def start(self, now: float, angle: float) -> None:
-        """Begin now, from the target that was in force."""
+    def start(self, now: float, angle: float, speed: float) -> None:
+        """Begin now, from the target angle and the speed that were in force."""
+        self._ramp = Ramp(self._acceleration, speed)
         self._ramp.follow(0.0, now)
+        self.duration = abs(speed) / self._acceleration
         self._angle, self._last = angle, now
 
     def target(self, now: float, angle: float) -> Target:
@@ -149,6 +153,8 @@ class RunDown:
 
 class Move:
     """A planned S-curve to a cable length; holds there when asked to."""
+
+    joins = False
 
     def __init__(
         self,
@@ -192,8 +198,8 @@ class Move:
         """Time of the planned move, s."""
         return self._plan.duration
 
-    def start(self, now: float, angle: float) -> None:
-        """Begin now; plans anew where the winch has moved since ``prepare``."""
+    def start(self, now: float, angle: float, _speed: float) -> None:
+        """Begin now, at rest; plans anew where the winch has moved since ``prepare``."""
         if not self._knots or abs(self._knots[0] - angle) > 0.5:
             self.prepare(angle)
         self._start = now

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.output import echo_json
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import Fault, FileError
 
 if TYPE_CHECKING:
-    from winchkit.schema.read import Declaration
+    from winchkit.schema.read import Declared
+    from winchkit.schema.winch import WinchProfile
 
 __all__ = ["command"]
 
@@ -60,9 +61,13 @@ def command(ctx: click.Context, files: tuple[str, ...], as_json: bool) -> None:
 
 def _verdict(file: str) -> Verdict:
     try:
-        if Path(file).suffix.lower() in RUNS:
+        suffix = Path(file).suffix.lower()
+        if suffix in RUNS:
             return _run(file)
-        return _declaration(file)
+        if suffix == ".toml" or not Path(file).is_file():
+            return _declaration(file)
+        known = ", ".join((".toml", *RUNS))
+        return Verdict(file, "", faults=(Fault(f"'{suffix}' is none of {known}", file),))
     except FileError as error:
         return Verdict(file, "", faults=error.faults)
 
@@ -80,28 +85,37 @@ def _declaration(file: str) -> Verdict:
     from winchkit.schema.read import load
 
     declaration = load(file)
-    name = declaration.value.name
-    faults = tuple(_effect_faults(declaration))
-    return Verdict(file, declaration.kind, name, "", faults, declaration.warnings)
+    faults = tuple(dict.fromkeys(_effect_faults(_profiles(declaration.value))))
+    return Verdict(file, declaration.kind, declaration.value.name, "", faults, declaration.warnings)
 
 
-def _effect_faults(declaration: Declaration) -> list[Fault]:
-    """What is wrong with the effects of a profile, and of the profiles within a robot."""
+def _profiles(value: Declared) -> list[WinchProfile]:
+    """The winch profiles of a declaration; those that a bench names are read as well."""
+    from winchkit.catalog import find
+    from winchkit.schema.bench import BenchSpec
+    from winchkit.schema.read import read_winch
     from winchkit.schema.robot import RobotProfile
+    from winchkit.schema.simbench import SimBench
     from winchkit.schema.winch import WinchProfile
 
-    value = declaration.value
-    lines = value.line if isinstance(value, RobotProfile) else ()
-    inner = [line.winch for line in lines if isinstance(line.winch, WinchProfile)]
-    profiles = [value] if isinstance(value, WinchProfile) else inner
+    if isinstance(value, WinchProfile):
+        return [value]
+    if isinstance(value, RobotProfile):
+        return [line.winch for line in value.line if isinstance(line.winch, WinchProfile)]
+    bench = value.bench if isinstance(value, SimBench) else value
+    if not isinstance(bench, BenchSpec):
+        return []
+    named = dict.fromkeys(wiring.profile for wiring in bench.winch.values())
+    return [read_winch(find("profiles", name, beside=bench.path)) for name in named]
+
+
+def _effect_faults(profiles: list[WinchProfile]) -> list[Fault]:
+    """What is wrong with the effects that profiles declare."""
     if not any(profile.effect for profile in profiles):
         return []
     from winchkit.effects import check_profile
 
-    try:
-        return [fault for profile in profiles for fault in check_profile(profile)]
-    except UsageError as error:
-        return [Fault(str(error))]
+    return [fault for profile in profiles for fault in check_profile(profile)]
 
 
 def _show(verdict: Verdict) -> None:

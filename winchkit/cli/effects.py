@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
+
+from winchkit.cli.output import echo_json
 
 if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue
@@ -32,16 +33,12 @@ def command(effect_id: str | None, files: Sequence[str], as_json: bool) -> None:
     from winchkit.effects.catalogue import load_catalogue
 
     catalogue = load_catalogue(files)
-    if effect_id is not None:
-        effect = catalogue[effect_id]
-        click.echo(
-            json.dumps({"schema": 1, **card_data(effect)}, allow_nan=False)
-            if as_json
-            else card(effect)
-        )
+    if effect_id is not None and as_json:
+        echo_json({"schema": 1, **card_data(catalogue[effect_id])})
+    elif effect_id is not None:
+        click.echo(card(catalogue[effect_id]))
     elif as_json:
-        listed = [card_data(effect) for effect in catalogue]
-        click.echo(json.dumps({"schema": 1, "effects": listed}, allow_nan=False))
+        echo_json({"schema": 1, "effects": [card_data(effect) for effect in catalogue]})
     else:
         click.echo(_listing(catalogue))
 

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import click
 from click.shell_completion import CompletionItem
 
+from winchkit.units import suggest
+
 __all__ = ["At", "LazyGroup"]
 
 
@@ -42,6 +44,15 @@ class LazyGroup(click.Group):
             ctx.fail(f"'{cmd_name}' is not part of this installation.")
         command: click.Command = getattr(import_module(entry.module), entry.name)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that the arguments begin with; a misspelt one gets a guess."""
+        name = args[0] if args else ""
+        if name and name not in self.table and not name.startswith("-"):
+            ctx.fail(f"no command '{name}'{suggest(name, list(self.table))}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with the table's help, importing none."""

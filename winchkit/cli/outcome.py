@@ -44,7 +44,7 @@ def finish(call: Callable[[], object]) -> NoReturn:
             f"(a defect of winchkit, please report it; {_DEBUG}=1 shows where)"
         )
         sys.exit(INTERNAL)
-    sys.exit(result if isinstance(result, int) else 0)
+    sys.exit(result if type(result) is int else 0)
 
 
 def _tell(message: str) -> None:

@@ -61,7 +61,7 @@ def command(
     from winchkit.catalog import find
     from winchkit.runs import write_csv, write_mcap
     from winchkit.schema.read import read_programme, read_simbench
-    from winchkit.sim.bench import hiding, profiles_of
+    from winchkit.sim.bench import hiding, profiles_of, programme_path
     from winchkit.sim.record import record
     from winchkit.units import parse
 
@@ -70,13 +70,13 @@ def command(
         declared = hiding(declared, hidden)
     profiles = profiles_of(declared)
     hertz = parse(rate, "frequency")
-    out.mkdir(parents=True, exist_ok=True)
     write = write_csv if suffix == "csv" else write_mcap
     written = []
     for name in programmes:
-        programme = read_programme(find("sim", name))
+        programme = read_programme(programme_path(name))
         for run in record(declared, profiles, programme, seed=seed, rate=hertz):
             path = out / f"{run.name}.{suffix}"
+            out.mkdir(parents=True, exist_ok=True)
             write(run, path)
             written.append(_entry(path, run, programme))
             if not as_json:

@@ -56,7 +56,10 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
     ours = held_out(inquiry.problem, final, noise, blocks)
     members: list[tuple[int, float, Term]] = [(freedom, final.cost, own)]
     for rival in rivals:
-        fitted = inquiry.trial(base, rival, noise).fit
+        trial = inquiry.trial(base, rival, noise)
+        fitted = trial.fit
+        if not np.isfinite(trial.criterion):
+            continue
         theirs = held_out(inquiry.problem, fitted, noise, blocks)
         if base.cost - fitted.cost < _SHARE * (base.cost - final.cost):
             continue

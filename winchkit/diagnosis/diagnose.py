@@ -39,7 +39,9 @@ __all__ = ["Answer", "diagnose", "inquire"]
 
 _CANDIDATES_FITTED = 5
 _NEGLIGIBLE = 0.02
-_AT_NOISE = 1.1
+_GENERALISES = 0.15
+_NAMED_BESIDE = 0.15
+_HALF = 0.5
 _WHERE = 6
 
 
@@ -65,10 +67,11 @@ def diagnose(
     catalogue = catalogue or load_catalogue()
     inquiry = inquire(prepare(runs, profile, band), catalogue)
     found = search(inquiry)
-    share = _unexplained(found)
+    share = _unexplained(inquiry, found)
     verdict = _verdict(found, share)
     outputs = _outputs(inquiry, found)
-    named = verdict != "unknown"
+    # While much is still unexplained a name would be a guess: it stays among the candidates.
+    named = verdict == "explained" or (verdict == "partly" and share < _NAMED_BESIDE)
     steps = _steps(inquiry, found) if named else ()
     notes = (*inquiry.problem.dataset.notes, *what_runs_cannot_show(inquiry.problem))
     diagnosis = Diagnosis(
@@ -78,7 +81,9 @@ def diagnose(
         candidates=_candidates(inquiry, found),
         detectable=detectable(found.scores, inquiry.price, found.threshold),
         unexplained_share=share,
-        where=_where(inquiry, found) if verdict in {"unknown", "partly"} else (),
+        where=_where(inquiry, found, found.final if named else found.begin)
+        if verdict in {"unknown", "partly"}
+        else (),
         next_runs=(),
         notes=notes,
     )
@@ -92,26 +97,36 @@ def inquire(dataset: Dataset, catalogue: Catalogue) -> Inquiry:
     return Inquiry(problem, begin, catalogue)
 
 
-def _unexplained(found: Found) -> float:
-    """Share of the excess over the noise that the final model leaves."""
-    if not found.alarmed or not found.noise.from_repeats:
-        return 0.0 if not found.still else 1.0
-    # Both in units of the final noise, so that a re-estimated noise does not shift the share.
-    scale = found.begin_noise.power / found.noise.power
-    before = float(np.sum(np.maximum(found.begin_presence.excess * scale, 0.0)))
-    after = float(np.sum(np.maximum(found.presence.excess, 0.0)[found.presence.rejected]))
-    return min(1.0, after / before) if before > 0 else 0.0
+def _unexplained(inquiry: Inquiry, found: Found) -> float:
+    """Share of the excess over the noise that the final model leaves, in sample or held out."""
+    if not found.alarmed:
+        return 0.0
+    held = [
+        held_out_rms(inquiry.problem, fitted, found.noise, inquiry.groups)
+        for fitted in (found.begin, found.final)
+    ]
+    squares = [
+        sum(max(0.0, (rms[o] / noise) ** 2 - 1) for o, noise in found.noise.rms.items())
+        for rms in held
+    ]
+    left = squares[1] / squares[0] if squares[0] > 0 else 0.0
+    if found.noise.from_repeats:
+        # Both in units of the final noise, so that a re-estimated noise does not shift the share.
+        scale = found.begin_noise.power / found.noise.power
+        before = float(np.sum(np.maximum(found.begin_presence.excess * scale, 0.0)))
+        after = float(np.sum(np.maximum(found.presence.excess, 0.0)[found.presence.rejected]))
+        left = max(left if left > _GENERALISES else 0.0, after / before if before > 0 else 0.0)
+    return min(1.0, left)
 
 
 def _verdict(found: Found, share: float) -> Verdict:
     if not found.alarmed:
         return "adequate"
     grown = len(found.final.hypothesis.terms) > len(found.begin.hypothesis.terms)
-    if not grown:
+    if not grown or share > _HALF:
         return "unknown"
-    if not found.still or share < _NEGLIGIBLE or not found.noise.from_repeats:
-        return "explained"
-    return "unknown" if share > 0.5 else "partly"
+    settled = not found.still or not found.noise.from_repeats
+    return "explained" if share < (_GENERALISES if settled else _NEGLIGIBLE) else "partly"
 
 
 def _outputs(inquiry: Inquiry, found: Found) -> dict[str, OutputFit]:
@@ -200,13 +215,9 @@ def _candidates(inquiry: Inquiry, found: Found) -> tuple[Candidate, ...]:
     return tuple(out)
 
 
-def _where(inquiry: Inquiry, found: Found) -> tuple[Where, ...]:
+def _where(inquiry: Inquiry, found: Found, fitted: Fit) -> tuple[Where, ...]:
     """Where the rest lives: angles with an order, other variables, and the loudest band."""
     problem = inquiry.problem
-    fitted = found.final if found.still else found.begin
-    if len(found.final.hypothesis.terms) > len(found.begin.hypothesis.terms):
-        named = _verdict(found, _unexplained(found)) == "partly"
-        fitted = found.final if named else found.begin
     places = [*harmonics(problem, fitted.residual), *follows(problem, fitted.residual)]
     out = [Where(f.output, f.variable, f.share, f.order) for f in places]
     excess = found.presence.excess

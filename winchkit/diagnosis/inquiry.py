@@ -126,7 +126,8 @@ class Inquiry:
         """Whitened squares and the price of everything that was added."""
         added = fitted.hypothesis.terms[self.given :]
         freedom = sum(Coordinates(term.effect).freedom for term in added)
-        return fitted.cost + self.price * freedom
+        states = sum(len(start) for start in fitted.hypothesis.starts[self.given :])
+        return fitted.cost + self.price * (freedom + states)
 
     def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
         """Fit a candidate beside the present terms; those that it contains give way to it."""
@@ -137,7 +138,8 @@ class Inquiry:
                 hypothesis = hypothesis.without(index)
         begun = hypothesis.with_term(Term(effect, _starting_values(item)), self.problem.runs)
         fitted = fit(self.problem, begun, noise.weight(self.problem))
-        return Trial(effect, fitted, self.criterion(fitted))
+        price = np.inf if _in_disguise(fitted.hypothesis.terms[-1]) else self.criterion(fitted)
+        return Trial(effect, fitted, float(price))
 
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """Fit a hypothesis under a given noise."""
@@ -156,6 +158,16 @@ def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
             ):
                 return True
     return False
+
+
+def _in_disguise(term: Term) -> bool:
+    """Whether a shape ran to its bound: there the term has become another effect."""
+    coordinates = Coordinates(term.effect)
+    at = coordinates.vector(term.values)
+    low, high = coordinates.bounds()
+    shapes = slice(len(coordinates.amplitudes), None)
+    ends = (at <= low + 1e-6) | (at >= high - 1e-6)
+    return bool(np.any(ends[shapes]))
 
 
 def _starting_values(item: Score) -> dict[str, float]:

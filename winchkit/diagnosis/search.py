@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.gate import confidence, held_out
+from winchkit.diagnosis.gate import confidence, held_out, held_out_rms
 from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
 from winchkit.diagnosis.signature import Score, chance_level
-from winchkit.effects.coordinates import Coordinates
 
 __all__ = ["Found", "search"]
 
@@ -23,6 +22,7 @@ _PRESENCE_LEVEL = 0.04
 _SCORE_LEVEL = 0.99
 _GATE_LEVEL = 0.02
 _BETTER = 2.0
+_NO_WORSE = 1.02
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,10 @@ def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
         return False
     groups = inquiry.groups
     gain = held_out(problem, present, noise, groups) - held_out(problem, trial.fit, noise, groups)
-    return bool(np.sum(gain) > 0)
+    was = held_out_rms(problem, present, noise, groups)
+    now = held_out_rms(problem, trial.fit, noise, groups)
+    worse = any(now[output] > _NO_WORSE * was[output] for output in problem.dataset.outputs)
+    return bool(np.sum(gain) > 0) and not worse
 
 
 def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
@@ -133,9 +136,7 @@ def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Nois
 
 def _without_the_needless(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
     for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
-        effect = present.hypothesis.terms[index].effect
         without = inquiry.refit(present.hypothesis.without(index), noise)
-        worth = without.cost - present.cost
-        if worth < inquiry.price * Coordinates(effect).freedom:
+        if inquiry.criterion(without) < inquiry.criterion(present):
             present = without
     return present

@@ -15,12 +15,12 @@ def apply(length: Array, at: At, values: Values) -> Array:
     """Length less w² ℓ³ cos²(inclination) / 24 T².
 
     The parabola holds while the tension exceeds the rope's weight across the chord; below, that
-    weight stands for the tension.
+    weight stands for the tension. Without any tension nothing is known of the sag: it is zero.
     """
     weight = values["mass_per_length"] * GRAVITY * np.abs(at.free_length)
     across = weight * abs(cos(at.profile.path.inclination))
     tension = np.maximum(at.tension, across)
-    ratio: Array = np.divide(across, tension, out=np.zeros_like(across), where=tension > 0)
+    ratio: Array = np.divide(across, tension, out=np.zeros_like(across), where=at.tension > 0)
     return length - at.free_length * ratio**2 / 24
 
 

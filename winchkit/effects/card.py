@@ -104,7 +104,7 @@ def card(effect: Effect) -> str:
 
 
 def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
-    """The card as data for JSON; infinities and NaN are None, SI units."""
+    """The card as data, SI; ``width`` samples of the signature at most."""
     drawn = signature(effect)
     return {
         "id": effect.id,
@@ -118,9 +118,9 @@ def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
         "looks_like": effect.looks_like,
         "confused_with": list(effect.confused_with),
         "told_apart": effect.told_apart,
-        "parameters": [_parameter_data(p) for p in effect.parameters],
+        "parameters": [_parameter_data(p, _kind(effect, p)) for p in effect.parameters],
         "signature": {
-            "values": {name: _finite(x) for name, x in drawn.values.items()},
+            "values": dict(drawn.values),
             "time": _listed(drawn.time, width),
             "cable_length": _listed(drawn.cable_length, width),
             "changes": {
@@ -143,8 +143,9 @@ def _paragraph(title: str, text: str) -> str:
 def _table(effect: Effect) -> list[str]:
     rows = [("name", "unit", "vanishes at", "typical", "range", "kind")]
     for p in effect.parameters:
-        gone = f"{p.null:g}" if p.role == "amplitude" else f"(default {p.null:g})"
-        rows.append((p.name, p.unit, gone, f"{p.typical:g}", _range(p), _kind(p)))
+        kind = _kind(effect, p)
+        gone = f"{p.null:g}" if kind == "amplitude" else f"(default {p.null:g})"
+        rows.append((p.name, p.unit, gone, f"{p.typical:g}", _range(p), kind))
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return [
         "  " + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
@@ -152,7 +153,9 @@ def _table(effect: Effect) -> list[str]:
     ]
 
 
-def _kind(parameter: Parameter) -> str:
+def _kind(effect: Effect, parameter: Parameter) -> str:
+    if effect.polar and parameter.name == effect.polar[1]:
+        return "phase"
     return "whole order" if parameter.whole else parameter.role
 
 
@@ -180,24 +183,19 @@ def _drawing(effect: Effect) -> list[str]:
     return lines if drawn.changes else [*lines, "  no change on this motion"]
 
 
-def _listed(values: Array, width: int) -> list[float | None]:
+def _listed(values: Array, width: int) -> list[float]:
     """``width`` of the values at most, evenly spaced."""
     index = np.linspace(0, len(values) - 1, min(width, len(values))).round().astype(int)
-    return [_finite(x) for x in values[index].tolist()]
+    return list(values[index].tolist())
 
 
-def _finite(value: float) -> float | None:
-    return value if isfinite(value) else None
-
-
-def _parameter_data(parameter: Parameter) -> dict[str, Any]:
+def _parameter_data(parameter: Parameter, kind: str) -> dict[str, Any]:
     return {
         "name": parameter.name,
         "unit": parameter.unit,
-        "null": _finite(parameter.null),
+        "null": parameter.null,
         "typical": parameter.typical,
-        "low": _finite(parameter.low),
-        "high": _finite(parameter.high),
-        "role": parameter.role,
-        "whole": parameter.whole,
+        "low": parameter.low,
+        "high": parameter.high,
+        "kind": kind,
     }

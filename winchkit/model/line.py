@@ -131,6 +131,8 @@ class Motion:
     """Tension at the platform end, N, where measured or known."""
     drum_tension: Array | None
     """The cell's reading, which stands in for the drum-side tension without a load, N."""
+    load_mass: float | None = None
+    """The weight whose acceleration makes the load, kg, where no instrument measures it."""
 
 
 @dataclass(frozen=True)
@@ -177,9 +179,10 @@ class Line:
         rate = np.gradient(angle, time)
         drum_angle, length = self._nominal_length(angle)
         speed = -np.gradient(length, time)
-        load = signals.load
+        load, mass = signals.load, None
         if load is None and signals.load_mass is not None:
-            load = signals.load_mass * (GRAVITY - _second_derivative(length, time))
+            mass = signals.load_mass
+            load = mass * (GRAVITY - _second_derivative(length, time))
         tension = load if load is not None else signals.tension
         missing = np.full_like(time, np.nan)
         at = At(
@@ -197,24 +200,26 @@ class Line:
             tension=np.zeros_like(time) if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
         )
-        return Motion(at, load, signals.tension if load is None else None)
+        return Motion(at, load, signals.tension if load is None else None, mass)
 
     def predict(self, motion: Motion) -> dict[str, Array]:
         """``cable_length``, ``motor_torque`` and, where a load is known, ``tension``."""
-        length, path = self._length(motion.at)
-        out = {"cable_length": length}
+        at = motion.at
+        free, length, path = self._length(at)
+        shown = self._through(Stage.LENGTH_INSTRUMENT, length, at)
+        out = {"cable_length": shown}
         if motion.load is not None:
-            drum_side = self._drum_side(motion.load, motion.at)
-            out["tension"] = self._through(Stage.CELL, drum_side, motion.at)
+            drum_side = self._drum_side(self._load(motion, free), at)
+            out["tension"] = self._through(Stage.CELL, drum_side, at)
         elif motion.drum_tension is not None:
             drum_side = motion.drum_tension
         else:
-            drum_side = np.zeros_like(motion.at.time)
-        out["motor_torque"] = self._torque(drum_side, path, motion.at)
+            drum_side = np.zeros_like(at.time)
+        out["motor_torque"] = self._torque(drum_side, path, at)
         return out
 
-    def _length(self, at: At) -> tuple[Array, Path]:
-        """Cable length, and the wound length over the motor angle, m and m/rad."""
+    def _length(self, at: At) -> tuple[Array, Array, Path]:
+        """Unstrained and true length, m, and the wound length over the motor angle, m/rad."""
         turned = self._through(Stage.DRUM_ANGLE, self._gear(at.motor_angle), at)
         at = replace(at, drum_angle=turned.value, wound_angle=self._reference_wound + turned.value)
         drum = self._through(Stage.DRUM, self._drum, at)
@@ -224,8 +229,19 @@ class Line:
         at = replace(at, free_length=free)
         length = self._through(Stage.ROPE, free, at)
         length = self._through(Stage.FRAME, length, at)
-        length = self._through(Stage.LENGTH_INSTRUMENT, length, at)
-        return length, Path(path.value, path.slope * turned.slope)
+        return free, length, Path(path.value, path.slope * turned.slope)
+
+    def _load(self, motion: Motion, free: Array) -> Array:
+        """A known weight follows the rope as it is really paid out, kinematic effects included.
+
+        What its strain adds is left out: a fourth derivative of the angle would be mostly noise.
+        """
+        load = motion.load
+        assert load is not None
+        if motion.load_mass is None or not self.modifiers:
+            return load
+        added = free - motion.at.free_length
+        return load - motion.load_mass * _second_derivative(added, motion.at.time)
 
     def _drum_side(self, load: Array, at: At) -> Array:
         """Tension at the drum: from the load up the rope and back over the pulleys."""
@@ -245,11 +261,11 @@ class Line:
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""
-        return float(self._length(self._at_rest(motor_angle, tension))[0][0])
+        return float(self._length(self._at_rest(motor_angle, tension))[1][0])
 
     def arm(self, motor_angle: float) -> float:
         """Rope wound in per motor angle, signed by the gearbox's direction, m/rad."""
-        return float(self._length(self._at_rest(motor_angle, 0.0))[1].slope[0])
+        return float(self._length(self._at_rest(motor_angle, 0.0))[2].slope[0])
 
     def motor_angle(self, cable_length: float, tension: float = 0.0) -> float:
         """Motor angle at which the rope has ``cable_length`` under a tension, rad.

@@ -17,6 +17,7 @@ class CsvWriter(RunWriter):
     flush_interval = 0.5
 
     def _begin(self, metadata: Mapping[str, str]) -> None:
+        self._waiting: list[str] = []
         lines = [f"# {key}: {value}\n" for key, value in metadata.items()]
         header = io.StringIO()
         cells = [f"{name} [{unit}]" if unit else name for name, unit in self.columns]
@@ -25,8 +26,10 @@ class CsvWriter(RunWriter):
 
     def _row(self, values: Sequence[float]) -> None:
         # NaN is the one number that differs from itself.
-        cells = [repr(float(value)) if value == value else "" for value in values]  # noqa: PLR0124
-        self._stream.write((",".join(cells) + "\n").encode())
+        cells = [repr(value) if value == value else "" for value in values]  # noqa: PLR0124
+        self._waiting.append(",".join(cells) + "\n")
 
-    def _end(self) -> None:
-        """Nothing follows the last row."""
+    def _hand_over(self) -> None:
+        # Whole rows in one write: a file that ends within a number would be read as another one.
+        self._stream.write("".join(self._waiting).encode())
+        self._waiting.clear()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -50,8 +50,10 @@ class RunWriter(ABC):
 
     def append_values(self, values: Iterable[float]) -> None:
         """Add a row in the order of the columns; what is not finite is written as no value."""
+        if self._stream.closed:
+            raise UsageError(f"{self.path} is closed; no row can follow")
         with self._writing():
-            self._row([value if math.isfinite(value) else math.nan for value in values])
+            self._row([float(value) if math.isfinite(value) else math.nan for value in values])
         now = self._clock()
         if now - self._flushed >= self.flush_interval:
             self.flush()
@@ -59,22 +61,29 @@ class RunWriter(ABC):
     def flush(self) -> None:
         """Hand what was appended to the operating system, so that it outlives this process."""
         with self._writing():
-            self._stream.flush()
+            if not self._stream.closed:
+                self._hand_over()
+                self._stream.flush()
         self._flushed = self._clock()
 
     def close(self) -> None:
         """Finish the file; closing twice does no harm."""
         if not self._stream.closed:
             with self._writing():
+                self._hand_over()
                 self._end()
                 self._stream.close()
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
+        """Turn a full disk into FileError, after which the writer is closed."""
         try:
             yield
         except OSError as error:
             message = f"cannot be written: {error.strerror}"
+            if "_stream" in vars(self):
+                with suppress(OSError):
+                    self._stream.close()
             raise FileError(Fault(message, str(self.path))) from None
 
     def __enter__(self) -> Self:
@@ -94,5 +103,10 @@ class RunWriter(ABC):
     @abstractmethod
     def _row(self, values: Sequence[float]) -> None: ...
 
-    @abstractmethod
-    def _end(self) -> None: ...
+    def _hand_over(self) -> None:
+        """Pass on what the format itself holds back; nothing, unless it says otherwise."""
+        return
+
+    def _end(self) -> None:
+        """Write what follows the last row; nothing, unless the format says otherwise."""
+        return

@@ -27,6 +27,7 @@ from winchkit.schema.winch import WinchProfile
 
 __all__ = [
     "Declaration",
+    "Declared",
     "load",
     "read_any",
     "read_bench",

@@ -11,6 +11,7 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.device import DeviceSpec
 from winchkit.schema.read_lines import Key
 from winchkit.schema.read_parts import Reading
+from winchkit.schema.read_source import spelled
 from winchkit.schema.read_table import marker_at
 from winchkit.schema.simbench import FaultSpec, HiddenSpec, NoiseSpec, SimBench, WinchTruth
 from winchkit.schema.winch import WinchProfile
@@ -102,16 +103,16 @@ def _numbered(
     for index, item in enumerate(raw):
         known = {key: value for key, value in item.items() if key in own}
         numbers = {key: value for key, value in item.items() if key not in own}
-        yield reading.table(kind, {**known, "numbers": numbers}, (*at, index))
+        piece = reading.table(kind, {**known, "numbers": numbers}, (*at, index))
+        if piece is not None:
+            yield piece
 
 
 def _check_references(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> None:
     """Profiles and devices exist, buses exist and fit, no two devices share an address."""
     winches, buses = tree.get("winch"), tree.get("bus")
-    if not isinstance(winches, dict):
-        return
-    taken: dict[tuple[str, object], str] = {}
-    for name, winch in winches.items():
+    taken: dict[tuple[str, str, int], str] = {}
+    for name, winch in winches.items() if isinstance(winches, dict) else ():
         if not isinstance(winch, dict):
             continue
         at: Key = ("winch", name)
@@ -119,14 +120,21 @@ def _check_references(reading: Reading, tree: dict[str, Any], read_device: Devic
         for role in ROLES:
             if isinstance(raw := winch.get(role), dict):
                 place: Key = (*at, role)
-                _check_device(
-                    reading, raw, buses if isinstance(buses, dict) else {}, place, read_device
-                )
-                address = raw.get("node", raw.get("unit"))
-                user = taken.setdefault((str(raw.get("bus")), address), ".".join(map(str, place)))
-                if address is not None and user != ".".join(map(str, place)):
-                    key = "node" if "node" in raw else "unit"
-                    reading.fault((*place, key), f"{address} on this bus is taken by {user}")
+                known = buses if isinstance(buses, dict) else {}
+                _check_device(reading, raw, known, place, read_device)
+                _check_address(reading, raw, place, taken)
+
+
+def _check_address(
+    reading: Reading, raw: dict[str, Any], at: Key, taken: dict[tuple[str, str, int], str]
+) -> None:
+    for key in ("node", "unit"):
+        bus, address = raw.get("bus"), raw.get(key)
+        if not isinstance(bus, str) or not isinstance(address, int):
+            continue
+        user = taken.setdefault((bus, key, address), spelled(at))
+        if user != spelled(at):
+            reading.fault((*at, key), f"{address} on this bus is taken by {user}")
 
 
 def _check_device(

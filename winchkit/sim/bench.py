@@ -4,17 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from random import Random
 
-from winchkit.catalog import find, names
+from winchkit.catalog import find, folder, names
 from winchkit.errors import FileError
 from winchkit.schema.simbench import HiddenSpec, SimBench
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.physics.table import build, scaled
+from winchkit.units import suggest
 
-__all__ = ["choose_bench", "choose_hidden", "demo_names", "hiding", "listed_benches", "profiles_of"]
+__all__ = [
+    "choose_bench",
+    "choose_hidden",
+    "demo_names",
+    "hiding",
+    "listed_benches",
+    "profiles_of",
+    "programme_path",
+]
 
 _DEMO = "demo-"
+_PROGRAMME = "programme-"
 _SIZES = (0.8, 1.3)
 
 
@@ -26,6 +37,21 @@ def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
         name: read_winch(find("profiles", wiring.profile, beside=bench.bench.path or None))
         for name, wiring in bench.bench.winch.items()
     }
+
+
+def programme_path(name: str) -> Path:
+    """Path of a motion programme: a file, or one shipped beside the simulated benches.
+
+    Raises FileError naming those that are shipped.
+    """
+    for path in (Path(name), folder("sim") / f"{name}.toml"):
+        if path.is_file():
+            return path
+    known = [shipped for shipped in names("sim") if shipped.startswith(_PROGRAMME)]
+    raise FileError(
+        f"there is no motion programme '{name}', neither as a file nor shipped "
+        f"({', '.join(known)}){suggest(name, known)}"
+    )
 
 
 def hiding(bench: SimBench, physics: Sequence[str]) -> SimBench:

@@ -47,8 +47,9 @@ class SdoServer:
         if command == _UPLOAD_SEGMENT:
             return self._upload_segment(request)
         self._transfer = None
-        if command == _ABORT:
-            return None
+        return None if command == _ABORT else self._begin(command, request)
+
+    def _begin(self, command: int, request: bytes) -> bytes:
         index, sub = struct.unpack_from("<HB", request, 1)
         if command == _DOWNLOAD:
             return self._download((index, sub), request)

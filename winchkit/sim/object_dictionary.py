@@ -11,7 +11,7 @@ from typing import Any
 
 from winchkit.errors import FileError
 
-__all__ = ["Abort", "Entry", "Key", "ObjectDictionary", "Value", "read_eds"]
+__all__ = ["Abort", "Entry", "Guard", "Key", "ObjectDictionary", "Value", "read_eds"]
 
 Key = tuple[int, int]
 """Index and sub-index."""
@@ -115,10 +115,11 @@ class ObjectDictionary:
             return found
         return Abort.NO_SUB_INDEX if key[0] in self._indices else Abort.NO_OBJECT
 
-    def reset(self) -> None:
-        """Take the stored values, else the defaults, as after power-on."""
-        defaults = {key: entry.default for key, entry in self._entries.items()}
-        self._values = {**defaults, **self._stored}
+    def reset(self, indices: range = range(0x10000)) -> None:
+        """Take the stored values, else the defaults, as after power-on, of a range of indices."""
+        for key, entry in self._entries.items():
+            if key[0] in indices:
+                self._values[key] = self._stored.get(key, entry.default)
 
     def number(self, index: int, sub: int = 0) -> int:
         """Present value of a numeric object; KeyError where the EDS does not declare it."""

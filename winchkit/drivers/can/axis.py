@@ -16,7 +16,7 @@ from winchkit.drivers.can.node import SdoNode
 from winchkit.drivers.can.pdo import PdoCodec
 from winchkit.drivers.can.pdo_setup import cob_id
 from winchkit.drivers.clock import Clock
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, NotPermitted
 from winchkit.schema.device import DeviceSpec
 
 __all__ = ["AxisFeedback", "Cia402Axis"]
@@ -25,6 +25,7 @@ _CONTROL, _TARGET_POSITION, _TARGET_VELOCITY = (0x6040, 0), (0x607A, 0), (0x60FF
 _STATUS, _POSITION, _VELOCITY, _TORQUE = (0x6041, 0), (0x6064, 0), (0x606C, 0), (0x6077, 0)
 _MODE, _ERROR = (0x6061, 0), (0x603F, 0)
 _COMMANDS = {_CONTROL, _TARGET_POSITION, _TARGET_VELOCITY}
+_POLL = 0.005
 _REST = 0.05
 """Below this speed of the motor, rad/s, it counts as standing still."""
 
@@ -83,6 +84,7 @@ class Cia402Axis:
         """Set the drive up, checked and disabled; raises NoReply, DeviceRefused, NotPermitted."""
         self.feedback = None
         self._latest.clear()
+        self.heartbeat.last = self.heartbeat.state = None
         drive = commission(self._node, self.servo, self._watch, self._clock)
         self._check_mapping(drive)
         target = _TARGET_POSITION if self.position_mode else _TARGET_VELOCITY
@@ -95,7 +97,12 @@ class Cia402Axis:
         for codec in drive.tpdo:
             identifier = cob_id("tpdo", codec.spec.number, self._node.node)
             self._bus.on(identifier, self._receiver(codec))
+        self._await_operational()
         return drive
+
+    def disarm(self) -> None:
+        """Let the drive, at rest, stop watching the host's heartbeat; raises ConnectionLost."""
+        self._node.write(0x1016, 1, 0)
 
     @property
     def position_mode(self) -> bool:
@@ -158,6 +165,17 @@ class Cia402Axis:
             self._bus.send(identifier, codec.encode([values[key] for key in codec.position]))
         self._previous = word
         return word
+
+    def _await_operational(self) -> None:
+        """Wait for the heartbeat that confirms the start; also proves that it beats at all."""
+        deadline = self._clock.now() + self._watch.timeout
+        while self.heartbeat.state != NmtState.OPERATIONAL:
+            if self._clock.now() > deadline:
+                raise NotPermitted(
+                    f"{self.name}: no heartbeat says operational within "
+                    f"{self._watch.timeout:g} s of the start; check 1017h and the drive's errors"
+                )
+            self._clock.sleep(_POLL)
 
     def _check_mapping(self, drive: Commissioned) -> None:
         """Refuse a device file whose PDOs lack what motion needs or map what nobody fills."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import Flag, auto
 
 from winchkit.errors import Fault, FileError
-from winchkit.schema.device import DeviceSpec, FieldSpec, ModbusSpec
+from winchkit.schema.device import DeviceSpec, FieldSpec, ModbusSpec, StatusMeaning
 from winchkit.units import convert, dimension_of
 
 __all__ = ["Decoder", "Quality", "Reading"]
@@ -37,6 +37,14 @@ class Quality(Flag):
 
     def __str__(self) -> str:
         return ", ".join(flag.name.lower() for flag in self if flag.name) or "good"
+
+
+_FLAGS: dict[StatusMeaning, Quality] = {
+    "overload": Quality.OVERLOAD,
+    "underload": Quality.UNDERLOAD,
+    "fault": Quality.FAULT,
+    "unstable": Quality.UNSTABLE,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +86,9 @@ class Decoder:
         if dimension is None:
             raise FileError(Fault(f"unknown unit '{self.field.unit}'", device.path))
         self.dimension = dimension
+        self._masks = {
+            meaning: sum(1 << bit for bit in bits) for meaning, bits in self.spec.status.items()
+        }
         self._check_block(device.path)
 
     def _check_block(self, path: str) -> None:
@@ -114,19 +125,13 @@ class Decoder:
         value = convert(counts * self.field.scale, self.field.unit, self.dimension)
         return value, counts, quality, status
 
-    def has(self, meaning: str, status: int) -> bool:
+    def has(self, meaning: StatusMeaning, status: int) -> bool:
         """Whether a status word says ``meaning``, e.g. that a tare is active."""
-        bits = dict(self.spec.status).get(meaning, ())  # type: ignore[call-overload]
-        return any(status >> bit & 1 for bit in bits)
+        return bool(status & self._masks.get(meaning, 0))
 
     def _quality(self, status: int) -> Quality:
         quality = Quality.GOOD
-        for meaning, flag in (
-            ("overload", Quality.OVERLOAD),
-            ("underload", Quality.UNDERLOAD),
-            ("fault", Quality.FAULT),
-            ("unstable", Quality.UNSTABLE),
-        ):
+        for meaning, flag in _FLAGS.items():
             if self.has(meaning, status):
                 quality |= flag
         if "stable" in self.spec.status and not self.has("stable", status):

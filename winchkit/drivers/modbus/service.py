@@ -40,6 +40,7 @@ class SlowDevices:
         self._clients = {line.name: ModbusClient(line.spec, line.name) for line in lines}
         self._locks: dict[str, asyncio.Lock] = {line.name: asyncio.Lock() for line in lines}
         self._lines = {line.name: line for line in lines}
+        self._line_of = {id(item): line.name for line in lines for item in line.instruments}
         self._thread = threading.Thread(target=self._run, name="slow-devices", daemon=True)
         self._thread.start()
 
@@ -48,12 +49,12 @@ class SlowDevices:
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(timeout=3.0)
 
-    def command(self, line: str, instrument: Instrument, name: str) -> None:
+    def command(self, instrument: Instrument, name: str) -> None:
         """Send a command to an instrument between two polls and wait for the device's answer.
 
         Raises NoReply, DeviceRefused, ConnectionLost, NotPermitted.
         """
-        self._wait(self._command(line, instrument, name), instrument)
+        self._wait(self._command(instrument, name), instrument)
 
     def _wait(self, coroutine: Coroutine[Any, Any, None], instrument: Instrument) -> None:
         future = asyncio.run_coroutine_threadsafe(coroutine, self._loop)
@@ -66,7 +67,8 @@ class SlowDevices:
                 "look at the line's other devices"
             ) from None
 
-    async def _command(self, line: str, instrument: Instrument, name: str) -> None:
+    async def _command(self, instrument: Instrument, name: str) -> None:
+        line = self._line_of[id(instrument)]
         async with self._locks[line]:
             client = self._clients[line]
             await instrument.command(client, name, self._lines[line].spec.timeout)

@@ -7,6 +7,8 @@ from math import ceil
 __all__ = ["relax"]
 
 _SMALL = 0.2
+_LONG = 200.0
+"""Travel in units of limit/slope after which the force has settled, for any shape up to 2."""
 
 
 def relax(force: float, travel: float, limit: float, slope: float, shape: float) -> float:
@@ -21,14 +23,21 @@ def relax(force: float, travel: float, limit: float, slope: float, shape: float)
     load = 1.0 - sign * force / limit
     if abs(load) < 1e-12:
         return force
-    count = ceil(slope * abs(travel) / limit / _SMALL)
-    step = slope * abs(travel) / limit / count
+    reach = slope * abs(travel) / limit
+    if reach > _LONG:
+        return sign * limit
+    count = ceil(reach / _SMALL)
+    step = reach / count
     for _ in range(count):
+        before = load
         k1 = -_rate(load, shape)
         k2 = -_rate(load + step * k1 / 2, shape)
         k3 = -_rate(load + step * k2 / 2, shape)
         k4 = -_rate(load + step * k3, shape)
         load += step * (k1 + 2 * k2 + 2 * k3 + k4) / 6
+        if load * before <= 0.0:
+            # A shape below 1 gets there in finite travel, and stays.
+            return sign * limit
     return sign * limit * (1.0 - load)
 
 

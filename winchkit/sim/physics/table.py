@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import Fault, FileError
 from winchkit.schema.simbench import HiddenSpec
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.numbers import number_names, read_numbers, with_unit
@@ -84,8 +84,8 @@ def _build_one(spec: HiddenSpec) -> Physics:
     if kind is None:
         known = list(PHYSICS)
         raise FileError(
-            f"hidden.physics: unknown '{spec.physics}'{suggest(spec.physics, known)}"
-            f"; known are {', '.join(known)}"
+            f"hidden.physics: there is no '{spec.physics}'; known are {', '.join(known)}"
+            + suggest(spec.physics, known)
         )
     return kind(**read_numbers(kind, spec.numbers, f"hidden '{spec.physics}'"))
 
@@ -106,8 +106,8 @@ def declared(profile: WinchProfile, pieces: Sequence[Physics]) -> list[Physics]:
     for piece in own:
         if any(type(other) is type(piece) for other in pieces):
             name = next(name for name, kind in PHYSICS.items() if kind is type(piece))
-            raise UsageError(
-                f"'{name}' is hidden and {profile.name} declares it too; "
+            raise FileError(
+                f"hidden: '{name}' is hidden and {profile.name} declares it too; "
                 "change the declared number under truth instead"
             )
     return _in_order([*pieces, *own])

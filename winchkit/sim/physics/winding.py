@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import cos, hypot, pi, sin
 from typing import ClassVar
 
-from winchkit.errors import UsageError
+from winchkit.errors import FileError
 from winchkit.schema.quantity import Angle, Duration, Length, Number, PositiveNumber, Torque
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.physics.base import Physics, motor_direction
@@ -60,11 +60,13 @@ class ThickLayers(Physics):
     size: ClassVar[str] = "growth_error"
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
-        """Add the error to the layer growth; UsageError on a drum without layers."""
+        """Add the error to the layer growth; FileError on a drum without layers."""
         drum = profile.drum
         growth = drum.layer_growth if drum.layer_growth is not None else profile.cable.diameter
         if drum.kind not in ("spiral", "archimedean") or growth is None:
-            raise UsageError(f"a {drum.kind} drum has no layers that could be too thick")
+            raise FileError(
+                f"hidden 'thick layers': a {drum.kind} drum has no layers that could be too thick"
+            )
         return replace(profile, drum=replace(drum, layer_growth=growth + self.growth_error))
 
 
@@ -94,9 +96,11 @@ class GuideOffset(Physics):
     _distance: float = 0.4
 
     def begin(self, profile: WinchProfile) -> None:
-        """Take the guide's distance; UsageError without a guide."""
+        """Take the guide's distance; FileError without a guide."""
         if profile.guide is None:
-            raise UsageError(f"{profile.name} has no guide that could stand off")
+            raise FileError(
+                f"hidden 'guide offset': {profile.name} has no guide that could stand off"
+            )
         self._distance = profile.guide.distance
 
     def wound_length(self, state: State) -> tuple[float, float]:

@@ -1,0 +1,104 @@
+"""A simulated drive on a virtual CAN bus in real time, for tests of the drivers and the bench."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import threading
+import time
+from dataclasses import dataclass
+
+import can
+
+from winchkit import catalog
+from winchkit.schema.bench import BusSpec
+from winchkit.schema.device import DeviceSpec
+from winchkit.schema.read import read_device
+from winchkit.sim.drive import SimDrive
+from winchkit.sim.servo import DriveCommand
+
+_channels = itertools.count()
+
+
+def bus_spec() -> BusSpec:
+    """A virtual bus of its own."""
+    channel = f"test-{os.getpid()}-{next(_channels)}"
+    return BusSpec("can", interface="virtual", channel=channel, heartbeat=0.1)
+
+
+def device() -> DeviceSpec:
+    """The generic drive."""
+    return read_device(catalog.find("devices", "generic-cia402"))
+
+
+@dataclass
+class Flywheel:
+    """A motor with nothing on it, that follows speeds within milliseconds."""
+
+    motor_angle: float = 0.0
+    motor_velocity: float = 0.0
+    motor_torque: float = 0.25
+
+    def advance(self, duration: float, command: DriveCommand) -> None:
+        wish = 0.0
+        if command.power and not command.brake:
+            wish = command.speed
+            if command.angle is not None:
+                wish += 25.0 * (command.angle - self.motor_angle)
+        self.motor_velocity += (wish - self.motor_velocity) * -math.expm1(-duration / 0.004)
+        self.motor_angle += self.motor_velocity * duration
+
+    def measure(self) -> Flywheel:
+        return self
+
+
+class DriveOnBus:
+    """Runs a SimDrive in a thread of its own; a context manager."""
+
+    def __init__(self, bus: BusSpec, node: int = 1, *, brake: bool = True) -> None:
+        self._bus = can.Bus(interface="virtual", channel=bus.channel)
+        self.frames: list[tuple[int, bytes]] = []
+        self.shaft = Flywheel()
+        spec = device()
+        assert spec.servo is not None
+        self.drive = SimDrive(
+            self._send,
+            node,
+            spec.servo,
+            catalog.find("devices", spec.name).parent / spec.servo.eds,
+            self.shaft,
+            brake=brake,
+            now=time.monotonic(),
+        )
+        self.drive.power_on(time.monotonic(), boot_time=0.02)
+        self.lock = threading.Lock()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> DriveOnBus:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self._bus.shutdown()
+
+    def words(self) -> list[int]:
+        """Control words that came in RPDO 1."""
+        node = self.drive.node
+        return [int.from_bytes(d[:2], "little") for i, d in self.frames if i == 0x200 + node]
+
+    def _send(self, identifier: int, data: bytes) -> None:
+        self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            message = self._bus.recv(0.001)
+            with self.lock:
+                now = time.monotonic()
+                if message is not None:
+                    self.frames.append((message.arbitration_id, bytes(message.data)))
+                    self.drive.receive(message.arbitration_id, bytes(message.data), now)
+                self.drive.tick(now)

@@ -1,0 +1,88 @@
+"""Effects of a user's own: files, entry points, and what is refused."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from effect_lines import IDS, MINE
+
+import winchkit.effects.catalogue as module
+from winchkit.effects import Effect, Term, line_of, load_catalogue
+from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
+from winchkit.errors import FileError, UsageError
+from winchkit.model.line import Line
+
+
+def write(tmp_path: Path, text: str, name: str = "mine.py") -> Path:
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+def test_a_file_adds_its_effects_to_the_catalogue(tmp_path: Path) -> None:
+    catalogue = load_catalogue([write(tmp_path, MINE)])
+    assert len(catalogue) == len(IDS) + 1
+    effect = catalogue["my-own"]
+    line = Line(STANDARD_PROFILE, (Term(effect, {"size": 0.25}).modifier(),))
+    motion = standard_motion()
+    moved = (
+        line.predict(motion)["cable_length"]
+        - line_of(STANDARD_PROFILE).predict(motion)["cable_length"]
+    )
+    assert np.allclose(moved, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("def broken(:\n", "mine.py:1"),
+        ("x = 1 / 0\n", "ZeroDivisionError"),
+        ("import no_such_module_at_all\n", "no_such_module_at_all"),
+        ("x = 1\n", "holds no"),
+        (MINE.replace('"m", null', '"furlong", null'), "unknown unit 'furlong'"),
+        (MINE.replace("null=0.0", "null=0.0, low=1.0"), "null 0 lies outside"),
+    ],
+)
+def test_a_broken_file_is_named_with_what_is_wrong(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(FileError) as caught:
+        load_catalogue([write(tmp_path, text)])
+    assert said in str(caught.value)
+
+
+def test_a_missing_file_and_one_that_is_not_python_are_named(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no such file"):
+        load_catalogue([tmp_path / "nothing.py"])
+    with pytest.raises(FileError, match="not a Python file"):
+        load_catalogue([write(tmp_path, MINE, "mine.txt")])
+
+
+@pytest.mark.parametrize("whole_module", [True, False])
+def test_an_entry_point_brings_effects(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole_module: bool
+) -> None:
+    effect: Effect = load_catalogue([write(tmp_path, MINE)])["my-own"]
+
+    class Point(EntryPoint):
+        def load(self) -> object:
+            return SimpleNamespace(MINE=effect) if whole_module else effect
+
+    def entry_points(*, group: str) -> list[EntryPoint]:
+        assert group == "winchkit.effects"
+        return [Point("mine", "mine_package:MINE", group)]
+
+    monkeypatch.setattr(module, "entry_points", entry_points)
+    assert load_catalogue()["my-own"] is effect
+
+
+def test_an_unknown_effect_suggests_a_name() -> None:
+    with pytest.raises(UsageError, match="did you mean 'cell-gain'"):
+        load_catalogue()["cell-gian"]
+
+
+def test_simple_effects_come_first() -> None:
+    counts = [len(effect.parameters) for effect in load_catalogue()]
+    assert counts == sorted(counts)

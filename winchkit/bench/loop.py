@@ -1,0 +1,251 @@
+"""The control loop: SYNC, newest feedback, supervision, motion, commands, once a cycle."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from winchkit.bench.controller import AxisPort, Controller
+from winchkit.bench.rope import RopeMap
+from winchkit.bench.snapshot import BenchSnapshot, Phase, Trip, WinchSnapshot
+from winchkit.bench.supervisor import Instrumented, Supervisor, WinchInput
+from winchkit.drivers.can.cia402 import State
+from winchkit.drivers.can.heartbeat import HeartbeatProducer, NmtState
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.modbus.reading import Reading
+from winchkit.errors import ConnectionLost
+
+__all__ = ["BusPort", "Callback", "ControlLoop", "SensorPort", "WinchParts"]
+
+Callback = Callable[[BenchSnapshot], Mapping[str, float] | None]
+
+_STOPPED = (Phase.DISABLED, Phase.STOPPING, Phase.RESETTING)
+_FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
+
+
+class BusPort(Protocol):
+    """What the loop needs of a CAN bus."""
+
+    @property
+    def fault(self) -> str | None:
+        """Why it died."""
+
+    def sync(self) -> None:
+        """Send SYNC."""
+
+    def heartbeat(self, node: int, state: int) -> None:
+        """Send the host's heartbeat."""
+
+
+class SensorPort(Protocol):
+    """What the loop needs of an instrument."""
+
+    latest: Reading | None
+    problem: ConnectionLost | None
+
+    @property
+    def max_age(self) -> float:
+        """After this its reading is stale, s."""
+
+
+@dataclass
+class WinchParts:
+    """One winch as the loop sees it."""
+
+    axis: AxisPort
+    rope: RopeMap
+    controller: Controller
+    sensors: Mapping[str, SensorPort] = field(default_factory=dict)
+    """By role: cell, load, length, temperature."""
+
+
+class ControlLoop:
+    """Runs ``step`` once a cycle on its own thread, or as its owner calls it in a test."""
+
+    def __init__(
+        self,
+        buses: Sequence[tuple[BusPort, int, float]],
+        winches: Mapping[str, WinchParts],
+        supervisor: Supervisor,
+        clock: Clock,
+        cycle: float,
+    ) -> None:
+        """Take buses with the host's node id and heartbeat period, and winches by name."""
+        self.winches = winches
+        self.supervisor = supervisor
+        self.callbacks: list[Callback] = []
+        self.on_jog: Callable[[str, float], None] = lambda _name, _speed: None
+        self.samplers: list[Callable[[BenchSnapshot], None]] = []
+        self.failure: BaseException | None = None
+        """What a callback or the loop itself raised."""
+        self.snapshot: BenchSnapshot | None = None
+        self.overruns = 0
+        self._buses = [(bus, node, HeartbeatProducer(period)) for bus, node, period in buses]
+        self._clock, self._cycle, self._count = clock, cycle, 0
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread = threading.Thread(target=self._run, name="control", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread; the drives notice by their heartbeat consumers."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join(timeout=2.0)
+
+    @property
+    def count(self) -> int:
+        """Cycles so far."""
+        return self._count
+
+    @property
+    def alive(self) -> bool:
+        """Whether the thread runs."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def step(self, now: float) -> BenchSnapshot:
+        """One control cycle at ``now`` (s)."""
+        self._count += 1
+        self._send_sync(now)
+        inputs = {name: _input(parts, now) for name, parts in self.winches.items()}
+        blocked = self.supervisor.check(now, inputs)
+        snapshot = self._picture(now, inputs, blocked)
+        self._ask_callbacks(snapshot)
+        if self.supervisor.tripped or self.failure is not None:
+            for parts in self.winches.values():
+                if parts.controller.phase not in _STOPPED:
+                    parts.controller.stop()
+        self._command(now)
+        self.snapshot = snapshot
+        for sample in self.samplers:
+            sample(snapshot)
+        return snapshot
+
+    def _run(self) -> None:
+        due = self._clock.now()
+        try:
+            while not self._stopping.is_set():
+                self.step(self._clock.now())
+                due += self._cycle
+                late = self._clock.now() - due
+                if late > self._cycle:
+                    self.overruns += 1
+                    due += late
+                self._clock.sleep(due - self._clock.now())
+        except BaseException as error:  # noqa: BLE001 - kept, and raised in the owner's thread
+            self.failure = error
+
+    def _send_sync(self, now: float) -> None:
+        for parts in self.winches.values():
+            parts.axis.begin_cycle(self._count, now)
+        for bus, node, producer in self._buses:
+            try:
+                bus.sync()
+                if producer.due(now):
+                    bus.heartbeat(node, NmtState.OPERATIONAL)
+            except ConnectionLost as error:
+                self._latch_bus(error)
+            if bus.fault:
+                self._latch_bus(ConnectionLost(f"CAN bus: {bus.fault}; reopen the bench"))
+
+    def _command(self, now: float) -> None:
+        for parts in self.winches.values():
+            try:
+                parts.controller.step(now)
+            except ConnectionLost as error:
+                self._latch_bus(error)
+
+    def _latch_bus(self, error: ConnectionLost) -> None:
+        self.supervisor.latch(Trip("bus", "", str(error), latches=True))
+
+    def _ask_callbacks(self, snapshot: BenchSnapshot) -> None:
+        """Let the user's functions see the cycle; speeds that they return are a live dead-man."""
+        for callback in list(self.callbacks):
+            try:
+                for name, speed in (callback(snapshot) or {}).items():
+                    self.on_jog(name, speed)
+            except BaseException as error:  # noqa: BLE001 - kept, and raised in the owner's thread
+                self.callbacks.remove(callback)
+                self.failure = error
+
+    def _picture(
+        self, now: float, inputs: Mapping[str, WinchInput], blocked: tuple[Trip, ...]
+    ) -> BenchSnapshot:
+        return BenchSnapshot(
+            time=now,
+            cycle=self._count,
+            winch={
+                name: _winch_picture(parts, inputs[name], now)
+                for name, parts in self.winches.items()
+            },
+            tripped=self.supervisor.tripped,
+            blocked=blocked,
+            overruns=self.overruns,
+        )
+
+
+def _input(parts: WinchParts, now: float) -> WinchInput:
+    """What the supervisor needs to know of a winch."""
+    axis, feedback = parts.axis, parts.axis.feedback
+    length = speed = math.nan
+    if feedback is not None:
+        length, arm = parts.rope.at(feedback.angle)
+        speed = feedback.velocity * arm
+    cell = parts.sensors.get("cell")
+    return WinchInput(
+        feedback_age=math.inf if feedback is None else now - feedback.time,
+        heartbeat_lost=axis.heartbeat.lost(now),
+        boot_ups=axis.heartbeat.boot_ups,
+        operational=axis.operational,
+        mode_kept=axis.mode_kept,
+        fault=axis.fault_text if feedback is not None and feedback.state in _FAULTS else "",
+        speed=speed,
+        commanded=parts.controller.commanded,
+        cable_length=length,
+        moving=parts.controller.phase not in (Phase.DISABLED, Phase.RESETTING),
+        tension=None if cell is None else instrumented(cell, now),
+    )
+
+
+def instrumented(sensor: SensorPort, now: float) -> Instrumented:
+    """Newest reading of a sensor and its age."""
+    reading, problem = sensor.latest, str(sensor.problem or "")
+    if reading is None:
+        return Instrumented(math.nan, math.inf, sensor.max_age, "", math.nan, problem)
+    age = now - reading.t_receive
+    return Instrumented(
+        reading.value, age, sensor.max_age, str(reading.quality), reading.t_sample, problem
+    )
+
+
+def _winch_picture(parts: WinchParts, known: WinchInput, now: float) -> WinchSnapshot:
+    feedback = parts.axis.feedback
+    sensors = {role: instrumented(sensor, now) for role, sensor in parts.sensors.items()}
+    fresh = {
+        role: item.value if item.age <= item.max_age else math.nan for role, item in sensors.items()
+    }
+    quality = {
+        role: item.quality if item.age <= item.max_age else "stale"
+        for role, item in sensors.items()
+    }
+    return WinchSnapshot(
+        phase=parts.controller.phase,
+        state=str(State.UNKNOWN if feedback is None else feedback.state),
+        time=math.nan if feedback is None else feedback.time,
+        motor_angle=math.nan if feedback is None else feedback.angle,
+        motor_velocity=math.nan if feedback is None else feedback.velocity,
+        motor_torque=math.nan if feedback is None else feedback.torque,
+        cable_length=known.cable_length,
+        speed=known.speed,
+        tension=fresh.get("cell", math.nan),
+        load=fresh.get("load", math.nan),
+        length=fresh.get("length", math.nan),
+        temperature=fresh.get("temperature", math.nan),
+        quality=quality,
+    )

@@ -1,0 +1,116 @@
+"""One process owns a bench: a lock that dies with its holder, and where to find the owner."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import socket
+import sys
+import tempfile
+from pathlib import Path
+
+from winchkit.errors import ConnectionLost, NotPermitted
+from winchkit.schema.bench import BenchSpec
+
+__all__ = ["Ownership", "connect_to_owner", "listen"]
+
+_CONNECT_TIME = 2.0
+
+
+def _folder() -> Path:
+    """A folder of this user's own for locks and sockets."""
+    user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+    folder = Path(tempfile.gettempdir()) / f"winchkit-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
+        raise NotPermitted(f"{folder} belongs to another user; remove it or set TMPDIR")
+    return folder
+
+
+def _key(spec: BenchSpec) -> str:
+    """The same for every file that names the same CAN buses."""
+    buses = sorted(
+        f"{bus.interface}/{bus.channel}/{bus.port}"
+        + (f"/{os.getpid()}" if bus.interface == "virtual" else "")
+        for bus in spec.bus.values()
+        if bus.kind == "can"
+    )
+    return hashlib.sha1("|".join(buses).encode(), usedforsecurity=False).hexdigest()[:16]
+
+
+def _lock(descriptor: int) -> bool:
+    """Take the lock if it is free; the system lets it go when the process ends."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+class Ownership:
+    """Holds a bench's lock until closed."""
+
+    def __init__(self, spec: BenchSpec) -> None:
+        """Raise NotPermitted, naming the owner, when another process holds it."""
+        path = _folder() / f"{_key(spec)}.lock"
+        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+        if not _lock(self._descriptor):
+            os.close(self._descriptor)
+            who = path.with_suffix(".owner")
+            pid = who.read_text() if who.is_file() else "another process"
+            raise NotPermitted(
+                f"bench '{spec.name}' is owned by process {pid}; one process owns a bench, "
+                "use `winchkit stop`, `monitor`, `log` beside it or end it first"
+            )
+        path.with_suffix(".owner").write_text(str(os.getpid()))
+
+    def close(self) -> None:
+        """Let it go."""
+        os.close(self._descriptor)
+
+
+def listen(spec: BenchSpec) -> tuple[socket.socket, Path]:
+    """A listening socket for the owner, and the file by which others find it."""
+    if hasattr(socket, "AF_UNIX"):
+        path = _folder() / f"{_key(spec)}.sock"
+        path.unlink(missing_ok=True)
+        server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        server.bind(str(path))
+    else:
+        path = _folder() / f"{_key(spec)}.port"
+        server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        server.bind(("127.0.0.1", 0))
+        path.write_text(json.dumps(server.getsockname()[1]))
+    server.listen()
+    return server, path
+
+
+def connect_to_owner(spec: BenchSpec) -> socket.socket | None:
+    """A connection to the process that owns the bench; None when nobody does."""
+    if hasattr(socket, "AF_UNIX"):
+        client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        address: str | tuple[str, int] = str(_folder() / f"{_key(spec)}.sock")
+    else:
+        path = _folder() / f"{_key(spec)}.port"
+        if not path.is_file():
+            return None
+        client = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        address = ("127.0.0.1", int(path.read_text()))
+    client.settimeout(_CONNECT_TIME)
+    try:
+        client.connect(address)
+    except (FileNotFoundError, ConnectionRefusedError):
+        client.close()
+        return None
+    except OSError as error:
+        client.close()
+        raise ConnectionLost(f"bench '{spec.name}': its owner does not answer: {error}") from error
+    return client

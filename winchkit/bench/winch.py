@@ -1,0 +1,185 @@
+"""One winch as its user drives it; every call is synchronous and may come from any thread."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from winchkit.bench.loop import WinchParts
+from winchkit.bench.motion import DEAD_MAN, Jog, Move
+from winchkit.bench.snapshot import Phase, WinchSnapshot
+from winchkit.bench.supervisor import direction_of
+from winchkit.drivers.modbus.instrument import Instrument
+from winchkit.errors import DriveFault, NoReply, NotPermitted, UsageError
+from winchkit.schema.bench import WinchWiring
+
+if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench
+
+__all__ = ["Winch"]
+
+_POLL = 0.01
+_TARE_TIME = 2.0
+_SETTLING = 3
+
+
+class Winch:
+    """A winch of an open bench: ``bench.winch["A"]``."""
+
+    def __init__(
+        self,
+        bench: Bench,
+        name: str,
+        wiring: WinchWiring,
+        parts: WinchParts,
+        sensors: dict[str, Instrument],
+    ) -> None:
+        self.name = name
+        self.wiring = wiring
+        self.sensors = sensors
+        """Instruments by role: cell, load, length, temperature."""
+        self._bench, self._parts = bench, parts
+        self._controller = parts.controller
+        self._jog: Jog | None = None
+
+    @property
+    def snapshot(self) -> WinchSnapshot:
+        """Newest picture of this winch."""
+        return self._bench.snapshot.winch[self.name]
+
+    @property
+    def cable_length(self) -> float:
+        """Free length from the motor angle, by the profile, m."""
+        return self.snapshot.cable_length
+
+    @property
+    def tension(self) -> float:
+        """Newest reading of the load cell, N; NaN where there is none."""
+        return self.snapshot.tension
+
+    @property
+    def moving(self) -> bool:
+        """Whether a motion is under way."""
+        return not self._controller.done
+
+    def jog(self, speed: float, duration: float | None = None, *, hold: float = DEAD_MAN) -> None:
+        """Move the rope at ``speed`` (m/s, positive winds in) for ``hold`` seconds.
+
+        Call it again within that time to keep going; without another call it ramps to rest and
+        disables. With ``duration`` it does so itself for that many seconds and returns at rest.
+        Raises NotPermitted, LimitTripped, DriveFault.
+        """
+        if not math.isfinite(speed) or not 0 < hold <= 1:
+            raise UsageError(f"a jog at {speed} m/s held for {hold} s cannot be meant")
+        if duration is None:
+            self._refresh(speed, hold)
+            return
+        clock = self._bench.clock
+        end = clock.now() + duration
+        while clock.now() < end:
+            self._refresh(speed, min(hold, end - clock.now() + _POLL))
+            clock.sleep(min(hold / 4, end - clock.now()))
+        self._refresh(0.0, _POLL)
+        self.wait()
+
+    def move_to(
+        self,
+        length: float,
+        speed: float | None = None,
+        acceleration: float | None = None,
+        *,
+        wait: bool = True,
+        hold: bool = False,
+    ) -> None:
+        """Move to a cable length (m) on an S-curve, limits of the winch unless lower ones given.
+
+        With ``hold`` the drive stays enabled there until ``stop``. Raises NotPermitted,
+        LimitTripped, DriveFault.
+        """
+        move = Move(
+            self._parts.rope.line,
+            self.wiring.limits,
+            length,
+            speed=speed,
+            acceleration=acceleration,
+            holds=hold,
+        )
+        here = self.snapshot
+        self._bench.permit(self.name, direction_of(here.cable_length - length))
+        move.prepare(here.motor_angle)
+        self._jog = None
+        self._controller.begin(move)
+        if wait:
+            self.wait()
+
+    def move_by(
+        self, change: float, speed: float | None = None, *, wait: bool = True, hold: bool = False
+    ) -> None:
+        """Change the cable length by ``change`` (m, positive pays out); else as ``move_to``."""
+        self.move_to(self.cable_length + change, speed, wait=wait, hold=hold)
+
+    def stop(self, *, wait: bool = True) -> None:
+        """Ramp to rest, then disable. Always allowed."""
+        self._jog = None
+        self._controller.run_down()
+        if wait:
+            self._bench.wait_at_rest((self.name,))
+
+    def wait(self) -> None:
+        """Return when the motion is done; raises LimitTripped or DriveFault when it was stopped."""
+        while self.moving:
+            self._bench.raise_trouble()
+            self._bench.clock.sleep(_POLL)
+        self._bench.raise_trouble()
+        if self._controller.failure:
+            raise DriveFault(
+                f"winch {self.name}: {self._controller.failure}; {self._parts.axis.fault_text}"
+            )
+        source = self._controller.source
+        if source is None or not source.holds:
+            self._bench.wait_at_rest((self.name,))
+
+    def tare(self) -> float:
+        """Tare the load cell with its own command, at rest; returns the tension that it then
+        reads, N. Its EEPROM is not touched. Raises NotPermitted, NoReply, DeviceRefused.
+        """
+        cell = self.sensors.get("cell")
+        if cell is None:
+            raise NotPermitted(f"winch {self.name} has no load cell to tare; wire one as `cell`")
+        if self._controller.phase is not Phase.DISABLED:
+            raise NotPermitted(
+                f"winch {self.name} is {self._controller.phase.value}; stop it first"
+            )
+        self._bench.command(cell, "tare")
+        return self._tared(cell)
+
+    def _tared(self, cell: Instrument) -> float:
+        """Wait for readings after the tare and make sure that the device took it."""
+        clock, decoder = self._bench.clock, cell.decoder
+        sent, seen, deadline = clock.now(), 0, clock.now() + _TARE_TIME
+        last = sent
+        while clock.now() < deadline:
+            clock.sleep(_POLL)
+            reading = cell.latest
+            if reading is None or reading.t_request <= last:
+                continue
+            last, seen = reading.t_request, seen + 1
+            tared = "net" not in decoder.spec.status or decoder.has("net", cell.status)
+            if seen >= _SETTLING and tared and reading.quality.usable:
+                return reading.value
+        raise NoReply(
+            f"winch {self.name}: {cell.name} did not confirm the tare within {_TARE_TIME:g} s; "
+            "check that the reading is stable and within the device's tare range"
+        )
+
+    def _refresh(self, speed: float, hold: float) -> None:
+        self._bench.permit(self.name, direction_of(speed))
+        expires = self._bench.clock.now() + hold
+        jog = self._jog
+        if jog is None or not self.moving or self._controller.source not in (jog, None):
+            jog = self._jog = Jog(self._parts.rope, self.wiring.limits)
+            jog.refresh(speed, expires)
+            if speed != 0:
+                self._controller.begin(jog)
+        else:
+            jog.refresh(speed, expires)

@@ -1,0 +1,91 @@
+"""CAN buses of a simulated bench, and which of them reach other processes."""
+
+from __future__ import annotations
+
+import os
+import socket
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, Literal
+
+import can
+
+from winchkit.errors import ConnectionLost
+from winchkit.schema.bench import BusSpec
+
+__all__ = ["CanPort", "Interface", "wired"]
+
+Interface = Literal["udp_multicast", "virtual"]
+
+_GROUP = "239.74.163.2"
+"""The group of python-can's own default."""
+_PROBE = can.Message(arbitration_id=0x7FF, is_extended_id=False)
+_ROUTE = (
+    "this machine has no route for multicast; add one with: ip route add 239.0.0.0/8 dev lo "
+    "(as root), or keep to one process with the interface 'virtual'"
+)
+
+
+def wired(spec: BusSpec, name: str, interface: Interface) -> BusSpec:
+    """Bus as the simulation opens it: a channel that no other simulation uses."""
+    if interface == "virtual":
+        return replace(spec, interface="virtual", channel=f"{name}-{os.getpid()}-{os.urandom(4).hex()}", port=None)
+    return replace(spec, interface="udp_multicast", channel=_GROUP, port=_free_udp_port())
+
+
+class CanPort:
+    """An open CAN bus that hands frames over and takes them; raises ConnectionLost."""
+
+    def __init__(self, spec: BusSpec) -> None:
+        self._name = f"{spec.interface} channel '{spec.channel}'"
+        options: dict[str, Any] = {"interface": spec.interface, "channel": spec.channel}
+        if spec.interface == "udp_multicast":
+            options["port"] = spec.port
+        elif spec.interface != "virtual":
+            options["bitrate"] = spec.bitrate
+        try:
+            self._bus = can.Bus(**options)
+        except (can.CanError, OSError, ValueError, ImportError) as error:
+            raise ConnectionLost(self._trouble(spec, error)) from error
+        if spec.interface == "udp_multicast":
+            self._try_sending(spec)
+
+    def _try_sending(self, spec: BusSpec) -> None:
+        try:
+            self._bus.send(_PROBE)
+        except (can.CanError, OSError) as error:
+            self._bus.shutdown()
+            raise ConnectionLost(self._trouble(spec, error)) from error
+
+    def _trouble(self, spec: BusSpec, error: Exception) -> str:
+        hint = f"; {_ROUTE}" if spec.interface == "udp_multicast" else ""
+        return f"cannot open {self._name} for the simulated drives: {error}{hint}"
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Send a frame with an 11-bit identifier; raises ConnectionLost."""
+        message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise ConnectionLost(f"{self._name}: cannot send: {error}") from error
+
+    def receive(self, timeout: float) -> tuple[int, bytes] | None:
+        """Take the next frame, waiting at most ``timeout`` s; raises ConnectionLost."""
+        try:
+            message = self._bus.recv(timeout)
+        except (can.CanError, OSError) as error:
+            raise ConnectionLost(f"{self._name}: cannot receive: {error}") from error
+        if message is None or message.is_error_frame or message.is_extended_id:
+            return None
+        return message.arbitration_id, bytes(message.data)
+
+    def close(self) -> None:
+        """Let the bus go."""
+        with suppress(can.CanError, OSError):
+            self._bus.shutdown()
+
+
+def _free_udp_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])

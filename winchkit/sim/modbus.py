@@ -1,0 +1,157 @@
+"""Simulated Modbus instruments behind a real pymodbus server, on a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pymodbus.constants import ExcCodes
+from pymodbus.exceptions import NoSuchIdException
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from winchkit.errors import ConnectionLost
+from winchkit.sim.modbus_instrument import ModbusInstrument
+
+__all__ = ["ModbusLine"]
+
+_READS = (3, 4)
+_WRITES = (6, 16)
+_START_TIMEOUT = 5.0
+
+
+class ModbusLine:
+    """One Modbus TCP server with several instruments by unit id.
+
+    ``up_to_date`` is called, on this line's thread, before registers are read or written; it
+    brings the simulation to now, and is a context in which nobody else touches it.
+    """
+
+    def __init__(
+        self,
+        instruments: Mapping[int, ModbusInstrument],
+        up_to_date: Callable[[], Any],
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+    ) -> None:
+        self._instruments = dict(instruments)
+        self._up_to_date = up_to_date
+        self._wanted = (host, port)
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name="modbus-server", daemon=True)
+        self._server: ModbusTcpServer | None = None
+        self._started = threading.Event()
+        self._failure: OSError | None = None
+        self.address = self._wanted
+        """Host and port, once it serves."""
+
+    def start(self) -> None:
+        """Begin to serve; raises ConnectionLost where the address is taken."""
+        self._thread.start()
+        self._started.wait(_START_TIMEOUT)
+        host, port = self._wanted
+        if self._server is None or self._failure is not None:
+            self._thread.join(_START_TIMEOUT)
+            reason = self._failure or "it did not start in time"
+            raise ConnectionLost(
+                f"cannot serve Modbus TCP on {host}:{port}: {reason}; choose another port"
+            )
+
+    def stop(self) -> None:
+        """Close every connection and end the thread."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join(_START_TIMEOUT)
+
+    def _run(self) -> None:
+        try:
+            self._loop.run_until_complete(self._serve())
+        except OSError as error:
+            self._failure = error
+        finally:
+            self._started.set()
+        if self._failure is None:
+            self._loop.run_forever()
+            self._loop.run_until_complete(self._close())
+        self._loop.close()
+
+    async def _serve(self) -> None:
+        devices = [self._device(unit, one) for unit, one in self._instruments.items()]
+        if 0 not in self._instruments:
+            devices.append(_nobody())
+        server = ModbusTcpServer(devices, address=self._wanted, ignore_missing_devices=True)
+        try:
+            await server.serve_forever(background=True)
+        except RuntimeError as error:
+            raise OSError("the address is in use or not of this machine") from error
+        self.address = server.transport.sockets[0].getsockname()[:2]
+        self._server = server
+
+    async def _close(self) -> None:
+        if self._server is not None:
+            await self._server.shutdown()
+        tasks = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _device(self, unit: int, instrument: ModbusInstrument) -> SimDevice:
+        blocks = [SimData(at, values=0, datatype=DataType.REGISTERS) for at in instrument.addresses]
+
+        async def act(*query: Any) -> ExcCodes | None:
+            return await self._act(instrument, *query)
+
+        return SimDevice(unit, simdata=blocks, action=act)
+
+    async def _act(self, instrument: ModbusInstrument, *query: Any) -> ExcCodes | None:
+        """Answer one query as the instrument does at this moment."""
+        function, start, address, count, registers, values = query
+        if "silence" in instrument.faults:
+            raise NoSuchIdException("the simulated instrument is silent")
+        if "late reply" in instrument.faults:
+            await asyncio.sleep(instrument.reply_delay)
+        if "exception" in instrument.faults:
+            return ExcCodes.DEVICE_FAILURE
+        with self._up_to_date():
+            if values is None:
+                return _read(instrument, function, (start, address, count), registers)
+            return _write(instrument, function, address, values)
+
+
+def _read(
+    instrument: ModbusInstrument,
+    function: int,
+    span: tuple[int, int, int],
+    registers: list[int],
+) -> ExcCodes | None:
+    start, address, count = span
+    read = instrument.spec.read
+    if function in _READS and function != read.function:
+        return ExcCodes.ILLEGAL_FUNCTION
+    if read.fixed and (address, count) != (read.start, read.count):
+        return ExcCodes.ILLEGAL_ADDRESS
+    for at, content in instrument.registers().items():
+        registers[at - start] = content
+    return None
+
+
+def _write(
+    instrument: ModbusInstrument, function: int, address: int, values: list[int] | list[bool]
+) -> ExcCodes | None:
+    if function not in _WRITES:
+        return ExcCodes.ILLEGAL_FUNCTION
+    taken = [instrument.command(address + at, int(value)) for at, value in enumerate(values)]
+    return None if all(taken) else ExcCodes.ILLEGAL_VALUE
+
+
+def _nobody() -> SimDevice:
+    """Stand for every unit that does not exist: nobody answers."""
+
+    async def silent(*_: Any) -> ExcCodes | None:
+        raise NoSuchIdException("no such unit")
+
+    everything = SimData(0, count=65_536, values=0, datatype=DataType.REGISTERS)
+    return SimDevice(0, simdata=[everything], action=silent)
