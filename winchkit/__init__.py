@@ -1,4 +1,30 @@
 """winchkit: moves winches, measures tension, and tells which physical effect a model lacks."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench, open_bench
+    from winchkit.runs import read_run
+
 __version__ = "0.1.0"
-__all__ = ["__version__"]
+__all__ = ["Bench", "__version__", "open_bench", "read_run"]
+
+_HOME = {
+    "Bench": "winchkit.bench.bench",
+    "open_bench": "winchkit.bench.bench",
+    "read_run": "winchkit.runs",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used, so that importing winchkit stays light."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'winchkit' has no attribute '{name}'")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -6,8 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from winchkit.errors import FileError
-from winchkit.units import suggest
+from winchkit.errors import FileError, suggest
 
 __all__ = ["Kind", "find", "folder", "names"]
 

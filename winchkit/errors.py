@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 __all__ = [
     "ConnectionLost",
@@ -33,6 +34,7 @@ __all__ = [
     "RunError",
     "UsageError",
     "WinchkitError",
+    "suggest",
 ]
 
 
@@ -108,3 +110,10 @@ class LimitTripped(MotionError):
 
 class NotPermitted(MotionError):
     """A condition for motion is not met, e.g. no drive-side watchdog."""
+
+
+def suggest(word: str, known: list[str]) -> str:
+    """``; did you mean 'x'?`` when a known word is close, else nothing."""
+    close = [name for name in known if name.casefold() == word.casefold()]
+    close = close or get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"; did you mean '{close[0]}'?" if close else ""

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 import re
-from difflib import get_close_matches
 
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, suggest
 
 __all__ = [
     "UNITS",
@@ -59,13 +58,6 @@ UNITS: dict[str, dict[str, float]] = {
 }
 _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf)\s*(.*)", re.ASCII)
 _ZERO_CELSIUS = 273.15
-
-
-def suggest(word: str, known: list[str]) -> str:
-    """``; did you mean 'x'?`` when a known word is close, else nothing."""
-    close = [name for name in known if name.casefold() == word.casefold()]
-    close = close or get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"; did you mean '{close[0]}'?" if close else ""
 
 
 def article(noun: str) -> str:

@@ -156,6 +156,21 @@ def test_numbers_of_parameters_are_sane(effect: Effect) -> None:
     assert any(p.role == "amplitude" for p in effect.parameters)
 
 
+@pytest.mark.parametrize(
+    "chain",
+    [
+        "cell-gain cell-offset cell-nonlinearity cell-drift cell-thermal cell-lag",
+        "gear-ratio gear-backlash encoder-slip",
+        "pulley-coulomb cell-gain",
+        "gear-efficiency torque-constant motor-coulomb torque-lag",
+        "cable-elongation-linear frame-compliance length-time-offset",
+    ],
+)
+def test_effects_act_in_the_order_of_the_interface(chain: str) -> None:
+    places = [(CATALOGUE[name].stage, CATALOGUE[name].order) for name in chain.split()]
+    assert places == sorted(set(places))
+
+
 @every_effect
 def test_words_are_complete(effect: Effect) -> None:
     for text in (effect.what, effect.looks_like, effect.told_apart):

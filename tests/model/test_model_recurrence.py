@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import exp
 
 import numpy as np
@@ -71,7 +72,7 @@ def test_lag_follows_its_differential_equation() -> None:
 
     y = np.array([1.5])
     expected = [1.5]
-    for before, after in zip(time[:-1], time[1:], strict=True):
+    for before, after in pairwise(time):
         y = solve_ivp(rate, (before, after), y, rtol=1e-11, atol=1e-12).y[:, -1]
         expected.append(float(y[0]))
     assert np.allclose(first_order_lag(x, time, 0.37, 1.5), expected, atol=1e-9)

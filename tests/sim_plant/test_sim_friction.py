@@ -85,6 +85,8 @@ def test_presliding_pulleys_end_where_dry_ones_are() -> None:
     # After a reversal dry friction turns with the speed, the soft one only with the travel.
     turned = dry.tension
     for winch in (dry, soft):
+        for speed in range(50, -1, -1):
+            cruise(winch, float(speed), 0.02)
         cruise(winch, -0.5, 0.3)
     assert dry.tension < dry.load < soft.tension < turned
 

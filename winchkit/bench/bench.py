@@ -185,7 +185,12 @@ class Bench:
         controllers = {name: self.loop.winches[name].controller for name in names}
         self._await_cycles(2)
         while True:
-            busy = [name for name, item in controllers.items() if item.phase is not Phase.DISABLED]
+            seen = self.snapshot.winch
+            busy = [
+                name
+                for name, item in controllers.items()
+                if item.phase is not Phase.DISABLED or seen[name].phase is not Phase.DISABLED
+            ]
             if not busy or not self.loop.alive:
                 return
             if self.clock.now() > deadline:

@@ -1,7 +1,8 @@
 """Logs a bench: one row per reading of its slowest instrument, everything at that moment.
 
 A row stands at the reading's estimated moment of sampling; every other channel is interpolated
-there between its own two neighbouring samples, and is NaN where it has none.
+there between its own two neighbouring samples, and is NaN where it has none. The log begins
+when every channel has come, or after half a second.
 """
 
 from __future__ import annotations
@@ -70,7 +71,8 @@ class Recorder:
                 columns.append((prefix[name] + channel, unit))
                 self._listen(prefix[name] + channel, instrument)
         self._start: float | None = None
-        self._last = -math.inf
+        self._opened = clock.now()
+        self._last = self._last_time = -math.inf
         self._writer = open_writer(path, columns, metadata)
         self._error: BaseException | None = None
         self._stopping = threading.Event()
@@ -148,12 +150,14 @@ class Recorder:
         self._writer.flush()
 
     def _write_row(self, moment: float) -> None:
-        if self._start is None:
-            self._start = self._last_time = moment
-        elif moment <= self._last_time:
+        if moment <= self._last_time:
             return
-        self._last_time = moment
         row = {column: series.at(moment) for column, series in self._series.items()}
+        if self._start is None:
+            if moment < self._opened + _PATIENCE and any(map(math.isnan, row.values())):
+                return
+            self._start = moment
+        self._last_time = moment
         self._writer.append({"time": moment - self._start, **row})
         self.rows += 1
 

@@ -43,6 +43,8 @@ class LazyGroup(click.Group):
         if find_spec(entry.module) is None:
             ctx.fail(f"'{cmd_name}' is not part of this installation.")
         command: click.Command = getattr(import_module(entry.module), entry.name)
+        if ctx.auto_envvar_prefix:
+            _name_variables(command, f"{ctx.auto_envvar_prefix}_{cmd_name}")
         return command
 
     def resolve_command(
@@ -67,3 +69,21 @@ class LazyGroup(click.Group):
             if name.startswith(incomplete)
         ]
         return names + click.Command.shell_complete(self, ctx, incomplete)
+
+
+def _name_variables(command: click.Command, prefix: str) -> None:
+    """Name the environment variables of a command after its options as they are typed.
+
+    click itself would take the name of the Python argument, such as ``as_json`` for ``--json``.
+    """
+    for option in command.params:
+        if isinstance(option, click.Option) and option.envvar is None:
+            typed = max(option.opts, key=len).lstrip("-")
+            option.envvar = _variable(f"{prefix}_{typed}")
+    if isinstance(command, click.Group):
+        for name, inner in command.commands.items():
+            _name_variables(inner, f"{prefix}_{name}")
+
+
+def _variable(words: str) -> str:
+    return words.replace("-", "_").upper()

@@ -16,6 +16,7 @@ from winchkit.diagnosis.follows import follows, harmonics
 from winchkit.diagnosis.gate import held_out, held_out_rms
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.limits import what_runs_cannot_show
+from winchkit.diagnosis.next_run import next_runs
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.power import detectable
 from winchkit.diagnosis.problem import Hypothesis, Problem
@@ -35,7 +36,7 @@ from winchkit.effects.coordinates import Coordinates
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Answer", "diagnose", "inquire"]
+__all__ = ["Answer", "diagnose", "inquire", "output_fits"]
 
 _CANDIDATES_FITTED = 5
 _NEGLIGIBLE = 0.02
@@ -69,22 +70,24 @@ def diagnose(
     found = search(inquiry)
     share = _unexplained(inquiry, found)
     verdict = _verdict(found, share)
-    outputs = _outputs(inquiry, found)
+    outputs = output_fits(inquiry, (found.begin, found.begin_noise), (found.final, found.noise))
     # While much is still unexplained a name would be a guess: it stays among the candidates.
     named = verdict == "explained" or (verdict == "partly" and share < _NAMED_BESIDE)
-    steps = _steps(inquiry, found) if named else ()
+    added = range(inquiry.given, len(found.final.hypothesis.terms) if named else inquiry.given)
+    sets = [confusion_of(inquiry, found.final, found.noise, index) for index in added]
+    pairs = [(c.term, rival) for c in sets for rival in c.terms if rival is not c.term]
     notes = (*inquiry.problem.dataset.notes, *what_runs_cannot_show(inquiry.problem))
     diagnosis = Diagnosis(
         verdict=verdict,
         outputs=outputs,
-        steps=steps,
+        steps=_steps(inquiry, found, sets) if sets else (),
         candidates=_candidates(inquiry, found),
         detectable=detectable(found.scores, inquiry.price, found.threshold),
         unexplained_share=share,
         where=_where(inquiry, found, found.final if named else found.begin)
         if verdict in {"unknown", "partly"}
         else (),
-        next_runs=(),
+        next_runs=next_runs(inquiry.problem.dataset, pairs, found.noise.rms),
         notes=notes,
     )
     return Answer(inquiry, found, diagnosis)
@@ -129,12 +132,16 @@ def _verdict(found: Found, share: float) -> Verdict:
     return "explained" if share < (_GENERALISES if settled else _NEGLIGIBLE) else "partly"
 
 
-def _outputs(inquiry: Inquiry, found: Found) -> dict[str, OutputFit]:
+def output_fits(
+    inquiry: Inquiry, begin: tuple[Fit, Noise], final: tuple[Fit, Noise]
+) -> dict[str, OutputFit]:
+    """Every output before and after, in sample and held out, beside its noise."""
     problem, groups = inquiry.problem, inquiry.groups
-    before, after = _rms(problem, found.begin), _rms(problem, found.final)
-    held_before = held_out_rms(problem, found.begin, found.begin_noise, groups)
-    held_after = held_out_rms(problem, found.final, found.noise, groups)
-    source = "repeats" if found.noise.from_repeats else "saturated fit"
+    before, after = _rms(problem, begin[0]), _rms(problem, final[0])
+    held_before = held_out_rms(problem, *begin, groups)
+    held_after = held_out_rms(problem, *final, groups)
+    noise = final[1]
+    source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         output: OutputFit(
             unit=OUTPUT_UNITS[output],
@@ -144,7 +151,7 @@ def _outputs(inquiry: Inquiry, found: Found) -> dict[str, OutputFit]:
             rms_after=after[output],
             heldout_rms_before=held_before[output],
             heldout_rms_after=held_after[output],
-            noise_rms=found.noise.rms[output],
+            noise_rms=noise.rms[output],
             noise_source=source,
         )
         for output in problem.dataset.outputs
@@ -160,11 +167,9 @@ def _rms(problem: Problem, fitted: Fit) -> dict[str, float]:
     return out
 
 
-def _steps(inquiry: Inquiry, found: Found) -> tuple[Step, ...]:
+def _steps(inquiry: Inquiry, found: Found, sets: Sequence[Confusion]) -> tuple[Step, ...]:
     """Every addition with its confusion set, values and held-out gain."""
     final, noise = found.final, found.noise
-    added = range(inquiry.given, len(final.hypothesis.terms))
-    sets = [confusion_of(inquiry, final, noise, index) for index in added]
     gains = _gains(inquiry, final, noise)
     std = unknown_std(inquiry.problem, final, noise, inquiry.blocks)
     own = estimates(inquiry.problem, final, std)

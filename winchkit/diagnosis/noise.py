@@ -7,7 +7,7 @@ between repeats for known reasons, such as the temperature, is taken out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,11 +146,11 @@ def _split(problem: Problem, rows: Array) -> _Split:
                 ]
             )
             mean, differences = contrasts(aligned)
-            band = problem.dataset.recordings[group.runs[0]].bands[output]
-            frequency = np.arange(len(mean)) * band.rate / (2 * len(mean))
-            kept = frequency <= (np.inf if band.cut_off is None else band.cut_off)
+            band = replace(problem.dataset.recordings[group.runs[0]].bands[output], count=len(mean))
+            frequency = band.frequency
+            kept = slice(len(frequency))
             first, own = edges[output]
-            ids = first + np.searchsorted(own, frequency[kept], side="right") - 1
+            ids = first + np.searchsorted(own, frequency, side="right") - 1
             spectra = np.asarray(dct(differences, type=2, norm="ortho", axis=1))[:, kept]
             parts[0].append(spectra.ravel())
             bands[0].append(np.tile(ids, len(spectra)))

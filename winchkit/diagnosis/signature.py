@@ -28,7 +28,7 @@ __all__ = [
     "Score",
     "Signatures",
     "chance_level",
-    "is_candidate",
+    "missing_needs",
     "score",
     "signatures",
 ]
@@ -37,6 +37,16 @@ Array = NDArray[np.float64]
 _NOTHING = 1e-12
 _SIMULATIONS = 400
 _PERIODS = 2
+_NEEDED = {
+    "cable": "a rope in the profile ([cable], [[pulley]] or reference.cable_length)",
+    "layers": "a drum that winds in layers (spiral or archimedean)",
+    "guide": "a [guide] in the profile",
+    "pulley": "a [[pulley]] in the profile",
+    "temperature": "a temperature channel in every run",
+    "load": "a load channel or load_mass",
+    "rope_force": "a load, load_mass or tension",
+    "gearing": "a gearbox",
+}
 _UNIDENTIFIABLE = 1e-7
 
 
@@ -80,20 +90,14 @@ class Score:
     """λ for one usual size: noncentrality of its whitened, projected signature."""
 
 
-def is_candidate(effect: Effect, problem: Problem) -> bool:
-    """Whether its part and its channels are there."""
+def missing_needs(effect: Effect, problem: Problem) -> list[str]:
+    """Parts and channels that an effect needs and that are not there, in words."""
     dataset = problem.dataset
     profile, recordings = dataset.profile, dataset.recordings
-    if not set(effect.outputs) & set(dataset.outputs):
-        return False
     cable = profile.cable
+    roped = cable.diameter or cable.dead_length or profile.pulley
     have = {
-        "cable": bool(
-            cable.diameter
-            or cable.dead_length
-            or profile.pulley
-            or profile.reference.cable_length is not None
-        ),
+        "cable": bool(roped) or profile.reference.cable_length is not None,
         "layers": profile.drum.kind in {"spiral", "archimedean"},
         "guide": profile.guide is not None,
         "pulley": bool(profile.pulley),
@@ -102,7 +106,10 @@ def is_candidate(effect: Effect, problem: Problem) -> bool:
         "rope_force": any(bool(r.raw.at.tension.any()) for r in recordings),
         "gearing": True,
     }
-    return all(have[need] for need in effect.needs)
+    lacking = [_NEEDED[need] for need in effect.needs if not have[need]]
+    if not set(effect.outputs) & set(dataset.outputs):
+        lacking.append("a measured " + " or ".join(effect.outputs))
+    return lacking
 
 
 def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect]) -> Signatures:
@@ -111,7 +118,7 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
     atoms: list[Atom] = []
     columns: list[Array] = []
     for effect in effects:
-        if not is_candidate(effect, problem):
+        if missing_needs(effect, problem):
             continue
         coordinates = Coordinates(effect)
         added = partial(_column, problem, present, here, effect)

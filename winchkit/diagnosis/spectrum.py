@@ -17,6 +17,7 @@ __all__ = ["Band", "band_edges", "low_pass", "to_frequency", "to_time", "torque_
 Array = NDArray[np.float64]
 _BUTTERWORTH_ORDER = 4
 _TORQUE_BAND = 20.0
+_SKIRT = 1.5
 _BANDS = 14
 _FEWEST = 8
 
@@ -41,7 +42,9 @@ class Band:
     def frequency(self) -> Array:
         """Of every kept coefficient, Hz, shape (kept,)."""
         frequency = np.arange(self.count) * self.rate / (2 * self.count)
-        return frequency if self.cut_off is None else frequency[frequency <= self.cut_off]
+        if self.cut_off is None:
+            return frequency
+        return frequency[frequency <= _SKIRT * self.cut_off]
 
     @property
     def gain(self) -> Array:

@@ -15,7 +15,16 @@ from winchkit.units import dimension_of, suggest
 
 __all__ = ["Catalogue", "load_catalogue"]
 
-_MECHANISM = {"effect", "catalogue", "bind", "coordinates", "empirical", "card", "standard"}
+_MECHANISM = {
+    "effect",
+    "catalogue",
+    "bind",
+    "coordinates",
+    "empirical",
+    "card",
+    "standard",
+    "profile_file",
+}
 
 
 class Catalogue:

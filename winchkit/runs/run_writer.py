@@ -36,7 +36,7 @@ class RunWriter(ABC):
         if "time" not in self._names:
             raise UsageError(f"{path}: a run needs a column 'time'")
         with self._writing():
-            self._stream = path.open("wb")
+            self._stream = path.open("wb", buffering=1 << 20)
             self._begin({key: " ".join(value.split()) for key, value in metadata.items()})
         self.flush()
 

@@ -134,7 +134,8 @@ def _line(reading: Reading, raw: object, at: Key) -> object:
     elif isinstance(winch, str):
         profile = _named_winch(reading, winch, place)
     else:
-        return raw
+        profile = None
+        reading.fault(place, f"expected the name of a winch or its tables, not {winch!r}")
     # A winch with faults, noted above, is not to be reported a second time.
     return {**raw, "winch": profile or str(winch)}
 

@@ -77,7 +77,7 @@ def _faults(kind: type, details: ErrorDetails) -> list[tuple[Key, str]]:
 
 def _is_branch(kind: type, place: Key) -> bool:
     """Whether a place ends in the name that pydantic gives to one branch of a union."""
-    return place[-1] in {"str", "int", "WinchProfile"} and type_at(kind, place) is None
+    return place[-1] in {"str", "int"} and type_at(kind, place) is None
 
 
 def _message(kind: type, error: str, place: Key, details: ErrorDetails) -> str:

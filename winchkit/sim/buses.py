@@ -29,7 +29,12 @@ _ROUTE = (
 def wired(spec: BusSpec, name: str, interface: Interface) -> BusSpec:
     """Bus as the simulation opens it: a channel that no other simulation uses."""
     if interface == "virtual":
-        return replace(spec, interface="virtual", channel=f"{name}-{os.getpid()}-{os.urandom(4).hex()}", port=None)
+        return replace(
+            spec,
+            interface="virtual",
+            channel=f"{name}-{os.getpid()}-{os.urandom(4).hex()}",
+            port=None,
+        )
     return replace(spec, interface="udp_multicast", channel=_GROUP, port=_free_udp_port())
 
 

@@ -23,6 +23,7 @@ from winchkit.sim.object_dictionary import Abort, read_eds
 __all__ = ["SimDrive"]
 
 _MAX_SLICE = 1e-3
+_MIN_SLICE = 2e-5
 _BOOT_SHARE = 0.8
 """Of the boot time that a device file declares as the longest."""
 _HEARTBEAT_LOST = 0x8130
@@ -242,7 +243,7 @@ class SimDrive:
     def advance(self, now: float) -> None:
         """Move until ``now``; the set-points are made in slices of at most a millisecond."""
         duration = now - self._now
-        if duration <= 0:
+        if duration < _MIN_SLICE:
             return
         count = ceil(duration / _MAX_SLICE - 1e-6)
         dt = duration / count

@@ -42,7 +42,7 @@ class ModbusLine:
         self._wanted = (host, port)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name="modbus-server", daemon=True)
-        self._server: ModbusTcpServer | None = None
+        self._server: Any = None
         self._started = threading.Event()
         self._failure: OSError | None = None
         self.address = self._wanted
@@ -82,7 +82,7 @@ class ModbusLine:
         devices = [self._device(unit, one) for unit, one in self._instruments.items()]
         if 0 not in self._instruments:
             devices.append(_nobody())
-        server = ModbusTcpServer(devices, address=self._wanted, ignore_missing_devices=True)
+        server: Any = ModbusTcpServer(devices, address=self._wanted, ignore_missing_devices=True)
         try:
             await server.serve_forever(background=True)
         except RuntimeError as error:

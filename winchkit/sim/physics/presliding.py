@@ -7,8 +7,8 @@ from math import ceil
 __all__ = ["relax"]
 
 _SMALL = 0.2
-_LONG = 200.0
-"""Travel in units of limit/slope after which the force has settled, for any shape up to 2."""
+_LONG = 100.0
+"""Travel in units of limit/slope after which the force has settled to a hundredth, for shapes up to 2."""
 
 
 def relax(force: float, travel: float, limit: float, slope: float, shape: float) -> float:
@@ -26,7 +26,8 @@ def relax(force: float, travel: float, limit: float, slope: float, shape: float)
     reach = slope * abs(travel) / limit
     if reach > _LONG:
         return sign * limit
-    count = ceil(reach / _SMALL)
+    steepness = max(1.0, shape * abs(load) ** (shape - 1.0))
+    count = ceil(reach * steepness / _SMALL)
     step = reach / count
     for _ in range(count):
         before = load

@@ -86,26 +86,25 @@ class CreepingRope(Physics):
 
 @dataclass
 class LaggingRope(Physics):
-    """Inner friction of the strands: a Dahl loop of strain over tension.
+    """Inner friction of the strands holds back strain: a loop of strain over tension.
 
-    ``fraction`` is the half-width of the loop as a share of the elastic strain of 500 N.
+    The friction takes half of a change of tension from rest, all of it after a full reversal,
+    and at most ``fraction`` of the tension.
     """
 
-    axial_stiffness: PositiveForce = 250e3
-    fraction: PositiveNumber = 0.3
+    axial_stiffness: PositiveForce = 80e3
+    fraction: PositiveNumber = 0.1
     size: ClassVar[str] = "fraction"
-    _loop: float = 0.0
+    _held: float = 0.0
     _before: float | None = None
+    _SLOPE: ClassVar[float] = 0.5
 
     def stretch(self, state: State, dt: float) -> float:
-        """Strain of the loop times the stressed length."""
-        before = state.load if self._before is None else self._before
-        limit = self.fraction * 500.0 / self.axial_stiffness
-        slope = self.fraction / self.axial_stiffness
-        self._loop = relax(self._loop, state.load - before, limit, slope, 1.0)
+        """Strain that the friction holds back, over the stressed length; a Dahl law in tension."""
+        change = 0.0 if self._before is None else state.load - self._before
         self._before = state.load
-        # The strain lags what the tension asks for, hence the sign.
-        return -self._loop * (state.unstrained + state.dead_length)
+        self._held = relax(self._held, change, self.fraction * state.load, self._SLOPE, 1.0)
+        return -self._held / self.axial_stiffness * (state.unstrained + state.dead_length)
 
 
 @dataclass

@@ -115,7 +115,7 @@ class GuideOffset(Physics):
 class WavyGear(Physics):
     """Transmission error of the gearbox, a whole number of waves per motor turn."""
 
-    amplitude: Angle = 0.01
+    amplitude: Angle = 0.0002
     order: PositiveNumber = 1.0
     phase: Angle = 0.4
     size: ClassVar[str] = "amplitude"

@@ -1,0 +1,107 @@
+"""A station at a bench that another process owns."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from typing import Any
+
+from winchkit import errors
+from winchkit.bench.owner import connect_to_owner
+from winchkit.errors import ConnectionLost, WinchkitError
+from winchkit.schema.bench import BenchSpec
+
+__all__ = ["RemoteStation", "attach"]
+
+_ANSWER_TIME = 10.0
+
+
+def attach(spec: BenchSpec) -> RemoteStation | None:
+    """A station at the bench's owner; None when nobody owns it."""
+    connection = connect_to_owner(spec)
+    return None if connection is None else RemoteStation(connection)
+
+
+class RemoteStation:
+    """Calls the owner for everything; its errors are raised here."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        connection.settimeout(_ANSWER_TIME)
+        self._connection = connection
+        self._stream = connection.makefile("rwb")
+        self._lock = threading.Lock()
+
+    def names(self) -> list[str]:
+        """Winches there are."""
+        return [str(name) for name in self._call("names")]
+
+    def status(self) -> dict[str, Any]:
+        """Newest snapshot as JSON has it."""
+        return dict(self._call("status"))
+
+    def jog(self, winch: str | None, speed: float, hold: float) -> None:
+        """Keep moving for ``hold`` seconds."""
+        self._call("jog", winch, speed, hold)
+
+    def step(self, winch: str | None, change: float, speed: float | None) -> None:
+        """Start to change the cable length."""
+        self._call("step", winch, change, speed)
+
+    def moving(self, winch: str | None) -> bool:
+        """Whether a motion is under way."""
+        return bool(self._call("moving", winch))
+
+    def stop(self) -> None:
+        """Quick-stop every winch."""
+        self._call("stop")
+
+    def reset(self) -> None:
+        """Clear trips and faults."""
+        self._call("reset")
+
+    def tare(self, winch: str | None) -> float:
+        """Tare a load cell."""
+        return float(self._call("tare", winch))
+
+    def start_log(self, path: str) -> None:
+        """Log to a file in the owner's process."""
+        self._call("start_log", path)
+
+    def log_rows(self) -> int:
+        """Rows written so far."""
+        return int(self._call("log_rows"))
+
+    def end_log(self) -> int:
+        """Finish the log."""
+        return int(self._call("end_log"))
+
+    def close(self) -> None:
+        """Go away; the owner ends what was started here."""
+        with self._lock:
+            self._stream.close()
+            self._connection.close()
+
+    def _call(self, operation: str, *arguments: Any) -> Any:
+        request = json.dumps({"op": operation, "args": arguments}).encode() + b"\n"
+        with self._lock:
+            try:
+                self._stream.write(request)
+                self._stream.flush()
+                line = self._stream.readline()
+            except OSError as error:
+                raise ConnectionLost(f"the bench's owner does not answer: {error}") from error
+        if not line:
+            raise ConnectionLost("the process that owned the bench has ended; its drives stop")
+        answer = json.loads(line)
+        if "error" in answer:
+            raise _error(answer["error"], answer["message"])
+        return answer["ok"]
+
+
+def _error(name: str, message: str) -> WinchkitError:
+    """The owner's error as the same class here."""
+    kind = getattr(errors, name, WinchkitError)
+    if isinstance(kind, type) and issubclass(kind, WinchkitError):
+        return kind(message)
+    return WinchkitError(message)

@@ -1,0 +1,84 @@
+"""Stops a bench that nobody owns, on its buses themselves; never energises anything."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from winchkit import catalog
+from winchkit.drivers.can.bus import CanBus
+from winchkit.drivers.can.cia402 import QUICK_STOP, State, state_of
+from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.clock import Clock, MonotonicClock
+from winchkit.errors import ConnectionLost, WinchkitError
+from winchkit.schema.bench import BenchSpec, WinchWiring
+
+__all__ = ["Stopped", "stop_on_bus"]
+
+_STOP_TIME = 5.0
+_POLL = 0.02
+_MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """How a stop ended for one winch."""
+
+    winch: str
+    confirmed: bool
+    """Whether the drive itself says that it stands still or is disabled."""
+    message: str
+
+
+def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
+    """Quick-stop every drive of a wiring file and wait until each confirms.
+
+    All drives are told before any is waited for. Raises ConnectionLost when a bus does not open.
+    """
+    clock = clock or MonotonicClock()
+    with ExitStack() as stack:
+        buses = {}
+        for name in dict.fromkeys(winch.servo.bus for winch in spec.winch.values()):
+            buses[name] = CanBus(spec.bus[name], name, clock)
+            stack.callback(buses[name].close)
+        nodes = {name: _node(spec, winch, buses) for name, winch in spec.winch.items()}
+        problems = {name: _tell(node) for name, node in nodes.items()}
+        return [_confirm(name, node, problems[name], clock) for name, node in nodes.items()]
+
+
+def _node(spec: BenchSpec, winch: WinchWiring, buses: dict[str, CanBus]) -> SdoNode:
+    from winchkit.schema.read import read_device
+
+    ref = winch.servo
+    device = read_device(catalog.find("devices", ref.device, spec.path or None))
+    assert device.servo is not None, "the reader has checked it"
+    eds = Path(device.path).parent / device.servo.eds
+    return SdoNode(buses[ref.bus], ref.node or 1, eds)
+
+
+def _tell(node: SdoNode) -> WinchkitError | None:
+    try:
+        node.write(0x6040, 0, QUICK_STOP)
+    except ConnectionLost as error:
+        return error
+    return None
+
+
+def _confirm(winch: str, node: SdoNode, problem: WinchkitError | None, clock: Clock) -> Stopped:
+    """Ask until the drive is disabled or stands in quick stop."""
+    deadline = clock.now() + _STOP_TIME
+    state, speed = State.UNKNOWN, 0
+    while clock.now() < deadline:
+        try:
+            state = state_of(node.read(0x6041))
+            speed = node.read_if_there(0x606C) or 0
+        except ConnectionLost as error:
+            return Stopped(winch, False, f"not confirmed: {problem or error}")
+        at_rest = state is State.QUICK_STOP_ACTIVE and speed == 0
+        if at_rest or (state not in _MOVING and state is not State.UNKNOWN):
+            return Stopped(winch, True, f"{state}, at rest" if at_rest else str(state))
+        if state is State.OPERATION_ENABLED:
+            _tell(node)
+        clock.sleep(_POLL)
+    return Stopped(winch, False, f"not confirmed: still {state} after {_STOP_TIME:g} s")

@@ -1,0 +1,98 @@
+"""Lets other processes take part in an owned bench: JSON lines over a local socket."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from typing import Any
+
+from winchkit.bench.bench import Bench
+from winchkit.bench.owner import listen
+from winchkit.bench.station import LocalStation
+from winchkit.errors import UsageError, WinchkitError
+
+__all__ = ["OPERATIONS", "StationServer"]
+
+OPERATIONS = (
+    "names",
+    "status",
+    "jog",
+    "step",
+    "moving",
+    "stop",
+    "reset",
+    "tare",
+    "start_log",
+    "log_rows",
+    "end_log",
+)
+"""Methods of a station that may be called from outside."""
+
+_MAX_LINE = 65_536
+
+
+class StationServer:
+    """Serves stations to other processes until closed; one thread for each."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._socket, self._path = listen(bench.spec)
+        self._clients: set[socket.socket] = set()
+        self._thread = threading.Thread(target=self._accept, name="stations", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Turn everybody out."""
+        for item in (self._socket, *tuple(self._clients)):
+            _shut(item)
+        self._thread.join(timeout=2.0)
+        self._socket.close()
+        self._path.unlink(missing_ok=True)
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                client, _ = self._socket.accept()
+            except OSError:
+                return
+            self._clients.add(client)
+            threading.Thread(
+                target=self._serve, args=(client,), name="station", daemon=True
+            ).start()
+
+    def _serve(self, client: socket.socket) -> None:
+        """Answer until the other side goes away, then end what it has started."""
+        station = LocalStation(self._bench)
+        try:
+            with client, client.makefile("rwb") as stream:
+                while line := stream.readline(_MAX_LINE):
+                    stream.write(json.dumps(_answer(station, line)).encode() + b"\n")
+                    stream.flush()
+        except OSError:
+            pass
+        finally:
+            self._clients.discard(client)
+            station.close()
+
+
+def _answer(station: LocalStation, line: bytes) -> dict[str, Any]:
+    """Call what a request names; errors of ours travel as their class and message."""
+    try:
+        request = json.loads(line)
+        operation, arguments = request["op"], request.get("args", [])
+        if operation not in OPERATIONS:
+            raise UsageError(f"no operation '{operation}'")
+        return {"ok": getattr(station, operation)(*arguments)}
+    except WinchkitError as error:
+        return {"error": type(error).__name__, "message": str(error)}
+    except (ValueError, KeyError, TypeError) as error:
+        return {"error": "UsageError", "message": f"a request that cannot be read: {error}"}
+
+
+def _shut(item: socket.socket) -> None:
+    """Wake whoever waits on a socket."""
+    try:
+        item.shutdown(socket.SHUT_RDWR)
+    except OSError:
+        item.close()

@@ -1,0 +1,41 @@
+"""Where a command works: at the owner of the bench, else as its owner."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from winchkit.bench.client import attach
+from winchkit.bench.station import LocalStation, Station
+
+__all__ = ["at_station"]
+
+
+@contextmanager
+def at_station(bench_file: str | Path) -> Iterator[Station]:
+    """A station at the bench: attached to its owner, or owning it for as long as this lasts.
+
+    Raises FileError, ConnectionLost, NotPermitted.
+    """
+    from winchkit.schema.read import read_bench
+
+    spec = read_bench(bench_file)
+    remote = attach(spec)
+    if remote is not None:
+        try:
+            yield remote
+        finally:
+            remote.close()
+        return
+    from winchkit.bench.bench import open_bench
+    from winchkit.bench.server import StationServer
+
+    with open_bench(spec) as bench:
+        server = StationServer(bench)
+        station = LocalStation(bench)
+        try:
+            yield station
+        finally:
+            station.close()
+            server.close()

@@ -1,0 +1,68 @@
+"""``winchkit add``: fit an effect and write it into a copy of a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.output import echo_json
+from winchkit.cli.runs_option import ManyValues, catalogue_of, model_options, read_runs
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.add import Addition
+
+__all__ = ["command", "write_addition"]
+
+
+@click.command(cls=ManyValues)
+@click.argument("effect")
+@click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs to fit.")
+@click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
+@model_options
+def command(
+    effect: str,
+    runs: Sequence[str],
+    output: str,
+    profile: str,
+    effect_files: Sequence[str],
+    winch: str | None,
+    band: float | None,
+    as_json: bool,
+) -> None:
+    """Fit EFFECT beside the effects of a profile on runs, and write the better profile.
+
+    Values that the profile has already are refitted with it; every value gets its standard
+    deviation, the runs and the date.
+    """
+    from winchkit.catalog import find
+    from winchkit.diagnosis.add import add
+    from winchkit.schema.read import read_winch
+
+    source = find("profiles", profile)
+    catalogue = catalogue_of(effect_files)
+    addition = add(effect, read_runs(runs, winch), read_winch(source), catalogue, band)
+    write_addition(source, addition, [Path(run).name for run in runs], Path(output))
+    click.echo(f"written: {output}", err=True)
+    if as_json:
+        echo_json(addition.to_json())
+        return
+    from winchkit.diagnosis.report_text import addition_text
+
+    click.echo(addition_text(addition))
+
+
+def write_addition(source: Path, addition: Addition, runs: Sequence[str], out: Path) -> None:
+    """Write a fitted addition into a copy of a profile, with its provenance."""
+    from datetime import UTC, datetime
+
+    from winchkit.effects.profile_file import Fitted, write_fitted
+
+    today = datetime.now(UTC).date()
+    fitted = [
+        Fitted(term, {name: e.std for name, e in values.items()}, runs, today)
+        for term, values in addition.terms
+    ]
+    write_fitted(source, fitted, out)

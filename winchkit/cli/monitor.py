@@ -1,0 +1,88 @@
+"""``winchkit monitor``: shows a bench live, or prints it as JSON lines."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.output import echo_json
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from winchkit.bench.station import Station
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.option("-b", "--bench", required=True, metavar="FILE", help="Wiring file of the bench.")
+@click.option("--period", default="0.2 s", show_default=True, help="Between two pictures.")
+@click.option("--for", "duration", metavar="TIME", help="End after this time.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line.")
+def command(*, bench: str, period: str, duration: str | None, as_json: bool) -> None:
+    """Show the winches of a bench until Ctrl-C. Moves nothing."""
+    from winchkit.bench.session import at_station
+    from winchkit.cli.duration import quantity, seconds
+
+    limit, pause = seconds(duration), quantity(period, "time")
+    end = None if limit is None else time.monotonic() + limit
+    with at_station(bench) as station:
+        try:
+            _show(station, pause, end, as_json)
+        except KeyboardInterrupt:
+            click.echo("", err=True)
+
+
+def _show(station: Station, pause: float, end: float | None, as_json: bool) -> None:
+    if as_json:
+        while True:
+            echo_json(station.status())
+            if not _again(pause, end):
+                return
+    from rich.console import Console
+    from rich.live import Live
+
+    with Live(_table(station.status()), console=Console(stderr=True), screen=False) as live:
+        while _again(pause, end):
+            live.update(_table(station.status()))
+
+
+def _again(pause: float, end: float | None) -> bool:
+    """Wait; whether there is time for another picture."""
+    left = pause if end is None else end - time.monotonic()
+    time.sleep(max(0.0, min(pause, left)))
+    return end is None or time.monotonic() < end
+
+
+def _table(status: dict[str, Any]) -> Table:
+    from rich.table import Table
+
+    trouble = [*status["tripped"], *(text for text in status["blocked"])]
+    table = Table(
+        title=f"cycle {status['cycle']}, overruns {status['overruns']}",
+        caption="\n".join(dict.fromkeys(trouble)) or "no trips",
+    )
+    for head in ("winch", "phase", "drive", "length", "speed", "torque", "tension", "sensors"):
+        table.add_column(head, min_width=8, justify="left" if head in _WORDS else "right")
+    for name, winch in status["winch"].items():
+        table.add_row(
+            name,
+            winch["phase"],
+            winch["state"],
+            _number(winch["cable_length"], 4, "m"),
+            _number(winch["speed"], 3, "m/s"),
+            _number(winch["motor_torque"], 3, "N m"),
+            _number(winch["tension"], 1, "N"),
+            ", ".join(f"{role} {text}" for role, text in (winch["quality"] or {}).items()),
+        )
+    return table
+
+
+_WORDS = ("winch", "phase", "drive", "sensors")
+
+
+def _number(value: float | None, digits: int, unit: str) -> str:
+    return "—" if value is None else f"{value:+.{digits}f} {unit}"

@@ -1,0 +1,88 @@
+"""What compare, diagnose and add share: reading runs, a profile and a user's own effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.effects.catalogue import Catalogue
+    from winchkit.runs.run import Run
+
+__all__ = ["ManyValues", "catalogue_of", "model_options", "read_runs"]
+
+
+class ManyValues(click.Command):
+    """A command whose repeatable options take several values: ``--fit a.csv b.csv``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Spell ``--fit a b`` as ``--fit a --fit b`` before click reads it."""
+        many = {name for p in self.params if getattr(p, "multiple", False) for name in p.opts}
+        out: list[str] = []
+        current: str | None = None
+        for arg in args:
+            if arg.startswith("-") and arg != "-":
+                current = arg if arg in many else None
+                out.append(arg)
+            elif current is not None and out[-1] != current:
+                out += [current, arg]
+            else:
+                out.append(arg)
+        return super().parse_args(ctx, out)
+
+
+def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every command that holds a model against runs."""
+    for option in (
+        click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON."),
+        click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
+        click.option("--winch", help="Which winch of runs with several."),
+        click.option(
+            "--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects."
+        ),
+        click.option(
+            "--profile", "-p", required=True, metavar="P", help="Profile: a name or a file."
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:
+    """Runs of one winch. Raises FileError with the faults of all files."""
+    from winchkit.errors import FileError
+    from winchkit.runs import read_run
+
+    runs, faults = [], []
+    for path in paths:
+        try:
+            runs.append(_of_winch(read_run(path), winch))
+        except FileError as error:
+            faults += error.faults
+    if faults:
+        raise FileError(faults)
+    return runs
+
+
+def _of_winch(run: Run, winch: str | None) -> Run:
+    known = run.winches()
+    if winch is None:
+        if len(known) > 1:
+            raise UsageError(
+                f"{run.path}: has the winches {', '.join(known)}; choose one with --winch"
+            )
+        return run.of_winch(known[0])
+    if known != [""] and winch not in known:
+        raise UsageError(f"{run.path}: no winch '{winch}'; it has {', '.join(known)}")
+    return run.of_winch(winch if known != [""] else "")
+
+
+def catalogue_of(effect_files: Sequence[str]) -> Catalogue:
+    """All effects, a user's own included."""
+    from winchkit.effects import load_catalogue
+
+    return load_catalogue(effect_files)

@@ -1,0 +1,28 @@
+"""``winchkit tare``: tares a load cell with its own volatile command."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.argument("winch", required=False)
+@click.option("-b", "--bench", required=True, metavar="FILE", help="Wiring file of the bench.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def command(winch: str | None, bench: str, as_json: bool) -> None:
+    """Tare the load cell of WINCH, at rest (the only winch where there is one).
+
+    From then on the cell counts from what hangs on it now. Nothing is written into its EEPROM.
+    """
+    from winchkit.bench.session import at_station
+
+    with at_station(bench) as station:
+        tension = station.tare(winch)
+    if as_json:
+        echo_json({"schema": 1, "winch": winch, "tension": tension})
+    else:
+        click.echo(f"tared: the cell reads {tension:.2f} N")

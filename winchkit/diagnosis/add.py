@@ -1,0 +1,106 @@
+"""Adding an effect: fitted on runs, judged on held-out ones, ready to be written to a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.diagnose import inquire, output_fits
+from winchkit.diagnosis.inquiry import Inquiry
+from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.result import Estimate, OutputFit
+from winchkit.diagnosis.signature import Score, missing_needs, score
+from winchkit.diagnosis.uncertainty import estimates, unknown_std
+from winchkit.effects.bind import Term
+from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.errors import UsageError
+from winchkit.runs.run import Run
+from winchkit.schema.winch import WinchProfile
+
+__all__ = ["Addition", "add"]
+
+_STARTS = 4
+
+
+@dataclass(frozen=True)
+class Addition:
+    """A profile's effects, the new one last, refitted together, and what that bought."""
+
+    outputs: Mapping[str, OutputFit]
+    terms: tuple[tuple[Term, Mapping[str, Estimate]], ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def added(self) -> tuple[Term, Mapping[str, Estimate]]:
+        """The new effect with its values."""
+        return self.terms[-1]
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``winchkit add --json`` prints it."""
+        kept = (
+            "unit",
+            "rms_before",
+            "rms_after",
+            "heldout_rms_before",
+            "heldout_rms_after",
+            "noise_rms",
+            "noise_source",
+        )
+        outputs = {
+            name: {key: getattr(output, key) for key in kept}
+            for name, output in self.outputs.items()
+        }
+        parameters = {
+            term.label: {name: vars(e) for name, e in values.items()} for term, values in self.terms
+        }
+        return {
+            "schema": 1,
+            "effect": self.added[0].effect.id,
+            "outputs": outputs,
+            "parameters": parameters,
+            "notes": list(self.notes),
+        }
+
+
+def add(
+    effect_id: str,
+    runs: Sequence[Run],
+    profile: WinchProfile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+) -> Addition:
+    """Fit an effect beside those that a profile has, all of them refitted.
+
+    Raises UsageError for an effect that is unknown, there already, or cannot be seen in the runs,
+    RunError with every fault of every run.
+    """
+    catalogue = catalogue or load_catalogue()
+    effect = catalogue[effect_id]
+    if not effect.repeatable and any(table.id == effect_id for table in profile.effect):
+        raise UsageError(f"profile '{profile.name}' has the effect '{effect_id}' already")
+    inquiry = inquire(prepare(runs, profile, band), catalogue)
+    lacking = missing_needs(effect, inquiry.problem)
+    if lacking:
+        raise UsageError(
+            f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
+        )
+    begin, noise = inquiry.settle(inquiry.begin)
+    trials = [inquiry.trial(begin, item, noise) for item in _atoms(inquiry, effect_id, noise)]
+    if not trials:
+        raise UsageError(f"effect '{effect_id}' changes nothing that these runs measured")
+    best = min(trials, key=lambda trial: trial.fit.cost)
+    final, final_noise = inquiry.settle(best.fit.hypothesis, noise)
+    std = unknown_std(inquiry.problem, final, final_noise, inquiry.blocks)
+    outputs = output_fits(inquiry, (begin, noise), (final, final_noise))
+    terms = tuple(estimates(inquiry.problem, final, std))
+    return Addition(outputs, terms, inquiry.problem.dataset.notes)
+
+
+def _atoms(inquiry: Inquiry, effect_id: str, noise: Noise) -> list[Score]:
+    """Points of an effect's shape grid that fit best."""
+    begin = inquiry.refit(inquiry.begin, noise)
+    projected = inquiry.projected(begin, noise)
+    ranked = score(projected, begin.residual, inquiry.problem.rows)
+    return [item for item in ranked if item.atom.effect.id == effect_id][:_STARTS]

@@ -1,0 +1,269 @@
+"""A simulated bench in real time: plants, drives and instruments behind real buses."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+
+from winchkit.errors import UsageError
+from winchkit.schema.bench import BenchSpec, BusSpec
+from winchkit.schema.programme import Step
+from winchkit.schema.simbench import FaultSpec, SimBench
+from winchkit.sim.bench import hiding, profiles_of
+from winchkit.sim.buses import CanPort, Interface, wired
+from winchkit.sim.live_file import write_bench
+from winchkit.sim.live_winch import LiveWinch
+from winchkit.sim.modbus import ModbusLine
+from winchkit.sim.modbus_instrument import ModbusInstrument
+from winchkit.units import suggest
+
+__all__ = ["LiveBench"]
+
+_TICK = 1e-3
+_OVERRUN = 0.02
+"""A tick later than this is counted, s."""
+_SUSPENDED = 1.0
+"""After a longer gap the process was suspended, and simulated time stood still with it, s."""
+_FRAMES_AT_ONCE = 500
+
+
+class LiveBench:
+    """A simulated bench that runs while the ``with`` block does.
+
+    ``bench_spec`` is the wiring that a user connects to: the declaration with channels and
+    ports of this run. ``hidden`` replaces what the declaration hides, as in
+    :func:`winchkit.sim.bench.hiding`. CAN is python-can's ``virtual`` (within this process) or
+    ``udp_multicast`` (between processes); instruments are reached over Modbus TCP on
+    127.0.0.1, whatever line the declaration names. Raises FileError for a declaration that
+    does not hold together, ConnectionLost where a bus cannot be opened.
+    """
+
+    def __init__(
+        self,
+        sim_bench: SimBench,
+        *,
+        seed: int = 0,
+        hidden: Sequence[str] = (),
+        interface: Interface = "virtual",
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.sim_bench = hiding(sim_bench, hidden) if hidden else sim_bench
+        self.seed = seed
+        self._interface = interface
+        self._clock = clock
+        self._lock = threading.RLock()
+        self._stopping = threading.Event()
+        self._pool: ThreadPoolExecutor | None = None
+        self._loops: list[Future[None]] = []
+        self._ports: dict[str, CanPort] = {}
+        self._lines: dict[str, ModbusLine] = {}
+        self.winches: dict[str, LiveWinch] = {}
+        self.bench_spec: BenchSpec = self.sim_bench.bench
+        self.overruns = 0
+        """Ticks that came later than 20 ms, because the machine was busy."""
+        self.worst_lateness = 0.0
+        """s."""
+        self._skipped = 0.0
+        self._started_at = self._last = clock()
+        self._faults = sorted(self.sim_bench.fault, key=lambda fault: fault.time)
+
+    def __enter__(self) -> LiveBench:
+        try:
+            self._open()
+        except BaseException:
+            self._close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._close()
+        if kind is None:
+            self.check()
+
+    # What a user does.
+
+    def write_bench_file(self, path: str | Path) -> Path:
+        """Write the wiring file to connect to; returns its path."""
+        return write_bench(self.bench_spec, Path(path))
+
+    def answer(self, step: Step) -> None:
+        """Do what a programme's ``ask`` asks for: hang its ``load_mass``, where it has one."""
+        if step.load_mass is not None:
+            for name in self.winches if step.winch == "all" else [step.winch]:
+                self.hang(name, step.load_mass)
+
+    def hang(self, winch: str, mass: float) -> None:
+        """Hang a load (kg) on a winch; NotPermitted while it moves."""
+        with self.up_to_date():
+            self._winch(winch).hang(mass)
+
+    def inject(self, target: str, kind: str) -> None:
+        """Make ``WINCH.ROLE`` go wrong, e.g. ``A.servo`` or ``A.cell``."""
+        winch, _, role = target.partition(".")
+        with self.up_to_date():
+            self._winch(winch).inject(role, kind)
+
+    def temperature(self, winch: str) -> float:
+        """True temperature at a winch, degC."""
+        with self.up_to_date():
+            return self._winch(winch).plant.temperature
+
+    def check(self) -> None:
+        """Raise what ended the simulation, if something has."""
+        for loop in self._loops:
+            if loop.done():
+                loop.result()
+
+    @contextmanager
+    def up_to_date(self) -> Iterator[None]:
+        """Hold the simulation still at this very moment."""
+        with self._lock:
+            now = self._now()
+            for winch in self.winches.values():
+                winch.advance(now)
+            yield
+
+    def _winch(self, name: str) -> LiveWinch:
+        if name not in self.winches:
+            known = list(self.winches)
+            raise UsageError(
+                f"there is no winch '{name}' on {self.bench_spec.name}; it has {', '.join(known)}"
+                + suggest(name, known)
+            )
+        return self.winches[name]
+
+    # Opening and closing.
+
+    def _open(self) -> None:
+        declared = self.sim_bench.bench
+        buses: dict[str, BusSpec] = {}
+        for name, bus in declared.bus.items():
+            if bus.kind == "can":
+                buses[name] = wired(bus, f"{declared.name}-{name}", self._interface)
+                self._ports[name] = CanPort(buses[name])
+        self._make_winches()
+        for name in declared.bus:
+            if name not in buses:
+                self._lines[name] = line = ModbusLine(self._units(name), self.up_to_date)
+                line.start()
+                host, port = line.address
+                timeout = declared.bus[name].timeout
+                buses[name] = BusSpec("modbus-tcp", host=host, port=port, timeout=timeout)
+        self.bench_spec = replace(declared, bus=buses)
+        self._pool = ThreadPoolExecutor(max(1, len(self._ports)), "sim-can")
+        self._loops = [self._pool.submit(self._run, name) for name in self._ports]
+
+    def _make_winches(self) -> None:
+        sim, now = self.sim_bench, self._now()
+        profiles = profiles_of(sim)
+        for name, wiring in sim.bench.winch.items():
+            port = self._ports.get(wiring.servo.bus)
+            if port is None:
+                raise UsageError(
+                    f"winch {name}: the bus '{wiring.servo.bus}' of its servo is no CAN bus"
+                )
+            self.winches[name] = LiveWinch(
+                name,
+                wiring,
+                profiles[name],
+                sim.truth[name],
+                sim.noise,
+                seed=self.seed,
+                send=port.send,
+                beside=sim.bench.path,
+                now=now,
+            )
+
+    def _units(self, bus: str) -> Mapping[int, ModbusInstrument]:
+        """Instruments on one line by unit id."""
+        found: dict[int, ModbusInstrument] = {}
+        for name, winch in self.winches.items():
+            wiring = self.sim_bench.bench.winch[name]
+            for role, instrument in winch.instruments.items():
+                ref = getattr(wiring, role)
+                if ref.bus != bus:
+                    continue
+                if ref.unit is None or ref.unit in found:
+                    raise UsageError(
+                        f"winch {name}: {role} needs a unit of its own on the bus '{bus}'"
+                    )
+                found[ref.unit] = instrument
+        return found
+
+    def _close(self) -> None:
+        self._stopping.set()
+        for line in self._lines.values():
+            line.stop()
+        if self._pool is not None:
+            self._pool.shutdown()
+        for port in self._ports.values():
+            port.close()
+
+    # Real time.
+
+    def _now(self) -> float:
+        """Simulated time; it stands still while the process is suspended."""
+        now = self._clock() - self._skipped
+        if now - self._last > _SUSPENDED:
+            self._skipped += now - self._last
+            now = self._last
+        self._last = max(self._last, now)
+        return self._last
+
+    def _run(self, bus: str) -> None:
+        """Serve one CAN bus: frames as they come, and a tick every millisecond.
+
+        Frames that wait are taken before the tick, so that a stall of this process is not
+        mistaken for a master that fell silent.
+        """
+        port = self._ports[bus]
+        wiring = self.sim_bench.bench.winch
+        winches = [one for name, one in self.winches.items() if wiring[name].servo.bus == bus]
+        due = self._clock()
+        while not self._stopping.is_set():
+            frame = port.receive(max(0.0, due - self._clock()))
+            for _ in range(_FRAMES_AT_ONCE):
+                if frame is None:
+                    break
+                self._deliver(winches, *frame)
+                frame = port.receive(0.0)
+            late = self._clock() - due
+            if late >= 0:
+                self._tick(winches)
+                due = max(due + _TICK, self._clock())
+                self._note_lateness(late)
+
+    def _deliver(self, winches: list[LiveWinch], identifier: int, data: bytes) -> None:
+        with self._lock:
+            now = self._now()
+            for winch in winches:
+                winch.advance(now)
+                winch.drive.receive(identifier, data, now)
+
+    def _tick(self, winches: list[LiveWinch]) -> None:
+        with self._lock:
+            now = self._now()
+            while self._faults and now - self._started_at >= self._faults[0].time:
+                self._go_wrong(self._faults.pop(0))
+            for winch in winches:
+                winch.advance(now)
+                winch.drive.tick(now)
+
+    def _go_wrong(self, fault: FaultSpec) -> None:
+        winch, _, role = fault.target.partition(".")
+        self._winch(winch).inject(role, fault.kind)
+
+    def _note_lateness(self, late: float) -> None:
+        self.worst_lateness = max(self.worst_lateness, late)
+        self.overruns += late > _OVERRUN

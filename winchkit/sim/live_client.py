@@ -1,0 +1,59 @@
+"""Talks to a simulated bench in another process, found beside its wiring file.
+
+``winchkit sim serve`` writes ``BENCH.toml.sim`` next to ``BENCH.toml``: the host and port on
+which it takes lines such as ``load A 32 kg``. No file, no simulation.
+"""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+from winchkit.errors import ConnectionLost, DeviceRefused
+from winchkit.schema.programme import Step
+
+__all__ = ["REFUSED", "address_file", "answer", "is_simulated", "tell"]
+
+REFUSED = "refused: "
+"""Begins a reply to a line that could not be obeyed."""
+_TIMEOUT = 5.0
+
+
+def address_file(bench_file: str | Path) -> Path:
+    """Where the address of the simulation behind a wiring file stands."""
+    path = Path(bench_file)
+    return path.with_name(path.name + ".sim")
+
+
+def is_simulated(bench_file: str | Path) -> bool:
+    """Whether ``sim serve`` wrote this wiring file and has not ended."""
+    return address_file(bench_file).is_file()
+
+
+def tell(bench_file: str | Path, line: str) -> str:
+    """Send a line and return the reply; ConnectionLost, or DeviceRefused with the reason."""
+    where = address_file(bench_file)
+    try:
+        host, _, port = where.read_text(encoding="utf-8").strip().partition(":")
+        with socket.create_connection((host, int(port)), _TIMEOUT) as connection:
+            connection.sendall(line.encode() + b"\n")
+            reply = connection.makefile(encoding="utf-8").readline().strip()
+    except (OSError, ValueError) as error:
+        raise ConnectionLost(
+            f"{where}: the simulation does not answer: {error}; start 'winchkit sim serve' again"
+        ) from error
+    if reply.startswith(REFUSED):
+        raise DeviceRefused(f"the simulation refused '{line}': {reply.removeprefix(REFUSED)}")
+    return reply
+
+
+def answer(bench_file: str | Path, step: Step) -> bool:
+    """Do what a programme's ``ask`` asks for, where the bench is simulated.
+
+    Hangs the step's ``load_mass``; True where that was done, False for a real bench or a
+    question about something else. Raises as :func:`tell`.
+    """
+    if step.load_mass is None or not is_simulated(bench_file):
+        return False
+    tell(bench_file, f"load {step.winch} {step.load_mass!r} kg")
+    return True

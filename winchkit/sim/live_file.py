@@ -1,0 +1,95 @@
+"""Writes the wiring file of a live simulated bench."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+from winchkit.catalog import Kind, find, folder
+from winchkit.errors import FileError
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.quantity import Quantity
+from winchkit.units import UNITS
+
+__all__ = ["bench_toml", "write_bench"]
+
+_NOT_IN_FILES = ("path",)
+
+
+def write_bench(bench: BenchSpec, path: Path) -> Path:
+    """Write a bench as a file; FileError where that is not possible."""
+    try:
+        path.write_text(bench_toml(bench), encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}") from error
+    return path
+
+
+def bench_toml(bench: BenchSpec) -> str:
+    """TOML of a bench in SI units; profiles and devices given by path become absolute."""
+    lines = ["schema = 1", 'kind = "bench"', *_lines(bench, "", bench.path)]
+    return "\n".join(lines) + "\n"
+
+
+def _lines(table: Any, at: str, beside: str) -> Iterator[str]:
+    """Plain keys first, then the tables below."""
+    below = []
+    for key, value, text in _items(table, beside):
+        if text is None:
+            below.append((key, value))
+        else:
+            yield f"{key} = {text}"
+    for key, value in below:
+        named = value.items() if isinstance(value, Mapping) else [(None, value)]
+        for name, inner in named:
+            path = ".".join(part for part in (at, key, name and _key(name)) if part)
+            yield from ("", f"[{path}]", *_lines(inner, path, beside))
+
+
+def _items(table: Any, beside: str) -> Iterator[tuple[str, Any, str | None]]:
+    hints = get_type_hints(type(table), include_extras=True)
+    for field in dataclasses.fields(table):
+        value = getattr(table, field.name)
+        if value is None or field.name in _NOT_IN_FILES or value == field.default:
+            continue
+        if isinstance(value, Mapping) or dataclasses.is_dataclass(value):
+            yield field.name, value, None
+        else:
+            yield field.name, value, _text(_located(field.name, value, beside), hints[field.name])
+
+
+def _located(key: str, value: Any, beside: str) -> Any:
+    """Profiles and devices that stand beside the declaration, by a path that holds elsewhere."""
+    kinds: dict[str, Kind] = {"profile": "profiles", "device": "devices"}
+    if key not in kinds or not beside:
+        return value
+    found = find(kinds[key], value, beside=beside)
+    return value if found.is_relative_to(folder(kinds[key])) else str(found.resolve())
+
+
+def _text(value: Any, hint: Any) -> str:
+    if isinstance(value, tuple):
+        inner = next((arg for arg in get_args(hint) if arg is not type(None)), hint)
+        return "[" + ", ".join(_text(one, get_args(inner)[0]) for one in value) + "]"
+    marker = _marker(hint)
+    if isinstance(value, float) and marker is not None:
+        unit = next(iter(UNITS[marker.dimension]))
+        return repr(value) if marker.dimension == "ratio" else json.dumps(f"{value!r} {unit}")
+    return json.dumps(value)
+
+
+def _marker(hint: Any) -> Quantity | None:
+    for part in (*getattr(hint, "__metadata__", ()), *get_args(hint)):
+        if isinstance(part, Quantity):
+            return part
+        found = None if isinstance(part, type) else _marker(part)
+        if found is not None:
+            return found
+    return None
+
+
+def _key(name: str) -> str:
+    return name if name.isidentifier() and name.isascii() else json.dumps(name)

@@ -1,0 +1,131 @@
+"""One winch of a live simulated bench: plant, drive and instruments on one time line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from pathlib import Path
+
+from winchkit.catalog import find
+from winchkit.errors import FileError, NotPermitted, UsageError
+from winchkit.schema.bench import DeviceRef, WinchWiring
+from winchkit.schema.device import DeviceSpec, ModbusSpec, ServoSpec
+from winchkit.schema.simbench import NoiseSpec, WinchTruth
+from winchkit.schema.winch import WinchProfile
+from winchkit.sim.drive import SimDrive
+from winchkit.sim.modbus_instrument import ModbusInstrument, in_unit_of
+from winchkit.sim.plant import Measurement, WinchPlant
+from winchkit.units import suggest
+
+__all__ = ["LiveWinch"]
+
+_QUANTITIES: dict[str, Callable[[Measurement], float]] = {
+    "cell": lambda reading: reading.tension,
+    "load": lambda reading: reading.load,
+    "length": lambda reading: reading.cable_length,
+    "temperature": lambda reading: reading.temperature,
+}
+"""What the instrument in each role of a wiring file measures."""
+_AT_REST = 0.5
+"""rad/s of the motor, below which a load can be changed."""
+
+
+class LiveWinch:
+    """Advances drive, rope and instruments together; not safe for threads by itself."""
+
+    def __init__(
+        self,
+        name: str,
+        wiring: WinchWiring,
+        profile: WinchProfile,
+        truth: WinchTruth,
+        noise: NoiseSpec,
+        *,
+        seed: int | str,
+        send: Callable[[int, bytes], None],
+        beside: str,
+        now: float,
+    ) -> None:
+        self.name = name
+        self.plant = WinchPlant(profile, truth, seed=f"{seed}/{name}", noise=noise)
+        servo, eds = _servo(wiring.servo, beside)
+        if wiring.servo.node is None:
+            raise UsageError(f"winch {name}: its servo has no node; give it one, e.g. node = 1")
+        self.drive = SimDrive(
+            send, wiring.servo.node, servo, eds, self.plant, brake=wiring.brake, now=now
+        )
+        self.drive.power_on(now, boot_time=0.0)
+        self.instruments = {
+            role: ModbusInstrument(
+                spec, in_unit_of(spec, self._measuring(_QUANTITIES[role])), now=now
+            )
+            for role, spec in _instruments(wiring, beside)
+        }
+
+    def _measuring(self, quantity: Callable[[Measurement], float]) -> Callable[[], float]:
+        return lambda: quantity(self.plant.measure())
+
+    def advance(self, now: float) -> None:
+        """Move everything up to ``now``, each conversion at its own instant."""
+        instruments = list(self.instruments.values())
+        while True:
+            due = min((one.next_conversion for one in instruments), default=inf)
+            if due > now:
+                break
+            self.drive.advance(due)
+            for one in instruments:
+                if one.next_conversion <= due:
+                    one.convert()
+        self.drive.advance(now)
+        for one in instruments:
+            one.show(now)
+
+    def hang(self, mass: float) -> None:
+        """Hang another load (kg); NotPermitted while the winch moves."""
+        speed = self.plant.motor_velocity
+        if abs(speed) > _AT_REST:
+            raise NotPermitted(
+                f"winch {self.name}: its motor turns at {speed:.3g} rad/s; a load can be "
+                f"changed below {_AT_REST:g} rad/s only; stop it first"
+            )
+        self.plant.hang(mass)
+
+    def inject(self, role: str, kind: str) -> None:
+        """Make a device of this winch go wrong; UsageError for an unknown one or kind."""
+        if role == "servo":
+            self.drive.inject(kind)
+            return
+        if role not in self.instruments:
+            known = ["servo", *self.instruments]
+            raise UsageError(
+                f"winch {self.name} has no '{role}'; it has {', '.join(known)}"
+                + suggest(role, known)
+            )
+        self.instruments[role].inject(kind)
+
+
+def _servo(ref: DeviceRef, beside: str) -> tuple[ServoSpec, Path]:
+    path, device = _device(ref, beside)
+    if device.servo is None:
+        raise FileError(f"{path}: '{ref.device}' is no servo drive; it has no [servo] table")
+    return device.servo, path.parent / device.servo.eds
+
+
+def _instruments(wiring: WinchWiring, beside: str) -> list[tuple[str, ModbusSpec]]:
+    found = []
+    for role in _QUANTITIES:
+        ref = getattr(wiring, role)
+        if ref is None:
+            continue
+        path, device = _device(ref, beside)
+        if device.modbus is None:
+            raise FileError(f"{path}: '{ref.device}' is no Modbus device; it has no [modbus] table")
+        found.append((role, device.modbus))
+    return found
+
+
+def _device(ref: DeviceRef, beside: str) -> tuple[Path, DeviceSpec]:
+    from winchkit.schema.read import read_device
+
+    path = find("devices", ref.device, beside=beside or None)
+    return path, read_device(path)
