@@ -78,6 +78,8 @@ class DriveOnBus:
 
     def __enter__(self) -> DriveOnBus:
         self._thread.start()
+        while self.drive.nmt.name == "BOOTING":
+            time.sleep(0.005)
         return self
 
     def __exit__(self, *_: object) -> None:

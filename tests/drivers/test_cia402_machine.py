@@ -96,7 +96,7 @@ def test_enabling_climbs_one_step_at_a_time_and_never_leaves_a_fault(start: Stat
         assert (state, seen) == (start, [])
     else:
         assert state is State.OPERATION_ENABLED
-        assert seen == [12, 2, 3, 4][-len(seen) :]
+        assert seen == [12, 2, 3, 4][4 - len(seen) :]
 
 
 def test_reset_is_an_edge_and_stays_disabled() -> None:

@@ -1,5 +1,7 @@
 """PDO layout against bit-by-bit packing, heartbeats in simulated time, emergencies in words."""
 
+import itertools
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -87,7 +89,7 @@ def test_producer_beats_as_often_as_it_is_asked_and_no_more(steps: list[float]) 
     for before, after in zip(beats, beats[2:], strict=False):
         assert after - before > 0.05 - 1e-9
     longest = max(steps)
-    for before, after in zip(beats, beats[1:], strict=False):
+    for before, after in itertools.pairwise(beats):
         assert after - before <= 0.05 + longest + 1e-9
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from contextlib import suppress
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -293,9 +291,3 @@ def test_quantities_as_written() -> None:
     for text in ("60", 60, "mm", "60 kg", "1_0 mm", "nan mm", "0x10 mm", "", True, None):
         with pytest.raises(UsageError):
             parse(text, "length")
-
-
-def test_a_declaration_has_no_field_that_files_cannot_give() -> None:
-    """``path`` is where a file was read, so a file that gives it is refused."""
-    assert [field.name for field in fields(BenchSpec) if not field.compare] == ["path"]
-    assert tomllib.loads(FULL_WINCH)["schema"] == 1

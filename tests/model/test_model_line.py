@@ -1,4 +1,4 @@
-"""The line: virtual work, symmetry, its inverse, and what it does without a channel."""
+"""The line: loads, missing channels, directions, and the order of its stages."""
 
 from __future__ import annotations
 
@@ -8,104 +8,12 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from model_lines import line_with, profile_with, swing
 
-from winchkit.effects import Term, load_catalogue
 from winchkit.model.line import GRAVITY, Line, Modifier, Signals, Stage
 from winchkit.schema.winch import (
-    CableSpec,
-    DrumSpec,
-    GearboxSpec,
-    GuideSpec,
-    PulleySpec,
     ReferenceSpec,
-    WinchProfile,
 )
-
-CATALOGUE = load_catalogue()
-DRUMS = {
-    "spiral": DrumSpec("spiral", 0.06),
-    "archimedean": DrumSpec("archimedean", 0.06, layer_growth=0.005),
-    "grooved": DrumSpec("grooved", 0.06, groove_pitch=0.007),
-    "squared": DrumSpec("squared", 0.06, build_up=2e-5),
-}
-KINEMATIC: dict[str, dict[str, float]] = {
-    "drum-radius": {"radius_error": 1.5e-3},
-    "gear-ratio": {"ratio_error": -0.03},
-    "layer-thickness": {"thickness_error": 4e-4},
-    "drum-eccentricity": {"eccentricity": 2e-3, "phase": 0.8},
-    "gear-transmission-error": {"amplitude": 1e-3, "phase": 0.5, "order": 3.0},
-    "guide-offset": {"offset": 0.05, "mismatch": 4e-3},
-}
-
-
-def profile_with(drum: str, direction: int = 1) -> WinchProfile:
-    return WinchProfile(
-        name="w",
-        drum=DRUMS[drum],
-        gearbox=GearboxSpec(ratio=17.3, direction=direction),  # type: ignore[arg-type]
-        reference=ReferenceSpec(motor_angle=0.0, cable_length=8.0, wound_turns=3.2),
-        cable=CableSpec(diameter=0.006, dead_length=1.0),
-        guide=GuideSpec(screw_lead=0.006),
-        pulley=(PulleySpec(0.04, pi / 2), PulleySpec(0.05, pi), PulleySpec(0.04, 0.3)),
-    )
-
-
-def line_with(profile: WinchProfile, effects: dict[str, dict[str, float]]) -> Line:
-    terms = [Term(CATALOGUE[name], CATALOGUE[name].null | v) for name, v in effects.items()]
-    return Line(profile, tuple(term.modifier() for term in terms))
-
-
-def swing(amplitude: float = 60.0, rate: float = 0.4) -> tuple[np.ndarray, np.ndarray]:
-    time = np.linspace(0, 20, 2001)
-    return time, amplitude * np.sin(rate * time) ** 3
-
-
-@pytest.mark.parametrize("drum", DRUMS)
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("effect", [None, *KINEMATIC, "all"])
-def test_work_at_the_motor_is_work_on_the_rope(
-    effect: str | None, direction: int, drum: str
-) -> None:
-    """∫ τ dθ = −F Δℓ, with τ by the line and ℓ by the line: one cannot lie without the other."""
-    chosen = {None: {}, "all": KINEMATIC}.get(effect, {effect: KINEMATIC.get(effect or "", {})})
-    line = line_with(profile_with(drum, direction), chosen)
-    angle = direction * np.linspace(-40, 240, 70001)
-    time = np.linspace(0, 100, 70001)
-    force = 150.0
-    predicted = line.predict(line.motion(Signals(time, angle, load=np.full_like(time, force))))
-    torque, length = predicted["motor_torque"], predicted["cable_length"]
-    work = np.concatenate([[0.0], np.cumsum((torque[1:] + torque[:-1]) / 2 * np.diff(angle))])
-    given_up = -force * (length - length[0])
-    # Where a layer begins the arm steps inside one sample, whose work is uncertain by half.
-    layers_begun = 4 if drum == "spiral" else 0
-    uncertain = layers_begun * force * 0.0064 / 17.3 * abs(angle[1] - angle[0])
-    assert np.allclose(work, given_up, rtol=0, atol=1e-6 * np.ptp(given_up) + uncertain)
-    assert np.ptp(given_up) > 100
-
-
-@pytest.mark.parametrize("drum", DRUMS)
-def test_a_gearbox_the_other_way_round_turns_both_angle_and_torque(drum: str) -> None:
-    effects = KINEMATIC | {
-        "gear-efficiency": {"efficiency": 0.8},
-        "pulley-coulomb": {"friction": 0.05},
-        "motor-coulomb": {"torque": 0.1},
-        "motor-viscous": {"viscosity": 0.01},
-        "rotor-inertia": {"inertia": 1e-3},
-        "gear-backlash": {"gap": 0.01},
-    }
-    del effects["gear-transmission-error"]
-    time, angle = swing()
-    load = 100 + 20 * np.sin(time)
-    both = []
-    for direction in (1, -1):
-        line = line_with(profile_with(drum, direction), effects)
-        both.append(line.predict(line.motion(Signals(time, direction * angle, load=load))))
-    assert np.allclose(both[0]["cable_length"], both[1]["cable_length"], rtol=1e-12)
-    assert np.allclose(both[0]["tension"], both[1]["tension"], rtol=1e-12)
-    assert np.allclose(both[0]["motor_torque"], -both[1]["motor_torque"], rtol=1e-12)
-    assert np.ptp(both[0]["cable_length"]) > 0.1
 
 
 def test_positive_motor_angle_winds_in_and_positive_torque_holds_the_load() -> None:
@@ -147,6 +55,36 @@ def test_a_hanging_mass_at_uneven_sampling_keeps_a_constant_acceleration() -> No
     # Acceleration of the length: −6 rad/s² times the arm.
     inner = motion.load[5:-5]
     assert np.allclose(inner, 10.0 * (GRAVITY + 6.0 * line.arm(0.0)), rtol=1e-6)
+
+
+def test_a_hanging_mass_follows_the_rope_as_it_is_really_paid_out() -> None:
+    """A drum that runs out of true shakes the load; what the length does, the load feels."""
+    line = line_with(
+        profile_with("grooved"), {"drum-eccentricity": {"eccentricity": 0.01, "phase": 0.3}}
+    )
+    time = np.linspace(0, 10, 2001)
+    signals = Signals(time, 60.0 * time, load_mass=20.0)
+    predicted = line.predict(line.motion(signals))
+    drum_speed = 60.0 / 17.3
+    shaking = 0.01 * drum_speed**2 * np.sin(drum_speed * time - 0.3)
+    expected = 20.0 * (GRAVITY - shaking)
+    assert np.ptp(expected) > 4
+    assert np.allclose(predicted["tension"][9:-9], expected[9:-9], atol=0.01)
+    arm = line.profile.drum.winding_radius
+    assert np.ptp(predicted["motor_torque"]) > 0.02 * arm
+
+
+def test_a_slow_machine_has_directions_too() -> None:
+    """Where nothing turns faster than the smoothing, the smoothing narrows."""
+    line = Line(profile_with("grooved"))
+    time = np.linspace(0, 20, 2001)
+    at = line.motion(Signals(time, 0.02 * np.sin(time))).at
+    moving = np.abs(at.motor_rate) > 0.3 * np.max(np.abs(at.motor_rate))
+    assert np.allclose(at.motor_direction[moving], np.sign(at.motor_rate[moving]), atol=0.01)
+    assert np.allclose(at.direction[moving], np.sign(at.speed[moving]), atol=0.01)
+    still = line.motion(Signals(time, np.full_like(time, 1234.567))).at
+    assert np.allclose(still.motor_direction, 0.0, atol=1e-6)
+    assert np.allclose(still.direction, 0.0, atol=1e-6)
 
 
 def test_a_measured_load_comes_before_a_known_mass() -> None:
@@ -214,46 +152,6 @@ def test_derivatives_and_directions_are_those_of_the_motion() -> None:
     assert np.allclose(np.abs(at.direction[fast]), 1.0, atol=1e-6)
     assert np.all(np.abs(at.direction) <= 1.0)
     assert np.all(np.isnan(at.temperature))
-
-
-@given(
-    st.sampled_from(list(DRUMS)),
-    st.sampled_from([1, -1]),
-    st.floats(0.5, 9.0),
-    st.floats(0.0, 500.0),
-    st.booleans(),
-)
-def test_motor_angle_is_the_inverse_of_cable_length(
-    drum: str, direction: int, length: float, tension: float, with_effects: bool
-) -> None:
-    effects = KINEMATIC | {
-        "cable-elongation-linear": {"axial_stiffness": 1e5},
-        "frame-compliance": {"stiffness": 1e5},
-    }
-    line = line_with(profile_with(drum, direction), effects if with_effects else {})
-    angle = line.motor_angle(length, tension)
-    assert line.cable_length(angle, tension) == pytest.approx(length, abs=1e-6)
-
-
-@given(st.sampled_from(list(DRUMS)), st.sampled_from([1, -1]), st.floats(-50.0, 400.0))
-def test_arm_is_rope_wound_in_per_motor_angle(drum: str, direction: int, angle: float) -> None:
-    line = Line(profile_with(drum, direction))
-    h = 1e-4
-    slope = (line.cable_length(angle - h) - line.cable_length(angle + h)) / (2 * h)
-    into_turn = (3.2 + direction * angle / 17.3 / (2 * pi)) % 1.0
-    if drum == "spiral" and min(into_turn, 1 - into_turn) < 1e-4:
-        return
-    assert line.arm(angle) == pytest.approx(slope, rel=1e-6)
-    assert np.sign(line.arm(angle)) == direction
-
-
-def test_one_state_at_rest_agrees_with_a_run() -> None:
-    line = line_with(profile_with("spiral"), {"cable-elongation-linear": {"axial_stiffness": 1e5}})
-    time, angle = swing()
-    predicted = line.predict(line.motion(Signals(time, angle, load=np.full_like(time, 200.0))))
-    for index in (0, 400, 1999):
-        at_rest = line.cable_length(float(angle[index]), tension=200.0)
-        assert at_rest == pytest.approx(predicted["cable_length"][index], rel=1e-14)
 
 
 def test_modifiers_act_in_the_order_of_stages_then_of_their_own() -> None:

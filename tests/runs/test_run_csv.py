@@ -172,6 +172,8 @@ def test_whichever_program_wrote_it(file: Path, encode: object) -> None:
         (PLAIN.replace(",11", ",1l"), 3, "column 'tension' holds '1l'"),
         (PLAIN.replace(",11", ",1_1"), 3, "column 'tension' holds '1_1'"),
         (PLAIN.replace(",11", ",inf"), 3, "column 'tension' is infinite"),
+        (PLAIN.replace("[N]", "[kN]").replace(",11", ",1e308"), 3, "'tension' is infinite"),
+        (PLAIN.replace("0.2,", "1e400,"), 4, "column 'time' is infinite"),
         (PLAIN.replace("0.1,1", "0.1,1,1"), 3, "4 cells in this row, 3 columns"),
         (PLAIN.replace(",2,12\n", ",2"), 4, "is the file cut off?"),
         (PLAIN.replace("0.1,", ","), 3, "time is missing here"),
@@ -195,6 +197,11 @@ def test_every_fault_in_line_order(file: Path) -> None:
     text = "# load_mass: x\ntime [s],motor_angle [kg],tension [kg]\n0,a,1\n\n1,2,b\n"
     faults = faults_of(file, text)
     assert [line for line, _ in faults] == [1, 2, 2, 3, 5]
+
+
+def test_infinite_times_are_faults_and_no_arithmetic(file: Path) -> None:
+    faults = faults_of(file, PLAIN.replace("0.1,", "inf,").replace("0.2,", "inf,"))
+    assert [line for line, _ in faults] == [3, 4, 4]
 
 
 def test_a_thousand_faults_are_capped_and_counted(file: Path) -> None:

@@ -128,6 +128,16 @@ def test_damage_is_no_cut(tmp_path: Path) -> None:
         read_run(path)
 
 
+def test_a_changed_digit_is_found_by_the_checksum(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    written(path, 10)
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b'"tension":1.0', b'"tension":7.0'))
+    assert path.read_bytes() != data
+    with pytest.raises(RunError, match="damaged"):
+        read_run(path)
+
+
 @pytest.mark.parametrize(
     ("message", "part"),
     [

@@ -186,7 +186,7 @@ def test_another_load_hangs_still() -> None:
     before = winch.cable_length
     winch.hang(40.0)
     assert winch.load == pytest.approx(40 * GRAVITY)
-    assert winch.cable_length - before == pytest.approx(20 * GRAVITY * 5.5 / 250e3, rel=1e-6)
+    assert winch.cable_length - before == pytest.approx(20 * GRAVITY * 5.5 / 300e3, rel=1e-6)
     with pytest.raises(UsageError, match="above 0 kg"):
         winch.hang(0.0)
 

@@ -113,7 +113,7 @@ class ControlLoop:
         """One control cycle at ``now`` (s)."""
         self._count += 1
         self._send_sync(now)
-        inputs = {name: _input(parts, now) for name, parts in self.winches.items()}
+        inputs = {name: _input(parts, now, self._count) for name, parts in self.winches.items()}
         blocked = self.supervisor.check(now, inputs)
         snapshot = self._picture(now, inputs, blocked)
         self._ask_callbacks(snapshot)
@@ -190,7 +190,7 @@ class ControlLoop:
         )
 
 
-def _input(parts: WinchParts, now: float) -> WinchInput:
+def _input(parts: WinchParts, now: float, sync: int) -> WinchInput:
     """What the supervisor needs to know of a winch."""
     axis, feedback = parts.axis, parts.axis.feedback
     length = speed = math.nan
@@ -200,6 +200,7 @@ def _input(parts: WinchParts, now: float) -> WinchInput:
     cell = parts.sensors.get("cell")
     return WinchInput(
         feedback_age=math.inf if feedback is None else now - feedback.time,
+        missed_syncs=sync if feedback is None else sync - 1 - feedback.sync,
         heartbeat_lost=axis.heartbeat.lost(now),
         boot_ups=axis.heartbeat.boot_ups,
         operational=axis.operational,

@@ -15,8 +15,7 @@ from winchkit.schema.bench import LimitSpec
 
 __all__ = ["Instrumented", "Supervisor", "WinchInput"]
 
-_STALE_CYCLES = 5
-_STALE_LEAST = 0.05
+_MISSED_SYNCS = 5
 _SLACK_TIME = 0.2
 _LENGTH_TOLERANCE = 5e-3
 _SPEED_TOLERANCE = 1.2
@@ -46,6 +45,8 @@ class WinchInput:
 
     feedback_age: float
     """Since the SYNC of the newest complete feedback, s; infinity before the first."""
+    missed_syncs: int
+    """SYNCs that were sent since then and are not answered, the one just sent left out."""
     heartbeat_lost: bool
     boot_ups: int
     operational: bool
@@ -65,10 +66,14 @@ class WinchInput:
 class Supervisor:
     """Rules over all winches of a bench, and the latch."""
 
-    def __init__(self, limits: Mapping[str, LimitSpec], cycle: float) -> None:
+    def __init__(self, limits: Mapping[str, LimitSpec], stale: float) -> None:
+        """Feedback older than ``stale`` (s) that has also missed several SYNCs is stale.
+
+        Both, since a late cycle of our own makes feedback old without a drive being silent.
+        """
         self.tripped: tuple[Trip, ...] = ()
         self._limits = limits
-        self._stale = max(_STALE_CYCLES * cycle, _STALE_LEAST)
+        self._stale = stale
         self._boot_ups: dict[str, int] = {}
         self._slack_since: dict[str, float] = {}
         self._tension: dict[str, tuple[float, float]] = {}
@@ -132,7 +137,7 @@ class Supervisor:
             )
         if not item.operational:
             yield Trip("nmt", name, "the drive has left the state operational; reset", latches=True)
-        if item.feedback_age > self._stale:
+        if item.feedback_age > self._stale and item.missed_syncs >= _MISSED_SYNCS:
             yield Trip(
                 "feedback",
                 name,

@@ -29,6 +29,8 @@ __all__ = ["READ_RATE", "Wired", "wire"]
 
 READ_RATE = 100.0
 """Readings a second of every instrument, unless its own rate is lower."""
+_STALE_BEATS = 2
+"""Feedback may be this many heartbeats old: the bench file says how soon silence must count."""
 _ROLES = ("cell", "load", "length", "temperature")
 
 
@@ -71,7 +73,8 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
         )
         for name, winch in spec.winch.items()
     }
-    supervisor = Supervisor({name: w.limits for name, w in spec.winch.items()}, spec.cycle)
+    stale = max(_STALE_BEATS * spec.bus[name].heartbeat for name in buses)
+    supervisor = Supervisor({name: w.limits for name, w in spec.winch.items()}, stale)
     hosts = [(bus, spec.bus[name].node, spec.bus[name].heartbeat) for name, bus in buses.items()]
     loop = ControlLoop(hosts, winches, supervisor, clock, spec.cycle)
     return Wired(loop, axes, sensors, slow.command, _metadata(spec, profiles))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,12 @@ __all__ = ["command"]
 @click.option(
     "--format", "suffix", default="csv", show_default=True, type=click.Choice(["csv", "mcap"])
 )
-@click.option("-y", "--yes", is_flag=True, help="Answer every question of the programme with yes.")
+@click.option(
+    "-y",
+    "--yes",
+    is_flag=True,
+    help="Answer every question with yes; a simulated bench does what is asked.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def command(programme: str, bench: str, out: Path, suffix: str, yes: bool, as_json: bool) -> None:
     """Execute PROGRAMME (a file, or a shipped name) on a bench, one log per load and repeat.
@@ -50,7 +56,7 @@ def command(programme: str, bench: str, out: Path, suffix: str, yes: bool, as_js
                 opened,
                 declared,
                 out,
-                _agree if yes else _ask,
+                partial(_agree, bench) if yes else _ask,
                 suffix=f".{suffix}",
                 progress=lambda repeat, number, step: click.echo(
                     f"{declared.name} {repeat}/{declared.repeat}, step {number}: {_words(step)}",
@@ -70,8 +76,12 @@ def _ask(step: Step) -> None:
     click.confirm(f"{step.ask}; done?", default=True, abort=True, err=True)
 
 
-def _agree(step: Step) -> None:
-    click.echo(f"{step.ask}: yes", err=True)
+def _agree(bench: str, step: Step) -> None:
+    """Say yes; where the bench is simulated, let the simulation do what is asked."""
+    from winchkit.sim.live_client import answer
+
+    done = answer(bench, step)
+    click.echo(f"{step.ask}: {'done by the simulation' if done else 'yes'}", err=True)
 
 
 def _words(step: Step) -> str:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _CHECK_EVERY = 0.1
+_TURN = 5e-4
 
 
 @click.command("serve")
@@ -57,6 +58,8 @@ def command(
     from winchkit.sim.live import LiveBench
     from winchkit.sim.live_control import ControlServer
 
+    # Bus and instruments share this interpreter; 5 ms, its default turn, is a whole cycle.
+    sys.setswitchinterval(_TURN)
     declared = read_simbench(find("sim", bench))
     path = bench_file or Path(f"{declared.name}-bench.toml")
     ended = threading.Event()

@@ -29,7 +29,7 @@ def admit(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
         faults = [fault for run in runs for fault in _other_winch(run, profile)]
     if faults:
         raise RunError(faults)
-    return [note for run in runs for note in _notes(run)]
+    return [note for run in runs for note in _notes(run, profile)]
 
 
 def _faults(run: Run) -> list[Fault]:
@@ -70,12 +70,12 @@ def _faults(run: Run) -> list[Fault]:
 def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
     """Whether the run was plainly recorded on another winch than the profile's."""
     where = run.path or run.name
-    named = run.metadata.get("profile")
-    if named and named != profile.name:
+    if "cable_length" not in run:
+        named = run.metadata.get("profile", profile.name)
+        if named == profile.name:
+            return []
         message = f"recorded with profile '{named}', compared with '{profile.name}'"
         return [Fault(message + "; give the profile of this winch", where, key="metadata profile")]
-    if "cable_length" not in run:
-        return []
     good = np.isfinite(run["motor_angle"]) & np.isfinite(run["cable_length"])
     line = Line(profile)
     signals = Signals(run.time[good], run["motor_angle"][good])
@@ -94,12 +94,15 @@ def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
     return [Fault(message, where, key="column 'cable_length'")]
 
 
-def _notes(run: Run) -> list[str]:
+def _notes(run: Run, profile: WinchProfile) -> list[str]:
     notes = []
     missing = {name: channel.missing for name, channel in run.channels.items() if channel.missing}
     if missing:
         listed = ", ".join(f"{name} {count}" for name, count in missing.items())
         notes.append(f"{run.name}: NaN samples not compared: {listed}")
+    named = run.metadata.get("profile", profile.name)
+    if named != profile.name:
+        notes.append(f"{run.name}: recorded with profile '{named}', compared with '{profile.name}'")
     if run.gaps:
         notes.append(f"{run.name}: {run.gaps} gaps in time")
     return notes

@@ -22,6 +22,7 @@ from winchkit.schema.winch import WinchProfile
 __all__ = ["begin_hypothesis", "compare", "signal_rms"]
 
 Array = NDArray[np.float64]
+_WHOLE_FILTER = 3.0
 
 
 def compare(
@@ -34,7 +35,7 @@ def compare(
 
     Raises RunError with every fault of every run.
     """
-    problem = Problem(prepare(runs, profile, band))
+    problem = Problem(prepare(runs, profile, band, skirt=_WHOLE_FILTER))
     start = begin_hypothesis(profile, catalogue, problem)
     residual = problem.residual(start)
     offset = None

@@ -46,6 +46,8 @@ class Recording:
     """Prediction of the bare profile on ``raw``."""
     nominal_smooth: Mapping[str, Array]
     programme: str = ""
+    path: str = ""
+    """File that it was read from."""
 
 
 @dataclass(frozen=True)
@@ -68,17 +70,20 @@ class Dataset:
         return tuple(group for group in self.repeats if len(group.runs) > 1)
 
 
-def prepare(runs: Sequence[Run], profile: WinchProfile, band: float | None = None) -> Dataset:
+def prepare(
+    runs: Sequence[Run], profile: WinchProfile, band: float | None = None, skirt: float = 1.0
+) -> Dataset:
     """Build a dataset of one winch's runs. Raises RunError with every fault of every run.
 
-    ``band`` overrides the torque's low-pass, Hz.
+    ``band`` overrides the torque's low-pass, Hz; ``skirt`` is how far beyond it is kept: what
+    the filter all but removes tells nothing and is left out of fits, but belongs to an rms.
     """
     notes = admit(runs, profile)
     signals = [_signals(run) for run in runs]
     repeats = find_repeats(signals)
     smooth = _denoised(signals, repeats, profile)
     recordings = tuple(
-        _recording(run, raw, quiet_one, profile, band)
+        _recording(run, raw, quiet_one, profile, (band, skirt))
         for run, raw, quiet_one in zip(runs, signals, smooth, strict=True)
     )
     return Dataset(profile, recordings, tuple(repeats), tuple(notes))
@@ -147,12 +152,16 @@ def _followed(line: Line, signals: Signals, force: Array) -> Array:
 
 
 def _recording(
-    run: Run, raw: Signals, smooth: Signals, profile: WinchProfile, band: float | None
+    run: Run,
+    raw: Signals,
+    smooth: Signals,
+    profile: WinchProfile,
+    filtered: tuple[float | None, float],
 ) -> Recording:
     line = Line(profile)
     motion, motion_smooth = line.motion(raw), line.motion(smooth)
     nominal = line.predict(motion)
-    rate = 1 / run.interval
+    rate, (band, skirt) = 1 / run.interval, filtered
     measured, valid, bands = {}, {}, {}
     inputs_ok = np.isfinite(run["motor_angle"])
     if motion.load is not None and "load" in run:
@@ -164,7 +173,7 @@ def _recording(
         cut_off = (band or torque_band(rate)) if output == "motor_torque" else None
         measured[output] = _bridged(values)
         valid[output] = _away_from_gaps(np.isfinite(values) & inputs_ok, rate, cut_off)
-        bands[output] = Band(len(values), rate, cut_off)
+        bands[output] = Band(len(values), rate, cut_off, skirt)
     return Recording(
         name=run.name,
         signals=raw,
@@ -177,6 +186,7 @@ def _recording(
         nominal=nominal,
         nominal_smooth=line.predict(motion_smooth),
         programme=run.metadata.get("programme", ""),
+        path=run.path,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -40,6 +40,8 @@ __all__ = ["Answer", "diagnose", "inquire", "output_fits"]
 
 _CANDIDATES_FITTED = 5
 _NEGLIGIBLE = 0.02
+_AT_NOISE = 1.1
+_TRACE = 0.25
 _GENERALISES = 0.15
 _NAMED_BESIDE = 0.15
 _HALF = 0.5
@@ -69,8 +71,8 @@ def diagnose(
     inquiry = inquire(prepare(runs, profile, band), catalogue)
     found = search(inquiry)
     share = _unexplained(inquiry, found)
-    verdict = _verdict(found, share)
     outputs = output_fits(inquiry, (found.begin, found.begin_noise), (found.final, found.noise))
+    verdict = _verdict(found, outputs, share)
     # While much is still unexplained a name would be a guess: it stays among the candidates.
     named = verdict == "explained" or (verdict == "partly" and share < _NAMED_BESIDE)
     added = range(inquiry.given, len(found.final.hypothesis.terms) if named else inquiry.given)
@@ -122,14 +124,20 @@ def _unexplained(inquiry: Inquiry, found: Found) -> float:
     return min(1.0, left)
 
 
-def _verdict(found: Found, share: float) -> Verdict:
+def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
     if not found.alarmed:
         return "adequate"
     grown = len(found.final.hypothesis.terms) > len(found.begin.hypothesis.terms)
     if not grown or share > _HALF:
         return "unknown"
-    settled = not found.still or not found.noise.from_repeats
-    return "explained" if share < (_GENERALISES if settled else _NEGLIGIBLE) else "partly"
+    if not found.still or not found.noise.from_repeats:
+        return "explained" if share < _GENERALISES else "partly"
+    # A trace below the noise, such as a load that bounces on its rope, is told but changes nothing.
+    at_noise = all(
+        fitted.noise_rms is not None and fitted.heldout_rms_after < _AT_NOISE * fitted.noise_rms
+        for fitted in outputs.values()
+    )
+    return "explained" if share < (_TRACE if at_noise else _NEGLIGIBLE) else "partly"
 
 
 def output_fits(

@@ -18,7 +18,7 @@ __all__ = ["Found", "search"]
 Array = NDArray[np.float64]
 _MOST_STEPS = 6
 _SHORT_LIST = 5
-_PRESENCE_LEVEL = 0.04
+_PRESENCE_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
 _GATE_LEVEL = 0.02
 _BETTER = 2.0
@@ -51,11 +51,12 @@ def search(inquiry: Inquiry) -> Found:
     present, noise = inquiry.settle(inquiry.begin)
     begin, begin_noise = present, noise
     begin_presence = inquiry.presence(present, noise)
-    begin_scores, threshold = _evidence(inquiry, present, noise)
+    begin_scores = scores = inquiry.scores(present, noise)
+    chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
+    threshold = max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
     alarmed = still = _anything(begin_presence, begin_scores, threshold)
-    scores, level = begin_scores, threshold
     for _ in range(_MOST_STEPS):
-        if not still or not scores or scores[0].value <= max(level, 0.0):
+        if not still or not scores or scores[0].value <= threshold:
             break
         grown = _grow(inquiry, present, noise, scores)
         if grown is None:
@@ -63,8 +64,8 @@ def search(inquiry: Inquiry) -> Found:
         inquiry.look_again(grown.hypothesis)
         present, noise = inquiry.settle(grown.hypothesis, noise)
         present, noise = _reconsider(inquiry, present, noise)
-        scores, level = _evidence(inquiry, present, noise)
-        still = _anything(inquiry.presence(present, noise), scores, level)
+        scores = inquiry.scores(present, noise)
+        still = _anything(inquiry.presence(present, noise), scores, threshold)
     return Found(
         begin=begin,
         begin_noise=begin_noise,
@@ -79,16 +80,9 @@ def search(inquiry: Inquiry) -> Found:
     )
 
 
-def _evidence(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[list[Score], float]:
-    """Scores of the candidates, and what noise alone would score at most."""
-    scores = inquiry.scores(present, noise)
-    chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
-    return scores, float(np.quantile(chance, _SCORE_LEVEL))
-
-
 def _anything(presence: Presence, scores: list[Score], threshold: float) -> bool:
     """Whether the residual holds more than noise."""
-    by_score = bool(scores) and scores[0].value > max(threshold, 0.0)
+    by_score = bool(scores) and scores[0].value > threshold
     return by_score or presence.p_value < _PRESENCE_LEVEL
 
 

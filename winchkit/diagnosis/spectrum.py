@@ -17,7 +17,6 @@ __all__ = ["Band", "band_edges", "low_pass", "to_frequency", "to_time", "torque_
 Array = NDArray[np.float64]
 _BUTTERWORTH_ORDER = 4
 _TORQUE_BAND = 20.0
-_SKIRT = 1.5
 _BANDS = 14
 _FEWEST = 8
 
@@ -37,6 +36,8 @@ class Band:
     """Samples per second."""
     cut_off: float | None = None
     """Low-pass, Hz; None keeps all."""
+    skirt: float = 1.0
+    """How far beyond the cut-off coefficients are kept, in units of it."""
 
     @property
     def frequency(self) -> Array:
@@ -44,7 +45,7 @@ class Band:
         frequency = np.arange(self.count) * self.rate / (2 * self.count)
         if self.cut_off is None:
             return frequency
-        return frequency[frequency <= _SKIRT * self.cut_off]
+        return frequency[frequency <= self.skirt * self.cut_off]
 
     @property
     def gain(self) -> Array:

@@ -13,7 +13,6 @@ Array = NDArray[np.float64]
 _SOFTEST = 0.1
 _TABLE = 513
 _NEWTON_STEPS = 4
-_HALVINGS = 60
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
@@ -50,12 +49,11 @@ def _soft_end(slope: Polynomial) -> float:
 
 
 def _largest(reach: Callable[[Array], tuple[Array, Array]], force: float) -> float:
-    """A strain just above that of the largest force, by halving."""
-    low, high = 0.0, force / _SOFTEST
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if reach(np.array(middle))[0] > force else (middle, high)
-    return high
+    """A strain above that of the largest force, by doubling from where it would be if linear."""
+    strain = force
+    while strain < force / _SOFTEST and float(reach(np.array(strain))[0]) < force:
+        strain *= 2
+    return strain
 
 
 EFFECT = Effect(

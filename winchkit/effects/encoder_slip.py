@@ -9,9 +9,9 @@ _DURATION = 0.4
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Drum angle with a step that begins at t0 and takes 0.4 s."""
-    slipped = np.clip((at.time - values["time"]) / _DURATION, 0.0, 1.0)
-    return Path(path.value + values["step"] * slipped, path.slope)
+    """Drum angle with a smooth step that begins at t0 and takes 0.4 s."""
+    x = np.clip((at.time - values["time"]) / _DURATION, 0.0, 1.0)
+    return Path(path.value + values["step"] * (x * x * (3 - 2 * x)), path.slope)
 
 
 EFFECT = Effect(
@@ -33,8 +33,8 @@ EFFECT = Effect(
     apply=apply,
     outputs=("cable_length", "motor_torque"),
     what="A coupling or a belt slipped: from then on drum and encoder disagree.",
-    formula="φ + Δφ ramp((t − t0) / 0.4 s), t from the run's start",
-    source="field experience; a step is spread so that a fit can find its time",
+    formula="φ + Δφ x²(3 − 2x), x = (t − t0) / 0.4 s from 0 to 1, t from the run's start",
+    source="field experience; a step without a jerk, so that a fit can find its time",
     looks_like="A step of the length at one moment that does not return.",
     confused_with=("cable-creep", "gear-backlash"),
     told_apart="Return to the same place at the end of the run: creep recovers, a slip stays.",

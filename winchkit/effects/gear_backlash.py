@@ -1,15 +1,25 @@
 """gear-backlash: the drum does not follow until the play of the gear is taken up."""
 
+import numpy as np
+
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.line import At, Path, Stage
 from winchkit.model.recurrence import play
 
+_ON_THE_FLANK = 1 - 1e-9
+
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Drum angle through a play; the torque arm stays that of the meshing gear."""
-    if values["gap"] == 0.0:
+    """Drum angle through a play; within the gap the drum stands and the motor turns freely.
+
+    One state at rest says nothing of the gap: it is taken as meshing.
+    """
+    gap = values["gap"]
+    if gap == 0.0 or len(path.value) < 2:
         return path
-    return Path(play(path.value, values["gap"], values["start"]), path.slope)
+    drum_angle = play(path.value, gap, values["start"])
+    meshes = np.abs(drum_angle - path.value) >= gap / 2 * _ON_THE_FLANK
+    return Path(drum_angle, path.slope * meshes)
 
 
 EFFECT = Effect(
@@ -24,7 +34,7 @@ EFFECT = Effect(
     what="Teeth have play: after a reversal the drum stands until the other flank bears.",
     formula="play operator of gap b on φ; start: place in the gap at the run's start, −½ to ½",
     source="play operator (Krasnosel'skii and Pokrovskii, Systems with Hysteresis)",
-    looks_like="A step of the length after every reversal, whatever the speed.",
+    looks_like="A step of the length after a reversal, whatever the speed, and no torque in it.",
     confused_with=("length-time-offset", "cable-hysteresis"),
     told_apart="A ladder of speeds: the step stays, a time offset grows with the speed.",
     needs=("gearing",),

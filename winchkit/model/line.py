@@ -25,6 +25,7 @@ GRAVITY = 9.80665
 _CREEP_SPEED = 1e-3
 _CREEP_RATE = 0.5
 _CREEP_SHARE = 0.02
+_CREEP_LEAST = 1e-3
 _LOAD_SPAN = 0.02
 _NEWTON_STEPS = 4
 
@@ -308,11 +309,12 @@ class Line:
 def _direction(rate: Array, creep: float) -> Array:
     """Sign of a rate, smooth below ``creep``; narrower on a machine that is slow altogether.
 
-    A drive that never turns faster than the smoothing would have no direction at all.
+    A drive that never turns faster than the smoothing would have no direction at all; one that
+    stands still has none, whatever the rounding of its derivative.
     """
-    fastest = float(np.max(np.abs(rate)))
-    width = min(creep, _CREEP_SHARE * fastest)
-    return np.tanh(rate / width) if width > 0 else np.zeros_like(rate)
+    fastest = float(np.max(np.abs(rate), initial=0.0))
+    width = np.clip(_CREEP_SHARE * fastest, _CREEP_LEAST * creep, creep)
+    return np.asarray(np.tanh(rate / width))
 
 
 def _second_derivative(x: Array, time: Array) -> Array:

@@ -69,7 +69,7 @@ def assemble(recording: Recording) -> Run:
             continue
         channels[name] = _channel(name, unit, values, number)
         if column_dimension(name) is not None:
-            faults += _infinite(recording, name, values)
+            faults += _infinite(recording, name, channels[name].values)
     time = channels.pop("time", None)
     if time is None:
         metadata.setdefault("time", "row number")
@@ -141,7 +141,8 @@ def _channel(name: str, unit: str, values: Array, number: int) -> Channel:
     unit = unit or "1"
     si, shift = factor(unit, dimension), convert(0.0, unit, dimension)
     if si != 1.0 or shift != 0.0:
-        values = values * si + shift
+        with np.errstate(over="ignore"):  # what becomes infinite is a fault, told by its line
+            values = values * si + shift
     return Channel(values, next(iter(UNITS[dimension])), number)
 
 
@@ -155,7 +156,7 @@ def _time_faults(recording: Recording, time: Array) -> Iterator[Fault]:
     """Every sample has a time, later than the one before it."""
     for row in np.flatnonzero(np.isnan(time)):
         yield Fault("time is missing here", recording.path, recording.line_of(int(row)))
-    for row in np.flatnonzero(np.diff(time) <= 0) + 1:
+    for row in np.flatnonzero(time[1:] <= time[:-1]) + 1:
         earlier, later = time[row - 1], time[row]
         word = "stands still at" if later == earlier else f"goes back from {earlier:.9g} s to"
         message = f"time {word} {later:.9g} s; rows must come in order of time, each once"

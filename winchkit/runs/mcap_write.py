@@ -21,7 +21,7 @@ class McapWriter(RunWriter):
     def _begin(self, metadata: Mapping[str, str]) -> None:
         self._time = self._names.index("time")
         self._count = 0
-        self._writer = Writer(self._stream, use_chunking=False)
+        self._writer = Writer(self._stream, use_chunking=False, enable_data_crcs=True)
         self._writer.start(PROFILE, "winchkit")
         schema = self._writer.register_schema(SCHEMA, "jsonschema", row_schema(self.columns))
         self._channel = self._writer.register_channel(TOPIC, "json", schema)

@@ -51,8 +51,9 @@ class DrumSpec(Table):
     kind: Literal["spiral", "archimedean", "grooved", "squared"]
     winding_radius: PositiveLength
     """Axis to rope centre on the first layer, m."""
-    groove_pitch: PositiveLength | None = None
-    layer_growth: PositiveLength | None = None
+    groove_pitch: Annotated[float, Quantity("length", 0.0)] | None = None
+    """Of a grooved drum, m a turn."""
+    layer_growth: Annotated[float, Quantity("length", 0.0)] | None = None
     """Radius gained per turn (spiral, archimedean), m; default is the rope's diameter."""
     build_up: Annotated[float, Quantity("length", 0.0)] | None = None
     """k of r² = r0² + k L (squared): an area per length, m."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil, inf
-from pathlib import Path
 
 from winchkit.schema.device import ServoSpec
+from winchkit.sim.drive_axis import Axis
 from winchkit.sim.drive_faults import ERROR_CODES, known
 from winchkit.sim.drive_guards import guard_options
 from winchkit.sim.drive_motion import SIMULATED_MODES, Mode, Motion
@@ -16,14 +15,12 @@ from winchkit.sim.drive_power import PowerStage
 from winchkit.sim.drive_sdo import SdoServer
 from winchkit.sim.drive_shaft import Shaft
 from winchkit.sim.drive_state import HALT, State
-from winchkit.sim.drive_status import SetPointHandshake, StatusBits
-from winchkit.sim.drive_units import units_of, wrapped
-from winchkit.sim.object_dictionary import Abort, read_eds
+from winchkit.sim.drive_status import SetPointHandshake
+from winchkit.sim.drive_units import units_of
+from winchkit.sim.object_dictionary import Abort, ObjectDictionary
 
 __all__ = ["SimDrive"]
 
-_MAX_SLICE = 1e-3
-_MIN_SLICE = 2e-5
 _BOOT_SHARE = 0.8
 """Of the boot time that a device file declares as the longest."""
 _HEARTBEAT_LOST = 0x8130
@@ -40,7 +37,8 @@ _COMMUNICATION = range(0x1000, 0x2000)
 class SimDrive:
     """One drive, driven by a clock that is handed in.
 
-    ``send`` takes an identifier and data. Frames come in through :meth:`receive`, time through
+    ``objects`` is its object dictionary, which it takes over. ``send`` takes an identifier and
+    data. Frames come in through :meth:`receive`, time through
     :meth:`tick`; both take the time in s of one steady clock and are called from one thread.
     """
 
@@ -49,21 +47,19 @@ class SimDrive:
         send: Callable[[int, bytes], None],
         node: int,
         servo: ServoSpec,
-        eds: Path,
+        objects: ObjectDictionary,
         shaft: Shaft,
         *,
         brake: bool,
         now: float = 0.0,
     ) -> None:
         self.node = node
-        self.objects = read_eds(eds, node)
+        self.objects = objects
         self.nmt = NmtState.BOOTING
         self._send_frame, self._servo, self._shaft = send, servo, shaft
-        self._now, self._sampled_at = now, -inf
         self._booted_at = now
         self._error = 0
         self._silent = False
-        self._following_since: float | None = None
         self._sdo = SdoServer(self.objects)
         self._pdos = Pdos(
             self.objects, self._send, self._sample, lambda: self._emergency(_PDO_TOO_SHORT)
@@ -74,7 +70,8 @@ class SimDrive:
         self._power = PowerStage(self.objects, self._state_changed)
         self._motion = Motion(self.objects, units_of(self.objects, servo), brake=brake)
         self._handshake = SetPointHandshake(self.objects, self._motion)
-        self._status = StatusBits(self.objects, self._motion)
+        self._axis = Axis(self.objects, shaft, self._power, self._motion, now=now)
+        self._axis.following_failed = lambda: self._fault(_FOLLOWING_ERROR)
         self._guard_objects()
         self.objects.put(0x6502, 0, SIMULATED_MODES)
 
@@ -144,7 +141,7 @@ class SimDrive:
         if kind in ERROR_CODES:
             self._fault(ERROR_CODES[kind])
         elif kind == "reboot":
-            self.power_on(self._now)
+            self.power_on(self._axis.now)
         elif kind == "heartbeat stop":
             self._heartbeats.producing = False
         elif kind == "silence":
@@ -241,57 +238,12 @@ class SimDrive:
             self._emergency(0)
 
     def advance(self, now: float) -> None:
-        """Move until ``now``; the set-points are made in slices of at most a millisecond."""
-        duration = now - self._now
-        if duration < _MIN_SLICE:
-            return
-        count = ceil(duration / _MAX_SLICE - 1e-6)
-        dt = duration / count
-        shaft, motion = self._shaft, self._motion
-        for index in range(count):
-            command = motion.step(self._power.order, shaft.motor_angle, shaft.motor_velocity, dt)
-            shaft.advance(dt, command)
-            time = self._now + (index + 1) * dt
-            if motion.at_rest(shaft.motor_velocity):
-                self._power.standstill()
-            self._watch_following(time)
-            self._status.advance(shaft.motor_angle, shaft.motor_velocity, dt)
-        self._now = now
-
-    def _watch_following(self, time: float) -> None:
-        error = self._motion.angle - self._shaft.motor_angle
-        window = self.objects.number(0x6065)
-        beyond = abs(error) > window * self._motion.units.angle and window != 0xFFFFFFFF
-        self._status.following_error = beyond and self._motion.controls_position
-        if not self._status.following_error:
-            self._following_since = None
-            return
-        if self._following_since is None:
-            self._following_since = time
-        if time - self._following_since >= self.objects.number(0x6066) * 1e-3:
-            self._fault(_FOLLOWING_ERROR)
+        """Move until ``now``, without looking at the network's timers."""
+        self._axis.advance(now)
 
     def _sample(self) -> None:
-        """Bring the actual values in the object dictionary up to now."""
-        put, motion = self.objects.put, self._motion
-        put(0x6041, 0, self._status_word())
-        put(0x603F, 0, self._error)
-        put(0x6061, 0, motion.mode)
-        if self._sampled_at == self._now:
-            return
-        self._sampled_at = self._now
-        reading, units = self._shaft.measure(), motion.units
-        put(0x6064, 0, wrapped(reading.motor_angle / units.angle, 32))
-        put(0x606C, 0, wrapped(reading.motor_velocity / units.speed, 32))
-        torque = round(reading.motor_torque / units.torque)
-        put(0x6077, 0, max(-32768, min(32767, torque)))
-        put(0x6062, 0, wrapped(motion.angle / units.angle, 32))
-        put(0x606B, 0, wrapped(motion.speed / units.speed, 32))
-        error = motion.angle - reading.motor_angle if motion.controls_position else 0.0
-        put(0x60F4, 0, wrapped(error / units.angle, 32))
-
-    def _status_word(self) -> int:
-        return self._status.word(self.state, acknowledged=self._handshake.acknowledged)
+        acknowledged = self._handshake.acknowledged
+        self._axis.sample(self._error, acknowledged=acknowledged)
 
     # Objects that do something when they are written.
 
@@ -311,11 +263,8 @@ class SimDrive:
     def _control(self, _sub: int, word: int) -> None:
         self._motion.halted = bool(word & HALT)
         self._power.control(word)
-        self._handshake.take(word, self._shaft.motor_angle, enabled=self._enabled)
-
-    @property
-    def _enabled(self) -> bool:
-        return self.state is State.OPERATION_ENABLED
+        enabled = self.state is State.OPERATION_ENABLED
+        self._handshake.take(word, self._shaft.motor_angle, enabled=enabled)
 
     def _aim(self) -> None:
         if self._motion.mode in (Mode.CSP, Mode.CSV):
@@ -328,4 +277,4 @@ class SimDrive:
 
     def _scale_again(self, _sub: int, _value: int) -> None:
         self._motion.units = units_of(self.objects, self._servo)
-        self._sampled_at = -inf
+        self._axis.forget_sample()

@@ -93,12 +93,12 @@ class Motion:
         """Command for the next ``dt`` s, given where the motor is."""
         if order is Order.OFF:
             self._following = self.stopping = False
+            self.profile.reset()
             self.angle, self.speed = angle, speed
             return self._off
         if not self._following:
             self._following = True
             self.angle, self.speed = angle, speed
-            self.profile.reset()
             self.aim()
         self.limited = False
         halt = self.halted and order is Order.FOLLOW
@@ -117,9 +117,9 @@ class Motion:
     def _stop(self, order: Order, angle: float, speed: float, dt: float) -> DriveCommand:
         if order is Order.FOLLOW:
             order = RAMPS.get(self._objects.number(0x605D), Order.SLOW_DOWN)
-        if not self.stopping:
-            self.stopping = True
+        else:
             self.profile.reset()
+        self.stopping = True
         index = {Order.SLOW_DOWN: 0x6084, Order.QUICK_STOP: 0x6085}.get(order, 0x60C6)
         self.speed = approach(self.speed, 0.0, self._per_second(index) * dt)
         self.angle = angle

@@ -76,7 +76,8 @@ class StatusBits:
         still = motion.at_rest(self._speed)
         bits = 0
         if motion.mode is Mode.PP:
-            reached = self._position_time > number(0x6068) * _MS
+            arrived = motion.profile.target is None
+            reached = arrived and self._position_time > number(0x6068) * _MS
             bits |= _REACHED if (still if motion.stopping else reached) else 0
             bits |= _MODE_BIT_12 if acknowledged else 0
             bits |= _MODE_BIT_13 if self.following_error else 0

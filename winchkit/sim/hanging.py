@@ -9,7 +9,8 @@ from winchkit.sim.state import GRAVITY
 
 __all__ = ["HangingLoad"]
 
-_DAMPING_RATIO = 0.2
+_DAMPING_RATIO = 0.4
+"""Of a fibre rope with its load; a steel rope would swing for longer."""
 _STIFF = 1.0
 """A spring of a natural angular frequency above this, in 1/step, is followed without its swing."""
 

@@ -14,6 +14,7 @@ from winchkit.schema.simbench import NoiseSpec, WinchTruth
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.drive import SimDrive
 from winchkit.sim.modbus_instrument import ModbusInstrument, in_unit_of
+from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
 from winchkit.sim.plant import Measurement, WinchPlant
 from winchkit.units import suggest
 
@@ -51,9 +52,9 @@ class LiveWinch:
         servo, eds = _servo(wiring.servo, beside)
         if wiring.servo.node is None:
             raise UsageError(f"winch {name}: its servo has no node; give it one, e.g. node = 1")
-        self.drive = SimDrive(
-            send, wiring.servo.node, servo, eds, self.plant, brake=wiring.brake, now=now
-        )
+        node = wiring.servo.node
+        objects = ObjectDictionary(read_eds(eds, node))
+        self.drive = SimDrive(send, node, servo, objects, self.plant, brake=wiring.brake, now=now)
         self.drive.power_on(now, boot_time=0.0)
         self.instruments = {
             role: ModbusInstrument(

@@ -22,6 +22,8 @@ Watcher = Callable[[int, int], None]
 
 _FORMATS = {0x02: "b", 0x03: "h", 0x04: "i", 0x05: "B", 0x06: "H", 0x07: "I", 0x15: "q", 0x1B: "Q"}
 _BOOLEAN = 0x01
+_FIRST_OBJECT = 0x1000
+"""Below stand data types."""
 _SAVE = 0x65766173
 _LOAD = 0x64616F6C
 
@@ -188,8 +190,8 @@ class ObjectDictionary:
         return None
 
 
-def read_eds(path: Path, node: int) -> ObjectDictionary:
-    """Object dictionary of an EDS or DCF file for a node id; FileError where it cannot be read."""
+def read_eds(path: Path, node: int) -> dict[Key, Entry]:
+    """Objects that an EDS or DCF file declares for a node id; FileError where it is none."""
     import canopen
 
     try:
@@ -200,7 +202,7 @@ def read_eds(path: Path, node: int) -> ObjectDictionary:
     for thing in declared.values():
         members = [thing] if not hasattr(thing, "subindices") else thing.subindices.values()
         entries.update({(one.index, one.subindex): _entry(one) for one in members})
-    return ObjectDictionary({key: entry for key, entry in entries.items() if key[0] >= 0x1000})
+    return {key: entry for key, entry in entries.items() if key[0] >= _FIRST_OBJECT}
 
 
 def _entry(variable: Any) -> Entry:

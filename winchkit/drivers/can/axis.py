@@ -35,7 +35,8 @@ class AxisFeedback:
     """What a drive said at one SYNC; SI at the motor shaft."""
 
     time: float
-    """Of the SYNC, on the bench's clock, s."""
+    """Estimate of the moment of sampling, on the bench's clock, s: the SYNC reaches the drive
+    between its sending and the arrival of the first answer."""
     sync: int
     """Number of that SYNC."""
     state: State
@@ -74,7 +75,7 @@ class Cia402Axis:
         self._node = SdoNode(bus, node, Path(device.path).parent / device.servo.eds)
         self._drive: Commissioned | None = None
         self._commands: tuple[tuple[int, PdoCodec], ...] = ()
-        self._cycle = (0, -math.inf)
+        self._cycle = self._answered = (0, -math.inf)
         self._latest: dict[int, tuple[int, tuple[int, ...]]] = {}
         self._previous = 0
         bus.on(0x700 + node, self.heartbeat.receive)
@@ -198,12 +199,16 @@ class Cia402Axis:
     def _receiver(self, codec: PdoCodec) -> Handler:
         number = codec.spec.number
 
-        def receive(data: bytes, _now: float) -> None:
+        def receive(data: bytes, now: float) -> None:
             values = codec.decode(data)
             if values is None:
                 self.short_frames += 1
                 return
-            self._latest[number] = (self._cycle[0], values)
+            sync, sent = self._cycle
+            if self._answered[0] != sync:
+                late = now - sent
+                self._answered = (sync, sent + late / 2 if late < self._watch.cycle else sent)
+            self._latest[number] = (sync, values)
             self._publish()
 
         return receive
@@ -211,7 +216,7 @@ class Cia402Axis:
     def _publish(self) -> None:
         """Make a snapshot once every TPDO of this SYNC is there, so that none is torn."""
         drive = self._drive
-        sync, time = self._cycle
+        sync, time = self._answered
         if drive is None or len(self._latest) < len(drive.tpdo):
             return
         values: dict[tuple[int, int], int] = {}

@@ -8,7 +8,7 @@ __all__ = ["relax"]
 
 _SMALL = 0.2
 _LONG = 100.0
-"""Travel in units of limit/slope after which the force has settled to a hundredth, for shapes up to 2."""
+"""Travel over limit/slope after which the force has settled to a hundredth, for shapes to 2."""
 
 
 def relax(force: float, travel: float, limit: float, slope: float, shape: float) -> float:

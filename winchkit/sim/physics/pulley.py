@@ -32,7 +32,7 @@ def _dragged(tension: float, wrap: float, friction: float) -> float:
 class StickyPulleys(Physics):
     """Dry friction of the axles, odd in direction."""
 
-    friction: Number = 0.015
+    friction: Number = 0.01
     size: ClassVar[str] = "friction"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
@@ -44,8 +44,8 @@ class StickyPulleys(Physics):
 class PreslidingPulleys(Physics):
     """Friction that gives elastically before it slides: Dahl, over the rope's travel."""
 
-    friction: Number = 0.02
-    stiffness: Stiffness = 800.0
+    friction: Number = 0.012
+    stiffness: Stiffness = 500.0
     shape: PositiveNumber = 1.0
     size: ClassVar[str] = "friction"
     _force: dict[int, float] = field(default_factory=dict)

@@ -32,7 +32,7 @@ _WARM = 20.0
 class ElasticRope(Physics):
     """The rope is a spring of stiffness EA over all of its stressed length."""
 
-    axial_stiffness: PositiveForce = 250e3
+    axial_stiffness: PositiveForce = 300e3
     size: ClassVar[str] = "axial_stiffness"
     inverse: ClassVar[bool] = True
 

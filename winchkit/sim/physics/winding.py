@@ -164,11 +164,13 @@ class LooseGear(Physics):
     """Friction torque at the drum, N m."""
     size: ClassVar[str] = "gap"
     _ratio: float = 1.0
+    _radius: float = 0.0
     _drum: float | None = None
 
     def begin(self, profile: WinchProfile) -> None:
-        """Take the ratio."""
+        """Take the ratio and the radius at which the load pulls."""
         self._ratio = profile.gearbox.ratio
+        self._radius = profile.drum.winding_radius
 
     def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
         """Play between the gear's output angle and the drum."""
@@ -176,9 +178,8 @@ class LooseGear(Physics):
         half = self.gap / 2
         if self._drum is None:
             self._drum = driven
-        pull = state.tension * abs(state.arm) * self._ratio
         low = high = driven - half
-        if pull <= self.drag:
+        if state.load * self._radius <= self.drag:
             high = driven + half
         inside = low < self._drum < high
         self._drum = min(max(self._drum, low), high)

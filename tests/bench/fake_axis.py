@@ -1,0 +1,177 @@
+"""A drive without a bus, in simulated time: for the control loop, supervisor and motion logic."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from winchkit.bench.controller import Controller
+from winchkit.bench.loop import ControlLoop, WinchParts
+from winchkit.bench.rope import RopeMap
+from winchkit.bench.supervisor import Supervisor
+from winchkit.drivers.can.axis import AxisFeedback
+from winchkit.drivers.can.cia402 import State, Wish, control_word
+from winchkit.drivers.can.heartbeat import HeartbeatWatch
+from winchkit.drivers.modbus.reading import Quality, Reading
+from winchkit.errors import ConnectionLost
+from winchkit.schema.bench import LimitSpec
+
+CYCLE = 0.004
+_NEXT = {
+    (State.SWITCH_ON_DISABLED, 0x06): State.READY_TO_SWITCH_ON,
+    (State.READY_TO_SWITCH_ON, 0x07): State.SWITCHED_ON,
+    (State.SWITCHED_ON, 0x0F): State.OPERATION_ENABLED,
+    (State.FAULT, 0x80): State.SWITCH_ON_DISABLED,
+    (State.READY_TO_SWITCH_ON, 0x02): State.SWITCH_ON_DISABLED,
+    (State.SWITCHED_ON, 0x02): State.SWITCH_ON_DISABLED,
+}
+_STOPPING_RATE = 50.0
+
+
+class StraightLine:
+    """A drum that never changes: 1 rad of the motor winds 5 mm, 4 m free at zero."""
+
+    def cable_length(self, motor_angle: float) -> float:
+        return 4.0 - 0.005 * motor_angle
+
+    def motor_angle(self, cable_length: float) -> float:
+        return (4.0 - cable_length) / 0.005
+
+    def arm(self, motor_angle: float) -> float:
+        return 0.005
+
+
+@dataclass
+class FakeAxis:
+    """Follows speeds at once, ramps in a quick stop; ``words`` are the control words it got."""
+
+    position_mode: bool = False
+    angle: float = 0.0
+    velocity: float = 0.0
+    state: State = State.SWITCH_ON_DISABLED
+    words: list[int] = field(default_factory=list)
+    heartbeat: HeartbeatWatch = field(default_factory=lambda: HeartbeatWatch(0.2))
+    operational: bool = True
+    mode_kept: bool = True
+    fault_text: str = ""
+    alive: bool = True
+    torque: float = 0.0
+    feedback: AxisFeedback | None = None
+    _sync: tuple[int, float] = (0, 0.0)
+    _last: float | None = None
+
+    @property
+    def at_rest(self) -> bool:
+        return abs(self.velocity) < 0.05
+
+    def begin_cycle(self, sync: int, now: float) -> None:
+        """The fake has answered the SYNC before this one by now."""
+        step = 0.0 if self._last is None else now - self._last
+        self._last = now
+        if not self.alive:
+            self._sync = (sync, now)
+            return
+        self.heartbeat.receive(b"\x05", now)
+        if self.state is State.QUICK_STOP_ACTIVE:
+            change = _STOPPING_RATE * step
+            self.velocity -= math.copysign(min(change, abs(self.velocity)), self.velocity)
+            if self.velocity == 0:
+                self.state = State.SWITCH_ON_DISABLED
+        elif self.state is not State.OPERATION_ENABLED:
+            self.velocity = 0.0
+        self.angle += self.velocity * step
+        self.feedback = AxisFeedback(
+            self._sync[1], self._sync[0], self.state, 0, self.angle, self.velocity, self.torque
+        )
+        self._sync = (sync, now)
+
+    def send(self, wish: Wish, *, velocity: float = 0.0, angle: float | None = None) -> int:
+        assert self.feedback is not None
+        previous = self.words[-1] if self.words else 0
+        fresh = self.feedback.sync >= self._sync[0] - 1
+        word = control_word(
+            self.feedback.state, wish, previous=previous, fresh=fresh, at_rest=self.at_rest
+        )
+        self.words.append(word)
+        if not self.alive:
+            return word
+        if word == 0x02 and self.state is State.OPERATION_ENABLED:
+            self.state = State.QUICK_STOP_ACTIVE
+        self.state = _NEXT.get((self.state, word), self.state)
+        if self.state is State.OPERATION_ENABLED and word & 0x0F == 0x0F:
+            self.velocity = velocity
+            if self.position_mode and angle is not None:
+                self.velocity = 25.0 * (angle - self.angle)
+        return word
+
+
+@dataclass
+class FakeBus:
+    """Counts what is sent."""
+
+    fault: str | None = None
+    syncs: int = 0
+    beats: int = 0
+
+    def sync(self) -> None:
+        if self.fault:
+            raise ConnectionLost(self.fault)
+        self.syncs += 1
+
+    def heartbeat(self, node: int, state: int) -> None:
+        self.beats += 1
+
+
+@dataclass
+class FakeCell:
+    """A load cell whose value and time a test sets."""
+
+    latest: Reading | None = None
+    problem: ConnectionLost | None = None
+    max_age: float = 0.25
+
+    def read(self, value: float, now: float, quality: Quality = Quality.GOOD) -> None:
+        self.latest = Reading(value, value, quality, now, now, now, 0.0)
+
+
+class Rig:
+    """Winches with fake axes under a real loop, stepped by hand."""
+
+    def __init__(self, limits: LimitSpec, names: str = "A", *, cell: bool = True) -> None:
+        self.now = 100.0
+        self.bus = FakeBus()
+        self.axes = {name: FakeAxis() for name in names}
+        self.cells = {name: FakeCell() for name in names}
+        self.limits = limits
+        parts = {}
+        for name, axis in self.axes.items():
+            rope = RopeMap(StraightLine())
+            sensors = {"cell": self.cells[name]} if cell else {}
+            parts[name] = WinchParts(axis, rope, Controller(axis, rope, limits), sensors)
+        self.supervisor = Supervisor(dict.fromkeys(names, limits), 0.05)
+        self.loop = ControlLoop([(self.bus, 127, 0.05)], parts, self.supervisor, self, CYCLE)
+        self.tension: dict[str, float | None] = dict.fromkeys(names, 100.0)
+        self.speeds: list[float] = []
+        self.step(3)
+
+    def controller(self, name: str = "A") -> Controller:
+        return self.loop.winches[name].controller
+
+    def rope(self, name: str = "A") -> RopeMap:
+        return self.loop.winches[name].rope
+
+    def sleep(self, duration: float) -> None:
+        raise AssertionError("simulated time does not sleep")
+
+    def step(self, count: int = 1) -> None:
+        for _ in range(count):
+            self.now += CYCLE
+            for name, cell in self.cells.items():
+                value = self.tension[name]
+                if value is not None:
+                    cell.read(value, self.now)
+            self.loop.step(self.now)
+            self.speeds.append(next(iter(self.axes.values())).velocity * 0.005)
+
+    def run(self, duration: float) -> None:
+        self.step(round(duration / CYCLE))

@@ -1,0 +1,160 @@
+"""Jogs, moves and stops through the real control loop with a fake drive, in simulated time."""
+
+import math
+
+import pytest
+from fake_axis import CYCLE, Rig, StraightLine
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from winchkit.bench.motion import DEAD_MAN, Jog, Move
+from winchkit.bench.snapshot import Phase
+from winchkit.drivers.can.cia402 import State
+from winchkit.errors import NotPermitted
+from winchkit.schema.bench import LimitSpec
+
+LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0))
+ENERGISING = {0x06, 0x07}
+
+
+def jog(rig: Rig, speed: float, hold: float = DEAD_MAN) -> Jog:
+    source = Jog(rig.rope(), rig.limits)
+    source.refresh(speed, rig.now + hold)
+    rig.controller().begin(source)
+    return source
+
+
+def test_a_jog_without_refresh_ends_by_itself_and_disables() -> None:
+    rig = Rig(LIMITS)
+    jog(rig, 0.1)
+    rig.run(0.15)
+    assert rig.speeds[-1] == pytest.approx(0.1)
+    rig.run(0.3)
+    assert rig.axes["A"].velocity == 0
+    assert rig.controller().phase is Phase.DISABLED
+    assert rig.axes["A"].state is State.SWITCH_ON_DISABLED
+    moved = 4.0 - rig.rope().at(rig.axes["A"].angle)[0]
+    assert 0 < moved <= 0.1 * (DEAD_MAN + 0.1)
+
+
+def test_a_refreshed_jog_goes_on_and_its_speed_ramps() -> None:
+    rig = Rig(LIMITS)
+    source = jog(rig, 0.3)
+    for _ in range(20):
+        source.refresh(0.3, rig.now + DEAD_MAN)
+        rig.run(0.1)
+    assert rig.speeds[-1] == pytest.approx(0.3)
+    changes = [abs(b - a) for a, b in zip(rig.speeds, rig.speeds[1:], strict=False)]
+    assert max(changes) <= LIMITS.acceleration * CYCLE * 1.001
+
+
+def test_a_jog_slows_down_before_a_length_limit() -> None:
+    rig = Rig(LimitSpec(0.5, 1.0, (3.8, 9.0)))
+    source = jog(rig, 0.5)
+    for _ in range(20):
+        source.refresh(0.5, rig.now + DEAD_MAN)
+        rig.run(0.1)
+    length = rig.rope().at(rig.axes["A"].angle)[0]
+    assert 3.8 - 1e-3 <= length < 3.81
+    assert not rig.supervisor.tripped
+
+
+@pytest.mark.parametrize("position_mode", [False, True])
+@pytest.mark.parametrize("target", [3.0, 4.8, 4.0])
+def test_a_move_arrives(target: float, position_mode: bool) -> None:
+    rig = Rig(LIMITS)
+    rig.axes["A"].position_mode = position_mode
+    move = Move(StraightLine(), LIMITS, target, speed=0.4)
+    move.prepare(0.0)
+    rig.controller().begin(move)
+    rig.run(move.duration + 1.2)
+    length = 4.0 - 0.005 * rig.axes["A"].angle
+    assert length == pytest.approx(target, abs=1e-3)
+    assert max(map(abs, rig.speeds)) <= 0.5
+    assert rig.controller().done
+    assert rig.controller().phase is Phase.DISABLED
+
+
+def test_a_held_move_stays_enabled_until_stopped() -> None:
+    rig = Rig(LIMITS)
+    move = Move(StraightLine(), LIMITS, 3.5, holds=True)
+    move.prepare(0.0)
+    rig.controller().begin(move)
+    rig.run(move.duration + 2.0)
+    assert rig.controller().done
+    assert rig.axes["A"].state is State.OPERATION_ENABLED
+    rig.controller().run_down()
+    rig.run(0.1)
+    assert rig.controller().phase is Phase.DISABLED
+
+
+def test_a_move_begun_during_a_jog_waits_for_rest_and_no_speed_jumps() -> None:
+    rig = Rig(LIMITS)
+    jog(rig, 0.3, hold=1.0)
+    rig.run(0.5)
+    move = Move(StraightLine(), LIMITS, 4.2)
+    rig.controller().begin(move)
+    rig.run(4.0)
+    assert 4.0 - 0.005 * rig.axes["A"].angle == pytest.approx(4.2, abs=1e-3)
+    changes = [abs(b - a) for a, b in zip(rig.speeds, rig.speeds[1:], strict=False)]
+    assert max(changes) <= 0.02
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    orders=st.lists(
+        st.tuples(st.sampled_from(["jog", "stop", "run_down", "wait"]), st.floats(0.0, 0.3)),
+        min_size=1,
+        max_size=12,
+    )
+)
+def test_after_a_stop_nothing_energises_whatever_came_before(
+    orders: list[tuple[str, float]],
+) -> None:
+    rig = Rig(LIMITS)
+    for order, duration in orders:
+        if order == "jog":
+            jog(rig, 0.4, hold=0.5)
+        elif order == "stop":
+            rig.controller().stop()
+        elif order == "run_down":
+            rig.controller().run_down()
+        rig.run(duration)
+    axis = rig.axes["A"]
+    rig.controller().stop()
+    before = len(axis.words)
+    rig.run(3.0)
+    assert not ENERGISING & set(axis.words[before:])
+    assert 0x0F not in axis.words[before:]
+    assert axis.state is State.SWITCH_ON_DISABLED
+    assert rig.controller().phase is Phase.DISABLED
+
+
+@settings(max_examples=40, deadline=None)
+@given(moment=st.floats(0.0, 1.0))
+def test_a_run_down_with_stale_feedback_becomes_a_quick_stop(moment: float) -> None:
+    """0Fh is repeated during a ramp only while this cycle's status word says enabled."""
+    rig = Rig(LIMITS)
+    jog(rig, 0.5, hold=1.0)
+    rig.run(moment)
+    axis = rig.axes["A"]
+    axis.alive = False
+    rig.controller().run_down()
+    rig.step(3)
+    before = len(axis.words)
+    rig.run(0.2)
+    assert not {0x06, 0x07, 0x0F} & set(axis.words[before:])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"length": 9.5}, "beyond the limits"),
+        ({"length": 5.0, "speed": 0.6}, "limit of 0.5 m/s"),
+        ({"length": 5.0, "acceleration": -1.0}, "limit of 1 m/s"),
+        ({"length": math.nan}, "beyond the limits"),
+    ],
+)
+def test_moves_beyond_the_limits_are_refused(arguments: dict[str, float], words: str) -> None:
+    with pytest.raises(NotPermitted, match=words):
+        Move(StraightLine(), LIMITS, **arguments)  # type: ignore[arg-type]

@@ -1,0 +1,155 @@
+"use strict";
+(() => {
+  const plots = JSON.parse(document.getElementById("plots").textContent);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const print = matchMedia("print");
+  const HEIGHT = 240;
+  const PRINTED = 640;
+  let drawn = [];
+
+  const colour = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  const short = value => (value == null ? "–" : String(+value.toPrecision(4)).replace("-", "−"));
+
+  function noiseBand(u, noise) {
+    if (!noise) return;
+    const top = Math.max(u.valToPos(noise, "y", true), u.bbox.top);
+    const bottom = Math.min(u.valToPos(-noise, "y", true), u.bbox.top + u.bbox.height);
+    u.ctx.save();
+    u.ctx.fillStyle = colour("noise");
+    u.ctx.fillRect(u.bbox.left, top, u.bbox.width, bottom - top);
+    u.ctx.restore();
+  }
+
+  function runMarks(u, marks) {
+    const ctx = u.ctx, ratio = devicePixelRatio, right = u.bbox.left + u.bbox.width;
+    ctx.save();
+    ctx.font = `${11 * ratio}px system-ui, sans-serif`;
+    ctx.fillStyle = colour("quiet");
+    ctx.strokeStyle = colour("line");
+    ctx.lineWidth = ratio;
+    ctx.textBaseline = "bottom";
+    marks.forEach((mark, n) => {
+      const from = u.valToPos(mark.at, "x", true);
+      const to = n + 1 < marks.length ? u.valToPos(marks[n + 1].at, "x", true) : right;
+      if (from < u.bbox.left - 1 || from > right) return;
+      if (n > 0) {
+        ctx.beginPath();
+        ctx.moveTo(from, u.bbox.top);
+        ctx.lineTo(from, u.bbox.top + u.bbox.height);
+        ctx.stroke();
+      }
+      let name = mark.name;
+      const room = to - from - 4 * ratio;
+      while (name.length > 2 && ctx.measureText(name).width > room) name = name.slice(0, -2) + "…";
+      if (name.length > 2) ctx.fillText(name, from + 3 * ratio, u.bbox.top - 2 * ratio);
+    });
+    ctx.restore();
+  }
+
+  function tooltip(plot) {
+    const tip = document.createElement("div");
+    tip.className = "tip";
+    tip.hidden = true;
+    return {
+      hooks: {
+        init: u => u.over.appendChild(tip),
+        setCursor: u => {
+          const { left, top, idxs } = u.cursor;
+          const lines = u.series.slice(1)
+            .map((series, n) => [series, idxs && idxs[n + 1]])
+            .filter(([series, at]) => series.show && at != null)
+            .map(([series, at]) => `${series.label}: ${short(u.data[u.series.indexOf(series)][at])} ${plot.unit}`);
+          tip.hidden = left < 0 || !lines.length;
+          if (tip.hidden) return;
+          tip.textContent = [`${plot.xLabel.split(" [")[0].split(",")[0]} ${short(u.posToVal(left, "x"))}`, ...lines].join("\n");
+          const right = left > u.over.clientWidth / 2;
+          tip.style.left = right ? "" : `${left + 12}px`;
+          tip.style.right = right ? `${u.over.clientWidth - left + 12}px` : "";
+          tip.style.top = `${Math.min(Math.max(top - 10, 0), u.over.clientHeight - 60)}px`;
+        },
+      },
+    };
+  }
+
+  function nearest(u, series, at) {
+    const values = u.data[series];
+    for (let away = 0; away < values.length; away++) {
+      if (values[at - away] != null) return at - away;
+      if (values[at + away] != null) return at + away;
+    }
+    return null;
+  }
+
+  function seriesOf(plot) {
+    const faint = plot.kind === "over";
+    const lines = plot.series.map(one => ({
+      label: faint ? `${one.name}, samples` : one.name,
+      stroke: colour(one.name) + (faint ? "59" : ""),
+      width: 1,
+      paths: faint ? () => null : undefined,
+      points: faint
+        ? { show: true, size: 4, width: 0, fill: colour(one.name) + "59", stroke: "transparent" }
+        : { show: false },
+    }));
+    const means = (plot.means || []).map(one => ({
+      label: `${one.name}, mean`,
+      stroke: colour(one.name),
+      width: 2,
+      spanGaps: true,
+      points: { show: true, size: 6, fill: colour(one.name), stroke: colour(one.name) },
+    }));
+    return [{}, ...lines, ...means];
+  }
+
+  function options(plot, width) {
+    const axis = {
+      stroke: colour("quiet"),
+      font: "11px system-ui, sans-serif",
+      labelFont: "12px system-ui, sans-serif",
+      labelSize: 18,
+      labelGap: 0,
+      grid: { stroke: colour("line"), width: 1 },
+      ticks: { stroke: colour("line"), width: 1, size: 4 },
+    };
+    const values = (u, ticks) => ticks.map(tick => (tick == null ? "" : short(tick)));
+    return {
+      width,
+      height: HEIGHT,
+      padding: [plot.marks ? 18 : 10, 10, 0, 0],
+      scales: { x: { time: false, distr: plot.log ? 3 : 1 } },
+      axes: [
+        { ...axis, label: plot.xLabel, size: 30, values },
+        { ...axis, label: plot.yLabel, size: 48, values },
+      ],
+      series: seriesOf(plot),
+      legend: { live: false },
+      cursor: { dataIdx: nearest, y: false, points: { size: 6 } },
+      hooks: {
+        drawClear: [u => noiseBand(u, plot.noise)],
+        drawAxes: [u => plot.marks && runMarks(u, plot.marks)],
+      },
+      plugins: [tooltip(plot)],
+    };
+  }
+
+  function draw(printed) {
+    drawn.forEach(u => u.destroy());
+    drawn = [...document.querySelectorAll("[data-plot]")].map(place => {
+      const plot = plots[place.dataset.plot];
+      const columns = [plot.x, ...plot.series.map(s => s.values), ...(plot.means || []).map(s => s.values)];
+      const width = printed ? PRINTED : place.clientWidth;
+      return new uPlot(options(plot, width), columns, place);
+    });
+  }
+
+  draw(false);
+  dark.addEventListener("change", () => draw(print.matches));
+  print.addEventListener("change", () => draw(print.matches));
+  let wait = 0;
+  addEventListener("resize", () => {
+    clearTimeout(wait);
+    wait = setTimeout(() => {
+      if (!print.matches) drawn.forEach(u => u.setSize({ width: u.root.parentElement.clientWidth, height: HEIGHT }));
+    }, 80);
+  });
+})();

@@ -1,0 +1,30 @@
+"""Plain-text columns for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import wrap
+
+__all__ = ["aligned", "paragraph"]
+
+_WIDTH = 96
+
+
+def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
+    """Rows indented by two, the first ``words`` columns flush left and the others flush right."""
+    if not rows:
+        return []
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = [
+            cell.ljust(width) if at < words else cell.rjust(width)
+            for at, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  " + "  ".join(cells).rstrip())
+    return lines
+
+
+def paragraph(text: str, first: str = "", then: str = "") -> list[str]:
+    """Text in lines of at most 96 characters."""
+    return wrap(text, _WIDTH, initial_indent=first, subsequent_indent=then) or [first.rstrip()]

@@ -1,0 +1,225 @@
+"""The curves of a report: residuals before and after, over time and over what they follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.follows import Followed, follows, harmonics, variables_of
+from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.report_phrases import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.diagnosis.report_thin import bin_means, thin, thin_points
+from winchkit.diagnosis.wording import Scale, percent, scale_for
+
+__all__ = ["OutputPlots", "Plot", "plots_of"]
+
+Array = NDArray[np.float64]
+_POINTS = 2000
+_DOTS = 600
+_BINS = 20
+_WORTH_DRAWING = 0.05
+_CLEAR_ORDER = 0.2
+_DIGITS = 4
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One drawing: what the page's script needs, and words for who cannot see it."""
+
+    id: str
+    caption: str
+    data: dict[str, Any]
+    """Plain lists and texts: ``x``, ``series``, labels, scale, marks."""
+
+
+@dataclass(frozen=True)
+class OutputPlots:
+    """The drawings of one output."""
+
+    output: str
+    scale: Scale
+    over_time: Plot
+    over_variable: Plot | None
+    """None where the residual follows nothing that was measured."""
+
+
+@dataclass(frozen=True)
+class _Residuals:
+    """Residuals of one output, all its runs one after another, in the unit shown."""
+
+    output: str
+    scale: Scale
+    runs: tuple[int, ...]
+    before: tuple[Array, ...]
+    after: tuple[Array, ...] | None
+    noise: float | None
+
+
+def plots_of(answer: Answer) -> tuple[OutputPlots, ...]:
+    """Drawings per output; ``after`` only where the diagnosis names effects."""
+    problem = answer.inquiry.problem
+    begin = answer.found.begin.residual
+    strongest = _strongest(problem, begin)
+    out = []
+    for output in problem.dataset.outputs:
+        residuals = _residuals(answer, output)
+        followed = strongest.get(output)
+        out.append(
+            OutputPlots(
+                output,
+                residuals.scale,
+                _over_time(problem, residuals),
+                _over_variable(problem, residuals, followed) if followed else None,
+            )
+        )
+    return tuple(out)
+
+
+def _strongest(problem: Problem, residual: Array) -> dict[str, Followed]:
+    """Per output what to draw its residual over: a clear order, else the largest share."""
+    orders = [f for f in harmonics(problem, residual) if f.share > _CLEAR_ORDER]
+    trends = [f for f in follows(problem, residual) if f.share > _WORTH_DRAWING]
+    out: dict[str, Followed] = {}
+    for found in (*sorted(orders, key=lambda f: -f.share), *sorted(trends, key=lambda f: -f.share)):
+        known = out.get(found.output)
+        if known is None or (known.order is not None and found.share > 2 * known.share):
+            out[found.output] = found
+    return out
+
+
+def _residuals(answer: Answer, output: str) -> _Residuals:
+    problem, diagnosis = answer.inquiry.problem, answer.diagnosis
+    recordings = problem.dataset.recordings
+    own = [i for i, s in enumerate(problem.segments) if s.output == output]
+
+    def in_runs(rows: Array) -> tuple[Array, ...]:
+        times = problem.in_time(rows)
+        return tuple(
+            np.where(recordings[problem.segments[i].run].valid[output], times[i], np.nan)
+            for i in own
+        )
+
+    before = in_runs(answer.found.begin.residual)
+    after = in_runs(answer.found.final.residual) if diagnosis.steps else None
+    fit = diagnosis.outputs[output]
+    scale = scale_for(3 * fit.rms_before, fit.unit)
+    return _Residuals(
+        output,
+        scale,
+        tuple(problem.segments[i].run for i in own),
+        tuple(part / scale.worth for part in before),
+        None if after is None else tuple(part / scale.worth for part in after),
+        None if fit.noise_rms is None else fit.noise_rms / scale.worth,
+    )
+
+
+def _over_time(problem: Problem, residuals: _Residuals) -> Plot:
+    """All runs one after another, at most ``_POINTS`` samples."""
+    recordings = problem.dataset.recordings
+    share = max(2, _POINTS // len(residuals.runs))
+    parts: list[tuple[Array, list[Array]]] = []
+    marks, begin = [], 0.0
+    for position, run in enumerate(residuals.runs):
+        time = recordings[run].signals.time - recordings[run].signals.time[0]
+        marks.append({"at": _number(begin), "name": recordings[run].name})
+        lines = [residuals.before[position]]
+        if residuals.after is not None:
+            lines.append(residuals.after[position])
+        parts.append(thin(begin + time, lines, share))
+        begin += float(time[-1]) + recordings[run].bands[residuals.output].rate ** -1
+    x = np.concatenate([part[0] for part in parts])
+    lines = [np.concatenate([part[1][i] for part in parts]) for i in range(len(parts[0][1]))]
+    name = OUTPUT_NAMES.get(residuals.output, residuals.output)
+    return Plot(
+        f"time-{residuals.output}",
+        f"Residual of the {name} over time, all runs one after another.",
+        {
+            "kind": "time",
+            "x": _numbers(x, 6),
+            "xLabel": "time, runs one after another [s]",
+            "yLabel": _labelled("residual", residuals.scale.label),
+            "unit": residuals.scale.label,
+            "series": _series(lines),
+            "marks": marks,
+            "noise": None if residuals.noise is None else _number(residuals.noise),
+        },
+    )
+
+
+def _over_variable(problem: Problem, residuals: _Residuals, followed: Followed) -> Plot | None:
+    """Samples as dots and means over bins as lines."""
+    variable, label, logarithmic = _axis(problem, residuals, followed)
+    before = np.concatenate(residuals.before)
+    lines = [before] if residuals.after is None else [before, np.concatenate(residuals.after)]
+    good = np.isfinite(before) & np.isfinite(variable)
+    x, lines = variable[good], [line[good] for line in lines]
+    dots = thin_points(x, _DOTS)
+    centres, means = bin_means(x, lines, _BINS)
+    whole = np.concatenate([x[dots], centres])
+    order = np.argsort(whole, kind="stable")
+    nothing_here, nothing_there = np.full(len(centres), np.nan), np.full(len(dots), np.nan)
+    drawn = [np.concatenate([line[dots], nothing_here])[order] for line in lines]
+    binned = [np.concatenate([nothing_there, mean])[order] for mean in means]
+    output = OUTPUT_NAMES.get(residuals.output, residuals.output)
+    name = VARIABLE_NAMES.get(followed.variable, followed.variable)
+    often = "" if followed.order is None else f", {followed.order} per turn"
+    return Plot(
+        f"over-{residuals.output}",
+        f"Residual of the {output} over the {name}{often}, which takes "
+        f"{percent(followed.share)} of it. Dots are samples, lines their means.",
+        {
+            "kind": "over",
+            "x": _numbers(whole[order], 5),
+            "xLabel": label,
+            "yLabel": _labelled("residual", residuals.scale.label),
+            "unit": residuals.scale.label,
+            "series": _series(drawn),
+            "means": _series(binned),
+            "log": logarithmic,
+            "noise": None if residuals.noise is None else _number(residuals.noise),
+        },
+    )
+
+
+def _axis(problem: Problem, residuals: _Residuals, followed: Followed) -> tuple[Array, str, bool]:
+    """Values of a variable along the runs as people read them, its label, and if it is a power."""
+    recordings = problem.dataset.recordings
+    values = np.concatenate(
+        [variables_of(recordings[run])[followed.variable] for run in residuals.runs]
+    )
+    name = VARIABLE_NAMES.get(followed.variable, followed.variable)
+    if followed.order is not None:
+        return np.mod(values, _TURN) / _TURN * 360, f"{name} within its turn [°]", False
+    if followed.variable in {"drum_angle", "motor_angle"}:
+        return values / _TURN, f"{name} [turns]", False
+    if followed.variable == "reversal_distance":
+        return 10.0**values, f"{name} [m]", True
+    if followed.variable == "direction":
+        return values, "direction (1 winds in, −1 pays out)", False
+    unit = {"speed": "m/s", "cable_length": "m", "time": "s", "temperature": "°C"}
+    return values, f"{name} [{unit.get(followed.variable, 'N')}]", False
+
+
+def _series(lines: list[Array]) -> list[dict[str, Any]]:
+    names = ("before", "after")
+    return [
+        {"name": name, "values": _numbers(line)} for name, line in zip(names, lines, strict=False)
+    ]
+
+
+def _labelled(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _numbers(values: Array, digits: int = _DIGITS) -> list[float | None]:
+    """Values to a few significant digits; None for NaN."""
+    return [_number(float(v), digits) if np.isfinite(v) else None for v in values]
+
+
+def _number(value: float, digits: int = _DIGITS) -> float:
+    return float(f"{value:.{digits}g}")

@@ -1,0 +1,68 @@
+"""What runs could have shown, in words: from which size on an effect would have been seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isclose, isinf
+
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.report_phrases import parameter_name, parameter_unit
+from winchkit.diagnosis.result import Detectable
+from winchkit.diagnosis.wording import quantity
+from winchkit.effects.effect import Effect, Parameter
+
+__all__ = ["Visible", "effects_of", "smallest_shown", "visible"]
+
+_FEW = 4
+
+
+@dataclass(frozen=True)
+class Visible:
+    """One effect and the size from which on these runs would have shown it."""
+
+    effect: str
+    parameter: str
+    text: str
+    share: float
+    """Of the usual size; NaN where no size within the bounds would have been seen."""
+
+
+def effects_of(answer: Answer) -> dict[str, Effect]:
+    """Every effect that a diagnosis tried or has, by id."""
+    tried = {score.atom.effect.id: score.atom.effect for score in answer.found.scores}
+    present = {t.effect.id: t.effect for t in answer.found.final.hypothesis.terms}
+    return tried | present
+
+
+def visible(answer: Answer) -> list[Visible]:
+    """All effects of a diagnosis, those that would have been seen soonest first."""
+    effects = effects_of(answer)
+    rows = [
+        _row(item, effects[item.effect].parameter(item.parameter))
+        for item in answer.diagnosis.detectable
+        if item.effect in effects
+    ]
+    return sorted(rows, key=lambda row: (row.share != row.share, row.share))
+
+
+def smallest_shown(answer: Answer) -> list[str]:
+    """A few words each on the effects that these runs would have shown soonest."""
+    seen = [row for row in visible(answer) if row.share == row.share]
+    return [f"{row.effect}: {row.parameter} {row.text}" for row in seen[:_FEW]]
+
+
+def _row(item: Detectable, parameter: Parameter) -> Visible:
+    name = parameter_name(item.parameter)
+    unit = parameter_unit(item.parameter, item.unit)
+    at_end = any(
+        isclose(item.smallest, end, rel_tol=1e-6) for end in (parameter.low, parameter.high)
+    )
+    if at_end:
+        return Visible(item.effect, name, "at no size within its bounds", float("nan"))
+    shown = quantity(item.smallest, unit, digits=2)
+    if parameter.reciprocal or isinf(parameter.null):
+        share = parameter.typical / item.smallest
+        return Visible(item.effect, name, f"up to {shown}", share)
+    share = abs((item.smallest - parameter.null) / (parameter.typical - parameter.null))
+    sense = "from" if item.smallest >= parameter.null else "below"
+    return Visible(item.effect, name, f"{sense} {shown}", share)

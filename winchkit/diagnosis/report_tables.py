@@ -1,0 +1,174 @@
+"""The tables of a report: figures, waterfall, candidates, confusion, what could be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import chain
+from math import degrees, isfinite
+
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.report_markup import Markup, details, element, join, table
+from winchkit.diagnosis.report_phrases import (
+    OUTPUT_NAMES,
+    clause,
+    estimate_text,
+    listed,
+    parameter_name,
+)
+from winchkit.diagnosis.report_power import visible
+from winchkit.diagnosis.report_waterfall import Waterfall
+from winchkit.diagnosis.result import Candidate, Diagnosis, OutputFit
+from winchkit.diagnosis.wording import Scale, scale_for, significant
+from winchkit.effects.effect import Effect
+
+__all__ = ["candidates", "confusion", "detectable", "figures", "named", "output_scale", "waterfall"]
+
+_TOP = 10
+
+
+def output_scale(output: OutputFit) -> Scale:
+    """One scale for all errors of an output."""
+    return scale_for(output.heldout_rms_before, output.unit)
+
+
+def figures(diagnosis: Diagnosis) -> Markup:
+    """Held-out error before and after per output, beside the noise."""
+    grown = bool(diagnosis.steps)
+    head = ["output", "measured, rms", "error before"]
+    head += ["error after"] if grown else []
+    rows = []
+    for name, output in diagnosis.outputs.items():
+        scale = output_scale(output)
+        last = output.heldout_rms_after if grown else output.heldout_rms_before
+        row = [OUTPUT_NAMES.get(name, name), scale_for(output.signal_rms, output.unit)]
+        cells = [str(row[0]), scale_for(output.signal_rms, output.unit).text(output.signal_rms)]
+        cells.append(scale.text(output.heldout_rms_before))
+        if grown:
+            cells.append(scale.text(last))
+        noise = output.noise_rms
+        cells.append("unknown" if noise is None else scale.text(noise))
+        cells.append(f"{last / noise:.2f}" if noise else "–")
+        rows.append(cells)
+    caption = "Held-out error, rms: each group of runs predicted with values fitted without it."
+    return table(caption, [*head, "noise", "error / noise"], rows)
+
+
+def named(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
+    """What every named effect is, with its formula, values and source."""
+    entries: list[Markup] = []
+    for effect_id in chain.from_iterable(step.effects for step in diagnosis.steps):
+        effect = effects.get(effect_id)
+        step = next(s for s in diagnosis.steps if effect_id in s.effects)
+        values = [estimate_text(n, e) for n, e in step.parameters.get(effect_id, {}).items()]
+        entries.append(element("dt", element("code", effect_id), " ", ", ".join(values)))
+        if effect is not None:
+            words = join([effect.what, " ", element("span", effect.formula, class_="formula")])
+            entries.append(element("dd", words, element("small", f"Source: {effect.source}")))
+    return element("dl", *entries, class_="named") if entries else Markup("")
+
+
+def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
+    """Bars of held-out error per rung beside the noise floor."""
+    if ladder is None:
+        return Markup("")
+    outputs = dict(diagnosis.outputs)
+    head = ["model", *(OUTPUT_NAMES.get(name, name) for name in outputs)]
+    rungs = [[label, *_bars(errors, outputs)] for label, errors in ladder.rungs]
+    out = [
+        table("Held-out error, rms, as the model grew. The mark is the noise.", head, rungs),
+    ]
+    if len(ladder.first) > 1:
+        alone = [[f"only {n}", *_bars(e, outputs)] for n, e in ladder.first.items()]
+        without = [[f"all but {n}", *_bars(e, outputs)] for n, e in ladder.last.items()]
+        caption = "Each effect added first, alone; and each dropped last, all others kept."
+        out.append(table(caption, head, [*alone, *without]))
+    return join(out)
+
+
+def _bars(errors: Mapping[str, float], outputs: Mapping[str, OutputFit]) -> list[Markup]:
+    return [_bar(errors[name], output) for name, output in outputs.items()]
+
+
+def _bar(error: float, output: OutputFit) -> Markup:
+    """A bar to the scale of the error at the start, the noise marked on it."""
+    full = 1.05 * max(output.heldout_rms_before, output.noise_rms or 0.0)
+    inside = [element("span", class_="fill", style=f"width:{_part(error, full)}%")]
+    if output.noise_rms:
+        floor = f"left:{_part(output.noise_rms, full)}%"
+        inside.append(element("span", class_="floor", style=floor))
+    track = element("span", *inside, class_="track", aria_hidden="true")
+    return join([track, element("span", output_scale(output).text(error), class_="value")])
+
+
+def _part(value: float, full: float) -> str:
+    share = 100 * value / full if full > 0 and isfinite(value) else 0.0
+    return f"{min(max(share, 0.0), 100.0):.1f}"
+
+
+def candidates(answer: Answer) -> Markup:
+    """Every effect that was tried beside the profile, the strongest evidence first."""
+    diagnosis = answer.diagnosis
+    ranked = diagnosis.candidates
+    if not ranked:
+        return Markup("")
+    outputs = diagnosis.outputs
+    scales = {name: output_scale(output) for name, output in outputs.items()}
+    head = ["effect", "what it would mean", "evidence"]
+    head += [f"{OUTPUT_NAMES.get(n, n)} [{scale.label}]" for n, scale in scales.items()]
+    rows = [_candidate(candidate, scales) for candidate in ranked]
+    caption = (
+        "Evidence: whitened squares that an effect saves, less the price of its freedom; noise "
+        f"alone reaches {significant(max(answer.found.threshold, 0.0), 2)} once in a hundred cases. "
+        "Held-out error with it alone, where its evidence earned a fit."
+    )
+    top = table(caption, head, rows[:_TOP], words=2)
+    if len(rows) <= _TOP:
+        return top
+    rest = table("The remaining effects.", head, rows[_TOP:], words=2)
+    return join([top, details(f"{len(rows) - _TOP} more, with less evidence", rest)])
+
+
+def _candidate(candidate: Candidate, scales: Mapping[str, Scale]) -> list[str]:
+    errors = [
+        significant(candidate.heldout_rms[name] / scale.worth)
+        if name in candidate.heldout_rms
+        else "–"
+        for name, scale in scales.items()
+    ]
+    score = f"{candidate.score:,.0f}".replace(",", " ").replace("-", "−")
+    return [element("code", candidate.effect), clause(candidate.effect), score, *errors]
+
+
+def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
+    """Sets that these runs cannot tell apart, with the angles between their signatures."""
+    out: list[Markup] = []
+    for step in diagnosis.steps:
+        if len(step.effects) < 2:
+            continue
+        rows = []
+        for effect_id in step.effects:
+            values = [estimate_text(n, e) for n, e in step.parameters.get(effect_id, {}).items()]
+            angle = step.angles.get(effect_id)
+            shown = "–" if angle is None else f"{degrees(angle):.1f}°"
+            effect = effects.get(effect_id)
+            tell = effect.told_apart if effect is not None else ""
+            rows.append([element("code", effect_id), ", ".join(values), tell, shown])
+        head = ["effect", "fitted values", "told apart by", "angle"]
+        caption = (
+            f"These runs cannot tell {listed(list(step.effects))} apart. The angle is that between "
+            "the signatures of a rival and of the effect that the search took (–): 0° look alike."
+        )
+        out.append(table(caption, head, rows, words=3))
+    return join(out)
+
+
+def detectable(answer: Answer) -> Markup:
+    """What these runs could have shown at all, and how small."""
+    rows = [
+        [element("code", row.effect), parameter_name(row.parameter), row.text]
+        for row in visible(answer)
+    ]
+    if not rows:
+        return Markup("")
+    caption = "The smallest size of each effect that these runs would have shown in 9 of 10 cases."
+    return table(caption, ["effect", "parameter", "seen from"], rows, words=2)

@@ -1,0 +1,119 @@
+"""Numbers as people read them: a prefix by size, digits by the standard deviation.
+
+SI comes in; ``"247.4 ± 6.1 kN"`` goes out. Nothing is rounded before it gets here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import floor, isfinite, isnan, log10
+
+__all__ = ["Scale", "percent", "quantity", "scale_for", "significant", "with_std"]
+
+_DEG = 57.29577951308232
+_LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
+    "m": ((1e-4, "µm", 1e-6), (1.0, "mm", 1e-3), (float("inf"), "m", 1.0)),
+    "m/s": ((0.1, "mm/s", 1e-3), (float("inf"), "m/s", 1.0)),
+    "N": ((0.01, "mN", 1e-3), (1e3, "N", 1.0), (1e6, "kN", 1e3), (float("inf"), "MN", 1e6)),
+    "N m": ((0.1, "mN m", 1e-3), (1e3, "N m", 1.0), (float("inf"), "kN m", 1e3)),
+    "N/m": ((1e3, "N/m", 1.0), (1e6, "N/mm", 1e3), (float("inf"), "kN/mm", 1e6)),
+    "N/s": ((1e-3, "N/h", 1 / 3600), (0.1, "N/min", 1 / 60), (float("inf"), "N/s", 1.0)),
+    "N/K": ((0.1, "mN/K", 1e-3), (float("inf"), "N/K", 1.0)),
+    "N s/m": ((1e3, "N s/m", 1.0), (float("inf"), "kN s/m", 1e3)),
+    "N m s": ((0.1, "mN m s", 1e-3), (float("inf"), "N m s", 1.0)),
+    "kg": ((0.1, "g", 1e-3), (float("inf"), "kg", 1.0)),
+    "kg/m": ((0.1, "g/m", 1e-3), (float("inf"), "kg/m", 1.0)),
+    "kg m^2": ((1e-7, "g cm²", 1e-7), (0.1, "kg cm²", 1e-4), (float("inf"), "kg m²", 1.0)),
+    "s": ((1e-3, "µs", 1e-6), (1.0, "ms", 1e-3), (float("inf"), "s", 1.0)),
+    "rad": ((1e-3, "mrad", 1e-3), (float("inf"), "°", 1 / _DEG)),
+    "1/K": ((1e-2, "·10⁻⁶/K", 1e-6), (float("inf"), "/K", 1.0)),
+    "degC": ((float("inf"), "°C", 1.0),),
+    "%": ((float("inf"), "%", 1e-2),),
+    "1": ((float("inf"), "", 1.0),),
+}
+"""Per SI unit: below which size which label, and the label's worth in SI."""
+_SIGNS = str.maketrans("-", "−")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A unit to show values in."""
+
+    label: str
+    worth: float
+    """SI value of one of it."""
+
+    def text(self, value: float, digits: int = 3) -> str:
+        """A value with its unit; ``unknown`` where it is NaN."""
+        if isnan(value):
+            return "unknown"
+        return self.labelled(significant(value / self.worth, digits))
+
+    def labelled(self, number: str) -> str:
+        """A number already written, with the unit behind it."""
+        tight = self.label in {"", "°", "/K"} or self.label.startswith("·")
+        return f"{number}{self.label}" if tight else f"{number} {self.label}"
+
+
+def scale_for(sizes: float | Sequence[float], unit: str) -> Scale:
+    """The scale in which the largest of some SI sizes reads well; an unknown unit stays itself."""
+    values = [sizes] if isinstance(sizes, int | float) else sizes
+    size = max((abs(v) for v in values if isfinite(v)), default=0.0)
+    ladder = _LADDERS.get(unit, ((float("inf"), unit, 1.0),))
+    if size == 0.0:
+        label, worth = next(((n, w) for _, n, w in ladder if w == 1.0), ladder[-1][1:])
+        return Scale(label, worth)
+    label, worth = next((n, w) for below, n, w in ladder if size < below)
+    return Scale(label, worth)
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """An SI value in its best unit: ``quantity(0.00163, "m") == "1.63 mm"``."""
+    return scale_for(value, unit).text(value, digits)
+
+
+def with_std(value: float, std: float, unit: str) -> str:
+    """Value and standard deviation, the latter to two digits: ``247.4 ± 6.1 kN``.
+
+    Without a deviation (NaN or zero) the value alone, to three digits.
+    """
+    if not isfinite(value) or not isfinite(std) or std <= 0:
+        return quantity(value, unit)
+    scale = scale_for(max(abs(value), std), unit)
+    shown, deviation = value / scale.worth, std / scale.worth
+    decimals = 1 - floor(log10(deviation))
+    if round(deviation, decimals) >= 10 ** (2 - decimals):
+        decimals -= 1
+    both = f"{_fixed(shown, decimals)} ± {_fixed(deviation, decimals)}"
+    return f"({both}){scale.label}" if scale.label.startswith("·") else scale.labelled(both)
+
+
+def percent(share: float) -> str:
+    """A share as per cent: ``0.934`` is ``93 %``; ``unknown`` where it is NaN."""
+    if isnan(share):
+        return "unknown"
+    shown = 100 * share
+    if 0 < shown < 0.1:
+        return "under 0.1 %"
+    return f"{_fixed(shown, 0 if abs(shown) >= 10 else 1)} %"
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number to some significant digits, never in powers of ten between 1e-6 and 1e9."""
+    if isnan(value):
+        return "unknown"
+    if not isfinite(value):
+        return "∞" if value > 0 else "−∞"
+    if value == 0:
+        return "0"
+    exponent = floor(log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if not -6 <= exponent < 9:
+        return f"{value:.{digits - 1}e}".translate(_SIGNS)
+    return _fixed(value, digits - 1 - exponent)
+
+
+def _fixed(value: float, decimals: int) -> str:
+    """A number with a fixed count of decimals; negative ones round before the point."""
+    rounded = round(value, decimals) + 0.0
+    return f"{rounded:.{max(decimals, 0)}f}".translate(_SIGNS)

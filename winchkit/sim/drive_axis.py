@@ -1,0 +1,100 @@
+"""The axis of a simulated drive: moves the shaft slice by slice and feeds back what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import ceil, inf
+
+from winchkit.sim.drive_motion import Motion
+from winchkit.sim.drive_power import PowerStage
+from winchkit.sim.drive_shaft import Shaft
+from winchkit.sim.drive_status import StatusBits
+from winchkit.sim.drive_units import wrapped
+from winchkit.sim.object_dictionary import ObjectDictionary
+
+__all__ = ["Axis"]
+
+_MAX_SLICE = 1e-3
+_MIN_SLICE = 2e-5
+_UNWATCHED = 0xFFFFFFFF
+_MS = 1e-3
+
+
+class Axis:
+    """Motion and feedback on one time line, which begins at ``now``.
+
+    ``following_failed`` is called while the following error (60F4h) has been beyond its window
+    (6065h) for longer than 6066h allows.
+    """
+
+    def __init__(
+        self,
+        objects: ObjectDictionary,
+        shaft: Shaft,
+        power: PowerStage,
+        motion: Motion,
+        *,
+        now: float,
+    ) -> None:
+        self._objects, self._shaft = objects, shaft
+        self._power, self._motion = power, motion
+        self._status = StatusBits(objects, motion)
+        self.following_failed: Callable[[], None] = lambda: None
+        self.now = now
+        self._sampled_at = -inf
+        self._following_since: float | None = None
+
+    def advance(self, now: float) -> None:
+        """Move until ``now``; set-points are made in slices of at most a millisecond."""
+        duration = now - self.now
+        if duration < _MIN_SLICE:
+            return
+        count = ceil(duration / _MAX_SLICE - 1e-6)
+        dt = duration / count
+        start, shaft, motion = self.now, self._shaft, self._motion
+        for index in range(count):
+            command = motion.step(self._power.order, shaft.motor_angle, shaft.motor_velocity, dt)
+            shaft.advance(dt, command)
+            self.now = start + (index + 1) * dt
+            if motion.at_rest(shaft.motor_velocity):
+                self._power.standstill()
+            self._watch_following()
+            self._status.advance(shaft.motor_angle, shaft.motor_velocity, dt)
+        self.now = now
+
+    def sample(self, error_code: int, *, acknowledged: bool) -> None:
+        """Bring the actual values in the object dictionary up to now."""
+        put, motion = self._objects.put, self._motion
+        put(0x6041, 0, self._status.word(self._power.state, acknowledged=acknowledged))
+        put(0x603F, 0, error_code)
+        put(0x6061, 0, motion.mode)
+        if self._sampled_at == self.now:
+            return
+        self._sampled_at = self.now
+        reading, units = self._shaft.measure(), motion.units
+        put(0x6064, 0, wrapped(reading.motor_angle / units.angle, 32))
+        put(0x606C, 0, wrapped(reading.motor_velocity / units.speed, 32))
+        torque = round(reading.motor_torque / units.torque)
+        put(0x6077, 0, max(-32768, min(32767, torque)))
+        put(0x6062, 0, wrapped(motion.angle / units.angle, 32))
+        put(0x606B, 0, wrapped(motion.speed / units.speed, 32))
+        error = motion.angle - reading.motor_angle if motion.controls_position else 0.0
+        put(0x60F4, 0, wrapped(error / units.angle, 32))
+
+    def forget_sample(self) -> None:
+        """Sample anew next time, in units that may have changed."""
+        self._sampled_at = -inf
+
+    def _watch_following(self) -> None:
+        window = self._objects.number(0x6065)
+        error = abs(self._motion.angle - self._shaft.motor_angle)
+        watched = self._motion.controls_position and window != _UNWATCHED
+        beyond = watched and error > window * self._motion.units.angle
+        self._status.following_error = beyond
+        if not beyond:
+            self._following_since = None
+            return
+        if self._following_since is None:
+            self._following_since = self.now
+        if self.now - self._following_since >= self._objects.number(0x6066) * _MS:
+            self.following_failed()
