@@ -10,7 +10,7 @@ from effect_lines import CATALOGUE, predict, profile_with
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from winchkit.effects.drum_winding_tension import stored
+from winchkit.effects.on_length.drum_winding_tension import stored
 from winchkit.effects.standard import STANDARD_PROFILE
 from winchkit.model.line import Line, Signals
 

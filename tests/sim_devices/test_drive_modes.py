@@ -202,7 +202,7 @@ def test_a_stuck_motor_is_a_following_error_in_position_modes() -> None:
     while rig.drive.error_code == 0:
         rig.run(1e-3)
         assert rig.now - start < 2.0
-    rig.run(0.02)
+    rig.run(0.2)
     assert rig.read(0x603F) == 0x8611
     assert rig.status & 0x4F == 0x08
     assert rig.emergencies() == [0x8611]

@@ -247,3 +247,17 @@ def test_a_killed_master_stops_the_real_winch_in_time(
     resting = rig.shaft.motor_angle
     rig.run(0.3)
     assert rig.shaft.motor_angle == pytest.approx(resting, abs=0.02)
+
+
+def test_a_motor_that_is_dragged_along_does_not_keep_its_drive_in_the_fault_reaction() -> None:
+    """A torque limit below the load's weight: the fault follows, and the brake with it."""
+    profile = read_winch(find("profiles", "bench-spiral"))
+    rig = Rig(WinchPlant(profile, WinchTruth(load_mass=10.0), seed=1))
+    rig.enable(CSV)
+    rig.write(0x6072, 0, 20)
+    rig.run(0.3)
+    assert rig.shaft.motor_velocity < -1.0
+    rig.drive.inject("over-temperature")
+    rig.run(1.0)
+    assert rig.status & 0x4F == FAULT
+    assert rig.shaft.motor_velocity == 0

@@ -15,16 +15,7 @@ from winchkit.units import dimension_of, suggest
 
 __all__ = ["Catalogue", "load_catalogue"]
 
-_MECHANISM = {
-    "effect",
-    "catalogue",
-    "bind",
-    "coordinates",
-    "empirical",
-    "card",
-    "standard",
-    "profile_file",
-}
+_ROOMS = ("on_length", "on_tension", "on_torque")
 
 
 class Catalogue:
@@ -58,10 +49,10 @@ def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:
     Raises FileError where a user's file cannot be loaded or holds no effect.
     """
     found: list[Effect] = []
-    package = import_module("winchkit.effects")
-    for module in iter_modules(package.__path__):
-        if module.name not in _MECHANISM:
-            found.append(import_module(f"winchkit.effects.{module.name}").EFFECT)
+    for room in _ROOMS:
+        package = import_module(f"winchkit.effects.{room}")
+        for module in iter_modules(package.__path__):
+            found.append(import_module(f"{package.__name__}.{module.name}").EFFECT)
     for point in entry_points(group="winchkit.effects"):
         found.extend(_effects_in(point.load(), point.name))
     for file in files:

@@ -56,7 +56,7 @@ class Axis:
             command = motion.step(self._power.order, shaft.motor_angle, shaft.motor_velocity, dt)
             shaft.advance(dt, command)
             self.now = start + (index + 1) * dt
-            if motion.at_rest(shaft.motor_velocity):
+            if motion.stop_is_over(shaft.motor_velocity):
                 self._power.standstill()
             self._watch_following()
             self._status.advance(shaft.motor_angle, shaft.motor_velocity, dt)

@@ -16,6 +16,8 @@ __all__ = ["SIMULATED_MODES", "Mode", "Motion", "approach"]
 _RPM = 0.10471975511965977
 _STANDSTILL = 0.05
 """rad/s below which a ramp has ended."""
+_PATIENCE = 0.5
+"""s for which a stop waits for the motor to stand after its ramp."""
 _NO_LIMITS = (-(2**31), 2**31 - 1)
 
 
@@ -63,6 +65,7 @@ class Motion:
         self._from = self._goal = 0.0
         self._elapsed = inf
         self._clipped = False
+        self._stood = 0.0
 
     @property
     def controls_position(self) -> bool:
@@ -111,17 +114,23 @@ class Motion:
         return self._follow(angle, speed, dt)
 
     def at_rest(self, speed: float) -> bool:
-        """Whether a stop has ended."""
+        """Whether it stands still at the end of a stop."""
         return self.stopping and self.speed == 0 and abs(speed) < _STANDSTILL
+
+    def stop_is_over(self, speed: float) -> bool:
+        """Whether a stop has ended, or has had time enough: a motor may be dragged along."""
+        return self.at_rest(speed) or (self.stopping and self._stood > _PATIENCE)
 
     def _stop(self, order: Order, angle: float, speed: float, dt: float) -> DriveCommand:
         if order is Order.FOLLOW:
             order = RAMPS.get(self._objects.number(0x605D), Order.SLOW_DOWN)
         else:
             self.profile.reset()
-        self.stopping = True
+        if not self.stopping:
+            self.stopping, self._stood = True, 0.0
         index = {Order.SLOW_DOWN: 0x6084, Order.QUICK_STOP: 0x6085}.get(order, 0x60C6)
         self.speed = approach(self.speed, 0.0, self._per_second(index) * dt)
+        self._stood = self._stood + dt if self.speed == 0 else 0.0
         self.angle = angle
         return self._command(None)
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import ceil
-from random import Random
 from typing import Any
 
 from winchkit.errors import UsageError
@@ -13,8 +11,8 @@ from winchkit.schema.simbench import NoiseSpec, WinchTruth
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.drum import CLIMB
 from winchkit.sim.hanging import HangingLoad
+from winchkit.sim.instruments import Instruments, Measurement
 from winchkit.sim.kinematics import Kinematics
-from winchkit.sim.noise import Noise
 from winchkit.sim.numbers import overridden
 from winchkit.sim.physics.base import HOOKS, Physics
 from winchkit.sim.physics.table import build, declared
@@ -25,20 +23,6 @@ __all__ = ["Measurement", "WinchPlant"]
 
 MAX_STEP = 1e-3
 _SMALLEST_INERTIA_SHARE = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class Measurement:
-    """What the instruments read at one instant, SI, with their noise."""
-
-    time: float
-    motor_angle: float
-    motor_velocity: float
-    motor_torque: float
-    tension: float
-    load: float
-    cable_length: float
-    temperature: float
 
 
 class WinchPlant:
@@ -78,7 +62,7 @@ class WinchPlant:
         self._load = HangingLoad(truth.load_mass, 0.0)
         self._powered = False
         self._settle()
-        self._make_instruments(noise if noise is not None else NoiseSpec(), seed)
+        self._instruments = Instruments(noise if noise is not None else NoiseSpec(), seed)
 
     def _bind_hooks(self) -> None:
         bound: dict[str, list[Callable[..., Any]]] = {
@@ -100,16 +84,6 @@ class WinchPlant:
         self._motor = bound["motor"]
         self._torque_signal = bound["torque_signal"]
         self._length_signal = bound["length_signal"]
-
-    def _make_instruments(self, noise: NoiseSpec, seed: int | str) -> None:
-        def instrument(name: str, sigma: float) -> Noise:
-            return Noise(sigma, noise.colour, noise.colour_time, Random(f"{seed}/{name}"))
-
-        self._noise = {
-            name: instrument(name, getattr(noise, name))
-            for name in ("motor_torque", "tension", "load", "cable_length", "temperature")
-        }
-        self._measured_at = 0.0
 
     # What is true now.
 
@@ -180,18 +154,11 @@ class WinchPlant:
 
     def measure(self) -> Measurement:
         """Read every instrument now, each with fresh noise."""
-        state, noise = self._state, self._noise
-        interval = state.time - self._measured_at
-        self._measured_at = state.time
-        return Measurement(
-            state.time,
-            state.motor_angle,
-            state.motor_speed,
-            self._torque_reading + noise["motor_torque"].sample(interval),
-            self._cell_reading + noise["tension"].sample(interval),
-            state.load + noise["load"].sample(interval),
-            self._length_reading + noise["cable_length"].sample(interval),
-            state.temperature + noise["temperature"].sample(interval),
+        return self._instruments.read(
+            self._state,
+            motor_torque=self._torque_reading,
+            tension=self._cell_reading,
+            cable_length=self._length_reading,
         )
 
     # How it goes on.

@@ -1,0 +1,1 @@
+"""Effects on the way from rope force to motor torque, one a file."""

@@ -1,0 +1,59 @@
+"""The instruments of a simulated winch: what they read, with their noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from random import Random
+
+from winchkit.schema.simbench import NoiseSpec
+from winchkit.sim.noise import Noise
+from winchkit.sim.state import State
+
+__all__ = ["Instruments", "Measurement"]
+
+_NOISY = ("motor_torque", "tension", "load", "cable_length", "temperature")
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """What the instruments read at one instant, SI, with their noise."""
+
+    time: float
+    motor_angle: float
+    motor_velocity: float
+    motor_torque: float
+    tension: float
+    load: float
+    cable_length: float
+    temperature: float
+
+
+class Instruments:
+    """Adds to every reading noise of its own, which a seed brings back."""
+
+    def __init__(self, noise: NoiseSpec, seed: int | str) -> None:
+        self._noise = {
+            name: Noise(
+                getattr(noise, name), noise.colour, noise.colour_time, Random(f"{seed}/{name}")
+            )
+            for name in _NOISY
+        }
+        self._read_at = 0.0
+
+    def read(
+        self, state: State, *, motor_torque: float, tension: float, cable_length: float
+    ) -> Measurement:
+        """Read now; the arguments are what drive, cell and length instrument make of the truth."""
+        interval = state.time - self._read_at
+        self._read_at = state.time
+        noise = {name: source.sample(interval) for name, source in self._noise.items()}
+        return Measurement(
+            state.time,
+            state.motor_angle,
+            state.motor_speed,
+            motor_torque + noise["motor_torque"],
+            tension + noise["tension"],
+            state.load + noise["load"],
+            cable_length + noise["cable_length"],
+            state.temperature + noise["temperature"],
+        )
