@@ -14,7 +14,8 @@ from time import perf_counter
 import numpy as np
 
 from winchkit.effects import Term, load_catalogue
-from winchkit.model.line import Line, Signals
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
 from winchkit.schema.winch import (
     CableSpec,
     DrumSpec,

@@ -131,7 +131,7 @@ class FakeCell:
     max_age: float = 0.25
 
     def read(self, value: float, now: float, quality: Quality = Quality.GOOD) -> None:
-        self.latest = Reading(value, value, quality, now, now, now, 0.0)
+        self.latest = Reading(value, value, value, quality, now, now, now, 0.0)
 
 
 class Rig:

@@ -8,6 +8,7 @@ import os
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import can
 
@@ -16,6 +17,7 @@ from winchkit.schema.bench import BusSpec
 from winchkit.schema.device import DeviceSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.drive import SimDrive
+from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
 from winchkit.sim.servo import DriveCommand
 
 _channels = itertools.count()
@@ -66,7 +68,7 @@ class DriveOnBus:
             self._send,
             node,
             spec.servo,
-            catalog.find("devices", spec.name).parent / spec.servo.eds,
+            ObjectDictionary(read_eds(Path(spec.path).parent / spec.servo.eds, node)),
             self.shaft,
             brake=brake,
             now=time.monotonic(),

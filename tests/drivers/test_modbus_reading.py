@@ -36,9 +36,10 @@ def registers(status: int, gross: int, net: int) -> list[int]:
 @given(net=st.integers(0, 999_999), negative=st.booleans())
 def test_laumas_net_weight(net: int, negative: bool) -> None:
     status = 1 << 11 | (1 << 8 if negative else 0)
-    value, counts, quality, _ = laumas().decode(registers(status, 5, net))
+    value, gross, counts, quality, _ = laumas().decode(registers(status, 5, net))
     assert counts == (-net if negative else net)
     assert value == pytest.approx(counts * 0.01)
+    assert gross == pytest.approx(0.05)
     assert quality is Quality.GOOD
 
 
@@ -54,14 +55,14 @@ def test_laumas_net_weight(net: int, negative: bool) -> None:
     ],
 )
 def test_laumas_alarms_give_no_number(bit: int, flag: Quality) -> None:
-    value, _, quality, _ = laumas().decode(registers(1 << bit | 1 << 11, 1000, 1000))
+    value, _, _, quality, _ = laumas().decode(registers(1 << bit | 1 << 11, 1000, 1000))
     assert math.isnan(value)
     assert quality is flag
     assert not quality.usable
 
 
 def test_unstable_is_still_a_number() -> None:
-    value, _, quality, status = laumas().decode(registers(1 << 10, 0, 12345))
+    value, _, _, quality, status = laumas().decode(registers(1 << 10, 0, 12345))
     assert value == pytest.approx(123.45)
     assert quality is Quality.UNSTABLE
     assert laumas().has("net", status)
@@ -93,7 +94,7 @@ def test_every_type_in_every_order(data: st.DataObject, kind: str, order: str) -
         wire = bytes(big["ABCD".index(letter)] for letter in order)
     words = [0, *struct.unpack(f">{len(wire) // 2}H", wire), 0][:3]
     field = FieldSpec("v", 1, kind, order, unit="N", scale=0.5)  # type: ignore[arg-type]
-    value, counts, _, _ = Decoder(device(field)).decode(words)
+    value, _, counts, _, _ = Decoder(device(field)).decode(words)
     assert counts == number
     assert value == pytest.approx(number * 0.5)
 
@@ -101,7 +102,7 @@ def test_every_type_in_every_order(data: st.DataObject, kind: str, order: str) -
 @pytest.mark.parametrize("bits", [0x7FC00000, 0x7F800000, 0xFF800000])
 def test_a_float_that_is_no_number_is_a_fault(bits: int) -> None:
     field = FieldSpec("v", 1, "f32", unit="N")
-    value, _, quality, _ = Decoder(device(field)).decode([0, bits >> 16, bits & 0xFFFF])
+    value, _, _, quality, _ = Decoder(device(field)).decode([0, bits >> 16, bits & 0xFFFF])
     assert math.isnan(value)
     assert quality is Quality.FAULT
 

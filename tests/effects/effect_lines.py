@@ -8,7 +8,8 @@ import numpy as np
 
 from winchkit.effects import Effect, Term, load_catalogue
 from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
-from winchkit.model.line import Line, Motion, Signals
+from winchkit.model.line import Line, Motion
+from winchkit.model.stages import Signals
 from winchkit.schema.winch import DrumSpec, WinchProfile
 
 CATALOGUE = load_catalogue()
@@ -24,7 +25,7 @@ DRUMS = {
 
 MINE = """
 from winchkit.effects.effect import Effect, Parameter
-from winchkit.model.line import Stage
+from winchkit.model.stages import Stage
 
 def apply(length, at, values):
     return length + values["size"]

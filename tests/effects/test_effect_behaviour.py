@@ -12,7 +12,8 @@ from winchkit.effects import Effect, Term
 from winchkit.effects.card import signature, usual_values
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
-from winchkit.model.line import Line, Modifier, Signals
+from winchkit.model.line import Line
+from winchkit.model.stages import Modifier, Signals
 
 NO_SLOPE_AT_NULL = {
     "gear-backlash",

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 
 from winchkit.effects.on_length.drum_winding_tension import stored
 from winchkit.effects.standard import STANDARD_PROFILE
-from winchkit.model.line import Line, Signals
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
 
 RATIO, DEAD, LENGTH = 20.4, 1.5, 6.0
 WRAPS = (pi / 2, pi)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from model_lines import line_with, profile_with, swing
 
-from winchkit.model.line import GRAVITY, Line, Modifier, Signals, Stage
+from winchkit.model.line import GRAVITY, Line
+from winchkit.model.stages import Modifier, Signals, Stage
 from winchkit.schema.winch import (
     ReferenceSpec,
 )

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from model_lines import DRUMS, KINEMATIC, line_with, profile_with, swing
 
-from winchkit.model.line import Line, Signals
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
 
 
 @pytest.mark.parametrize("drum", DRUMS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, pi, sin, sqrt
 
 import pytest
 from drive_rig import COUNT, Flywheel, Rig
@@ -91,8 +91,6 @@ def test_cyclic_velocity_goes_to_each_target_within_the_interpolation_period() -
 
 
 def test_cyclic_position_follows_a_sine_without_steps() -> None:
-    from math import cos, pi, sin
-
     rig = Rig(winch())
     rig.write(0x60C2, 1, 4)
     start = rig.read(0x6064)
@@ -125,8 +123,8 @@ def test_cyclic_position_stays_within_the_software_limit() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(
-    st.integers(-2_000_000, 2_000_000).filter(lambda counts: abs(counts) > 2_000),
-    st.integers(50_000, 1_500_000),
+    st.integers(-600_000, 600_000).filter(lambda counts: abs(counts) > 2_000),
+    st.integers(150_000, 1_500_000),
     st.integers(300_000, 5_000_000),
     st.integers(300_000, 5_000_000),
 )

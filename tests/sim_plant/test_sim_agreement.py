@@ -12,7 +12,8 @@ import pytest
 from winchkit.catalog import find
 from winchkit.effects.bind import Term, modifiers_of
 from winchkit.effects.catalogue import load_catalogue
-from winchkit.model.line import Line, Signals
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
 from winchkit.schema.read import read_programme, read_simbench
 from winchkit.schema.simbench import NoiseSpec
 from winchkit.sim.bench import hiding, profiles_of, programme_path

@@ -33,6 +33,7 @@ __all__ = ["Bench", "open_bench"]
 
 _POLL = 0.01
 _FIRST_FEEDBACK = 2.0
+_FIRST_READING = 1.5
 _REST_TIME = 5.0
 _RELEASE = 0.5
 _RESET_TIME = 2.0
@@ -59,6 +60,7 @@ class Bench:
             stack.callback(self.loop.close)
             self.loop.start()
             self._await_feedback()
+            self._await_sensors()
             self._stack = stack.pop_all()
 
     def __enter__(self) -> Self:
@@ -260,6 +262,15 @@ class Bench:
                         f"SYNC within {_FIRST_FEEDBACK:g} s; check its PDO mapping and SYNC id 80h"
                     )
                 self.clock.sleep(_POLL)
+
+    def _await_sensors(self) -> None:
+        """Give every sensor time for its first answer; a silent one is told when it matters."""
+        deadline = self.clock.now() + _FIRST_READING
+        sensors = [item for winch in self.winch.values() for item in winch.sensors.values()]
+        while any(item.latest is None and item.problem is None for item in sensors):
+            if self.clock.now() > deadline:
+                return
+            self.clock.sleep(_POLL)
 
     def _await_cycles(self, count: int) -> None:
         """Let the loop take notice of what was just ordered."""

@@ -219,9 +219,14 @@ def instrumented(sensor: SensorPort, now: float) -> Instrumented:
     reading, problem = sensor.latest, str(sensor.problem or "")
     if reading is None:
         return Instrumented(math.nan, math.inf, sensor.max_age, "", math.nan, problem)
-    age = now - reading.t_receive
     return Instrumented(
-        reading.value, age, sensor.max_age, str(reading.quality), reading.t_sample, problem
+        value=reading.value,
+        age=now - reading.t_receive,
+        max_age=sensor.max_age,
+        quality=str(reading.quality),
+        time=reading.t_sample,
+        problem=problem,
+        gross=reading.gross,
     )
 
 

@@ -37,6 +37,8 @@ class Instrumented:
     """Of the sample, s."""
     problem: str = ""
     """Why nothing comes, in words."""
+    gross: float = math.nan
+    """Before any tare."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,18 +166,20 @@ class Supervisor:
         if math.isnan(cell.value):
             yield Trip("cell", name, f"the load cell reads no number ({cell.quality}); check it")
             return
-        yield from self._level_rules(name, cell.value, limits, now)
+        yield from self._level_rules(name, cell, limits, now)
         yield from self._rate_rule(name, cell, limits)
 
     def _level_rules(
-        self, name: str, tension: float, limits: LimitSpec, now: float
+        self, name: str, cell: Instrumented, limits: LimitSpec, now: float
     ) -> Iterator[Trip]:
-        high, slack = limits.tension_high, limits.tension_slack
-        if high is not None and tension > high:
+        high, slack, tension = limits.tension_high, limits.tension_slack, cell.value
+        # A tare must not hide an overload: the rope carries the gross value.
+        highest = max(tension, cell.gross) if math.isfinite(cell.gross) else tension
+        if high is not None and highest > high:
             yield Trip(
                 "tension high",
                 name,
-                f"tension {tension:.1f} N is above tension_high {high:g} N; only paying out is "
+                f"tension {highest:.1f} N is above tension_high {high:g} N; only paying out is "
                 "allowed until it falls",
                 Direction.WIND_IN,
             )

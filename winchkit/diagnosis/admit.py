@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from winchkit.errors import Fault, RunError
-from winchkit.model.line import Line, Signals
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 

@@ -16,7 +16,8 @@ from winchkit.diagnosis.admit import OUTPUTS, admit
 from winchkit.diagnosis.denoise import agreed, quiet
 from winchkit.diagnosis.repeats import Repeats, find_repeats
 from winchkit.diagnosis.spectrum import Band, torque_band
-from winchkit.model.line import Line, Motion, Signals
+from winchkit.model.line import Line, Motion
+from winchkit.model.stages import Signals
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
@@ -109,6 +110,7 @@ def _signals(run: Run) -> Signals:
         load_mass=run.load_mass,
         tension=channel("tension"),
         temperature=channel("temperature"),
+        motor_velocity=channel("motor_velocity"),
     )
 
 

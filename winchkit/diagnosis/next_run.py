@@ -18,7 +18,8 @@ from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.repeats import mean_load
 from winchkit.diagnosis.result import NextRun
 from winchkit.effects.bind import Term
-from winchkit.model.line import GRAVITY, Line, Signals
+from winchkit.model.line import GRAVITY, Line
+from winchkit.model.stages import Signals
 from winchkit.model.trajectory import plan
 from winchkit.runs.run import Channel, Run
 

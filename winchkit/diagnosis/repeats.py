@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate
 
-from winchkit.model.line import GRAVITY, Signals
+from winchkit.model.line import GRAVITY
+from winchkit.model.stages import Signals
 
 __all__ = ["Repeats", "find_repeats"]
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from textwrap import wrap
 
+from winchkit.diagnosis.wording import unbroken
+
 __all__ = ["aligned", "paragraph"]
 
 _WIDTH = 96
@@ -27,4 +29,5 @@ def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
 
 def paragraph(text: str, first: str = "", then: str = "") -> list[str]:
     """Text in lines of at most 96 characters."""
-    return wrap(text, _WIDTH, initial_indent=first, subsequent_indent=then) or [first.rstrip()]
+    lines = wrap(unbroken(text), _WIDTH, initial_indent=first, subsequent_indent=then)
+    return [line.replace("\u00a0", " ") for line in lines]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isclose
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ _BINS = 20
 _WORTH_DRAWING = 0.05
 _CLEAR_ORDER = 0.2
 _DIGITS = 4
+_SAME = 1e-3
+_AT_NOISE = 1.15
+_SPREAD = 0.2
 _TURN = 2 * np.pi
 
 
@@ -58,10 +62,12 @@ class _Residuals:
     before: tuple[Array, ...]
     after: tuple[Array, ...] | None
     noise: float | None
+    tone: str
+    """How to colour a residual that nothing changes: ``residual`` at the noise, else ``before``."""
 
 
 def plots_of(answer: Answer) -> tuple[OutputPlots, ...]:
-    """Drawings per output; ``after`` only where the diagnosis names effects."""
+    """Drawings per output; ``after`` only where effects are named that change the output."""
     problem = answer.inquiry.problem
     begin = answer.found.begin.residual
     strongest = _strongest(problem, begin)
@@ -105,8 +111,9 @@ def _residuals(answer: Answer, output: str) -> _Residuals:
         )
 
     before = in_runs(answer.found.begin.residual)
-    after = in_runs(answer.found.final.residual) if diagnosis.steps else None
     fit = diagnosis.outputs[output]
+    changed = diagnosis.steps and not isclose(fit.rms_after, fit.rms_before, rel_tol=_SAME)
+    after = in_runs(answer.found.final.residual) if changed else None
     scale = scale_for(3 * fit.rms_before, fit.unit)
     return _Residuals(
         output,
@@ -115,6 +122,7 @@ def _residuals(answer: Answer, output: str) -> _Residuals:
         tuple(part / scale.worth for part in before),
         None if after is None else tuple(part / scale.worth for part in after),
         None if fit.noise_rms is None else fit.noise_rms / scale.worth,
+        "residual" if fit.rms_before < _AT_NOISE * (fit.noise_rms or 0.0) else "before",
     )
 
 
@@ -135,16 +143,17 @@ def _over_time(problem: Problem, residuals: _Residuals) -> Plot:
     x = np.concatenate([part[0] for part in parts])
     lines = [np.concatenate([part[1][i] for part in parts]) for i in range(len(parts[0][1]))]
     name = OUTPUT_NAMES.get(residuals.output, residuals.output)
+    band = "" if residuals.noise is None else "; the grey band is the noise, ± its rms"
     return Plot(
         f"time-{residuals.output}",
-        f"Residual of the {name} over time, all runs one after another.",
+        f"Residual of the {name} over time, all runs one after another{band}.",
         {
             "kind": "time",
             "x": _numbers(x, 6),
             "xLabel": "time, runs one after another [s]",
             "yLabel": _labelled("residual", residuals.scale.label),
             "unit": residuals.scale.label,
-            "series": _series(lines),
+            "series": _series(lines, residuals.tone),
             "marks": marks,
             "noise": None if residuals.noise is None else _number(residuals.noise),
         },
@@ -160,7 +169,8 @@ def _over_variable(problem: Problem, residuals: _Residuals, followed: Followed) 
     x, lines = variable[good], [line[good] for line in lines]
     dots = thin_points(x, _DOTS)
     centres, means = bin_means(x, lines, _BINS)
-    whole = np.concatenate([x[dots], centres])
+    placed = _spread(x[dots]) if followed.variable == "direction" else x[dots]
+    whole = np.concatenate([placed, centres])
     order = np.argsort(whole, kind="stable")
     nothing_here, nothing_there = np.full(len(centres), np.nan), np.full(len(dots), np.nan)
     drawn = [np.concatenate([line[dots], nothing_here])[order] for line in lines]
@@ -178,12 +188,21 @@ def _over_variable(problem: Problem, residuals: _Residuals, followed: Followed) 
             "xLabel": label,
             "yLabel": _labelled("residual", residuals.scale.label),
             "unit": residuals.scale.label,
-            "series": _series(drawn),
-            "means": _series(binned),
+            "series": _series(drawn, residuals.tone),
+            "means": _series(binned, residuals.tone),
             "log": logarithmic,
             "noise": None if residuals.noise is None else _number(residuals.noise),
         },
     )
+
+
+def _spread(values: Array) -> Array:
+    """Dots of a variable with few values side by side, so that they do not hide each other."""
+    out = values.copy()
+    for value in np.unique(values):
+        alike = values == value
+        out[alike] += np.linspace(-_SPREAD, _SPREAD, np.count_nonzero(alike))
+    return out
 
 
 def _axis(problem: Problem, residuals: _Residuals, followed: Followed) -> tuple[Array, str, bool]:
@@ -205,10 +224,11 @@ def _axis(problem: Problem, residuals: _Residuals, followed: Followed) -> tuple[
     return values, f"{name} [{unit.get(followed.variable, 'N')}]", False
 
 
-def _series(lines: list[Array]) -> list[dict[str, Any]]:
-    names = ("before", "after")
+def _series(lines: list[Array], tone: str) -> list[dict[str, Any]]:
+    names = ("before", "after") if len(lines) > 1 else ("residual",)
     return [
-        {"name": name, "values": _numbers(line)} for name, line in zip(names, lines, strict=False)
+        {"name": name, "tone": name if len(lines) > 1 else tone, "values": _numbers(line)}
+        for name, line in zip(names, lines, strict=True)
     ]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isclose, isinf
+from math import ceil, isclose, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.report_phrases import parameter_name, parameter_unit
@@ -42,12 +42,12 @@ def visible(answer: Answer) -> list[Visible]:
         for item in answer.diagnosis.detectable
         if item.effect in effects
     ]
-    return sorted(rows, key=lambda row: (row.share != row.share, row.share))
+    return sorted(rows, key=lambda row: (isnan(row.share), row.share))
 
 
 def smallest_shown(answer: Answer) -> list[str]:
     """A few words each on the effects that these runs would have shown soonest."""
-    seen = [row for row in visible(answer) if row.share == row.share]
+    seen = [row for row in visible(answer) if not isnan(row.share)]
     return [f"{row.effect}: {row.parameter} {row.text}" for row in seen[:_FEW]]
 
 
@@ -59,10 +59,17 @@ def _row(item: Detectable, parameter: Parameter) -> Visible:
     )
     if at_end:
         return Visible(item.effect, name, "at no size within its bounds", float("nan"))
-    shown = quantity(item.smallest, unit, digits=2)
+    shown = quantity(item.smallest, unit, _digits(item.smallest, parameter.null))
     if parameter.reciprocal or isinf(parameter.null):
         share = parameter.typical / item.smallest
         return Visible(item.effect, name, f"up to {shown}", share)
     share = abs((item.smallest - parameter.null) / (parameter.typical - parameter.null))
     sense = "from" if item.smallest >= parameter.null else "below"
     return Visible(item.effect, name, f"{sense} {shown}", share)
+
+
+def _digits(value: float, null: float) -> int:
+    """Digits that show how far a value is from a null that is neither zero nor infinite."""
+    if null == 0 or isinf(null) or value == null:
+        return 2
+    return 2 + max(0, ceil(-log10(abs(value - null) / abs(null))))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
+from math import isnan
 from platform import python_version
 
 from winchkit.diagnosis import report_tables as tables
@@ -18,9 +19,11 @@ from winchkit.diagnosis.report_power import effects_of, smallest_shown
 from winchkit.diagnosis.report_sentence import moved_outputs, sentence, where_text
 from winchkit.diagnosis.report_waterfall import waterfall_of
 from winchkit.diagnosis.result import Diagnosis
-from winchkit.diagnosis.wording import percent
+from winchkit.diagnosis.wording import percent, unbroken
 
 __all__ = ["sections"]
+
+_TRACE = 0.005
 
 
 def sections(
@@ -63,7 +66,7 @@ def _verdict(answer: Answer) -> Markup:
     diagnosis = answer.diagnosis
     inside = [
         element("h2", VERDICT_NAMES[diagnosis.verdict], id="verdict-heading", class_="chip"),
-        element("p", sentence(diagnosis), class_="sentence"),
+        element("p", unbroken(sentence(diagnosis)), class_="sentence"),
     ]
     if diagnosis.verdict == "adequate":
         seen = smallest_shown(answer)
@@ -117,23 +120,26 @@ def _drawings(diagnosis: Diagnosis, plots: Sequence[OutputPlots]) -> list[Markup
     out = []
     for own in ordered:
         name = OUTPUT_NAMES.get(own.output, own.output)
-        drawn = [_figure(own.over_time)]
-        if own.over_variable is not None:
-            drawn.append(_figure(own.over_variable))
-        else:
-            words = "It follows nothing that was measured by more than chance would."
-            drawn.append(element("p", words, class_="quiet"))
         title = element("h3", name[:1].upper() + name[1:])
-        out.append(element("div", title, element("div", *drawn, class_="pair"), class_="output"))
+        if own.over_variable is None:
+            words = element("p", "It follows nothing that was measured.", class_="quiet")
+            out.append(element("div", title, _figure(own.over_time), words, class_="output"))
+            continue
+        pair = element("div", _figure(own.over_time), _figure(own.over_variable), class_="pair")
+        out.append(element("div", title, pair, class_="output"))
     return out
 
 
 def _figure(plot: Plot) -> Markup:
     canvas = element("div", class_="plot", data_plot=plot.id, role="img", aria_label=plot.caption)
-    return element("figure", canvas, element("figcaption", plot.caption))
+    return element("figure", canvas, element("figcaption", unbroken(plot.caption)))
 
 
 def _unexplained(diagnosis: Diagnosis) -> Markup:
+    if diagnosis.verdict == "explained" and diagnosis.unexplained_share >= _TRACE:
+        left = percent(diagnosis.unexplained_share)
+        trace = f"A trace of {left} of what stood above the noise is left, below the noise itself."
+        return element("p", trace)
     if diagnosis.verdict not in {"partly", "unknown"}:
         return Markup("")
     left = f"{percent(diagnosis.unexplained_share)} of what stood above the noise is left."
@@ -146,11 +152,14 @@ def _next(diagnosis: Diagnosis) -> Markup:
     if not diagnosis.next_runs:
         return Markup("")
     rows = [
-        [" / ".join(run.separates), run.programme, percent(run.power)]
-        for run in diagnosis.next_runs
+        [" / ".join(r.separates), r.programme, "–" if isnan(r.power) else percent(r.power)]
+        for r in diagnosis.next_runs
     ]
-    caption = "Motion programmes that would tell effects apart, and the chance that they do."
-    return table(caption, ["effects", "programme", "power"], rows, words=2)
+    caption = (
+        "What would tell effects apart, and the chance that it does; – where no motion does, "
+        "only the change that is named."
+    )
+    return table(caption, ["effects", "what to run", "power"], rows, words=2)
 
 
 def _truth(truth: Mapping[str, object] | None) -> Markup:

@@ -90,12 +90,12 @@ def _named(steps: tuple[Step, ...]) -> str:
     if len(steps) == 1:
         return _capital(_step(steps[0])) + "."
     count = _COUNTS.get(len(steps), str(len(steps)))
-    return f"{count} effects are missing: {'; '.join(_step(step) for step in steps)}."
+    return f"{count} effects are missing: {listed([_step(step, ' ({})') for step in steps])}."
 
 
-def _step(step: Step) -> str:
+def _step(step: Step, form: str = ": {}") -> str:
     if len(step.effects) == 1:
-        return _with_values(step, step.effects[0], ": {}")
+        return _with_values(step, step.effects[0], form)
     either = listed([_with_values(step, effect, " ({})") for effect in step.effects], "or")
     return f"{either} – these runs cannot tell which"
 
@@ -113,14 +113,29 @@ def _gain(diagnosis: Diagnosis) -> str:
     several = len(diagnosis.steps) > 1
     either = not several and len(diagnosis.steps[0].effects) > 1
     them = "them" if several else "one of them" if either else "it"
-    falls = [_fall(name, diagnosis.outputs[name]) for name in moved]
-    return f"Add {them} and the held-out error of the {', of the '.join(falls)}."
+    if len(moved) == 1:
+        output = diagnosis.outputs[moved[0]]
+        error = f"the held-out error of the {OUTPUT_NAMES.get(moved[0], moved[0])}"
+        return f"Add {them} and {error} {_fall(output)}{_beside(output)}."
+    falls = [_in_one(name, diagnosis.outputs[name]) for name in moved]
+    return f"Add {them} and the held-out error {listed(falls)}."
 
 
-def _fall(name: str, output: OutputFit) -> str:
+def _fall(output: OutputFit) -> str:
     before = quantity(output.heldout_rms_before, output.unit)
-    after = quantity(output.heldout_rms_after, output.unit)
-    text = f"{OUTPUT_NAMES.get(name, name)} falls from {before} to {after}"
+    return f"falls from {before} to {quantity(output.heldout_rms_after, output.unit)}"
+
+
+def _beside(output: OutputFit) -> str:
+    if output.noise_rms is None:
+        return ""
+    known = output.noise_source == "repeats"
+    what = "the instruments' noise" if known else "what no known effect explains"
+    return f"; {what} is {quantity(output.noise_rms, output.unit)}"
+
+
+def _in_one(name: str, output: OutputFit) -> str:
+    text = f"of the {OUTPUT_NAMES.get(name, name)} {_fall(output)}"
     if output.noise_rms is None:
         return text
     return f"{text} (noise {quantity(output.noise_rms, output.unit)})"

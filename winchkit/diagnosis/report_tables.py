@@ -18,7 +18,7 @@ from winchkit.diagnosis.report_phrases import (
 from winchkit.diagnosis.report_power import visible
 from winchkit.diagnosis.report_waterfall import Waterfall
 from winchkit.diagnosis.result import Candidate, Diagnosis, OutputFit
-from winchkit.diagnosis.wording import Scale, scale_for, significant
+from winchkit.diagnosis.wording import Scale, quantity, scale_for, significant
 from winchkit.effects.effect import Effect
 
 __all__ = ["candidates", "confusion", "detectable", "figures", "named", "output_scale", "waterfall"]
@@ -40,8 +40,7 @@ def figures(diagnosis: Diagnosis) -> Markup:
     for name, output in diagnosis.outputs.items():
         scale = output_scale(output)
         last = output.heldout_rms_after if grown else output.heldout_rms_before
-        row = [OUTPUT_NAMES.get(name, name), scale_for(output.signal_rms, output.unit)]
-        cells = [str(row[0]), scale_for(output.signal_rms, output.unit).text(output.signal_rms)]
+        cells = [OUTPUT_NAMES.get(name, name), quantity(output.signal_rms, output.unit)]
         cells.append(scale.text(output.heldout_rms_before))
         if grown:
             cells.append(scale.text(last))
@@ -71,30 +70,34 @@ def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
     """Bars of held-out error per rung beside the noise floor."""
     if ladder is None:
         return Markup("")
-    outputs = dict(diagnosis.outputs)
+    outputs = diagnosis.outputs
+    longest = {name: 1.05 * _longest(ladder, name, output) for name, output in outputs.items()}
+
+    def row(label: str, errors: Mapping[str, float]) -> list[str]:
+        return [label, *(_bar(errors[n], longest[n], outputs[n]) for n in outputs)]
+
     head = ["model", *(OUTPUT_NAMES.get(name, name) for name in outputs)]
-    rungs = [[label, *_bars(errors, outputs)] for label, errors in ladder.rungs]
-    out = [
-        table("Held-out error, rms, as the model grew. The mark is the noise.", head, rungs),
-    ]
+    caption = "Held-out error, rms, as the model grew. The upright mark is the noise."
+    out = [table(caption, head, [row(label, errors) for label, errors in ladder.rungs])]
     if len(ladder.first) > 1:
-        alone = [[f"only {n}", *_bars(e, outputs)] for n, e in ladder.first.items()]
-        without = [[f"all but {n}", *_bars(e, outputs)] for n, e in ladder.last.items()]
+        alone = [row(f"only {name}", errors) for name, errors in ladder.first.items()]
+        without = [row(f"all but {name}", errors) for name, errors in ladder.last.items()]
         caption = "Each effect added first, alone; and each dropped last, all others kept."
         out.append(table(caption, head, [*alone, *without]))
     return join(out)
 
 
-def _bars(errors: Mapping[str, float], outputs: Mapping[str, OutputFit]) -> list[Markup]:
-    return [_bar(errors[name], output) for name, output in outputs.items()]
+def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
+    rungs = (errors for _, errors in ladder.rungs)
+    errors = [e[name] for e in chain(rungs, ladder.first.values(), ladder.last.values())]
+    return max([output.noise_rms or 0.0, *(e for e in errors if isfinite(e))])
 
 
-def _bar(error: float, output: OutputFit) -> Markup:
-    """A bar to the scale of the error at the start, the noise marked on it."""
-    full = 1.05 * max(output.heldout_rms_before, output.noise_rms or 0.0)
-    inside = [element("span", class_="fill", style=f"width:{_part(error, full)}%")]
+def _bar(error: float, longest: float, output: OutputFit) -> Markup:
+    """A bar as a share of the longest, the noise marked on it."""
+    inside = [element("span", class_="fill", style=f"width:{_part(error, longest)}%")]
     if output.noise_rms:
-        floor = f"left:{_part(output.noise_rms, full)}%"
+        floor = f"left:{_part(output.noise_rms, longest)}%"
         inside.append(element("span", class_="floor", style=floor))
     track = element("span", *inside, class_="track", aria_hidden="true")
     return join([track, element("span", output_scale(output).text(error), class_="value")])
@@ -118,8 +121,8 @@ def candidates(answer: Answer) -> Markup:
     rows = [_candidate(candidate, scales) for candidate in ranked]
     caption = (
         "Evidence: whitened squares that an effect saves, less the price of its freedom; noise "
-        f"alone reaches {significant(max(answer.found.threshold, 0.0), 2)} once in a hundred cases. "
-        "Held-out error with it alone, where its evidence earned a fit."
+        f"alone reaches {significant(max(answer.found.threshold, 0.0), 2)} once in a hundred "
+        "cases. The held-out error is that with this effect alone, where its evidence earned a fit."
     )
     top = table(caption, head, rows[:_TOP], words=2)
     if len(rows) <= _TOP:

@@ -16,7 +16,7 @@ from winchkit.diagnosis.report_phrases import (
     listed,
 )
 from winchkit.diagnosis.report_power import smallest_shown
-from winchkit.diagnosis.report_sentence import sentence, where_text
+from winchkit.diagnosis.report_sentence import sentence, telling, where_text
 from winchkit.diagnosis.result import Comparison, Diagnosis, OutputFit
 from winchkit.diagnosis.wording import percent, quantity, scale_for
 
@@ -57,7 +57,10 @@ def compare_text(comparison: Comparison) -> str:
     for name, error in comparison.outputs.items():
         scale = scale_for(error.rms, error.unit)
         noise = "unknown" if error.noise_rms is None else scale.text(error.noise_rms)
-        sizes = [scale.text(value) for value in (error.rms, error.bias, error.max)]
+        sizes = [
+            scale.text(value)
+            for value in (error.rms, _noticeable(error.bias, error.rms), error.max)
+        ]
         signal = quantity(error.signal_rms, error.unit)
         rows.append([OUTPUT_NAMES.get(name, name), *sizes, noise, signal])
         shares = [
@@ -72,6 +75,11 @@ def compare_text(comparison: Comparison) -> str:
         blocks.append([f"offset of the length instrument, fitted: {offset}"])
     blocks.append(_notes(comparison.notes))
     return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
+
+
+def _noticeable(bias: float, rms: float) -> float:
+    """A bias, zero where it is only what rounding leaves of a fitted offset."""
+    return 0.0 if abs(bias) < 1e-6 * rms else bias
 
 
 def addition_text(addition: Addition) -> str:
@@ -119,7 +127,7 @@ def _confusion(diagnosis: Diagnosis) -> list[str]:
 def _places(diagnosis: Diagnosis) -> list[str]:
     lines = [
         line
-        for where in diagnosis.where[:_FEW]
+        for where in telling(diagnosis.where)[:_FEW]
         for line in paragraph(where_text(where), "  ", "    ")
     ]
     return ["where the rest lives", *lines] if lines else []

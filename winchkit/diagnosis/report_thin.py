@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ def thin(x: Array, series: Sequence[Array], points: int) -> tuple[Array, list[Ar
 
 def _extremes(values: Array, edges: NDArray[np.intp]) -> Array:
     out = np.full((len(edges) - 1, 2), np.nan)
-    for row, (first, last) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for row, (first, last) in enumerate(pairwise(edges)):
         stretch = values[first:last]
         if np.isfinite(stretch).any():
             ends = sorted([int(np.nanargmin(stretch)), int(np.nanargmax(stretch))])

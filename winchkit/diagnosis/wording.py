@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, isfinite, isnan, log10
+from re import compile as pattern
 
-__all__ = ["Scale", "percent", "quantity", "scale_for", "significant", "with_std"]
+__all__ = ["Scale", "percent", "quantity", "scale_for", "significant", "unbroken", "with_std"]
 
 _DEG = 57.29577951308232
 _LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
@@ -33,6 +34,7 @@ _LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
     "1": ((float("inf"), "", 1.0),),
 }
 """Per SI unit: below which size which label, and the label's worth in SI."""
+_WITHIN_A_FIGURE = pattern(r"(?<=[\d±]) | (?=±)|(?<=N) (?=m\b)|(?<=m) (?=s\b)")
 _SIGNS = str.maketrans("-", "−")
 
 
@@ -111,6 +113,11 @@ def significant(value: float, digits: int = 3) -> str:
     if not -6 <= exponent < 9:
         return f"{value:.{digits - 1}e}".translate(_SIGNS)
     return _fixed(value, digits - 1 - exponent)
+
+
+def unbroken(text: str) -> str:
+    """Text whose figures keep together with their units where lines are broken."""
+    return _WITHIN_A_FIGURE.sub("\u00a0", text)
 
 
 def _fixed(value: float, decimals: int) -> str:

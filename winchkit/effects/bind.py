@@ -10,7 +10,8 @@ from typing import Any
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.errors import Fault, FileError, UsageError
-from winchkit.model.line import At, Line, Modifier
+from winchkit.model.line import Line
+from winchkit.model.stages import At, Modifier
 from winchkit.schema.winch import EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse, suggest
 

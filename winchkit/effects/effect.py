@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from winchkit.model.line import At, Stage
+from winchkit.model.stages import At, Stage
 
 __all__ = ["Effect", "Need", "Parameter", "Values"]
 

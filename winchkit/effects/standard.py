@@ -12,7 +12,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.model.line import GRAVITY, Line, Motion, Signals
+from winchkit.model.line import GRAVITY, Line, Motion
+from winchkit.model.stages import Signals
 from winchkit.model.trajectory import plan
 from winchkit.schema.winch import (
     CableSpec,

@@ -6,121 +6,26 @@ modifier, made by an effect, may act; without modifiers the line is the nominal 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.model.derivatives import is_calmer, second_derivative, smooth_sign, wide_gradient
 from winchkit.model.drum import Drum, drum_of
+from winchkit.model.stages import At, Modifier, Path, Signals, Stage
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["GRAVITY", "At", "Line", "Modifier", "Motion", "Path", "Signals", "Stage"]
+__all__ = ["GRAVITY", "Line", "Motion"]
 
 Array = NDArray[np.float64]
 GRAVITY = 9.80665
 _CREEP_SPEED = 1e-3
 _CREEP_RATE = 0.5
-_CREEP_SHARE = 0.02
-_CREEP_LEAST = 1e-3
-_LOAD_SPAN = 0.02
 _NEWTON_STEPS = 4
-
-
-class Stage(IntEnum):
-    """Where a modifier acts, in the order in which the physics happens."""
-
-    DRUM_ANGLE = 1
-    """Value: :class:`Path` of the drum angle over the motor angle."""
-    DRUM = 2
-    """Value: the :class:`~winchkit.model.drum.Drum`."""
-    WOUND = 3
-    """Value: :class:`Path` of the wound length over the drum angle."""
-    ROPE = 4
-    """Value: length with the rope's strain, m."""
-    FRAME = 5
-    """Value: length at the exit point, m."""
-    LENGTH_INSTRUMENT = 6
-    """Value: length as the instrument shows it, m."""
-    ROPE_WEIGHT = 7
-    """Value: tension at the last pulley, N."""
-    PULLEY = 8
-    """Value: tension after one pulley, N; once per pulley, ``At.wrap`` and ``At.pulley`` set."""
-    CELL = 9
-    """Value: tension as the cell shows it, N."""
-    GEARBOX = 10
-    """Value: torque of the rope at the motor, N m."""
-    TORQUE_CONSTANT = 11
-    """Value: as before, in the drive's units."""
-    MOTOR = 12
-    """Value: torque with the motor's own terms, N m."""
-    TORQUE_SIGNAL = 13
-    """Value: torque as the drive reports it, N m."""
-
-
-@dataclass(frozen=True)
-class Path:
-    """A coordinate and its derivative by the one before it, so that torque follows length."""
-
-    value: Array
-    slope: Array
-
-
-@dataclass(frozen=True)
-class Signals:
-    """What was measured on one line; arrays of shape (n,), SI, None where not measured."""
-
-    time: Array
-    motor_angle: Array
-    load: Array | None = None
-    load_mass: float | None = None
-    tension: Array | None = None
-    temperature: Array | None = None
-
-
-@dataclass(frozen=True)
-class At:
-    """What a modifier may look at besides the value passing through; arrays (n,), SI."""
-
-    profile: WinchProfile
-    time: Array
-    """Since the run's start, s."""
-    motor_angle: Array
-    motor_rate: Array
-    motor_acceleration: Array
-    motor_direction: Array
-    """Tanh(θ'/0.5 rad/s): smooth at standstill; see :func:`_direction`."""
-    drum_angle: Array
-    wound_angle: Array
-    speed: Array
-    """Winding-in speed of the rope, m/s."""
-    direction: Array
-    """Tanh(v/1 mm/s)."""
-    free_length: Array
-    """Unstrained, from exit point to attachment, m."""
-    tension: Array
-    """In the rope: the load, else the cell's, else zero, N."""
-    temperature: Array
-    """NaN where not measured, degrees Celsius."""
-    pulley: int = -1
-    wrap: float = 0.0
-
-    @property
-    def stressed_length(self) -> Array:
-        """Free length and the stressed rope on the machine, m."""
-        return self.free_length + self.profile.cable.dead_length
-
-
-@dataclass(frozen=True)
-class Modifier:
-    """One effect with its values, ready to act at its stage; lower ``order`` acts first."""
-
-    stage: Stage
-    apply: Callable[[Any, At], Any]
-    order: int = 0
 
 
 @dataclass(frozen=True)
@@ -168,6 +73,11 @@ class Line:
         wound = self._drum.wound(phi + drum_angle) - self._drum.wound(np.asarray(phi))
         return drum_angle, (self.profile.reference.cable_length or 0.0) - wound
 
+    def _pace(self, motor_angle: Array) -> Array:
+        """Rope wound in per motor angle on the bare profile, m/rad."""
+        gear = self._gear(motor_angle)
+        return np.asarray(self._drum.arm(self._reference_wound + gear.value) * gear.slope)
+
     def _gear(self, motor_angle: Array) -> Path:
         gearbox = self.profile.gearbox
         slope = gearbox.direction / gearbox.ratio
@@ -177,13 +87,17 @@ class Line:
     def motion(self, signals: Signals) -> Motion:
         """Derivatives, directions and rope force along a run, by central differences."""
         time, angle = signals.time, signals.motor_angle
-        rate = np.gradient(angle, time)
         drum_angle, length = self._nominal_length(angle)
-        speed = -np.gradient(length, time)
+        rate, speed = np.gradient(angle, time), -np.gradient(length, time)
+        jitter = signals.motor_velocity is not None and is_calmer(signals.motor_velocity, rate)
+        if jitter and signals.motor_velocity is not None:
+            speed = speed + self._pace(angle) * (signals.motor_velocity - rate)
+            rate = signals.motor_velocity
         load, mass = signals.load, None
         if load is None and signals.load_mass is not None:
             mass = signals.load_mass
-            load = mass * (GRAVITY - _second_derivative(length, time))
+            bent = -wide_gradient(speed, time) if jitter else second_derivative(length, time)
+            load = mass * (GRAVITY - bent)
         tension = load if load is not None else signals.tension
         missing = np.full_like(time, np.nan)
         at = At(
@@ -192,11 +106,11 @@ class Line:
             motor_angle=angle,
             motor_rate=rate,
             motor_acceleration=np.gradient(rate, time),
-            motor_direction=_direction(rate, _CREEP_RATE),
+            motor_direction=smooth_sign(rate, _CREEP_RATE),
             drum_angle=drum_angle,
             wound_angle=self._reference_wound + drum_angle,
             speed=speed,
-            direction=_direction(speed, _CREEP_SPEED),
+            direction=smooth_sign(speed, _CREEP_SPEED),
             free_length=length,
             tension=np.zeros_like(time) if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
@@ -242,7 +156,7 @@ class Line:
         if motion.load_mass is None or not self.modifiers:
             return load
         added = free - motion.at.free_length
-        return load - motion.load_mass * _second_derivative(added, motion.at.time)
+        return load - motion.load_mass * second_derivative(added, motion.at.time)
 
     def _drum_side(self, load: Array, at: At) -> Array:
         """Tension at the drum: from the load up the rope and back over the pulleys."""
@@ -304,25 +218,3 @@ class Line:
             tension=np.array([tension]),
             temperature=np.array([20.0]),
         )
-
-
-def _direction(rate: Array, creep: float) -> Array:
-    """Sign of a rate, smooth below ``creep``; narrower on a machine that is slow altogether.
-
-    A drive that never turns faster than the smoothing would have no direction at all; one that
-    stands still has none, whatever the rounding of its derivative.
-    """
-    fastest = float(np.max(np.abs(rate), initial=0.0))
-    width = np.clip(_CREEP_SHARE * fastest, _CREEP_LEAST * creep, creep)
-    return np.asarray(np.tanh(rate / width))
-
-
-def _second_derivative(x: Array, time: Array) -> Array:
-    """Central second difference over at least ±20 ms, so that encoder noise stays small."""
-    step = max(1, round(_LOAD_SPAN / float(np.median(np.diff(time)))))
-    if len(x) <= 2 * step:
-        return np.zeros_like(x)
-    before, after = time[step:-step] - time[: -2 * step], time[2 * step :] - time[step:-step]
-    slope = (x[2 * step :] - x[step:-step]) / after - (x[step:-step] - x[: -2 * step]) / before
-    inner = 2 * slope / (before + after)
-    return np.concatenate([np.zeros(step), inner, np.zeros(step)])

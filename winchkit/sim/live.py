@@ -153,6 +153,9 @@ class LiveBench:
                 buses[name] = wired(bus, f"{declared.name}-{name}", self._interface)
                 self._ports[name] = CanPort(buses[name])
         self._make_winches()
+        for fault in self._faults:
+            winch, _, role = fault.target.partition(".")
+            self._winch(winch).check_fault(role, fault.kind)
         for name in declared.bus:
             if name not in buses:
                 self._lines[name] = line = ModbusLine(self._units(name), self.up_to_date)
@@ -161,6 +164,7 @@ class LiveBench:
                 timeout = declared.bus[name].timeout
                 buses[name] = BusSpec("modbus-tcp", host=host, port=port, timeout=timeout)
         self.bench_spec = replace(declared, bus=buses)
+        self._started_at = self._now()
         self._pool = ThreadPoolExecutor(max(1, len(self._ports)), "sim-can")
         self._loops = [self._pool.submit(self._run, name) for name in self._ports]
 

@@ -13,7 +13,8 @@ from winchkit.schema.device import DeviceSpec, ModbusSpec, ServoSpec
 from winchkit.schema.simbench import NoiseSpec, WinchTruth
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.drive import SimDrive
-from winchkit.sim.modbus_instrument import ModbusInstrument, in_unit_of
+from winchkit.sim.drive_faults import known
+from winchkit.sim.modbus_instrument import ModbusInstrument, check_kind, in_unit_of
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
 from winchkit.sim.plant import Measurement, WinchPlant
 from winchkit.units import suggest
@@ -91,18 +92,26 @@ class LiveWinch:
             )
         self.plant.hang(mass)
 
-    def inject(self, role: str, kind: str) -> None:
-        """Make a device of this winch go wrong; UsageError for an unknown one or kind."""
+    def check_fault(self, role: str, kind: str) -> None:
+        """Raise UsageError where there is no such device on this winch, or no such fault of it."""
         if role == "servo":
-            self.drive.inject(kind)
+            known(kind)
             return
         if role not in self.instruments:
-            known = ["servo", *self.instruments]
+            roles = ["servo", *self.instruments]
             raise UsageError(
-                f"winch {self.name} has no '{role}'; it has {', '.join(known)}"
-                + suggest(role, known)
+                f"winch {self.name} has no '{role}'; it has {', '.join(roles)}"
+                + suggest(role, roles)
             )
-        self.instruments[role].inject(kind)
+        check_kind(kind)
+
+    def inject(self, role: str, kind: str) -> None:
+        """Make a device of this winch go wrong; raises as :meth:`check_fault`."""
+        self.check_fault(role, kind)
+        if role == "servo":
+            self.drive.inject(kind)
+        else:
+            self.instruments[role].inject(kind)
 
 
 def _servo(ref: DeviceRef, beside: str) -> tuple[ServoSpec, Path]:

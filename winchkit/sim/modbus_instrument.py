@@ -12,7 +12,7 @@ from winchkit.schema.device import REGISTERS, FieldSpec, ModbusSpec, StatusMeani
 from winchkit.sim.modbus_registers import counts_of, encode
 from winchkit.units import convert, dimension_of, factor, suggest
 
-__all__ = ["INSTRUMENT_FAULTS", "ModbusInstrument", "in_unit_of"]
+__all__ = ["INSTRUMENT_FAULTS", "ModbusInstrument", "check_kind", "in_unit_of"]
 
 INSTRUMENT_FAULTS = (
     "silence",
@@ -136,11 +136,7 @@ class ModbusInstrument:
 
     def inject(self, kind: str) -> None:
         """Make something go wrong; raises UsageError for an unknown kind."""
-        if kind not in INSTRUMENT_FAULTS:
-            raise UsageError(
-                f"a simulated instrument has no fault '{kind}'; use one of "
-                f"{', '.join(INSTRUMENT_FAULTS)}" + suggest(kind, list(INSTRUMENT_FAULTS))
-            )
+        check_kind(kind)
         if kind == "recover":
             self.faults.clear()
         else:
@@ -181,6 +177,15 @@ class ModbusInstrument:
             if says.get(meaning, False):
                 bits |= 1 << numbers[0]
         return bits
+
+
+def check_kind(kind: str) -> None:
+    """Raise UsageError for a fault that no simulated instrument has."""
+    if kind not in INSTRUMENT_FAULTS:
+        raise UsageError(
+            f"a simulated instrument has no fault '{kind}'; use one of "
+            f"{', '.join(INSTRUMENT_FAULTS)}" + suggest(kind, list(INSTRUMENT_FAULTS))
+        )
 
 
 def in_unit_of(spec: ModbusSpec, measure: Callable[[], float]) -> Callable[[], float]:

@@ -20,14 +20,56 @@
     u.ctx.restore();
   }
 
+  function noiseLines(u, noise) {
+    if (!noise) return;
+    u.ctx.save();
+    u.ctx.strokeStyle = colour("quiet");
+    u.ctx.lineWidth = devicePixelRatio;
+    u.ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
+    for (const level of [noise, -noise]) {
+      const y = u.valToPos(level, "y", true);
+      if (y < u.bbox.top || y > u.bbox.top + u.bbox.height) continue;
+      u.ctx.beginPath();
+      u.ctx.moveTo(u.bbox.left, y);
+      u.ctx.lineTo(u.bbox.left + u.bbox.width, y);
+      u.ctx.stroke();
+    }
+    u.ctx.restore();
+  }
+
+  function span(columns, margin) {
+    let low = Infinity, high = -Infinity;
+    for (const column of columns) for (const value of column) {
+      if (value == null) continue;
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+    const edge = margin * (high - low);
+    return high > low ? [low - edge, high + edge] : [low - 1, high + 1];
+  }
+
+  // The range of everything, until the user zooms into a part of it.
+  function ranges(plot) {
+    const y = span([...plot.series, ...(plot.means || [])].map(one => one.values), 0.06);
+    const scales = { x: { time: false, distr: plot.log ? 3 : 1 }, y: { range: y } };
+    if (plot.kind === "over" && !plot.log) {
+      const [low, high] = [plot.x[0], plot.x[plot.x.length - 1]];
+      const edge = 0.03 * (high - low) || 1;
+      scales.x.range = (u, from, to) => (from <= low && to >= high ? [low - edge, high + edge] : [from, to]);
+    }
+    return scales;
+  }
+
   function runMarks(u, marks) {
     const ctx = u.ctx, ratio = devicePixelRatio, right = u.bbox.left + u.bbox.width;
     ctx.save();
     ctx.font = `${11 * ratio}px system-ui, sans-serif`;
     ctx.fillStyle = colour("quiet");
-    ctx.strokeStyle = colour("line");
+    ctx.strokeStyle = colour("quiet");
     ctx.lineWidth = ratio;
+    ctx.textAlign = "left";
     ctx.textBaseline = "bottom";
+    ctx.setLineDash([3 * ratio, 3 * ratio]);
     marks.forEach((mark, n) => {
       const from = u.valToPos(mark.at, "x", true);
       const to = n + 1 < marks.length ? u.valToPos(marks[n + 1].at, "x", true) : right;
@@ -84,19 +126,19 @@
     const faint = plot.kind === "over";
     const lines = plot.series.map(one => ({
       label: faint ? `${one.name}, samples` : one.name,
-      stroke: colour(one.name) + (faint ? "59" : ""),
+      stroke: colour(one.tone) + (faint ? "59" : ""),
       width: 1,
       paths: faint ? () => null : undefined,
       points: faint
-        ? { show: true, size: 4, width: 0, fill: colour(one.name) + "59", stroke: "transparent" }
+        ? { show: true, size: 4, width: 0, fill: colour(one.tone) + "59", stroke: "transparent" }
         : { show: false },
     }));
     const means = (plot.means || []).map(one => ({
       label: `${one.name}, mean`,
-      stroke: colour(one.name),
+      stroke: colour(one.tone),
       width: 2,
       spanGaps: true,
-      points: { show: true, size: 6, fill: colour(one.name), stroke: colour(one.name) },
+      points: { show: true, size: 6, fill: colour(one.tone), stroke: colour(one.tone) },
     }));
     return [{}, ...lines, ...means];
   }
@@ -116,7 +158,7 @@
       width,
       height: HEIGHT,
       padding: [plot.marks ? 18 : 10, 10, 0, 0],
-      scales: { x: { time: false, distr: plot.log ? 3 : 1 } },
+      scales: ranges(plot),
       axes: [
         { ...axis, label: plot.xLabel, size: 30, values },
         { ...axis, label: plot.yLabel, size: 48, values },
@@ -126,6 +168,7 @@
       cursor: { dataIdx: nearest, y: false, points: { size: 6 } },
       hooks: {
         drawClear: [u => noiseBand(u, plot.noise)],
+        draw: [u => noiseLines(u, plot.noise)],
         drawAxes: [u => plot.marks && runMarks(u, plot.marks)],
       },
       plugins: [tooltip(plot)],

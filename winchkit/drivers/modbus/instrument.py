@@ -96,16 +96,18 @@ class Instrument:
 
     def _publish(self, registers: list[int], t_request: float, t_receive: float) -> None:
         spec = self.decoder.spec
-        value, raw, quality, self.status = self.decoder.decode(registers)
-        duplicate = self.latest is not None and raw == self.latest.raw
+        decoded = self.decoder.decode(registers)
+        quality, self.status = decoded.quality, decoded.status
+        duplicate = self.latest is not None and decoded.counts == self.latest.raw
         if duplicate:
             quality |= Quality.DUPLICATE
         if t_receive - t_request > _LATE:
             quality |= Quality.LATE
         conversion = 1.0 / spec.rate
         reading = Reading(
-            value=value,
-            raw=raw,
+            value=decoded.value,
+            gross=decoded.gross,
+            raw=decoded.counts,
             quality=quality,
             t_request=t_request,
             t_receive=t_receive,

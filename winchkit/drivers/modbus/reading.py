@@ -7,12 +7,13 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Flag, auto
+from typing import NamedTuple
 
 from winchkit.errors import Fault, FileError
 from winchkit.schema.device import DeviceSpec, FieldSpec, ModbusSpec, StatusMeaning
 from winchkit.units import convert, dimension_of
 
-__all__ = ["Decoder", "Quality", "Reading"]
+__all__ = ["Decoded", "Decoder", "Quality", "Reading"]
 
 _FORMAT = {"u16": ">H", "i16": ">h", "u32": ">I", "i32": ">i", "f32": ">f"}
 
@@ -53,6 +54,8 @@ class Reading:
 
     value: float
     """SI; NaN where the flags say that it is no measurement."""
+    gross: float
+    """The value before any tare, where the device has a field ``gross``; else the value."""
     raw: float
     """Counts as read, with their sign."""
     quality: Quality
@@ -62,6 +65,16 @@ class Reading:
     """Estimate of the moment that the value belongs to: filter and conversion taken off."""
     t_uncertainty: float
     """Half the interval in which that moment lies, s."""
+
+
+class Decoded(NamedTuple):
+    """What one block of registers says."""
+
+    value: float
+    gross: float
+    counts: float
+    quality: Quality
+    status: int
 
 
 class Decoder:
@@ -82,6 +95,7 @@ class Decoder:
                 )
             )
         self.field = by_name[self.spec.value]
+        self._gross = by_name.get("gross", self.field)
         dimension = dimension_of(self.field.unit)
         if dimension is None:
             raise FileError(Fault(f"unknown unit '{self.field.unit}'", device.path))
@@ -108,22 +122,30 @@ class Decoder:
                 )
             )
 
-    def decode(self, registers: Sequence[int]) -> tuple[float, float, Quality, int]:
-        """Value (SI or NaN), signed counts, quality and status word of one block."""
+    def decode(self, registers: Sequence[int]) -> Decoded:
+        """Value and gross value (SI or NaN), signed counts, quality, status word of one block."""
         block = self.spec.read
         status = 0
         if self.spec.status_register is not None:
             status = registers[self.spec.status_register - block.start]
-        counts = _number(self.field, registers, self.field.register - block.start)
-        if self.field.sign_bit is not None and status >> self.field.sign_bit & 1:
-            counts = -counts
+        counts = self._counts(self.field, registers, status)
+        gross = self._counts(self._gross, registers, status)
         quality = self._quality(status)
         if not math.isfinite(counts):
             quality |= Quality.FAULT
         if not quality.usable:
-            return math.nan, counts, quality, status
-        value = convert(counts * self.field.scale, self.field.unit, self.dimension)
-        return value, counts, quality, status
+            return Decoded(math.nan, math.nan, counts, quality, status)
+        return Decoded(
+            self._si(self.field, counts), self._si(self._gross, gross), counts, quality, status
+        )
+
+    def _counts(self, item: FieldSpec, registers: Sequence[int], status: int) -> float:
+        counts = _number(item, registers, item.register - self.spec.read.start)
+        negative = item.sign_bit is not None and status >> item.sign_bit & 1
+        return -counts if negative else counts
+
+    def _si(self, item: FieldSpec, counts: float) -> float:
+        return convert(counts * item.scale, item.unit, self.dimension)
 
     def has(self, meaning: StatusMeaning, status: int) -> bool:
         """Whether a status word says ``meaning``, e.g. that a tare is active."""

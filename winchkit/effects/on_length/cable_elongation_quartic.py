@@ -7,7 +7,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.line import At, Stage
+from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
 _SOFTEST = 0.1

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.friction import dahl
-from winchkit.model.line import At, Stage
+from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
 _STUCK = 0.5

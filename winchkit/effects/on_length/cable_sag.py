@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.line import GRAVITY, At, Stage
+from winchkit.model.line import GRAVITY
+from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
 

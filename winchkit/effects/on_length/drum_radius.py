@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.drum import Archimedean, Grooved, Spiral, Squared
-from winchkit.model.line import At, Stage
+from winchkit.model.stages import At, Stage
 
 LayeredDrum = Archimedean | Grooved | Spiral | Squared
 

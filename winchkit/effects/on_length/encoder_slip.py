@@ -3,7 +3,7 @@
 import numpy as np
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.line import At, Path, Stage
+from winchkit.model.stages import At, Path, Stage
 
 _DURATION = 0.4
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.line import At, Path, Stage
 from winchkit.model.recurrence import play
+from winchkit.model.stages import At, Path, Stage
 
 _ON_THE_FLANK = 1 - 1e-9
 

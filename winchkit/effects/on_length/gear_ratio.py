@@ -1,7 +1,7 @@
 """gear-ratio: the gearbox turns the drum a little more or less than the profile says."""
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.line import At, Path, Stage
+from winchkit.model.stages import At, Path, Stage
 
 
 def apply(path: Path, at: At, values: Values) -> Path:

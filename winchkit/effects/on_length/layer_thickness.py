@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.drum import Archimedean, Drum, Spiral
-from winchkit.model.line import At, Stage
+from winchkit.model.stages import At, Stage
 
 
 def apply(drum: Drum, at: At, values: Values) -> Drum:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.friction import coulomb_ratio
-from winchkit.model.line import At, Stage
+from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.line import At, Stage
+from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,94 @@
+"""A small Modbus TCP device written from the protocol's own text, that misbehaves on request."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+
+
+@dataclass
+class Peer:
+    """Answers FC 3 and FC 6 on 127.0.0.1; ``behave`` may change, delay or swallow an answer."""
+
+    registers: dict[int, int] = field(default_factory=dict)
+    end: int = 200
+    """First address that does not exist."""
+    behave: Callable[[int, int, bytes], tuple[float, bytes] | None] = lambda _u, _n, b: (0.0, b)
+    """Unit, number of the request, answer PDU -> delay (s) and PDU, or None for silence."""
+    requests: list[tuple[int, int, int, int]] = field(default_factory=list)
+    """Unit, function, address, count or value."""
+    connections: int = 0
+    port: int = 0
+    _loop: asyncio.AbstractEventLoop = field(default_factory=asyncio.new_event_loop)
+    _writers: set[asyncio.StreamWriter] = field(default_factory=set)
+    _tasks: set[asyncio.Task[None]] = field(default_factory=set)
+
+    def __enter__(self) -> Peer:
+        ready: Future[int] = Future()
+        self._thread = threading.Thread(target=self._run, args=(ready,), daemon=True)
+        self._thread.start()
+        self.port = ready.result(5)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+
+    def hang_up(self) -> None:
+        """Close every connection."""
+        self._loop.call_soon_threadsafe(lambda: [w.close() for w in self._writers])
+
+    def _run(self, ready: Future[int]) -> None:
+        asyncio.set_event_loop(self._loop)
+        server = self._loop.run_until_complete(asyncio.start_server(self._serve, "127.0.0.1", 0))
+        ready.set_result(server.sockets[0].getsockname()[1])
+        self._loop.run_forever()
+        server.close()
+        for writer in self._writers:
+            writer.close()
+        tasks = asyncio.all_tasks(self._loop)
+        for task in tasks:
+            task.cancel()
+        self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        self._loop.close()
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.connections += 1
+        self._writers.add(writer)
+        try:
+            while True:
+                head = await reader.readexactly(7)
+                transaction, _, length, unit = struct.unpack(">HHHB", head)
+                pdu = await reader.readexactly(length - 1)
+                number = len(self.requests)
+                answer = self.behave(unit, number, self._answer(unit, pdu))
+                if answer is not None:
+                    task = self._loop.create_task(self._send(writer, transaction, unit, *answer))
+                    self._tasks.add(task)
+                    task.add_done_callback(self._tasks.discard)
+        except (asyncio.IncompleteReadError, ConnectionError):
+            pass
+        finally:
+            self._writers.discard(writer)
+            writer.close()
+
+    async def _send(
+        self, writer: asyncio.StreamWriter, transaction: int, unit: int, delay: float, pdu: bytes
+    ) -> None:
+        await asyncio.sleep(delay)
+        writer.write(struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu)
+
+    def _answer(self, unit: int, pdu: bytes) -> bytes:
+        function, address, number = struct.unpack_from(">BHH", pdu)
+        self.requests.append((unit, function, address, number))
+        if function == 6:
+            self.registers[address] = number
+            return pdu
+        if address + number > self.end:
+            return bytes((function | 0x80, 2))
+        words = [self.registers.get(address + k, 0) for k in range(number)]
+        return struct.pack(f">BB{number}H", function, 2 * number, *words)

@@ -1,0 +1,114 @@
+"""``winchkit sim serve`` in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+import pytest
+
+from winchkit.schema.read import read_bench
+from winchkit.sim.live_client import address_file, tell
+
+COMMAND = [sys.executable, "-c", "from winchkit.cli import main; main()", "sim", "serve"]
+
+
+@contextmanager
+def serving(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [*COMMAND, "spiral-bench", *options],
+        cwd=folder,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def wait_for_file(process: subprocess.Popen[str], path: Path) -> None:
+    end = time.monotonic() + 60
+    while not path.is_file():
+        if process.poll() is not None:
+            assert process.stderr is not None
+            words = process.stderr.read()
+            if "multicast" in words:
+                pytest.skip(f"no multicast on this machine: {words}")
+            pytest.fail(words)
+        assert time.monotonic() < end, "sim serve did not start"
+        time.sleep(0.02)
+
+
+def end(process: subprocess.Popen[str]) -> tuple[str, str]:
+    words = process.communicate(timeout=30)
+    assert process.returncode == 0, words
+    return words
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for another process")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_serves_until_it_is_interrupted(tmp_path: Path, number: int) -> None:
+    path = tmp_path / "spiral-bench-bench.toml"
+    with serving(tmp_path) as process:
+        wait_for_file(process, address_file(path))
+        bus = read_bench(path).bus["can"]
+        assert isinstance(bus.port, int)
+        tell(path, "load A 14 kg")
+        assert "14 kg" in tell(path, "status")
+        with can.Bus(interface="udp_multicast", channel=bus.channel, port=bus.port) as master:
+            # Upload 1018:4, the serial number, of node 1.
+            request = can.Message(
+                arbitration_id=0x601, data=bytes.fromhex("4018100400000000"), is_extended_id=False
+            )
+            master.send(request)
+            replies = iter(lambda: master.recv(10.0), None)
+            reply = next(frame for frame in replies if frame.arbitration_id == 0x581)
+            assert bytes(reply.data) == bytes.fromhex("4318100400000000")
+        process.send_signal(number)
+        out, err = end(process)
+    assert out.splitlines()[0] == "spiral-bench-bench.toml"
+    assert "winchkit jog A --bench spiral-bench-bench.toml" in err
+    assert not address_file(path).exists()
+
+
+def test_it_takes_lines_on_its_input(tmp_path: Path) -> None:
+    path = tmp_path / "here.toml"
+    with serving(tmp_path, "--bench-file", "here.toml", "--interface", "virtual") as process:
+        wait_for_file(process, address_file(path))
+        assert process.stdin is not None
+        out, err = process.communicate("load A 21 kg\nstatus\nlood A 3 kg\nquit\n", timeout=30)
+    assert process.returncode == 0
+    assert "21 kg on A" in out
+    assert "did you mean 'load'?" in err
+
+
+def test_an_unknown_bench_is_a_clear_error(tmp_path: Path) -> None:
+    found = subprocess.run(
+        [*COMMAND, "spirl-bench"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert found.returncode == 3
+    assert "did you mean 'spiral-bench'?" in found.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_not_there_is_a_clear_error(tmp_path: Path) -> None:
+    found = subprocess.run(
+        [*COMMAND, "spiral-bench", "--interface", "virtual", "--bench-file", "no/where.toml"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 3
+    assert found.stderr.startswith(str(Path("no/where.toml")))

@@ -1,0 +1,58 @@
+"""Derivatives of sampled signals, with the noise of encoders and the jitter of clocks in mind."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["is_calmer", "second_derivative", "smooth_sign", "wide_gradient"]
+
+Array = NDArray[np.float64]
+_CREEP_SHARE = 0.02
+_CREEP_LEAST = 1e-3
+_LOAD_SPAN = 0.02
+_AGREES = 0.1
+_CALMER = 0.5
+
+
+def smooth_sign(rate: Array, creep: float) -> Array:
+    """Sign of a rate, smooth below ``creep``; narrower on a machine that is slow altogether.
+
+    A drive that never turns faster than the smoothing would have no direction at all; one that
+    stands still has none, whatever the rounding of its derivative.
+    """
+    fastest = float(np.max(np.abs(rate), initial=0.0))
+    width = np.clip(_CREEP_SHARE * fastest, _CREEP_LEAST * creep, creep)
+    return np.asarray(np.tanh(rate / width))
+
+
+def is_calmer(measured: Array, differences: Array) -> bool:
+    """Whether a measured rate agrees with differences of the angle and is less rough.
+
+    Jitter of the time stamps roughens differences of the angle and leaves a drive's own velocity
+    alone; a velocity that is quantised or filtered is rougher, or does not agree.
+    """
+    spread = float(np.std(differences))
+    if spread == 0.0 or float(np.std(measured - differences)) > _AGREES * spread:
+        return False
+    return float(np.std(np.diff(measured, 2))) < _CALMER * float(np.std(np.diff(differences, 2)))
+
+
+def wide_gradient(x: Array, time: Array) -> Array:
+    """First derivative over at least ±20 ms, (n,)."""
+    step = max(1, round(_LOAD_SPAN / float(np.median(np.diff(time)))))
+    if len(x) <= 2 * step:
+        return np.zeros_like(x)
+    inner = (x[2 * step :] - x[: -2 * step]) / (time[2 * step :] - time[: -2 * step])
+    return np.concatenate([np.zeros(step), inner, np.zeros(step)])
+
+
+def second_derivative(x: Array, time: Array) -> Array:
+    """Central second difference over at least ±20 ms, so that encoder noise stays small."""
+    step = max(1, round(_LOAD_SPAN / float(np.median(np.diff(time)))))
+    if len(x) <= 2 * step:
+        return np.zeros_like(x)
+    before, after = time[step:-step] - time[: -2 * step], time[2 * step :] - time[step:-step]
+    slope = (x[2 * step :] - x[step:-step]) / after - (x[step:-step] - x[: -2 * step]) / before
+    inner = 2 * slope / (before + after)
+    return np.concatenate([np.zeros(step), inner, np.zeros(step)])

@@ -1,0 +1,111 @@
+"""The stages of a line, what passes through them, and what a modifier there may look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.schema.winch import WinchProfile
+
+__all__ = ["At", "Modifier", "Path", "Signals", "Stage"]
+
+Array = NDArray[np.float64]
+
+
+class Stage(IntEnum):
+    """Where a modifier acts, in the order in which the physics happens."""
+
+    DRUM_ANGLE = 1
+    """Value: :class:`Path` of the drum angle over the motor angle."""
+    DRUM = 2
+    """Value: the :class:`~winchkit.model.drum.Drum`."""
+    WOUND = 3
+    """Value: :class:`Path` of the wound length over the drum angle."""
+    ROPE = 4
+    """Value: length with the rope's strain, m."""
+    FRAME = 5
+    """Value: length at the exit point, m."""
+    LENGTH_INSTRUMENT = 6
+    """Value: length as the instrument shows it, m."""
+    ROPE_WEIGHT = 7
+    """Value: tension at the last pulley, N."""
+    PULLEY = 8
+    """Value: tension after one pulley, N; once per pulley, ``At.wrap`` and ``At.pulley`` set."""
+    CELL = 9
+    """Value: tension as the cell shows it, N."""
+    GEARBOX = 10
+    """Value: torque of the rope at the motor, N m."""
+    TORQUE_CONSTANT = 11
+    """Value: as before, in the drive's units."""
+    MOTOR = 12
+    """Value: torque with the motor's own terms, N m."""
+    TORQUE_SIGNAL = 13
+    """Value: torque as the drive reports it, N m."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A coordinate and its derivative by the one before it, so that torque follows length."""
+
+    value: Array
+    slope: Array
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What was measured on one line; arrays of shape (n,), SI, None where not measured."""
+
+    time: Array
+    motor_angle: Array
+    load: Array | None = None
+    load_mass: float | None = None
+    tension: Array | None = None
+    temperature: Array | None = None
+    motor_velocity: Array | None = None
+
+
+@dataclass(frozen=True)
+class At:
+    """What a modifier may look at besides the value passing through; arrays (n,), SI."""
+
+    profile: WinchProfile
+    time: Array
+    """Since the run's start, s."""
+    motor_angle: Array
+    motor_rate: Array
+    motor_acceleration: Array
+    motor_direction: Array
+    """Tanh(θ'/0.5 rad/s): smooth at standstill; see :func:`~winchkit.model.derivatives.smooth_sign`."""
+    drum_angle: Array
+    wound_angle: Array
+    speed: Array
+    """Winding-in speed of the rope, m/s."""
+    direction: Array
+    """Tanh(v/1 mm/s)."""
+    free_length: Array
+    """Unstrained, from exit point to attachment, m."""
+    tension: Array
+    """In the rope: the load, else the cell's, else zero, N."""
+    temperature: Array
+    """NaN where not measured, degrees Celsius."""
+    pulley: int = -1
+    wrap: float = 0.0
+
+    @property
+    def stressed_length(self) -> Array:
+        """Free length and the stressed rope on the machine, m."""
+        return self.free_length + self.profile.cable.dead_length
+
+
+@dataclass(frozen=True)
+class Modifier:
+    """One effect with its values, ready to act at its stage; lower ``order`` acts first."""
+
+    stage: Stage
+    apply: Callable[[Any, At], Any]
+    order: int = 0
