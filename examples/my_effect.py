@@ -1,32 +1,39 @@
-"""An effect of one's own: the fairlead at the exit point grips the rope.
+"""An effect of one's own: the drum has five corners.
 
-Use it with any command that takes a model: ``--effects examples/my_effect.py``. It is then
-listed, has a card, and is a candidate of the diagnosis like every other effect.
+Any command that holds a model against runs takes it with ``--effects examples/my_effect.py``.
+It is then listed, has a card, and is a candidate of the diagnosis like every other effect.
 """
 
 import numpy as np
 
 from winchkit.effects import Effect, Parameter, Values
-from winchkit.model.stages import At, Stage
+from winchkit.model.stages import At, Path, Stage
+
+CORNERS = 5
 
 
-def apply(tension: np.ndarray, at: At, values: Values) -> np.ndarray:
-    """Tension (N) above the fairlead: a constant force against the motion of the rope."""
-    return tension + values["grip"] * at.direction
+def apply(path: Path, at: At, values: Values) -> Path:
+    """Wound length (m) and torque arm (m) with a wave of five periods per drum turn on them."""
+    size, phase = values["amplitude"], values["phase"]
+    angle = CORNERS * at.drum_angle - phase
+    wave = size * (np.sin(angle) + np.sin(phase))
+    return Path(path.value + wave, path.slope + CORNERS * size * np.cos(angle))
 
 
 EFFECT = Effect(
-    id="fairlead-grip",
-    stage=Stage.ROPE_WEIGHT,  # the rope's way up, before the first pulley
-    order=1,  # after the rope's own weight
-    parameters=(Parameter("grip", "N", null=0.0, typical=5.0, low=0.0, high=500.0),),
+    id="drum-corners",
+    stage=Stage.WOUND,
+    parameters=(
+        Parameter("amplitude", "m", null=0.0, typical=2e-4, low=0.0, high=0.02),
+        Parameter("phase", "rad", null=0.0, typical=1.0),
+    ),
     apply=apply,
-    outputs=("tension", "motor_torque"),
-    what="The fairlead at the exit point grips the rope, whatever hangs on it.",
-    formula="T + s F",
-    source="Coulomb friction with a clamping force that does not depend on the load",
-    looks_like="A step of tension and torque with the direction, the same at every load.",
-    confused_with=("pulley-coulomb", "motor-coulomb"),
-    told_apart="Two loads in both directions; the cell tells it from the motor's friction.",
-    needs=("load",),
+    outputs=("cable_length", "tension", "motor_torque"),
+    what="The drum is built of five segments, and the rope bends over their edges.",
+    formula="W + a (sin(5φ − p) + sin p)",
+    source="first harmonic of a regular pentagon",
+    looks_like="Five waves per drum turn, in length, torque and the load's acceleration.",
+    confused_with=("gear-transmission-error", "motor-cogging"),
+    told_apart="Two loads: the torque's waves grow with the load; a ratio that is no multiple.",
+    polar=("amplitude", "phase"),
 )

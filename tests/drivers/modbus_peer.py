@@ -70,7 +70,7 @@ class Peer:
                     task = self._loop.create_task(self._send(writer, transaction, unit, *answer))
                     self._tasks.add(task)
                     task.add_done_callback(self._tasks.discard)
-        except (asyncio.IncompleteReadError, ConnectionError):
+        except (asyncio.IncompleteReadError, asyncio.CancelledError, ConnectionError):
             pass
         finally:
             self._writers.discard(writer)

@@ -173,7 +173,8 @@ def test_commands_reach_the_device_between_polls() -> None:
     with Peer() as peer:
         weigh(peer, 1000)
         with polled(peer, instrument) as slow:
+            until(lambda: instrument.latest is not None)
             slow.command(instrument, "tare")
             assert (1, 6, 5, 7) in peer.requests
-            with pytest.raises(NotPermitted, match="no command .weigh.; its device file has tare"):
+            with pytest.raises(NotPermitted, match=r"no command .weigh.; its device file has tare"):
                 slow.command(instrument, "weigh")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.errors import UsageError
+from winchkit.errors import Fault, FileError, UsageError
 
 if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue
@@ -54,10 +54,10 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:
     """Runs of one winch. Raises FileError with the faults of all files."""
-    from winchkit.errors import FileError
     from winchkit.runs import read_run
 
-    runs, faults = [], []
+    runs: list[Run] = []
+    faults: list[Fault] = []
     for path in paths:
         try:
             runs.append(_of_winch(read_run(path), winch))

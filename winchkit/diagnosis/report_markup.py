@@ -49,7 +49,9 @@ def table(
     def row(cells: Sequence[str]) -> Markup:
         first = element("th", cells[0], scope="row")
         rest = [
-            element("td", cell) if at < words else element("td", cell, class_="figure")
+            element("td", cell, class_="words")
+            if at < words
+            else element("td", cell, class_="figure")
             for at, cell in enumerate(cells[1:], start=1)
         ]
         return element("tr", first, *rest)

@@ -13,7 +13,7 @@ from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.follows import Followed, follows, harmonics, variables_of
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.report_phrases import OUTPUT_NAMES, VARIABLE_NAMES
-from winchkit.diagnosis.report_thin import bin_means, thin, thin_points
+from winchkit.diagnosis.report_thin import bin_means, filled_edges, thin, thin_points
 from winchkit.diagnosis.wording import Scale, percent, scale_for
 
 __all__ = ["OutputPlots", "Plot", "plots_of"]
@@ -28,6 +28,8 @@ _DIGITS = 4
 _SAME = 1e-3
 _AT_NOISE = 1.15
 _SPREAD = 0.2
+_PER_PERIOD = 8
+_DEGREES = 360.0
 _TURN = 2 * np.pi
 
 
@@ -168,7 +170,7 @@ def _over_variable(problem: Problem, residuals: _Residuals, followed: Followed) 
     good = np.isfinite(before) & np.isfinite(variable)
     x, lines = variable[good], [line[good] for line in lines]
     dots = thin_points(x, _DOTS)
-    centres, means = bin_means(x, lines, _BINS)
+    centres, means = bin_means(x, lines, _edges(x, followed))
     placed = _spread(x[dots]) if followed.variable == "direction" else x[dots]
     whole = np.concatenate([placed, centres])
     order = np.argsort(whole, kind="stable")
@@ -196,6 +198,13 @@ def _over_variable(problem: Problem, residuals: _Residuals, followed: Followed) 
     )
 
 
+def _edges(x: Array, followed: Followed) -> Array:
+    """Inner edges of bins: even within a turn, fine enough for the order; else equally filled."""
+    if followed.order is None:
+        return filled_edges(x, _BINS)
+    return np.linspace(0, _DEGREES, max(_BINS, _PER_PERIOD * followed.order) + 1)[1:-1]
+
+
 def _spread(values: Array) -> Array:
     """Dots of a variable with few values side by side, so that they do not hide each other."""
     out = values.copy()
@@ -213,7 +222,7 @@ def _axis(problem: Problem, residuals: _Residuals, followed: Followed) -> tuple[
     )
     name = VARIABLE_NAMES.get(followed.variable, followed.variable)
     if followed.order is not None:
-        return np.mod(values, _TURN) / _TURN * 360, f"{name} within its turn [°]", False
+        return np.mod(values, _TURN) / _TURN * _DEGREES, f"{name} within its turn [°]", False
     if followed.variable in {"drum_angle", "motor_angle"}:
         return values / _TURN, f"{name} [turns]", False
     if followed.variable == "reversal_distance":

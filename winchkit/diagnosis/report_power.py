@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from math import ceil, isclose, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.report_phrases import parameter_name, parameter_unit
+from winchkit.diagnosis.report_phrases import listed, parameter_name, parameter_unit
 from winchkit.diagnosis.result import Detectable
+from winchkit.diagnosis.signature import missing_needs
 from winchkit.diagnosis.wording import quantity
+from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 
-__all__ = ["Visible", "effects_of", "smallest_shown", "visible"]
+__all__ = ["Visible", "effects_of", "smallest_shown", "unseen", "visible"]
 
 _FEW = 4
 
@@ -51,6 +53,17 @@ def smallest_shown(answer: Answer) -> list[str]:
     return [f"{row.effect}: {row.parameter} {row.text}" for row in seen[:_FEW]]
 
 
+def unseen(answer: Answer) -> list[str]:
+    """Effects of the catalogue that no run could show, each with what they lack."""
+    problem, tried = answer.inquiry.problem, effects_of(answer)
+    out = []
+    for effect in load_catalogue():
+        lacking = missing_needs(effect, problem) if effect.id not in tried else []
+        if lacking:
+            out.append(f"{effect.id}: needs {listed(lacking)}")
+    return out
+
+
 def _row(item: Detectable, parameter: Parameter) -> Visible:
     name = parameter_name(item.parameter)
     unit = parameter_unit(item.parameter, item.unit)
@@ -72,4 +85,4 @@ def _digits(value: float, null: float) -> int:
     """Digits that show how far a value is from a null that is neither zero nor infinite."""
     if null == 0 or isinf(null) or value == null:
         return 2
-    return 2 + max(0, ceil(-log10(abs(value - null) / abs(null))))
+    return 1 + max(1, ceil(-log10(abs(value - null) / abs(null))))

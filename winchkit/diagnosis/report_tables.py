@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from math import degrees, isfinite
 
@@ -15,7 +15,7 @@ from winchkit.diagnosis.report_phrases import (
     listed,
     parameter_name,
 )
-from winchkit.diagnosis.report_power import visible
+from winchkit.diagnosis.report_power import unseen, visible
 from winchkit.diagnosis.report_waterfall import Waterfall
 from winchkit.diagnosis.result import Candidate, Diagnosis, OutputFit
 from winchkit.diagnosis.wording import Scale, quantity, scale_for, significant
@@ -124,11 +124,18 @@ def candidates(answer: Answer) -> Markup:
         f"alone reaches {significant(max(answer.found.threshold, 0.0), 2)} once in a hundred "
         "cases. The held-out error is that with this effect alone, where its evidence earned a fit."
     )
+    return _shortened(caption, head, rows, "more, with less evidence")
+
+
+def _shortened(
+    caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], rest: str
+) -> Markup:
+    """The first rows, the others to be opened; two columns of words."""
     top = table(caption, head, rows[:_TOP], words=2)
     if len(rows) <= _TOP:
         return top
-    rest = table("The remaining effects.", head, rows[_TOP:], words=2)
-    return join([top, details(f"{len(rows) - _TOP} more, with less evidence", rest)])
+    others = table("The remaining effects.", head, rows[_TOP:], words=2)
+    return join([top, details(f"{len(rows) - _TOP} {rest}", others)])
 
 
 def _candidate(candidate: Candidate, scales: Mapping[str, Scale]) -> list[str]:
@@ -174,4 +181,8 @@ def detectable(answer: Answer) -> Markup:
     if not rows:
         return Markup("")
     caption = "The smallest size of each effect that these runs would have shown in 9 of 10 cases."
-    return table(caption, ["effect", "parameter", "seen from"], rows, words=2)
+    head = ["effect", "parameter", "would have been seen"]
+    seen = _shortened(caption, head, rows, "more, seen less easily")
+    blind = element("ul", *(element("li", line) for line in unseen(answer)))
+    lost = details("Not looked for: a part or a channel is missing", blind)
+    return join([seen, lost]) if unseen(answer) else seen

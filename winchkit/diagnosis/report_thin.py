@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["bin_means", "thin", "thin_points"]
+__all__ = ["bin_means", "filled_edges", "thin", "thin_points"]
 
 Array = NDArray[np.float64]
 _FEW = 5
@@ -44,18 +44,24 @@ def thin_points(x: Array, points: int) -> NDArray[np.intp]:
     return np.asarray(chosen[np.argsort(x[chosen], kind="stable")])
 
 
-def bin_means(x: Array, values: Sequence[Array], bins: int) -> tuple[Array, list[Array]]:
-    """Means of signals over equally filled bins of x, or over its values where they are few.
+def filled_edges(x: Array, bins: int) -> Array:
+    """Inner edges of at most ``bins`` equally filled bins; between the values where they are few.
 
-    Returns the mean x of every bin and, per signal, its mean there.
+    x is (n,) and finite.
     """
     distinct = np.unique(x)
     if len(distinct) <= _FEW:
-        index = np.searchsorted(distinct, x)
-    else:
-        edges = np.unique(np.quantile(x, np.linspace(0, 1, bins + 1)[1:-1]))
-        index = np.searchsorted(edges, x, side="right")
+        return np.asarray((distinct[1:] + distinct[:-1]) / 2)
+    return np.unique(np.quantile(x, np.linspace(0, 1, bins + 1)[1:-1]))
+
+
+def bin_means(x: Array, values: Sequence[Array], edges: Array) -> tuple[Array, list[Array]]:
+    """Mean x of every bin that holds samples and, per signal, its mean there.
+
+    x and each signal are (n,) and finite, ``edges`` are inner and sorted.
+    """
+    index = np.searchsorted(edges, x, side="right")
     count = np.bincount(index)
     used = count > 0
     means = [np.bincount(index, weights=v)[used] / count[used] for v in (x, *values)]
-    return means[0], [np.asarray(m) for m in means[1:]]
+    return means[0], means[1:]

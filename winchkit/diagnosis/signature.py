@@ -35,7 +35,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 _NOTHING = 1e-300
-_TRACE = 1e-7
 _SIMULATIONS = 400
 _PERIODS = 2
 _NEEDED = {
@@ -209,12 +208,11 @@ class Projected:
         random = np.random.default_rng(0)
         out = np.zeros((len(self.inner), samples))
         for part, freedom in zip(self._parts, self._freedom, strict=True):
-            size = np.sqrt(np.maximum(np.diag(part), _NOTHING))
-            # Columns of one effect at several shapes are nearly alike: a trace on the diagonal.
-            unit = part / np.outer(size, size) + _TRACE * np.eye(len(part))
+            # No Cholesky factor: what the present model explains whole is left with rounding only.
+            values, vectors = np.linalg.eigh(part)
             factor = np.sqrt(freedom / random.chisquare(freedom, samples))
             noise = random.standard_normal((len(part), samples)) * factor
-            out += size[:, None] * (np.linalg.cholesky(unit) @ noise)
+            out += (vectors * np.sqrt(np.maximum(values, 0.0))) @ noise
         return out
 
     def _root(self, atom: Atom, plain: Array) -> Array:

@@ -1,0 +1,63 @@
+"""Runs cases through the diagnosis, one after the other or in a few processes."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from campaign.case import Case, Plan, make_case
+from campaign.score import Score, score
+
+__all__ = ["run_case", "run_cases"]
+
+
+def run_case(seed: int, plan: Plan, folder: Path) -> Score:
+    """Make one case, diagnose its files and score the answer."""
+    return answer(make_case(seed, plan, folder))
+
+
+def answer(case: Case) -> Score:
+    """Diagnose a case from its files."""
+    from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.runs.read import read_run
+    from winchkit.schema.read import read_winch
+
+    runs = [read_run(path) for path in case.runs]
+    begun = time.perf_counter()
+    result = diagnose(runs, read_winch(case.profile))
+    seconds = time.perf_counter() - begun
+    p_value = result.found.presence.p_value
+    return score(case, result.diagnosis.to_json(), p_value, seconds)
+
+
+def _one(job: tuple[int, Plan, str | None]) -> Score:
+    seed, plan, keep = job
+    if keep is not None:
+        return run_case(seed, plan, Path(keep) / f"case-{seed}")
+    with tempfile.TemporaryDirectory() as folder:
+        return run_case(seed, plan, Path(folder))
+
+
+def run_cases(seed: int, plans: Sequence[Plan], jobs: int, keep: Path | None) -> list[Score]:
+    """Scores in the order of the plans; progress on stderr."""
+    work = [(seed * 100_000 + i, p, str(keep) if keep else None) for i, p in enumerate(plans)]
+    if jobs > 1:
+        with ProcessPoolExecutor(jobs) as pool:
+            return list(pool.map(_one, work))
+    out = []
+    for job in work:
+        got = _one(job)
+        out.append(got)
+        told = "ok  " if got.ok else "FAIL"
+        print(
+            f"{told} {got.seed} {got.kind} {got.snr:g} {','.join(got.truth)} -> {got.verdict} "
+            f"{[list(s) for s in got.steps]} share {got.share:.3f} p {got.p_value:.2g} "
+            f"{got.seconds:.1f} s | {got.scene}",
+            file=sys.stderr,
+            flush=True,
+        )
+    return out

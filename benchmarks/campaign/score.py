@@ -1,0 +1,142 @@
+"""Scores: what an answer is worth against the truth, and the figures of a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from campaign.case import Case
+
+__all__ = ["Score", "score", "summary", "table"]
+
+AIMS = {
+    "none": {"alarm": "<= 0.05", "named": "<= 0.01"},
+    "single": {"truth_in_first": ">= 0.98", "wrong_single_name": "<= 0.005"},
+    "pair": {"all_found": ">= 0.92"},
+    "outside": {"unknown_or_partly": ">= 0.97", "wrong_single_name": "<= 0.02"},
+}
+
+
+@dataclass(frozen=True)
+class Score:
+    """One case's answer."""
+
+    seed: int
+    kind: str
+    snr: float
+    truth: tuple[str, ...]
+    verdict: str
+    steps: tuple[tuple[str, ...], ...]
+    share: float
+    p_value: float
+    truth_in_first: bool
+    wrong_single_names: tuple[str, ...]
+    found: int
+    heldout_over_noise: float
+    covered: tuple[int, int]
+    seconds: float
+    scene: str
+
+    @property
+    def ok(self) -> bool:
+        """Whether the answer is as the truth is."""
+        if self.kind == "none":
+            return self.verdict == "adequate"
+        if self.kind == "outside":
+            return self.verdict in {"unknown", "partly"} and not self.wrong_single_names
+        if self.snr < 1:
+            return not self.wrong_single_names
+        return self.found == len(self.truth) and not self.wrong_single_names
+
+
+def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) -> Score:
+    """Compare an answer (as JSON) with what the case hides."""
+    steps = tuple(tuple(s["effects"]) for s in answer["steps"])
+    truth = tuple(case.hidden)
+    inside = [t for t in truth if not t.startswith("outside-")]
+    covered = [0, 0]
+    for step in answer["steps"]:
+        for effect, values in step["parameters"].items():
+            for name, estimate in values.items() if effect in case.hidden else ():
+                true, std = case.hidden[effect].get(name), estimate["std"]
+                if true is not None and std is not None and np.isfinite(std) and std > 0:
+                    off = _apart(name, estimate["value"], true)
+                    covered[0] += abs(off) <= 1.96 * std
+                    covered[1] += 1
+    ratios = [
+        o["heldout_rms_after"] / o["noise_rms"]
+        for o in answer["outputs"].values()
+        if o["noise_rms"]
+    ]
+    return Score(
+        case.seed,
+        case.kind,
+        case.snr,
+        truth,
+        answer["verdict"],
+        steps,
+        answer["unexplained"]["share"],
+        p_value,
+        bool(steps) and any(t in steps[0] for t in inside),
+        tuple(s[0] for s in steps if len(s) == 1 and s[0] not in inside),
+        sum(any(t in s for s in steps) for t in inside),
+        max(ratios, default=float("nan")),
+        (covered[0], covered[1]),
+        seconds,
+        case.scene,
+    )
+
+
+def _apart(name: str, value: float, true: float) -> float:
+    off = value - true
+    return float((off + np.pi) % (2 * np.pi) - np.pi) if name == "phase" else off
+
+
+def summary(scores: Sequence[Score]) -> dict[str, Any]:
+    """Figures by kind and SNR, and every failure."""
+    groups: dict[str, list[Score]] = {}
+    for s in scores:
+        groups.setdefault(s.kind if s.kind == "none" else f"{s.kind} snr {s.snr:g}", []).append(s)
+    return {
+        "cases": len(scores),
+        "aims": AIMS,
+        "groups": {name: _figures(group) for name, group in sorted(groups.items())},
+        "failures": [asdict(s) for s in scores if not s.ok],
+    }
+
+
+def _figures(group: Sequence[Score]) -> dict[str, Any]:
+    explained = [s.heldout_over_noise for s in group if s.verdict == "explained"]
+    hits = np.sum([s.covered for s in group], axis=0)
+    sizes = [len(s.steps[0]) for s in group if s.steps]
+    return {
+        "cases": len(group),
+        "alarm": _mean([s.verdict != "adequate" for s in group]),
+        "named": _mean([bool(s.steps) for s in group]),
+        "truth_in_first": _mean([s.truth_in_first for s in group]),
+        "all_found": _mean([s.found == len(s.truth) for s in group]),
+        "wrong_single_name": _mean([bool(s.wrong_single_names) for s in group]),
+        "unknown_or_partly": _mean([s.verdict in {"unknown", "partly"} for s in group]),
+        "set_size": _mean(sizes),
+        "heldout_at_noise": _mean([ratio <= 1.1 for ratio in explained]),
+        "coverage": float(hits[0] / hits[1]) if hits[1] else None,
+        "seconds": _mean([s.seconds for s in group]),
+    }
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return float(np.mean(values)) if len(values) else None
+
+
+def table(result: dict[str, Any]) -> str:
+    """The figures for a reader."""
+    names = list(next(iter(result["groups"].values())))
+    lines = [f"{'':20}" + "".join(f"{n[:12]:>13}" for n in names)]
+    for group, figures in result["groups"].items():
+        cells = [figures[n] for n in names]
+        shown = "".join(f"{'-' if c is None else f'{c:.3g}':>13}" for c in cells)
+        lines.append(f"{group:20}" + shown)
+    return "\n".join(lines)

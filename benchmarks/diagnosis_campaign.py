@@ -1,0 +1,60 @@
+"""Tries to break the diagnosis: cases made by another physics, answers scored against the truth.
+
+``python benchmarks/diagnosis_campaign.py --cases 40 --seed 1 --json``: one JSON object on stdout,
+a table on stderr. See benchmarks/README.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent))
+
+from campaign.case import Plan
+from campaign.run import run_cases
+from campaign.score import summary, table
+
+KINDS = ("none", "single", "pair", "triple", "outside", "norepeat")
+SNRS = (0.3, 1.0, 3.0, 10.0)
+
+
+def plans(cases: int, kinds: list[str], snrs: list[float], effects: tuple[str, ...], small: bool):
+    """One plan a case, kinds and sizes in turn."""
+    mix = [(kind, snr) for kind in kinds for snr in (snrs if kind != "none" else snrs[:1])]
+    return [Plan(*mix[i % len(mix)], effects, small) for i in range(cases)]
+
+
+def main() -> None:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kind", choices=KINDS, action="append")
+    parser.add_argument("--snr", type=float, action="append")
+    parser.add_argument("--effect", action="append", help="hide this one instead of a drawn one")
+    parser.add_argument("--small", action="store_true", help="shorter runs")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--keep", type=Path, help="folder in which the cases' files stay")
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    todo = plans(
+        args.cases,
+        args.kind or list(KINDS),
+        args.snr or list(SNRS),
+        tuple(args.effect or ()),
+        args.small,
+    )
+    scores = run_cases(args.seed, todo, args.jobs, args.keep)
+    result = summary(scores)
+    print(table(result), file=sys.stderr)
+    if args.json:
+        print(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,272 @@
+"""The whole bench against the simulated one in real time: CAN frames, Modbus, logs, stations."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from winchkit import catalog, open_bench
+from winchkit.bench.bench import Bench
+from winchkit.bench.client import attach
+from winchkit.bench.emergency_stop import stop_on_bus
+from winchkit.bench.programme import run_programme
+from winchkit.bench.server import StationServer
+from winchkit.bench.snapshot import Phase
+from winchkit.errors import (
+    DriveFault,
+    LimitTripped,
+    MotionError,
+    NotPermitted,
+    UsageError,
+)
+from winchkit.runs import read_run
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.programme import Programme, Step
+from winchkit.schema.read import read_simbench
+from winchkit.sim.live import LiveBench
+
+
+@pytest.fixture
+def live() -> Iterator[LiveBench]:
+    declared = read_simbench(catalog.find("sim", "spiral-bench"))
+    with LiveBench(declared, seed=3) as running:
+        yield running
+
+
+@pytest.fixture
+def bench(live: LiveBench) -> Iterator[Bench]:
+    with open_bench(live.bench_spec) as opened:
+        yield opened
+
+
+def until(condition: Callable[[], bool], within: float = 3.0) -> None:
+    deadline = time.monotonic() + within
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come to that"
+        time.sleep(0.005)
+
+
+def test_jog_move_log_and_the_instruments_agree(bench: Bench, tmp_path: Path) -> None:
+    winch = bench.winch["A"]
+    start = winch.cable_length
+    winch.jog(0.2, 0.6)
+    assert winch.snapshot.phase is Phase.DISABLED
+    assert 0.05 < start - winch.cable_length < 0.16
+    path = tmp_path / "lift.csv"
+    with bench.log(path, {"programme": "up"}):
+        winch.move_to(3.6, 0.4)
+    assert winch.cable_length == pytest.approx(3.6, abs=2e-3)
+    assert winch.tension == pytest.approx(10 * 9.80665, abs=6)
+    run = read_run(path)
+    assert run.metadata["programme"] == "up"
+    assert run.load_mass == 10.0
+    assert 0.008 < run.interval < 0.012
+    assert np.isfinite(run["motor_angle"]).mean() > 0.98
+    measured, turned = run["cable_length"], run["motor_angle"]
+    expected = np.array([bench.loop.winches["A"].rope.line.cable_length(a) for a in turned])
+    assert np.nanmax(np.abs(measured - expected)) < 5e-3
+    assert np.nanstd(measured - expected) < 1e-3
+
+
+def test_a_jog_ends_without_its_beats_and_other_errors_stop_it(live: LiveBench) -> None:
+    with open_bench(live.bench_spec) as bench:
+        winch = bench.winch["A"]
+        winch.jog(-0.2)
+        until(lambda: winch.snapshot.phase is Phase.MOVING)
+        until(lambda: winch.snapshot.phase is Phase.DISABLED)
+        assert not winch.moving
+    with pytest.raises(ZeroDivisionError):
+        fail_while_moving(live.bench_spec)
+    with live.up_to_date():
+        assert live.winches["A"].drive.state.name == "SWITCH_ON_DISABLED"
+        assert abs(live.winches["A"].plant.motor_velocity) < 1e-3
+
+
+def fail_while_moving(spec: BenchSpec) -> None:
+    with open_bench(spec) as bench:
+        bench.winch["A"].jog(-0.2, hold=1.0)
+        until(lambda: abs(bench.winch["A"].snapshot.speed) > 0.1)
+        raise ZeroDivisionError
+
+
+def test_a_callback_steers_and_its_error_comes_out_of_the_block(live: LiveBench) -> None:
+    seen: list[float] = []
+
+    def steer(snapshot: object) -> dict[str, float]:
+        seen.append(time.monotonic())
+        if len(seen) > 150:
+            raise KeyError("user's own")
+        return {"A": -0.1}
+
+    bench = open_bench(live.bench_spec)
+    start = bench.winch["A"].cable_length
+    bench.on_cycle(steer)
+    until(lambda: bench.loop.failure is not None)
+    until(lambda: bench.snapshot.at_rest)
+    assert bench.winch["A"].cable_length > start + 0.01
+    with pytest.raises(KeyError, match="user's own"), bench:
+        pass
+
+
+def test_what_is_refused(bench: Bench, live: LiveBench) -> None:
+    winch = bench.winch["A"]
+    with pytest.raises(NotPermitted, match="beyond the limits"):
+        winch.move_to(7.0)
+    with pytest.raises(UsageError, match="cannot be meant"):
+        winch.jog(math.nan)
+    with pytest.raises(UsageError, match=r"no winch 'B'; it has A"):
+        bench.named("B")
+    with pytest.raises(NotPermitted, match="owned by process"):
+        open_bench(live.bench_spec)
+
+
+def test_a_drive_fault_stops_latches_and_is_reset(bench: Bench, live: LiveBench) -> None:
+    winch = bench.winch["A"]
+    winch.move_to(3.0, 0.2, wait=False)
+    until(lambda: abs(winch.snapshot.speed) > 0.1)
+    live.inject("A.servo", "following error")
+    with pytest.raises(DriveFault, match="8611h following error"):
+        winch.wait()
+    with pytest.raises(DriveFault, match="latched"):
+        winch.jog(0.1)
+    bench.reset()
+    winch.jog(0.1, 0.2)
+    assert not bench.snapshot.tripped
+
+
+def test_a_reboot_is_commissioned_again_by_a_reset(bench: Bench, live: LiveBench) -> None:
+    winch = bench.winch["A"]
+    live.inject("A.servo", "reboot")
+    until(lambda: any(t.kind in ("boot-up", "nmt") for t in bench.snapshot.tripped))
+    with pytest.raises(LimitTripped, match="reset"):
+        winch.jog(0.1)
+    time.sleep(1.0)
+    bench.reset()
+    winch.jog(0.1, 0.2)
+
+
+def test_a_silent_cell_stops_the_winch(bench: Bench, live: LiveBench) -> None:
+    winch = bench.winch["A"]
+    winch.move_to(3.0, 0.1, wait=False)
+    until(lambda: abs(winch.snapshot.speed) > 0.05)
+    live.inject("A.cell", "silence")
+    with pytest.raises(LimitTripped, match="no load cell reading"):
+        winch.wait()
+    until(lambda: bench.snapshot.at_rest)
+    assert math.isnan(winch.tension)
+
+
+def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None:
+    server = StationServer(bench)
+    station, other = attach(bench.spec), attach(bench.spec)
+    assert station is not None
+    assert other is not None
+    try:
+        assert station.names() == ["A"]
+        other.start_log(str(tmp_path / "other.csv"))
+        station.jog("A", -0.2, 0.7)
+        until(lambda: bench.winch["A"].snapshot.speed < -0.1)
+        other.stop()
+        assert bench.snapshot.at_rest
+        with pytest.raises(NotPermitted, match="let go"):
+            station.jog("A", -0.2, 0.2)
+        assert other.end_log() > 5
+        assert abs(station.tare(None)) < 8
+        with pytest.raises(UsageError, match="no winch 'Z'"):
+            station.moving("Z")
+        assert station.status()["winch"]["A"]["phase"] == "disabled"
+    finally:
+        station.close()
+        other.close()
+        server.close()
+    assert attach(bench.spec) is None
+
+
+def test_a_station_that_goes_away_lets_go(bench: Bench) -> None:
+    server = StationServer(bench)
+    try:
+        station = attach(bench.spec)
+        assert station is not None
+        station.step("A", 0.8, 0.1)
+        until(lambda: bench.winch["A"].snapshot.speed < -0.05)
+        station.close()
+        until(lambda: bench.snapshot.at_rest)
+        assert bench.winch["A"].cable_length < 4.6
+    finally:
+        server.close()
+
+
+def test_stop_without_an_owner_acts_on_the_bus(live: LiveBench) -> None:
+    """The drive is left moving by an owner that died: here its loop is simply ended."""
+    bench = open_bench(live.bench_spec)
+    bench.winch["A"].jog(-0.2, hold=1.0)
+    until(lambda: bench.winch["A"].snapshot.speed < -0.1)
+    bench.loop.close()
+    (stopped,) = stop_on_bus(live.bench_spec)
+    assert stopped.confirmed
+    with live.up_to_date():
+        assert abs(live.winches["A"].plant.motor_velocity) < 0.1
+        assert live.winches["A"].drive.state.name != "OPERATION_ENABLED"
+    bench.close()
+
+
+def test_a_programme_writes_a_run_per_load_and_repeat(
+    bench: Bench, live: LiveBench, tmp_path: Path
+) -> None:
+    steps = (
+        Step(ask="hang 10 kg", load_mass=10.0),
+        Step(by=-0.1, speed=0.3),
+        Step(hold=0.2),
+        Step(ask="hang 20 kg", load_mass=20.0),
+        Step(by=0.1, speed=0.3),
+    )
+    asked: list[str] = []
+
+    def hang(step: Step) -> None:
+        assert bench.snapshot.at_rest
+        asked.append(str(step.ask))
+        live.answer(step)
+
+    written = run_programme(bench, Programme("short", steps, repeat=2), tmp_path, hang)
+    assert [path.name for path in written] == [
+        "short-10kg-1.csv",
+        "short-20kg-1.csv",
+        "short-10kg-2.csv",
+        "short-20kg-2.csv",
+    ]
+    assert asked == ["hang 20 kg", "hang 10 kg", "hang 20 kg"]
+    for path in written:
+        run = read_run(path)
+        assert run.load_mass is not None
+        weight = run.load_mass * 9.80665
+        assert np.nanmean(run["tension"]) == pytest.approx(weight, rel=0.1)
+        assert run.metadata["programme"] == "short"
+
+
+def test_what_stops_a_programme_keeps_its_log(
+    bench: Bench, live: LiveBench, tmp_path: Path
+) -> None:
+    programme = Programme("cut", (Step(to=2.0, speed=0.2),))
+    stopper = threading.Timer(1.0, bench.stop_now)
+    stopper.start()
+    with pytest.raises(MotionError):
+        run_programme(bench, programme, tmp_path, lambda _step: None)
+    stopper.join()
+    assert len(read_run(tmp_path / "cut-10kg-1.csv")) > 20
+
+
+def test_a_bench_whose_drive_does_not_exist(live: LiveBench) -> None:
+    spec: BenchSpec = live.bench_spec
+    wiring = spec.winch["A"]
+    ghost = replace(spec, winch={"A": replace(wiring, servo=replace(wiring.servo, node=44))})
+    with pytest.raises(OSError, match="node 44"):
+        open_bench(ghost)
+    with open_bench(spec) as bench:
+        assert bench.snapshot.at_rest
