@@ -18,15 +18,24 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaign.case import Plan
 from campaign.run import run_cases
 from campaign.score import summary, table
+from campaign.sizes import CATALOGUE, OUTSIDE
 
 KINDS = ("none", "single", "pair", "triple", "outside", "norepeat")
 SNRS = (0.3, 1.0, 3.0, 10.0)
 
 
-def plans(cases: int, kinds: list[str], snrs: list[float], effects: tuple[str, ...], small: bool):
-    """One plan a case, kinds and sizes in turn."""
+def plans(
+    cases: int, kinds: list[str], snrs: list[float], effects: tuple[str, ...], small: bool
+) -> list[Plan]:
+    """One plan a case: kinds and sizes in turn, every effect as often as any other."""
     mix = [(kind, snr) for kind in kinds for snr in (snrs if kind != "none" else snrs[:1])]
-    return [Plan(*mix[i % len(mix)], effects, small) for i in range(cases)]
+    out = []
+    for index in range(cases):
+        kind, snr = mix[index % len(mix)]
+        pool = {"single": CATALOGUE, "norepeat": CATALOGUE, "outside": OUTSIDE}.get(kind)
+        turn = (pool[(index // len(mix)) % len(pool)],) if pool else ()
+        out.append(Plan(kind, snr, effects or turn, small))
+    return out
 
 
 def main() -> None:

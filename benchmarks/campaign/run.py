@@ -15,9 +15,10 @@ from campaign.score import Score, score
 __all__ = ["run_case", "run_cases"]
 
 
-def run_case(seed: int, plan: Plan, folder: Path) -> Score:
-    """Make one case, diagnose its files and score the answer."""
-    return answer(make_case(seed, plan, folder))
+def run_case(seed: int, plan: Plan, folder: Path) -> Score | None:
+    """Make one case, diagnose its files and score the answer; None where no case can be made."""
+    case = make_case(seed, plan, folder)
+    return None if case is None else answer(case)
 
 
 def answer(case: Case) -> Score:
@@ -34,7 +35,7 @@ def answer(case: Case) -> Score:
     return score(case, result.diagnosis.to_json(), p_value, seconds)
 
 
-def _one(job: tuple[int, Plan, str | None]) -> Score:
+def _one(job: tuple[int, Plan, str | None]) -> Score | None:
     seed, plan, keep = job
     if keep is not None:
         return run_case(seed, plan, Path(keep) / f"case-{seed}")
@@ -47,10 +48,13 @@ def run_cases(seed: int, plans: Sequence[Plan], jobs: int, keep: Path | None) ->
     work = [(seed * 100_000 + i, p, str(keep) if keep else None) for i, p in enumerate(plans)]
     if jobs > 1:
         with ProcessPoolExecutor(jobs) as pool:
-            return list(pool.map(_one, work))
+            return [got for got in pool.map(_one, work) if got is not None]
     out = []
     for job in work:
         got = _one(job)
+        if got is None:
+            print(f"none {job[0]} cannot be made: {job[1]}", file=sys.stderr)
+            continue
         out.append(got)
         told = "ok  " if got.ok else "FAIL"
         print(

@@ -27,6 +27,7 @@ class Score:
     seed: int
     kind: str
     snr: float
+    hidden: dict[str, dict[str, float]]
     truth: tuple[str, ...]
     verdict: str
     steps: tuple[tuple[str, ...], ...]
@@ -75,6 +76,7 @@ def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) ->
         case.seed,
         case.kind,
         case.snr,
+        {name: dict(values) for name, values in case.hidden.items()},
         truth,
         answer["verdict"],
         steps,

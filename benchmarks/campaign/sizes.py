@@ -40,7 +40,7 @@ OUTSIDE = (
 )  # fmt: skip
 
 
-def allowed(effect: str, winch: Winch, load_known: bool, warms: bool) -> bool:
+def allowed(effect: str, winch: Winch, load_known: bool, warms: bool, loads: int) -> bool:
     """Whether an effect can act, and show, on a winch and its channels."""
     if effect.startswith("gear-") and effect != "gear-efficiency" and winch.ratio == 1:
         return False
@@ -54,6 +54,7 @@ def allowed(effect: str, winch: Winch, load_known: bool, warms: bool) -> bool:
         "cable-thermal": warms,
         "cell-thermal": warms and load_known,
         "outside-clipping": load_known,
+        "outside-joint": loads > 2,
         "outside-sticky-place": load_known,
         "outside-square-drag": load_known,
     }
@@ -89,7 +90,6 @@ _ONE = {
     "drum-radius": ("radius_error", 5e-4, True),
     "gear-ratio": ("ratio_error", 5e-3, True),
     "layer-thickness": ("thickness_error", 1e-4, True),
-    "gear-backlash": ("gap", 4e-3, False),
     "cable-thermal": ("expansion", 1.1e-5, True),
     "cable-sag": ("mass_per_length", 0.14, False),
     "drum-winding-tension": ("fraction", 5e-3, False),
@@ -133,6 +133,10 @@ def _shaped(effect: str, random: Random, winch: Winch, scene: Scene) -> Sized:
         case "gear-transmission-error":
             order = float(random.choice([1, 2, 3, 4, 6, 8, 12]))
             return lambda z: {"amplitude": 2e-4 * z, "phase": phase, "order": order}
+        case "gear-backlash":
+            # Whether the motor feels no load within the play, or is held on a flank.
+            opens = float(random.integers(0, 2))
+            return lambda z: {"gap": 4e-3 * z, "opens": opens}
         case "motor-cogging":
             order = float(random.choice([2, 4, 6, 12]))
             return lambda z: {"amplitude": 0.01 * z, "phase": phase, "order": order}
@@ -179,7 +183,7 @@ def _shaped(effect: str, random: Random, winch: Winch, scene: Scene) -> Sized:
             angle = 2 * pi * winch.wound_turns - gone
             return lambda z: {"jump": 1e-4 * z, "angle": angle}
         case "outside-joint":
-            force = low + random.uniform(0.3, 0.6) * (high - low)
+            force = random.uniform(0.62, 0.8) * high
             return lambda z: {"force": force, "stiffness": 2e5 / z}
         case "outside-clipping":
             return lambda z: {"most": high * (1.02 - 0.04 * min(z, 20.0))}

@@ -35,6 +35,8 @@ class Situation:
     temperature: Array
     wander: Array
     """A slow curve of rms one, the same in every run."""
+    every: int = 1
+    """Physics steps per sample: instruments see one of so many."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,8 @@ class _Line:
         load = self.run.mass * (G - np.gradient(np.gradient(free, self.time), self.time))
         drum_side = self._to_the_drum(load, free)
         length = self._rope(free, load)
-        return Shown(length, self._cell(drum_side, free), self._torque(drum_side, arm, free), load)
+        ideal = length, self._cell(drum_side, free), self._torque(drum_side, arm, free), load
+        return Shown(*(channel[:: self.run.every] for channel in ideal))
 
     def _turned(self, motor_angle: Array) -> Array:
         winch = self.winch
@@ -107,7 +110,8 @@ class _Line:
         sticks = np.ones_like(theta)
         if p := self.get("gear-backlash"):
             followed = play(angle, p["gap"])
-            sticks = (np.abs(followed - angle) > 0.4999 * p["gap"]).astype(float)
+            if p["opens"]:
+                sticks = (np.abs(followed - angle) > 0.4999 * p["gap"]).astype(float)
             more, less, angle = more + followed - angle, less + followed - angle, followed
         if p := self.get("encoder-slip"):
             done = np.clip((self.time - p["time"]) / 0.4, 0, 1)
@@ -233,7 +237,7 @@ class _Line:
         if p := self.get("rotor-inertia"):
             torque = torque + p["inertia"] * np.gradient(rate, self.time)
         if p := self.get("outside-crosstalk"):
-            torque = torque + p["size"] * free
+            torque = torque + p["size"] * (free - self.winch.length_reference)
         if p := self.get("torque-lag"):
             torque = lag(torque, self.time, p["time_constant"], float(torque[0]))
         return torque

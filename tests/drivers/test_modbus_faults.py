@@ -23,9 +23,8 @@ CLOCK = MonotonicClock()
 
 
 def cell(unit: int = 1) -> Instrument:
-    return Instrument(
-        f"cell {unit}", read_device(catalog.find("devices", "laumas-tlb")), unit, 100.0, CLOCK
-    )
+    spec = read_device(catalog.find("devices", "laumas-tlb"))
+    return Instrument(f"cell {unit}", spec, unit, CLOCK, rate=100.0, timeout=0.1)
 
 
 def weigh(peer: Peer, counts: int, status: int = 1 << 11) -> None:

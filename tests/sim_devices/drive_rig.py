@@ -62,7 +62,9 @@ class Flywheel:
 class Rig:
     """A drive on a bus without a wire: the master's frames arrive at once, and time is ours."""
 
-    def __init__(self, shaft: Any = None, *, brake: bool = True, boot: bool = True) -> None:
+    def __init__(
+        self, shaft: Any = None, *, brake: bool = True, boot: bool = True, smoothing: float = 0.0
+    ) -> None:
         self.now = 100.0
         self.shaft: Any = Flywheel() if shaft is None else shaft
         self.frames: list[tuple[float, int, bytes]] = []
@@ -73,6 +75,7 @@ class Rig:
             ObjectDictionary(ENTRIES),
             self.shaft,
             brake=brake,
+            smoothing=smoothing,
             now=self.now,
         )
         self.network = canopen.Network()

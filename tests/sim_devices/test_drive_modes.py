@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from winchkit.catalog import find
 from winchkit.schema.read import read_winch
 from winchkit.schema.simbench import WinchTruth
+from winchkit.sim.drive_smooth import MovingAverage
 from winchkit.sim.plant import WinchPlant
 
 PP, PV, CSP, CSV = 1, 3, 8, 9
@@ -252,3 +253,35 @@ def test_enabling_begins_where_the_motor_is() -> None:
     rig.enable(CSP)
     rig.run(0.1)
     assert rig.shaft.motor_angle == pytest.approx(3.0, abs=COUNT)
+
+
+@given(
+    st.floats(0.0, 0.05),
+    st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(1e-4, 2e-3)), min_size=1, max_size=80),
+)
+def test_the_set_point_filter_is_the_mean_over_its_duration(
+    duration: float, signal: list[tuple[float, float]]
+) -> None:
+    filtered = MovingAverage(duration)
+    filtered.begin(7.0)
+    for value, dt in signal:
+        mean = filtered.step(value, dt)
+    left, total = duration, 0.0
+    for value, dt in reversed(signal):
+        part = min(left, dt)
+        total += part * value
+        left -= part
+    expected = signal[-1][0] if duration == 0 else (total + left * 7.0) / duration
+    assert mean == pytest.approx(expected, abs=1e-6 / max(duration, 1e-3))
+
+
+def test_the_set_point_filter_delays_a_ramp_by_half_its_length() -> None:
+    speeds = []
+    for smoothing in (0.0, 0.04):
+        rig = Rig(smoothing=smoothing)
+        rig.enable(CSV)
+        for cycle in range(50):
+            rig.write(0x60FF, 0, 2_000 * cycle)
+            rig.run(0.004)
+        speeds.append(rig.read(0x606C))
+    assert speeds[0] - speeds[1] == pytest.approx(500_000 * 0.02, rel=0.05)

@@ -262,6 +262,7 @@ class Bench:
                         f"SYNC within {_FIRST_FEEDBACK:g} s; check its PDO mapping and SYNC id 80h"
                     )
                 self.clock.sleep(_POLL)
+        self._await_cycles(2)
 
     def _await_sensors(self) -> None:
         """Give every sensor time for its first answer; a silent one is told when it matters."""

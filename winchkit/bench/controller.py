@@ -77,7 +77,7 @@ class Controller:
         self._lock = threading.Lock()
         self._down = RunDown(rope, limits)
         self._angle = 0.0
-        self._since = 0.0
+        self._since = self._time = 0.0
 
     def begin(self, source: MotionSource) -> None:
         """Start a source, enabling the drive first where needed; replaces the one before."""
@@ -98,8 +98,9 @@ class Controller:
         """Clear a drive's fault; it stays disabled."""
         self._order(Phase.RESETTING)
 
-    def step(self, now: float) -> None:
-        """Send this cycle's command."""
+    def step(self, now: float, time: float) -> None:
+        """Send this cycle's command; ``time`` is that of motion, one cycle a cycle."""
+        self._time = time
         self._take_orders(now)
         feedback = self.axis.feedback
         if feedback is None:
@@ -139,7 +140,7 @@ class Controller:
         feedback = self.axis.feedback
         if feedback is not None and self.phase in (Phase.MOVING, Phase.RUN_DOWN):
             if wanted.joins or self.commanded == 0.0:
-                wanted.start(now, feedback.angle, self.commanded)
+                wanted.start(self._time, feedback.angle, self.commanded)
                 self.source, self.done = wanted, False
                 self.phase, self._since = Phase.MOVING, now
                 return
@@ -165,7 +166,7 @@ class Controller:
 
     def _enable(self, now: float, feedback: AxisFeedback) -> None:
         if feedback.state is State.OPERATION_ENABLED and self.source is not None:
-            self.source.start(now, feedback.angle, 0.0)
+            self.source.start(self._time, feedback.angle, 0.0)
             self._angle = feedback.angle
             self._enter(Phase.MOVING, now)
             self._move(now, feedback)
@@ -181,7 +182,7 @@ class Controller:
             self._enter(Phase.STOPPING, now)
             self._stop(now, feedback)
             return
-        target = self.source.target(now, feedback.angle)
+        target = self.source.target(self._time, feedback.angle, now)
         self._follow(target, feedback)
         if target.done:
             self.done = True
@@ -198,12 +199,12 @@ class Controller:
 
     def _begin_run_down(self, now: float) -> None:
         self._down = RunDown(self.rope, self.limits)
-        self._down.start(now, self._angle, self.commanded)
+        self._down.start(self._time, self._angle, self.commanded)
         self._enter(Phase.RUN_DOWN, now)
         self.source, self.done = None, True
 
     def _slow_down(self, now: float, feedback: AxisFeedback) -> None:
-        target = self._down.target(now, feedback.angle)
+        target = self._down.target(self._time, feedback.angle, now)
         self.commanded = target.speed
         late = now - self._since > self._down.duration + _RUN_DOWN_MARGIN
         settled = target.done and self.axis.at_rest and self._wanted is None

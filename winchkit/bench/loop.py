@@ -45,10 +45,8 @@ class SensorPort(Protocol):
 
     latest: Reading | None
     problem: ConnectionLost | None
-
-    @property
-    def max_age(self) -> float:
-        """After this its reading is stale, s."""
+    max_age: float
+    """A reading older than this is stale, s."""
 
 
 @dataclass
@@ -157,7 +155,7 @@ class ControlLoop:
     def _command(self, now: float) -> None:
         for parts in self.winches.values():
             try:
-                parts.controller.step(now)
+                parts.controller.step(now, self._count * self._cycle)
             except ConnectionLost as error:
                 self._latch_bus(error)
 

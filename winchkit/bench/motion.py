@@ -21,7 +21,7 @@ DEAD_MAN = 0.2
 FIRST_PRESS = 0.7
 """Hold of the first press of a key, whose repeat starts late, s."""
 
-JERK_TIME = 0.1
+JERK_TIME = 0.3
 """Time in which a move's acceleration builds up, s."""
 _GAIN = 8.0
 """Of the position loop around a speed-controlled drive, 1/s."""
@@ -54,11 +54,15 @@ class MotionSource(Protocol):
     joins: bool
     """Whether it can take over a rope that moves."""
 
-    def start(self, now: float, angle: float, speed: float) -> None:
+    def start(self, time: float, angle: float, speed: float) -> None:
         """Begin at a motor angle (rad) and a rope speed (m/s)."""
 
-    def target(self, now: float, angle: float) -> Target:
-        """Target at ``now`` (s), the motor being at ``angle`` (rad)."""
+    def target(self, time: float, angle: float, now: float) -> Target:
+        """Target at ``time`` (s), the motor being at ``angle`` (rad).
+
+        Time of motion advances by exactly one cycle a cycle, so that a late cycle makes no jump;
+        ``now`` (s) is the true time, for whatever expires.
+        """
 
 
 class Ramp:
@@ -69,10 +73,10 @@ class Ramp:
         self._acceleration = acceleration
         self._time: float | None = None
 
-    def follow(self, wish: float, now: float) -> float:
-        """Speed at ``now``; the first call starts the clock."""
-        step = 0.0 if self._time is None else (now - self._time) * self._acceleration
-        self._time = now
+    def follow(self, wish: float, time: float) -> float:
+        """Speed at ``time``; the first call starts the clock."""
+        step = 0.0 if self._time is None else (time - self._time) * self._acceleration
+        self._time = time
         self.speed += max(-step, min(step, wish - self.speed))
         return self.speed
 
@@ -88,29 +92,27 @@ class Jog:
         self._ramp = Ramp(limits.acceleration)
         self._wish = 0.0
         self._expires = -math.inf
-        self._angle: float | None = None
-        self._last: float | None = None
+        self._angle = self._last = 0.0
 
     def refresh(self, speed: float, expires: float) -> None:
         """Keep going at ``speed`` until ``expires`` (s on the bench's clock)."""
         self._wish = max(-self._limits.speed, min(self._limits.speed, speed))
         self._expires = expires
 
-    def start(self, now: float, angle: float, speed: float) -> None:
+    def start(self, time: float, angle: float, speed: float) -> None:
         """Begin with the speed that the rope has."""
         self._ramp = Ramp(self._limits.acceleration, speed)
-        self._angle, self._last = angle, now
+        self._angle, self._last = angle, time
 
-    def target(self, now: float, angle: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Target:
         """Follow the wish, slow down before a length limit, end once expired and at rest."""
         live = now < self._expires
         length, arm = self._rope.at(angle)
         wish = self._within(self._wish, length) if live else 0.0
-        speed = self._ramp.follow(wish, now)
+        speed = self._ramp.follow(wish, time)
         velocity = speed / arm
-        if self._angle is not None and self._last is not None:
-            self._angle += velocity * (now - self._last)
-        self._last = now
+        self._angle += velocity * (time - self._last)
+        self._last = time
         return Target(velocity, self._angle, speed, done=not live and speed == 0.0)
 
     def _within(self, wish: float, length: float) -> float:
@@ -135,19 +137,19 @@ class RunDown:
         self._ramp = Ramp(self._acceleration)
         self._angle = self._last = 0.0
 
-    def start(self, now: float, angle: float, speed: float) -> None:
-        """Begin now, from the target angle and the speed that were in force."""
+    def start(self, time: float, angle: float, speed: float) -> None:
+        """Begin from the target angle and the speed that were in force."""
         self._ramp = Ramp(self._acceleration, speed)
-        self._ramp.follow(0.0, now)
+        self._ramp.follow(0.0, time)
         self.duration = abs(speed) / self._acceleration
-        self._angle, self._last = angle, now
+        self._angle, self._last = angle, time
 
-    def target(self, now: float, angle: float) -> Target:
+    def target(self, time: float, angle: float, _now: float) -> Target:
         """Slower by one cycle's worth."""
-        before, speed = self._ramp.speed, self._ramp.follow(0.0, now)
+        before, speed = self._ramp.speed, self._ramp.follow(0.0, time)
         arm = self._rope.at(angle)[1]
-        self._angle += (before + speed) / 2 / arm * (now - self._last)
-        self._last = now
+        self._angle += (before + speed) / 2 / arm * (time - self._last)
+        self._last = time
         return Target(speed / arm, self._angle, speed, done=speed == 0.0)
 
 
@@ -198,19 +200,19 @@ class Move:
         """Time of the planned move, s."""
         return self._plan.duration
 
-    def start(self, now: float, angle: float, _speed: float) -> None:
-        """Begin now, at rest; plans anew where the winch has moved since ``prepare``."""
+    def start(self, time: float, angle: float, _speed: float) -> None:
+        """Begin at rest; plans anew where the winch has moved since ``prepare``."""
         if not self._knots or abs(self._knots[0] - angle) > 0.5:
             self.prepare(angle)
-        self._start = now
+        self._start = time
 
-    def target(self, now: float, angle: float) -> Target:
-        """Where the plan is now, with the position loop's correction for speed control."""
-        time = now - self._start
-        position, speed, _ = (float(value) for value in self._plan.at(time))
+    def target(self, time: float, angle: float, _now: float) -> Target:
+        """Where the plan is, with the position loop's correction for speed control."""
+        elapsed = time - self._start
+        position, speed, _ = (float(value) for value in self._plan.at(elapsed))
         planned, slope = self._angle_at(position)
         velocity = speed * slope + _GAIN * (planned - angle)
-        late = time - self._plan.duration
+        late = elapsed - self._plan.duration
         arrived = late >= 0 and abs(planned - angle) <= _SETTLED * abs(slope)
         return Target(velocity, planned, -speed, done=arrived or late >= _SETTLE_TIME)
 

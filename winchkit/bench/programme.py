@@ -8,7 +8,7 @@ from pathlib import Path
 from winchkit.bench.bench import Bench
 from winchkit.bench.recorder import Recorder
 from winchkit.bench.winch import Winch
-from winchkit.errors import RunError, UsageError
+from winchkit.errors import MotionError, RunError, UsageError
 from winchkit.schema.programme import Programme, Step
 
 __all__ = ["Ask", "Progress", "run_programme"]
@@ -17,6 +17,9 @@ Ask = Callable[[Step], None]
 """Asks the operator to do something; returns when it is done, raises when it is refused."""
 Progress = Callable[[int, int, Step], None]
 """Told the repeat, the step's number and the step before it is executed."""
+
+Again = Callable[[MotionError], bool]
+"""Told what stopped a run; says whether to reset the bench and try the run once more."""
 
 _LEAD = 0.1
 """Logged at rest before the first and after the last motion of a run, s."""
@@ -30,24 +33,43 @@ def run_programme(
     *,
     suffix: str = ".csv",
     progress: Progress = lambda _repeat, _number, _step: None,
+    again: Again = lambda _error: False,
 ) -> list[Path]:
     """Run every step of every repeat; returns the files written, in order.
 
     Files are ``<programme>-<load>kg-<repeat>.csv``, without the load where none is known. A
-    question about a load that already hangs there is not asked again. At a question the winches
-    are disabled. Raises whatever stops a motion; what was logged until then is kept.
+    question about a load that this programme has hung already is not asked again. At a question
+    the winches are disabled. Raises whatever stops a motion, and what was logged until then is
+    kept, unless ``again`` says to try that run once more: then the bench is reset, its file
+    dropped, and the winches go back to where the run began.
     """
     execution = _Execution(bench, programme, Path(folder), ask, suffix)
     execution.folder.mkdir(parents=True, exist_ok=True)
+    numbered = list(enumerate(programme.step, start=1))
     try:
         for repeat in range(1, programme.repeat + 1):
-            for number, step in enumerate(programme.step, start=1):
-                progress(repeat, number, step)
-                execution.execute(repeat, step)
-            execution.end_run()
+            for part in _parts(numbered):
+                execution.run(repeat, part, progress, again)
     finally:
         execution.abandon()
     return execution.written
+
+
+def _parts(steps: list[tuple[int, Step]]) -> list[list[tuple[int, Step]]]:
+    """Steps cut where a question follows a motion: a question begins a new run.
+
+    One about the load that was hung last is none, and is left out.
+    """
+    parts: list[list[tuple[int, Step]]] = []
+    hanging = None
+    for number, step in steps:
+        if step.ask is not None and step.load_mass is not None and step.load_mass == hanging:
+            continue
+        hanging = step.load_mass or hanging
+        if not parts or (step.ask is not None and parts[-1][-1][1].ask is None):
+            parts.append([])
+        parts[-1].append((number, step))
+    return parts
 
 
 class _Execution:
@@ -60,7 +82,32 @@ class _Execution:
         self.written: list[Path] = []
         self._bench, self._programme, self._ask, self._suffix = bench, programme, ask, suffix
         self._recorder: Recorder | None = None
-        self._hanging = _declared_load(bench)
+        asks = any(step.load_mass is not None for step in programme.step)
+        # What hangs there now is known only once it was asked for: another programme may have
+        # left another load than the wiring declares.
+        self._hanging = None if asks else _declared_load(bench)
+
+    def run(
+        self, repeat: int, part: list[tuple[int, Step]], progress: Progress, again: Again
+    ) -> None:
+        """Ask what there is to ask, then log the motions, as often as it takes."""
+        begun: dict[str, float] = {}
+        while True:
+            try:
+                for number, step in part:
+                    if step.ask is not None and begun:
+                        continue
+                    if step.ask is None and not begun:
+                        begun = {n: w.cable_length for n, w in self._bench.winch.items()}
+                    progress(repeat, number, step)
+                    self.execute(repeat, step)
+                self.end_run()
+            except MotionError as error:
+                if not again(error):
+                    raise
+                self._go_back(begun)
+            else:
+                return
 
     def execute(self, repeat: int, step: Step) -> None:
         """One step; a motion starts the log of its run where none is open."""
@@ -72,6 +119,15 @@ class _Execution:
             self._hold(step.hold)
         else:
             self._move(step)
+
+    def _go_back(self, begun: dict[str, float]) -> None:
+        """Drop the disturbed run and go back to where it began."""
+        if self._recorder is not None:
+            self._finish()
+            self.written.pop().unlink()
+        self._bench.reset()
+        for name, length in begun.items():
+            self._bench.winch[name].move_to(length)
 
     def end_run(self) -> None:
         """Disable the winches and finish the file."""
@@ -102,8 +158,16 @@ class _Execution:
             name = f"{name}-{self._hanging:g}kg"
             about["load_mass"] = f"{self._hanging:g} kg"
         about["repeat"] = str(repeat)
-        self._recorder = self._bench.log(self.folder / f"{name}-{repeat}{self._suffix}", about)
+        self._recorder = self._bench.log(self._free(f"{name}-{repeat}"), about)
         self._hold(_LEAD)
+
+    def _free(self, name: str) -> Path:
+        """Path of a run; a letter more where this programme has written one of that name."""
+        for letter in ("", *"bcdefghijklmnopqrstuvwxyz"):
+            path = self.folder / f"{name}{letter}{self._suffix}"
+            if path not in self.written:
+                return path
+        raise UsageError(f"more than 26 runs would be named {name}; split the programme")
 
     def _finish(self) -> None:
         recorder, self._recorder = self._recorder, None

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Self
 
 from winchkit.bench.series import Series
-from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.bench.snapshot import BenchSnapshot, Phase
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.reading import Reading
@@ -38,6 +38,7 @@ _PERIOD = 0.05
 _PATIENCE = 0.5
 _FAST_GAP = 0.1
 _BARE_PERIOD = 0.01
+_UNPOWERED = (Phase.DISABLED, Phase.ENABLING, Phase.RESETTING)
 
 
 class Recorder:
@@ -85,7 +86,9 @@ class Recorder:
             winch = snapshot.winch[name]
             if math.isfinite(winch.time):
                 for item, key in zip(series, _FAST_ATTRIBUTES, strict=True):
-                    item.append(winch.time, getattr(winch, key))
+                    # While the brake holds the rope the drive's torque says nothing of it.
+                    unknown = key == "motor_torque" and winch.phase in _UNPOWERED
+                    item.append(winch.time, math.nan if unknown else getattr(winch, key))
         if self._base is None and snapshot.time - self._last >= _BARE_PERIOD:
             self._last = snapshot.time
             self._moments.append(snapshot.time)
@@ -138,23 +141,29 @@ class Recorder:
             self._error = error
 
     def _write_rows(self, final: bool = False) -> None:
-        """Write every row whose channels are complete, or waited for long enough."""
+        """Write every row whose channels are complete; one that has gone silent is not awaited.
+
+        At the end the rows that still wait for a channel are dropped.
+        """
         now = self._clock.now()
+        awaited = [item for item in self._series.values() if item.reaches(now - _PATIENCE)]
         while self._moments:
             moment = self._moments[0]
-            waited = final or now - moment > _PATIENCE
-            if not waited and not all(item.reaches(moment) for item in self._series.values()):
-                return
+            if not all(item.reaches(moment) for item in awaited):
+                break
             self._moments.popleft()
             self._write_row(moment)
+        if final:
+            self._moments.clear()
         self._writer.flush()
 
     def _write_row(self, moment: float) -> None:
-        if moment <= self._last_time:
+        if moment <= self._last_time or moment < self._opened:
             return
         row = {column: series.at(moment) for column, series in self._series.items()}
         if self._start is None:
-            if moment < self._opened + _PATIENCE and any(map(math.isnan, row.values())):
+            slow = {k: v for k, v in row.items() if not k.endswith("motor_torque")}
+            if moment < self._opened + _PATIENCE and any(map(math.isnan, slow.values())):
                 return
             self._start = moment
         self._last_time = moment

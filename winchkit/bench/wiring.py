@@ -31,6 +31,8 @@ READ_RATE = 100.0
 """Readings a second of every instrument, unless its own rate is lower."""
 _STALE_BEATS = 2
 """Feedback may be this many heartbeats old: the bench file says how soon silence must count."""
+_HEADROOM = 4.0
+"""Of a drive's own ramps in a profile mode over those that the host makes."""
 _ROLES = ("cell", "load", "length", "temperature")
 
 
@@ -58,7 +60,9 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
     profiles = {name: _profile(spec, winch) for name, winch in spec.winch.items()}
     ropes = {name: RopeMap(line_of(profile)) for name, profile in profiles.items()}
     buses = _open_buses(spec, clock, stack)
-    axes = {name: _axis(spec, winch, buses, clock) for name, winch in spec.winch.items()}
+    axes = {
+        name: _axis(spec, winch, ropes[name], buses, clock) for name, winch in spec.winch.items()
+    }
     sensors, lines = _instruments(spec, clock)
     slow = SlowDevices(lines, clock)
     stack.callback(slow.close)
@@ -104,13 +108,19 @@ def _open_buses(spec: BenchSpec, clock: Clock, stack: ExitStack) -> dict[str, Ca
 
 
 def _axis(
-    spec: BenchSpec, winch: WinchWiring, buses: Mapping[str, CanBus], clock: Clock
+    spec: BenchSpec,
+    winch: WinchWiring,
+    rope: RopeMap,
+    buses: Mapping[str, CanBus],
+    clock: Clock,
 ) -> Cia402Axis:
     ref = winch.servo
     bus = spec.bus[ref.bus]
     if ref.node is None:
         raise FileError(Fault(f"servo '{ref.device}' needs its node number", spec.path))
-    watch = WatchSpec(bus.node, bus.heartbeat, spec.cycle, winch.brake)
+    arm = abs(rope.line.arm(0.0))
+    acceleration = _HEADROOM * winch.limits.acceleration / arm
+    watch = WatchSpec(bus.node, bus.heartbeat, spec.cycle, winch.brake, acceleration)
     return Cia402Axis(buses[ref.bus], ref.node, _device(spec, ref), watch, clock)
 
 
@@ -128,7 +138,14 @@ def _instruments(
             key = (ref.bus, ref.unit or 1)
             if key not in found:
                 label = f"{role} of winch {name} (bus '{key[0]}' unit {key[1]})"
-                found[key] = Instrument(label, _device(spec, ref), key[1], READ_RATE, clock)
+                found[key] = Instrument(
+                    label,
+                    _device(spec, ref),
+                    key[1],
+                    clock,
+                    rate=READ_RATE,
+                    timeout=spec.bus[ref.bus].timeout,
+                )
             sensors[name][role] = found[key]
     by_bus: dict[str, list[Instrument]] = {}
     for (bus, _), instrument in found.items():
@@ -144,7 +161,8 @@ def _metadata(spec: BenchSpec, profiles: Mapping[str, WinchProfile]) -> dict[str
         "recorded": datetime.now(UTC).isoformat(timespec="seconds"),
         "winchkit": __version__,
         "wiring": json.dumps(dataclasses.asdict(spec), default=str),
-        "profile": json.dumps(
+        "profile": ", ".join(item.name for item in profiles.values()),
+        "declared": json.dumps(
             {name: dataclasses.asdict(item) for name, item in profiles.items()}, default=str
         ),
     }

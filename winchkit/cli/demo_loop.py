@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
     from winchkit.diagnosis.add import Addition
     from winchkit.diagnosis.diagnose import Answer
+    from winchkit.errors import MotionError
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme, Step
     from winchkit.schema.simbench import SimBench
@@ -29,6 +30,7 @@ PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
 _AT_NOISE = 1.3
 _TURN = 5e-4
 _APPROACH = 0.5
+_TRIES = 4
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,7 @@ def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
     from winchkit.sim.live import LiveBench
 
     written: list[Path] = []
+    patience = _Patience(told)
     with _quick_turns(), LiveBench(bench, seed=seed) as live:
         told("commissioning the drive")
         with open_bench(live.bench_spec) as opened:
@@ -93,6 +96,7 @@ def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
                     folder,
                     live.answer,
                     progress=lambda repeat, _, step: told(f"repeat {repeat}: {_words(step)}"),
+                    again=patience.again,
                 )
     return written
 
@@ -114,6 +118,19 @@ def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
     addition = add(answer.diagnosis.steps[0].effects[0], runs, profile)
     write_addition(nominal, addition, [run.name for run in runs], out / "improved.toml")
     return Findings(answer, addition)
+
+
+class _Patience:
+    """Tries a run again when this machine was too busy for a bench in real time."""
+
+    def __init__(self, told: Told) -> None:
+        self._told, self._left = told, _TRIES
+
+    def again(self, error: MotionError) -> bool:
+        """Whether to try once more."""
+        self._left -= 1
+        self._told(f"the machine was too busy ({error}); that run once more")
+        return self._left >= 0
 
 
 @contextmanager

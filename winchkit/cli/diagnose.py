@@ -40,7 +40,7 @@ def command(
         from winchkit.diagnosis.report import report_html
 
         title = f"{declared.name}: {', '.join(Path(run).name for run in runs)}"
-        Path(html).write_text(report_html(answer, title), encoding="utf-8")
+        Path(html).write_text(report_html(answer, title, profile=profile), encoding="utf-8")
         click.echo(f"report: {html}", err=True)
     if as_json:
         echo_json(answer.diagnosis.to_json())

@@ -25,7 +25,7 @@ def admit(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     """Notes on what is missing but no fault; raises RunError with every fault of every run."""
     if not runs:
         raise RunError("no run given")
-    faults = [fault for run in runs for fault in _faults(run)]
+    faults = [fault for run in runs for fault in _faults(run)] + _twice(runs)
     if not faults:
         faults = [fault for run in runs for fault in _other_winch(run, profile)]
     if faults:
@@ -65,6 +65,19 @@ def _faults(run: Run) -> list[Fault]:
                     "did not measure; remove the column"
                 )
             faults.append(Fault(message, where, key=key))
+    return faults
+
+
+def _twice(runs: Sequence[Run]) -> list[Fault]:
+    """Runs given twice: as repeats of themselves they would show no noise at all."""
+    faults = []
+    for index, run in enumerate(runs):
+        for other in runs[:index]:
+            if len(run) != len(other) or set(run) != set(other):
+                continue
+            if all(np.array_equal(run[c], other[c], equal_nan=True) for c in run):
+                message = f"holds the same samples as {other.path or other.name}; give it once"
+                faults.append(Fault(message, run.path or run.name))
     return faults
 
 

@@ -25,6 +25,8 @@ __all__ = ["Dataset", "Recording", "prepare"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+_GAP = 2.5
+_SHAKEN = 0.25
 
 
 @dataclass(frozen=True)
@@ -165,7 +167,7 @@ def _recording(
     nominal = line.predict(motion)
     rate, (band, skirt) = 1 / run.interval, filtered
     measured, valid, bands = {}, {}, {}
-    inputs_ok = np.isfinite(run["motor_angle"])
+    inputs_ok = np.isfinite(run["motor_angle"]) & _away_from_time_gaps(run.time)
     if motion.load is not None and "load" in run:
         inputs_ok &= np.isfinite(run["load"])
     for output in OUTPUTS:
@@ -190,6 +192,15 @@ def _recording(
         programme=run.metadata.get("programme", ""),
         path=run.path,
     )
+
+
+def _away_from_time_gaps(time: Array) -> Mask:
+    """Samples whose motion is known: what happened in a gap, and shook on after it, is not."""
+    steps = np.diff(time)
+    out = np.ones(len(time), dtype=bool)
+    for index in np.flatnonzero(steps > _GAP * np.median(steps)):
+        out &= (time < time[index] - _SHAKEN) | (time > time[index + 1] + _SHAKEN)
+    return out
 
 
 def _away_from_gaps(good: Mask, rate: float, cut_off: float | None) -> Mask:

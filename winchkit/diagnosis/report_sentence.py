@@ -18,6 +18,7 @@ __all__ = ["moved_outputs", "sentence", "telling", "where_text"]
 
 _MOVED = 1.05
 _CLEAR = 0.2
+_ABOVE = 1.5
 _COUNTS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
 
 
@@ -26,7 +27,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "adequate":
         return _adequate(diagnosis)
     if diagnosis.steps:
-        parts = [_named(diagnosis.steps), _gain(diagnosis)]
+        parts = [_named(diagnosis.steps), _gain(diagnosis), _still(diagnosis)]
         if diagnosis.verdict == "partly":
             parts.append(_rest(diagnosis, "Something else is still missing"))
         return " ".join(part for part in parts if part)
@@ -139,6 +140,21 @@ def _in_one(name: str, output: OutputFit) -> str:
     if output.noise_rms is None:
         return text
     return f"{text} (noise {quantity(output.noise_rms, output.unit)})"
+
+
+def _still(diagnosis: Diagnosis) -> str:
+    """Outputs that stay well above their noise, which an explained error need not fall to."""
+    above = {
+        name: output.heldout_rms_after / output.noise_rms
+        for name, output in diagnosis.outputs.items()
+        if output.noise_rms
+    }
+    told = [
+        f"the {OUTPUT_NAMES.get(name, name)} at {significant(ratio, 2)} times its noise"
+        for name, ratio in above.items()
+        if ratio > _ABOVE
+    ]
+    return f"That leaves {listed(told)}." if told else ""
 
 
 def _rest(diagnosis: Diagnosis, opening: str) -> str:

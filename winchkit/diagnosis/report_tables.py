@@ -18,7 +18,7 @@ from winchkit.diagnosis.report_phrases import (
 from winchkit.diagnosis.report_power import unseen, visible
 from winchkit.diagnosis.report_waterfall import Waterfall
 from winchkit.diagnosis.result import Candidate, Diagnosis, OutputFit
-from winchkit.diagnosis.wording import Scale, quantity, scale_for, significant
+from winchkit.diagnosis.wording import Scale, grouped, quantity, scale_for, significant
 from winchkit.effects.effect import Effect
 
 __all__ = ["candidates", "confusion", "detectable", "figures", "named", "output_scale", "waterfall"]
@@ -145,8 +145,8 @@ def _candidate(candidate: Candidate, scales: Mapping[str, Scale]) -> list[str]:
         else "–"
         for name, scale in scales.items()
     ]
-    score = f"{candidate.score:,.0f}".replace(",", " ").replace("-", "−")
-    return [element("code", candidate.effect), clause(candidate.effect), score, *errors]
+    name = element("code", candidate.effect)
+    return [name, clause(candidate.effect), grouped(candidate.score), *errors]
 
 
 def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:

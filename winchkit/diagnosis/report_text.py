@@ -18,7 +18,7 @@ from winchkit.diagnosis.report_phrases import (
 from winchkit.diagnosis.report_power import smallest_shown
 from winchkit.diagnosis.report_sentence import sentence, telling, where_text
 from winchkit.diagnosis.result import Comparison, Diagnosis, OutputFit
-from winchkit.diagnosis.wording import percent, quantity, scale_for
+from winchkit.diagnosis.wording import grouped, percent, quantity, scale_for
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
@@ -146,7 +146,7 @@ def _candidates(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict == "adequate":
         return []
     best = [c for c in diagnosis.candidates if c.score > 0][:_FEW]
-    rows = [[c.effect, clause(c.effect), f"{c.score:.0f}"] for c in best]
+    rows = [[c.effect, clause(c.effect), grouped(c.score)] for c in best]
     return ["strongest evidence, each alone", *aligned(rows, words=2)] if rows else []
 
 

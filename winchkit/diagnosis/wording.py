@@ -10,7 +10,16 @@ from dataclasses import dataclass
 from math import floor, isfinite, isnan, log10
 from re import compile as pattern
 
-__all__ = ["Scale", "percent", "quantity", "scale_for", "significant", "unbroken", "with_std"]
+__all__ = [
+    "Scale",
+    "grouped",
+    "percent",
+    "quantity",
+    "scale_for",
+    "significant",
+    "unbroken",
+    "with_std",
+]
 
 _DEG = 57.29577951308232
 _LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
@@ -113,6 +122,11 @@ def significant(value: float, digits: int = 3) -> str:
     if not -6 <= exponent < 9:
         return f"{value:.{digits - 1}e}".translate(_SIGNS)
     return _fixed(value, digits - 1 - exponent)
+
+
+def grouped(value: float) -> str:
+    """A whole number with its thousands apart: ``22 503 365``."""
+    return f"{value:,.0f}".replace(",", " ").translate(_SIGNS)
 
 
 def unbroken(text: str) -> str:

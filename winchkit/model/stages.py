@@ -80,7 +80,7 @@ class At:
     motor_rate: Array
     motor_acceleration: Array
     motor_direction: Array
-    """Tanh(θ'/0.5 rad/s): smooth at standstill; see :func:`~winchkit.model.derivatives.smooth_sign`."""
+    """Tanh(θ'/0.5 rad/s): smooth at standstill; see ``winchkit.model.derivatives``."""
     drum_angle: Array
     wound_angle: Array
     speed: Array

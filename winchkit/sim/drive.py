@@ -40,6 +40,7 @@ class SimDrive:
     ``objects`` is its object dictionary, which it takes over. ``send`` takes an identifier and
     data. Frames come in through :meth:`receive`, time through
     :meth:`tick`; both take the time in s of one steady clock and are called from one thread.
+    ``smoothing`` is the length of its set-point filter in CSV, s.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class SimDrive:
         shaft: Shaft,
         *,
         brake: bool,
+        smoothing: float = 0.0,
         now: float = 0.0,
     ) -> None:
         self.node = node
@@ -68,7 +70,8 @@ class SimDrive:
             self.objects, self._send_heartbeat, self._host_lost, self._host_back
         )
         self._power = PowerStage(self.objects, self._state_changed)
-        self._motion = Motion(self.objects, units_of(self.objects, servo), brake=brake)
+        units = units_of(self.objects, servo)
+        self._motion = Motion(self.objects, units, brake=brake, smoothing=smoothing)
         self._handshake = SetPointHandshake(self.objects, self._motion)
         self._axis = Axis(self.objects, shaft, self._power, self._motion, now=now)
         self._axis.following_failed = lambda: self._fault(_FOLLOWING_ERROR)

@@ -7,6 +7,7 @@ from math import copysign, inf, sqrt
 
 from winchkit.sim.drive_power import RAMPS, Order
 from winchkit.sim.drive_pp import ProfilePosition
+from winchkit.sim.drive_smooth import MovingAverage
 from winchkit.sim.drive_units import Units
 from winchkit.sim.object_dictionary import ObjectDictionary
 from winchkit.sim.servo import DriveCommand
@@ -43,12 +44,16 @@ def approach(value: float, goal: float, step: float) -> float:
 class Motion:
     """Makes :class:`DriveCommand` of an order, the mode and the targets.
 
-    ``angle`` and ``speed`` of the methods are the motor's own, in rad and rad/s; ``units`` may be
-    replaced while the drive is off.
+    ``smoothing`` (s) averages the targets of CSV, as drives can: it keeps the jitter of a
+    master's cycle out of the rope. ``angle`` and ``speed`` of the methods are the motor's own,
+    in rad and rad/s; ``units`` may be replaced while the drive is off.
     """
 
-    def __init__(self, objects: ObjectDictionary, units: Units, *, brake: bool) -> None:
+    def __init__(
+        self, objects: ObjectDictionary, units: Units, *, brake: bool, smoothing: float = 0.0
+    ) -> None:
         self._objects = objects
+        self._smooth = MovingAverage(smoothing)
         self.units = units
         self._off = DriveCommand.off(brake=brake)
         self.mode = Mode.NONE
@@ -65,6 +70,7 @@ class Motion:
         self._from = self._goal = 0.0
         self._elapsed = inf
         self._clipped = False
+        self._wanted = 0.0
         self._stood = 0.0
 
     @property
@@ -75,8 +81,13 @@ class Motion:
     def set_mode(self, mode: Mode, angle: float) -> None:
         """Change the mode; set-points begin where the motor is."""
         self.mode = mode
-        self.angle = angle
         self.profile.reset()
+        self._begin(angle)
+
+    def _begin(self, angle: float) -> None:
+        """Let the set-points go on from the present speed, at an angle."""
+        self.angle, self._wanted = angle, self.speed
+        self._smooth.begin(self.speed)
         self.aim()
 
     def aim(self) -> None:
@@ -89,7 +100,7 @@ class Motion:
             self._from, self._goal = self.angle, min(max(wanted, low), high)
             self._clipped = self._goal != wanted
         else:
-            self._from = self.speed
+            self._from = self._wanted
             self._goal = (number(0x60FF) + number(0x60B1)) * self.units.speed
 
     def step(self, order: Order, angle: float, speed: float, dt: float) -> DriveCommand:
@@ -101,16 +112,15 @@ class Motion:
             return self._off
         if not self._following:
             self._following = True
-            self.angle, self.speed = angle, speed
-            self.aim()
+            self.speed = speed
+            self._begin(angle)
         self.limited = False
         halt = self.halted and order is Order.FOLLOW
         if halt or order is not Order.FOLLOW:
             return self._stop(order, angle, speed, dt)
         if self.stopping:
             self.stopping = False
-            self.angle = angle
-            self.aim()
+            self._begin(angle)
         return self._follow(angle, speed, dt)
 
     def at_rest(self, speed: float) -> bool:
@@ -157,7 +167,8 @@ class Motion:
         self.speed = approach(self.speed, goal, rate * dt)
 
     def _cyclic_velocity(self, angle: float, dt: float) -> None:
-        goal = self._clamped(self._interpolated(dt), self._motor_speed())
+        self._wanted = self._interpolated(dt)
+        goal = self._clamped(self._smooth.step(self._wanted, dt), self._motor_speed())
         hardest = self._per_second(0x60C6)
         goal = self._within(goal, angle, hardest)
         reached = approach(self.speed, goal, hardest * dt)

@@ -28,6 +28,8 @@ _QUANTITIES: dict[str, Callable[[Measurement], float]] = {
     "temperature": lambda reading: reading.temperature,
 }
 """What the instrument in each role of a wiring file measures."""
+_SMOOTHING = 0.024
+"""Set-point filter of the drives, s: an ordinary computer's cycle jitters by a millisecond."""
 _AT_REST = 0.5
 """rad/s of the motor, below which a load can be changed."""
 
@@ -55,7 +57,16 @@ class LiveWinch:
             raise UsageError(f"winch {name}: its servo has no node; give it one, e.g. node = 1")
         node = wiring.servo.node
         objects = ObjectDictionary(read_eds(eds, node))
-        self.drive = SimDrive(send, node, servo, objects, self.plant, brake=wiring.brake, now=now)
+        self.drive = SimDrive(
+            send,
+            node,
+            servo,
+            objects,
+            self.plant,
+            brake=wiring.brake,
+            smoothing=_SMOOTHING,
+            now=now,
+        )
         self.drive.power_on(now, boot_time=0.0)
         self.instruments = {
             role: ModbusInstrument(

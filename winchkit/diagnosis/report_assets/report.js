@@ -103,7 +103,9 @@
             .map(([series, at]) => `${series.label}: ${short(u.data[u.series.indexOf(series)][at])} ${plot.unit}`);
           tip.hidden = left < 0 || !lines.length;
           if (tip.hidden) return;
-          tip.textContent = [`${plot.xLabel.split(" [")[0].split(",")[0]} ${short(u.posToVal(left, "x"))}`, ...lines].join("\n");
+          const [, name, unit] = plot.xLabel.match(/^([^,([]+)[^[]*(?:\[(.*)\])?$/);
+          const here = short(u.posToVal(left, "x"));
+          tip.textContent = [`${name.trim()} ${here} ${unit || ""}`, ...lines].join("\n");
           const right = left > u.over.clientWidth / 2;
           tip.style.left = right ? "" : `${left + 12}px`;
           tip.style.right = right ? `${u.over.clientWidth - left + 12}px` : "";

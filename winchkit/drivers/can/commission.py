@@ -48,6 +48,9 @@ class WatchSpec:
     brake: bool
     """Whether a holding brake lets the drive lose torque without dropping the load."""
 
+    acceleration: float = 0.0
+    """Of the motor, that a profile mode may use, rad/s^2; 0 leaves the drive's own."""
+
     @property
     def timeout(self) -> float:
         """After this long without a heartbeat the other side counts as lost, s."""
@@ -83,6 +86,7 @@ def commission(node: SdoNode, servo: ServoSpec, watch: WatchSpec, clock: Clock) 
     _set_cycle(node, watch.cycle)
     _set_heartbeats(node, watch)
     _set_targets(node)
+    _set_profile(node, mode, round(watch.acceleration / scale.velocity))
     _set_mode(node, mode, clock)
     node.bus.nmt(_START, node.node)
     return Commissioned(mode, scale, tpdo, rpdo, options)
@@ -187,6 +191,13 @@ def _set_targets(node: SdoNode) -> None:
     node.write(0x60FF, 0, 0)
     if node.read_if_there(0x607A) is not None:
         node.write(0x607A, 0, node.read(0x6064))
+
+
+def _set_profile(node: SdoNode, mode: str, counts: int) -> None:
+    """Keep the drive's own ramps out of the way of those that the host makes."""
+    if mode == "PV" and counts:
+        for index in (0x6083, 0x6084):
+            node.write_verified(index, 0, counts)
 
 
 def _set_mode(node: SdoNode, mode: str, clock: Clock) -> None:

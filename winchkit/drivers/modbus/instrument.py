@@ -14,6 +14,9 @@ from winchkit.schema.device import DeviceSpec
 __all__ = ["Counters", "Instrument"]
 
 _RETRY = 0.5
+_QUICK_RETRIES = 2
+_STALE_TIMEOUTS = 2
+"""One lost answer is no reason to stop a winch, two are."""
 _LATE = 0.02
 
 
@@ -30,8 +33,20 @@ class Counters:
 class Instrument:
     """A Modbus instrument. ``latest`` is what other threads read."""
 
-    def __init__(self, name: str, device: DeviceSpec, unit: int, rate: float, clock: Clock) -> None:
-        """Poll at ``rate`` readings a second, or at the device's own rate where that is lower."""
+    def __init__(
+        self,
+        name: str,
+        device: DeviceSpec,
+        unit: int,
+        clock: Clock,
+        *,
+        rate: float,
+        timeout: float,
+    ) -> None:
+        """Poll at ``rate`` readings a second, or at the device's own rate where that is lower.
+
+        ``timeout`` (s) is the line's for one answer.
+        """
         self.name = name
         self.unit = unit
         self.decoder = Decoder(device)
@@ -43,25 +58,27 @@ class Instrument:
         """Why there is no new reading, while there is none."""
         self.due = clock.now()
         self.listeners: list[Callable[[Reading], None]] = []
+        self.max_age = max(_STALE_TIMEOUTS * timeout, 5 * self.period)
+        """A reading older than this is stale, s."""
         self._clock = clock
+        self._silence = max(0.0, self.decoder.spec.longest_reply - timeout)
+        self._failures = 0
         self._longer = False
         self._fixed = self.decoder.spec.read.fixed
 
-    @property
-    def max_age(self) -> float:
-        """A reading older than this is stale, s."""
-        return max(0.25, 5 * self.period)
+    async def poll(self, client: ModbusClient) -> None:
+        """Take one reading; a failure is counted, kept as ``problem`` and retried.
 
-    async def poll(self, client: ModbusClient, timeout: float) -> None:
-        """Take one reading; a failure is counted, kept as ``problem`` and retried later."""
+        One that fails again and again is asked less often, so that the others on its line keep
+        their rates.
+        """
         spec = self.decoder.spec
-        silence = max(0.0, spec.longest_reply - timeout)
         self._longer = not self._longer and not self._fixed
         count = spec.read.count + self._longer
         t_request = self._clock.now()
         self.due = max(self.due + self.period, t_request)
         try:
-            registers = await client.read(self.unit, spec.read, count, silence)
+            registers = await client.read(self.unit, spec.read, count, self._silence)
         except DeviceRefused as error:
             self._refused(error)
         except NoReply as error:
@@ -72,15 +89,14 @@ class Instrument:
         else:
             self._publish(registers, t_request, self._clock.now())
 
-    async def command(self, client: ModbusClient, name: str, timeout: float) -> None:
+    async def command(self, client: ModbusClient, name: str) -> None:
         """Send a command of the device file, e.g. ``tare``."""
         spec = self.decoder.spec
         command = spec.command.get(name)
         if command is None:
             known = ", ".join(spec.command) or "none"
             raise NotPermitted(f"{self.name} has no command '{name}'; its device file has {known}")
-        silence = max(0.0, spec.longest_reply - timeout)
-        await client.write(self.unit, command.register, command.value, silence)
+        await client.write(self.unit, command.register, command.value, self._silence)
 
     def _refused(self, error: DeviceRefused) -> None:
         if self._longer:
@@ -92,7 +108,8 @@ class Instrument:
 
     def _failed(self, error: ConnectionLost) -> None:
         self.problem = error
-        self.due = self._clock.now() + _RETRY
+        self._failures += 1
+        self.due = self._clock.now() + (_RETRY if self._failures > _QUICK_RETRIES else 0.0)
 
     def _publish(self, registers: list[int], t_request: float, t_receive: float) -> None:
         spec = self.decoder.spec
@@ -119,7 +136,7 @@ class Instrument:
             readings=self.counters.readings + 1,
             duplicates=self.counters.duplicates + duplicate,
         )
-        self.problem = None
+        self.problem, self._failures = None, 0
         self.latest = reading
         for listener in self.listeners:
             listener(reading)

@@ -39,15 +39,18 @@ class SlowDevices:
         self._loop = asyncio.new_event_loop()
         self._clients = {line.name: ModbusClient(line.spec, line.name) for line in lines}
         self._locks: dict[str, asyncio.Lock] = {line.name: asyncio.Lock() for line in lines}
-        self._lines = {line.name: line for line in lines}
+        self._lines = tuple(lines)
         self._line_of = {id(item): line.name for line in lines for item in line.instruments}
+        self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="slow-devices", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Stop polling and close the lines."""
+        """Stop polling and close the lines; raises what ended the polling before, if anything."""
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(timeout=3.0)
+        if self._failure is not None:
+            raise self._failure
 
     def command(self, instrument: Instrument, name: str) -> None:
         """Send a command to an instrument between two polls and wait for the device's answer.
@@ -70,16 +73,16 @@ class SlowDevices:
     async def _command(self, instrument: Instrument, name: str) -> None:
         line = self._line_of[id(instrument)]
         async with self._locks[line]:
-            client = self._clients[line]
-            await instrument.command(client, name, self._lines[line].spec.timeout)
+            await instrument.command(self._clients[line], name)
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
-        tasks = [self._loop.create_task(self._poll(line)) for line in self._lines.values()]
+        tasks = [self._loop.create_task(self._poll(line)) for line in self._lines]
         self._loop.run_forever()
         for task in tasks:
             task.cancel()
-        self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        ended = self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        self._failure = next((item for item in ended if isinstance(item, Exception)), None)
         for client in self._clients.values():
             client.close()
         self._loop.run_until_complete(asyncio.sleep(0.01))
@@ -94,7 +97,7 @@ class SlowDevices:
             instrument = min(line.instruments, key=lambda item: item.due)
             await asyncio.sleep(max(0.0, instrument.due - self._clock.now()))
             async with lock:
-                await instrument.poll(client, line.spec.timeout)
+                await instrument.poll(client)
 
     async def _connect(self, line: Line, client: ModbusClient) -> bool:
         try:

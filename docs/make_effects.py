@@ -1,0 +1,38 @@
+"""Writes docs/effects.md from the catalogue: ``python docs/make_effects.py``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from winchkit.effects import Catalogue, load_catalogue
+from winchkit.effects.card import card
+
+PAGE = Path(__file__).with_name("effects.md")
+_BEGIN = """\
+# The catalogue of effects
+
+Written by `python docs/make_effects.py` from the effects themselves; do not edit it by hand.
+`winchkit effects` lists them, `winchkit effects ID` shows a card with the effect's signature drawn.
+
+Symbols: θ motor angle, φ drum angle since the reference, Φ total wound angle, ℓ unstrained free
+length, ℓ_s = ℓ + dead length, T tension in the rope, v its winding-in speed, s = sgn v (smooth at
+standstill). Each term vanishes exactly at its null; stiffnesses are fitted as compliances.
+"""
+_OUTPUTS = ("cable_length", "tension", "motor_torque")
+
+
+def page(catalogue: Catalogue) -> str:
+    """The page: effects by the first output that they change, each with its card."""
+    parts = [_BEGIN]
+    for output in _OUTPUTS:
+        own = sorted(e.id for e in catalogue if e.outputs[0] == output)
+        parts.append(f"## On the way to {output}\n\n{', '.join(f'[{i}](#{i})' for i in own)}\n")
+        for name in own:
+            text, _, _ = card(catalogue[name]).partition("\n\nSignature over")
+            body = text.removeprefix(name).strip()
+            parts.append(f"### {name}\n\n```text\n{body}\n```\n")
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(load_catalogue()), encoding="utf-8")

@@ -1,0 +1,130 @@
+"""Other motion modes, several winches, and parts of the recorder and the keyboard by themselves."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from winchkit import catalog, open_bench
+from winchkit.bench.series import Series
+from winchkit.cli.keys import HeldKey, split_keys
+from winchkit.errors import NotPermitted
+from winchkit.runs import read_run
+from winchkit.schema.read import read_simbench
+from winchkit.schema.simbench import SimBench
+from winchkit.sim.live import LiveBench
+
+
+def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:
+    """The spiral bench with drives in another mode, or with more winches."""
+    folder = tmp_path / f"drive-{mode}"
+    shutil.copytree(catalog.find("devices", "generic-cia402").parent, folder)
+    path = folder / "device.toml"
+    path.write_text(path.read_text().replace('motion_mode = "CSV"', f'motion_mode = "{mode}"'))
+    spiral = read_simbench(catalog.find("sim", "spiral-bench"))
+    one, truth = spiral.bench.winch["A"], spiral.truth["A"]
+    wiring = {}
+    for number, name in enumerate(winches):
+        units = {
+            role: replace(getattr(one, role), unit=getattr(one, role).unit + 10 * number)
+            for role in ("cell", "length", "temperature")
+        }
+        servo = replace(one.servo, device=str(path), node=number + 1)
+        wiring[name] = replace(one, servo=servo, **units)
+    return replace(
+        spiral,
+        bench=replace(spiral.bench, winch=wiring),
+        truth=dict.fromkeys(winches, truth),
+    )
+
+
+@pytest.mark.parametrize("mode", ["CSP", "PV"])
+def test_the_same_motion_in_another_mode(mode: str, tmp_path: Path) -> None:
+    with LiveBench(declared(tmp_path, mode)) as live, open_bench(live.bench_spec) as bench:
+        winch = bench.winch["A"]
+        winch.move_to(3.7, 0.3)
+        with live.up_to_date():
+            assert live.winches["A"].plant.cable_length == pytest.approx(3.7, abs=5e-3)
+        winch.jog(-0.2, 0.5)
+        assert 3.73 < winch.cable_length < 3.81
+        assert not bench.snapshot.tripped
+
+
+def test_two_winches_move_together_and_share_a_log(tmp_path: Path) -> None:
+    with LiveBench(declared(tmp_path, winches="AB")) as live, open_bench(live.bench_spec) as bench:
+        path = tmp_path / "two.csv"
+        with bench.log(path):
+            bench.winch["A"].move_to(3.7, 0.3, wait=False)
+            bench.winch["B"].move_to(4.2, 0.3, wait=False)
+            for winch in bench.winch.values():
+                winch.wait()
+        run = read_run(path)
+        assert run.winches() == ["A", "B"]
+        for name, length in (("A", 3.7), ("B", 4.2)):
+            own = run.of_winch(name)
+            assert own["cable_length"][-1] == pytest.approx(length, abs=5e-3)
+            assert np.isfinite(own["tension"]).mean() > 0.95
+        bench.winch["A"].move_to(3.0, 0.3, wait=False)
+        live.inject("B.servo", "silence")
+        with pytest.raises(Exception, match="winch B"):
+            bench.winch["A"].wait()
+        assert bench.winch["A"].cable_length > 3.1
+
+
+def test_a_drive_without_the_mode_is_not_opened(tmp_path: Path) -> None:
+    with LiveBench(declared(tmp_path)) as live:
+        with live.up_to_date():
+            live.winches["A"].drive.objects.put(0x6502, 0, 0x01)
+        with pytest.raises(NotPermitted, match="no mode CSV"):
+            open_bench(live.bench_spec)
+
+
+@given(
+    steps=st.lists(st.floats(1e-3, 0.09), min_size=3, max_size=40),
+    slope=st.floats(-5, 5),
+    moments=st.lists(st.floats(0, 1), min_size=1, max_size=20),
+)
+def test_a_straight_line_is_interpolated_exactly(
+    steps: list[float], slope: float, moments: list[float]
+) -> None:
+    series = Series(max_gap=0.1)
+    times = np.cumsum(steps)
+    for time in times:
+        series.append(float(time), slope * float(time) + 1)
+    for moment in sorted(times[0] + share * (times[-1] - times[0]) for share in moments):
+        assert series.at(float(moment)) == pytest.approx(slope * moment + 1, abs=1e-9)
+
+
+def test_no_value_without_neighbours() -> None:
+    series = Series(max_gap=0.1)
+    assert math.isnan(series.at(0.0))
+    for time, value in ((1.0, 1.0), (1.05, 2.0), (1.5, 3.0), (1.52, math.nan), (1.54, 5.0)):
+        series.append(time, value)
+    series.append(1.5, 99.0)
+    assert math.isnan(series.at(0.9)), "before the first"
+    assert series.at(1.0) == 1.0
+    assert math.isnan(series.at(1.2)), "a gap is not bridged"
+    assert math.isnan(series.at(1.51)), "nor is a missing value"
+    assert series.at(1.54) == 5.0
+    assert math.isnan(series.at(1.6)), "after the last"
+    assert not series.reaches(1.6)
+
+
+def test_a_held_key_refreshes_shortly_and_a_single_press_lasts() -> None:
+    held = HeldKey()
+    assert held.hold("up", 0.0) == 0.7
+    assert held.hold("up", 0.5) == 0.2
+    assert held.hold("up", 0.53) == 0.2
+    assert held.hold("up", 0.9) == 0.7, "let go in between"
+    assert held.hold("down", 1.0) == 0.7, "another key"
+
+
+def test_keys_of_a_terminal() -> None:
+    assert split_keys("\x1b[A\x1b[A \x1bOBq") == ["up", "up", " ", "down", "q"]

@@ -1,0 +1,68 @@
+"""Answers and diagnoses that the tests of the report share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+from winchkit.catalog import find
+from winchkit.diagnosis.diagnose import Answer, diagnose
+from winchkit.diagnosis.result import Diagnosis, Estimate, OutputFit, Step, Where
+from winchkit.runs.run import Run
+from winchkit.schema.read import read_programme, read_simbench, read_winch
+from winchkit.sim.bench import profiles_of, programme_path
+from winchkit.sim.record import record
+
+NOISY = OutputFit("m", None, 2.5, 1.7e-3, 0.31e-3, 1.63e-3, 0.36e-3, 0.30e-3)
+CALM = OutputFit("N", None, 155.0, 0.75, 0.75, 0.753, 0.753, 0.742)
+RUBBING = OutputFit("N m", 5.0, 0.46, 16.5e-3, 3.0e-3, 16.5e-3, 3.04e-3, 2.88e-3)
+STRETCH = Step(
+    ("cable-elongation-linear",),
+    {"cable-elongation-linear": {"axial_stiffness": Estimate(249_900.0, 7_000.0, "N")}},
+    0.95,
+)
+FRICTION = Step(
+    ("pulley-coulomb", "pulley-capstan"),
+    {
+        "pulley-coulomb": {"friction": Estimate(0.0150, 0.0001, "1")},
+        "pulley-capstan": {"friction": Estimate(0.0138, float("nan"), "1")},
+    },
+    0.9,
+    {"pulley-capstan": 0.002},
+)
+FIVE_CORNERS = (
+    Where("tension", "time", 0.64, frequency=8.2),
+    Where("motor_torque", "drum_angle", 0.49),
+    Where("tension", "drum_angle", 0.44, order=5),
+)
+
+
+def told(verdict: str, *steps: Step, **more: object) -> Diagnosis:
+    """A diagnosis made up from its parts."""
+    parts = {
+        "outputs": {"cable_length": NOISY, "tension": CALM},
+        "candidates": (),
+        "detectable": (),
+        "unexplained_share": 0.0,
+        "where": (),
+        "next_runs": (),
+    }
+    return Diagnosis(verdict=verdict, steps=steps, **(parts | more))  # type: ignore[arg-type]
+
+
+@cache
+def recorded(bench: str) -> tuple[Run, ...]:
+    """Runs of the demo's programme on a shipped simulated bench."""
+    declared = read_simbench(find("sim", bench))
+    programme = read_programme(programme_path("programme-demo"))
+    return tuple(record(declared, profiles_of(declared), programme, seed=3, rate=25.0))
+
+
+def answered(runs: Sequence[Run]) -> Answer:
+    return diagnose(runs, read_winch(find("profiles", "bench-spiral")))
+
+
+@cache
+def answer_of(bench: str) -> Answer:
+    """What the diagnosis says of such a bench."""
+    return answered(recorded(bench))

@@ -1,0 +1,94 @@
+"""Every page's commands and programmes do what the page says, and its links lead somewhere."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from snippets import ROOT, Session, Snippet, said, snippets_of
+
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+RUN = [page for page in PAGES if any(not s.reason for s in snippets_of(page))]
+_LINK = re.compile(r"\]\((?!\w+://)([^)\s]+)\)")
+_HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+
+
+def name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sessions are written for a POSIX shell")
+@pytest.mark.parametrize("page", RUN, ids=name)
+def test_what_a_page_shows_is_what_happens(page: Path, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    with Session(tmp_path) as session:
+        for snippet in snippets_of(page):
+            session.run(snippet)
+
+
+def test_the_readme_begins_with_the_two_commands() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    first = [line.strip() for line in text.splitlines() if line.startswith("    ")][:2]
+    assert first == [
+        "python3 -m venv .venv && .venv/bin/pip install -e '.[dev]' && .venv/bin/winchkit demo",
+        ".venv/bin/pytest",
+    ]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_somewhere(page: Path) -> None:
+    lost = []
+    for link in _LINK.findall(page.read_text(encoding="utf-8")):
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            lost.append(link)
+    assert not lost
+
+
+def anchors(page: Path) -> set[str]:
+    headings = _HEADING.findall(page.read_text(encoding="utf-8"))
+    return {re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-") for h in headings}
+
+
+def test_blocks_are_told_apart(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# x\n```console\n$ echo a\na\n$ echo b\n```\n"
+        "<!-- not run: needs a terminal -->\n```console\n$ jog\n```\n```python\n1\n```\n"
+    )
+    first, second, third = snippets_of(page)
+    assert (first.line, list(first.commands)) == (2, [("echo a", "a\n"), ("echo b", "")])
+    assert second.reason == "needs a terminal"
+    assert (third.language, third.text) == ("python", "1\n")
+
+
+@pytest.mark.parametrize(
+    ("expected", "printed", "same"),
+    [
+        ("EA = 298 ± 13 kN", "EA = 301.5 ±\n  9 kN", True),
+        ("a\n...\nz", "a\nb c\nz", True),
+        ("a\n...", "a", True),
+        ("...", "", True),
+        ("a ... z", "a b", False),
+        ("EXPLAINED", "UNKNOWN", False),
+        ("a", "a\nb", False),
+        ("", "a", False),
+    ],
+)
+def test_outputs_are_compared_apart_from_numbers(expected: str, printed: str, same: bool) -> None:
+    assert said(expected, printed) is same
+
+
+def test_a_wrong_page_is_noticed(tmp_path: Path) -> None:
+    with Session(tmp_path) as session:
+        session.run(Snippet(1, "console", "", "$ echo a\na\n", ""))
+        with pytest.raises(AssertionError, match="and not"):
+            session.run(Snippet(1, "console", "", "$ echo a\nb\n", ""))
+        with pytest.raises(AssertionError, match="ends with 3"):
+            session.run(Snippet(1, "console", "", "$ exit 3\n", ""))
+        with pytest.raises(AssertionError, match="ends with 1"):
+            session.run(Snippet(1, "python", "", "assert False\n", ""))

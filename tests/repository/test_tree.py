@@ -1,0 +1,123 @@
+"""The repository's own rules: data without code, small files and functions, nothing private."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from snippets import ROOT
+
+from winchkit.cli import COMMANDS
+
+_LONGEST_FILE, _LONGEST_FUNCTION = 300, 40
+_DATA = ("devices", "profiles", "sim")
+_SOURCES = sorted((ROOT / "winchkit").rglob("*.py"))
+# Spelt in pieces, so that this file does not hold what it looks for.
+_PRIVATE = re.compile(
+    "|".join(
+        [
+            r"pypi\." + r"(?:org|python)",
+            r"python" + r"hosted\.org",
+            r"npm" + r"js\.(?:org|com)",
+            r"conda\." + r"anaconda",
+            r"(?<![\w./])/" + r"(?:work|root|home|Users|opt)/\w",
+            r"(?<![\w./])/" + r"tmp/\w",
+            r"index-" + r"url",
+        ]
+    )
+)
+
+
+def tracked() -> list[Path]:
+    """Files under version control and new ones that are not ignored."""
+    try:
+        done = subprocess.run(
+            ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("not a git checkout")
+    paths = [ROOT / name for name in done.stdout.split("\0") if name]
+    return [path for path in paths if path.is_file()]
+
+
+@pytest.mark.parametrize("folder", _DATA)
+def test_data_folders_hold_no_code(folder: str) -> None:
+    files = [path for path in (ROOT / folder).rglob("*") if path.is_file()]
+    assert files
+    assert [path for path in files if path.suffix not in {".toml", ".eds"}] == []
+
+
+def test_no_file_is_too_long() -> None:
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in _SOURCES}
+    long = {str(p.relative_to(ROOT)): n for p, n in lengths.items() if n > _LONGEST_FILE}
+    assert not long, f"files over {_LONGEST_FILE} lines: {long}"
+
+
+def test_no_function_is_too_long() -> None:
+    long = {
+        f"{path.relative_to(ROOT)}:{node.lineno} {node.name}": length
+        for path in _SOURCES
+        for node, length in functions(ast.parse(path.read_text(encoding="utf-8")))
+        if length > _LONGEST_FUNCTION
+    }
+    assert not long, f"functions over {_LONGEST_FUNCTION} lines: {long}"
+
+
+def functions(tree: ast.AST) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionDef, int]]:
+    """Every function with its length in lines, its signature and docstring included."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            assert node.end_lineno is not None
+            yield node, node.end_lineno - node.lineno + 1
+
+
+def test_functions_are_measured() -> None:
+    tree = ast.parse("def a():\n    x = 1\n    async def b():\n        pass\n    return b\n")
+    assert {node.name: length for node, length in functions(tree)} == {"a": 5, "b": 2}
+
+
+def test_nothing_tells_of_registries_or_machines() -> None:
+    found = []
+    for path in tracked():
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue
+        for number, line in enumerate(text.splitlines(), start=1):
+            found += [f"{path.relative_to(ROOT)}:{number}: {m[0]}" for m in _PRIVATE.finditer(line)]
+    assert not found
+
+
+@pytest.mark.parametrize(
+    ("text", "private"),
+    [
+        ("see /" + "home/me/x.toml", True),
+        ('"/' + 'tmp/run.csv"', True),
+        ("https://py" + "pi.org/simple", True),
+        ("a share of the work/load", False),
+        ("./tmp_path/x", False),
+    ],
+)
+def test_private_things_are_recognised(text: str, private: bool) -> None:
+    assert bool(_PRIVATE.search(text)) is private
+
+
+def test_the_changelog_mentions_every_command() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    quoted = set(re.findall(r"[\w-]+", " ".join(re.findall(r"`([^`]+)`", text))))
+    assert set(COMMANDS) <= quoted
+
+
+def test_the_ci_script_is_a_valid_program() -> None:
+    done = subprocess.run(
+        ["bash", "-n", str(ROOT / ".ci" / "run")], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
