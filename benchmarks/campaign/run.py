@@ -10,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from campaign.case import Case, Plan, make_case
-from campaign.score import Score, score
+from campaign.score import Score, refused, score
 
 __all__ = ["run_case", "run_cases"]
 
@@ -24,12 +24,17 @@ def run_case(seed: int, plan: Plan, folder: Path) -> Score | None:
 def answer(case: Case) -> Score:
     """Diagnose a case from its files."""
     from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.errors import WinchkitError
     from winchkit.runs.read import read_run
     from winchkit.schema.read import read_winch
 
     runs = [read_run(path) for path in case.runs]
     begun = time.perf_counter()
-    result = diagnose(runs, read_winch(case.profile))
+    try:
+        result = diagnose(runs, read_winch(case.profile))
+    except WinchkitError as error:
+        # A refusal of good files is an answer too, a wrong one.
+        return refused(case, str(error), time.perf_counter() - begun)
     seconds = time.perf_counter() - begun
     p_value = result.found.presence.p_value
     return score(case, result.diagnosis.to_json(), p_value, seconds)

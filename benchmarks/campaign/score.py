@@ -10,7 +10,7 @@ import numpy as np
 
 from campaign.case import Case
 
-__all__ = ["Score", "score", "summary", "table"]
+__all__ = ["Score", "refused", "score", "summary", "table"]
 
 AIMS = {
     "none": {"alarm": "<= 0.05", "named": "<= 0.01"},
@@ -90,6 +90,17 @@ def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) ->
         seconds,
         case.scene,
     )
+
+
+def refused(case: Case, message: str, seconds: float) -> Score:
+    """A case that was not answered."""
+    nothing: dict[str, Any] = {
+        "verdict": f"error: {message}",
+        "steps": [],
+        "outputs": {},
+        "unexplained": {"share": float("nan")},
+    }
+    return score(case, nothing, float("nan"), seconds)
 
 
 def _apart(name: str, value: float, true: float) -> float:

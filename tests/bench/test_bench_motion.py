@@ -158,3 +158,23 @@ def test_a_run_down_with_stale_feedback_becomes_a_quick_stop(moment: float) -> N
 def test_moves_beyond_the_limits_are_refused(arguments: dict[str, float], words: str) -> None:
     with pytest.raises(NotPermitted, match=words):
         Move(StraightLine(), LIMITS, **arguments)  # type: ignore[arg-type]
+
+
+@settings(max_examples=80, deadline=None)
+@given(pause=st.floats(0.0, 0.6), order=st.sampled_from(["expire", "stop", "run_down"]))
+def test_a_new_press_moves_again_whenever_it_comes(pause: float, order: str) -> None:
+    rig = Rig(LIMITS)
+    jog(rig, 0.1, hold=0.3)
+    rig.run(0.25)
+    if order == "stop":
+        rig.controller().stop()
+    elif order == "run_down":
+        rig.controller().run_down()
+    rig.run(pause)
+    before = rig.axes["A"].angle
+    jog(rig, 0.1, hold=0.7)
+    rig.run(0.5)
+    assert rig.axes["A"].angle - before > 0.1 * 0.2 / 0.005
+    rig.run(2.0)
+    assert rig.controller().phase is Phase.DISABLED
+    assert rig.controller().done

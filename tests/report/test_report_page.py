@@ -248,6 +248,15 @@ def test_story_truth_and_commands_are_told() -> None:
     assert "winchkit add cable-elongation-linear" in page.text
 
 
+def test_several_effects_are_added_one_after_another() -> None:
+    real = answer_of("demo-elastic-rope")
+    said = replace(real.diagnosis, steps=(*real.diagnosis.steps, FRICTION))
+    text = Page(report_html(Answer(real.inquiry, real.found, said), "x", profile="p")).text
+    assert "winchkit add cable-elongation-linear --profile p --fit" in text
+    assert "winchkit add pulley-coulomb --profile better-1.toml --fit" in text
+    assert "-o better-2.toml" in text
+
+
 def test_the_raw_diagnosis_is_there_as_json() -> None:
     answer = answer_of("demo-adequate")
     page = page_of("demo-adequate")

@@ -141,3 +141,10 @@ def test_orders_are_whole_and_shares_are_per_cent() -> None:
 
 def test_lists_read_as_sentences() -> None:
     assert [listed([]), listed(["a"]), listed(["a", "b", "c"], "or")] == ["", "a", "a, b or c"]
+
+
+def test_an_error_that_stays_above_the_noise_is_not_hidden() -> None:
+    high = replace(RUBBING, heldout_rms_after=15.6e-3, heldout_rms_before=0.763)
+    text = sentence(told("explained", STRETCH, outputs={"motor_torque": high, "tension": CALM}))
+    assert text.endswith("That leaves the motor torque at 5.4 times its noise.")
+    assert "That leaves" not in sentence(told("explained", STRETCH))

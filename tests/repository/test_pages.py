@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,9 @@ from snippets import ROOT, Session, Snippet, said, snippets_of
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 RUN = [page for page in PAGES if any(not s.reason for s in snippets_of(page))]
 _LINK = re.compile(r"\]\((?!\w+://)([^)\s]+)\)")
+_PATH = re.compile(
+    r"`((?:winchkit|devices|profiles|sim|tests|docs|examples|\.ci|benchmarks)/[\w./-]*)`"
+)
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 
 
@@ -47,6 +51,19 @@ def test_links_lead_somewhere(page: Path) -> None:
         if not target.exists() or (anchor and anchor not in anchors(target)):
             lost.append(link)
     assert not lost
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_paths_that_are_named_exist(page: Path) -> None:
+    named = _PATH.findall(page.read_text(encoding="utf-8"))
+    assert [path for path in named if not (ROOT / path).exists()] == []
+
+
+def test_the_layers_are_those_that_are_enforced() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
+    drawn = "\n".join(f"    {layer.replace('winchkit.', '')}" for layer in layers)
+    assert drawn in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
 def anchors(page: Path) -> set[str]:

@@ -233,3 +233,30 @@ def test_another_process_finds_the_simulation_beside_its_wiring_file(
     address_file(path).write_text("127.0.0.1:1\n", encoding="utf-8")
     with pytest.raises(ConnectionLost, match="sim serve"):
         tell(path, "status")
+
+
+def test_a_machine_without_a_multicast_route_is_told_how_to_get_one(
+    declared: SimBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(**_: object) -> None:
+        raise OSError(19, "No such device")
+
+    monkeypatch.setattr(can, "Bus", refuse)
+    with (
+        pytest.raises(ConnectionLost, match=r"ip route add 239\.0\.0\.0/8 dev lo"),
+        LiveBench(declared, interface="udp_multicast"),
+    ):
+        pass
+
+
+def test_a_bus_that_dies_is_not_hidden(declared: SimBench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unplugged(_timeout: float) -> None:
+        raise can.CanOperationError("unplugged")
+
+    def run() -> None:
+        with LiveBench(declared) as live:
+            monkeypatch.setattr(live._ports["can"]._bus, "recv", unplugged)
+            wait_for(live._loops[0].done)
+
+    with pytest.raises(ConnectionLost, match="cannot receive: unplugged"):
+        run()

@@ -17,17 +17,21 @@ __all__ = ["RemoteStation", "attach"]
 _ANSWER_TIME = 10.0
 
 
-def attach(spec: BenchSpec) -> RemoteStation | None:
-    """A station at the bench's owner; None when nobody owns it."""
+def attach(spec: BenchSpec, patience: float = _ANSWER_TIME) -> RemoteStation | None:
+    """A station at the bench's owner; None when nobody owns it.
+
+    ``patience`` (s) is how long it waits for an answer. Raises ConnectionLost when the owner
+    does not take it.
+    """
     connection = connect_to_owner(spec)
-    return None if connection is None else RemoteStation(connection)
+    return None if connection is None else RemoteStation(connection, patience)
 
 
 class RemoteStation:
     """Calls the owner for everything; its errors are raised here."""
 
-    def __init__(self, connection: socket.socket) -> None:
-        connection.settimeout(_ANSWER_TIME)
+    def __init__(self, connection: socket.socket, patience: float) -> None:
+        connection.settimeout(patience)
         self._connection = connection
         self._stream = connection.makefile("rwb")
         self._lock = threading.Lock()

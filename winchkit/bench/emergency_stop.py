@@ -74,11 +74,11 @@ def _confirm(winch: str, node: SdoNode, problem: WinchkitError | None, clock: Cl
             state = state_of(node.read(0x6041))
             speed = node.read_if_there(0x606C) or 0
         except ConnectionLost as error:
-            return Stopped(winch, False, f"not confirmed: {problem or error}")
+            return Stopped(winch, False, str(problem or error))
         at_rest = state is State.QUICK_STOP_ACTIVE and speed == 0
         if at_rest or (state not in _MOVING and state is not State.UNKNOWN):
             return Stopped(winch, True, f"{state}, at rest" if at_rest else str(state))
         if state is State.OPERATION_ENABLED:
             _tell(node)
         clock.sleep(_POLL)
-    return Stopped(winch, False, f"not confirmed: still {state} after {_STOP_TIME:g} s")
+    return Stopped(winch, False, f"still {state} after {_STOP_TIME:g} s")

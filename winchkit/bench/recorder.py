@@ -93,6 +93,11 @@ class Recorder:
             self._last = snapshot.time
             self._moments.append(snapshot.time)
 
+    def check(self) -> None:
+        """Raise what has ended the writing, e.g. FileError for a full disk."""
+        if self._error is not None:
+            raise self._error
+
     def close(self) -> None:
         """Write what is pending and finish the file; raises what the writing raised."""
         self._detach(self)

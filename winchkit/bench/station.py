@@ -105,8 +105,11 @@ class LocalStation:
         self._recorder = self._bench.log(path)
 
     def log_rows(self) -> int:
-        """Rows written so far."""
-        return self._recorder.rows if self._recorder else 0
+        """Rows written so far; raises what has ended the writing."""
+        if self._recorder is None:
+            return 0
+        self._recorder.check()
+        return self._recorder.rows
 
     def end_log(self) -> int:
         """Finish the log."""

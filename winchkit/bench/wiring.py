@@ -135,6 +135,14 @@ def _instruments(
             ref: DeviceRef | None = getattr(winch, role)
             if ref is None:
                 continue
+            if not spec.bus[ref.bus].kind.startswith("modbus"):
+                raise FileError(
+                    Fault(
+                        f"winch {name}: its {role} is on bus '{ref.bus}' of kind "
+                        f"'{spec.bus[ref.bus].kind}'; use modbus-rtu or modbus-tcp",
+                        spec.path,
+                    )
+                )
             key = (ref.bus, ref.unit or 1)
             if key not in found:
                 label = f"{role} of winch {name} (bus '{key[0]}' unit {key[1]})"

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme, Step
     from winchkit.schema.simbench import SimBench
+    from winchkit.sim.pace import PacedClock
 
 __all__ = ["Findings", "Told", "learn", "programmes", "record", "truth_of"]
 
@@ -81,12 +83,16 @@ def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
     from winchkit.bench.bench import open_bench
     from winchkit.bench.programme import run_programme
     from winchkit.sim.live import LiveBench
+    from winchkit.sim.pace import PacedClock
 
     written: list[Path] = []
     patience = _Patience(told)
-    with _quick_turns(), LiveBench(bench, seed=seed) as live:
+    clock = PacedClock()
+    simulation = partial(clock.beat, "simulation")
+    with _quick_turns(), LiveBench(bench, seed=seed, clock=simulation) as live:
         told("commissioning the drive")
-        with open_bench(live.bench_spec) as opened:
+        with open_bench(live.bench_spec, clock) as opened:
+            opened.on_cycle(lambda _snapshot: _beaten(clock))
             for programme in programmes():
                 _go_to_start(opened, programme)
 
@@ -99,6 +105,10 @@ def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
                     again=patience.again,
                 )
     return written
+
+
+def _beaten(clock: PacedClock) -> None:
+    clock.beat("control")
 
 
 def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:

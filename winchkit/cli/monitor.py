@@ -60,28 +60,35 @@ def _again(pause: float, end: float | None) -> bool:
 def _table(status: dict[str, Any]) -> Table:
     from rich.table import Table
 
-    trouble = [*status["tripped"], *(text for text in status["blocked"])]
+    trouble = dict.fromkeys([*status["tripped"], *status["blocked"]])
     table = Table(
         title=f"cycle {status['cycle']}, overruns {status['overruns']}",
-        caption="\n".join(dict.fromkeys(trouble)) or "no trips",
+        caption="\n".join(trouble) or "no trips",
     )
-    for head in ("winch", "phase", "drive", "length", "speed", "torque", "tension", "sensors"):
-        table.add_column(head, min_width=8, justify="left" if head in _WORDS else "right")
+    table.add_column("winch")
+    table.add_column("phase", min_width=len("running down"))
+    for head in ("length", "speed", "torque", "tension"):
+        table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("drive, sensors")
     for name, winch in status["winch"].items():
         table.add_row(
             name,
             winch["phase"],
-            winch["state"],
             _number(winch["cable_length"], 4, "m"),
             _number(winch["speed"], 3, "m/s"),
             _number(winch["motor_torque"], 3, "N m"),
             _number(winch["tension"], 1, "N"),
-            ", ".join(f"{role} {text}" for role, text in (winch["quality"] or {}).items()),
+            ", ".join([winch["state"], *_complaints(winch["quality"] or {})]),
         )
     return table
 
 
-_WORDS = ("winch", "phase", "drive", "sensors")
+def _complaints(quality: dict[str, str]) -> list[str]:
+    """Sensors about which there is something to say."""
+    return [f"{role} {text}" for role, text in quality.items() if text not in _FINE]
+
+
+_FINE = ("good", "duplicate")
 
 
 def _number(value: float | None, digits: int, unit: str) -> str:

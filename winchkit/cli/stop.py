@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.errors import ConnectionLost, MotionError
+from winchkit.errors import ConnectionLost, MotionError, WinchkitError
 
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
 
 __all__ = ["command"]
+
+_PATIENCE = 3.0
+"""With the owner, before the bus itself is used, s."""
 
 
 @click.command()
@@ -28,13 +31,13 @@ def command(bench: str) -> None:
 
     spec = read_bench(bench)
     try:
-        station = attach(spec)
+        station = attach(spec, patience=_PATIENCE)
         if station is not None:
             station.stop()
             station.close()
             click.echo("stopped: the bench's owner confirms every winch at rest")
             return
-    except ConnectionLost as error:
+    except WinchkitError as error:
         click.echo(f"winchkit: {error}; acting on the bus itself", err=True)
     _stop_on_bus(spec)
 

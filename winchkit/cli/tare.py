@@ -21,8 +21,9 @@ def command(winch: str | None, bench: str, as_json: bool) -> None:
     from winchkit.bench.session import at_station
 
     with at_station(bench) as station:
-        tension = station.tare(winch)
+        name = winch if winch is not None or len(station.names()) > 1 else station.names()[0]
+        tension = station.tare(name)
     if as_json:
-        echo_json({"schema": 1, "winch": winch, "tension": tension})
+        echo_json({"schema": 1, "winch": name, "tension": tension})
     else:
         click.echo(f"tared: the cell reads {tension:.2f} N")

@@ -148,7 +148,7 @@ def _over_time(problem: Problem, residuals: _Residuals) -> Plot:
     band = "" if residuals.noise is None else "; the grey band is the noise, ± its rms"
     return Plot(
         f"time-{residuals.output}",
-        f"Residual of the {name} over time, all runs one after another{band}.",
+        f"Measured less predicted {name} over time, all runs one after another{band}.",
         {
             "kind": "time",
             "x": _numbers(x, 6),

@@ -208,13 +208,14 @@ def _runs(problem: Problem) -> Markup:
 def _commands(problem: Problem, diagnosis: Diagnosis, profile: str) -> list[str]:
     """What to type to get this again, and to go on from it."""
     runs = " ".join(shlex.quote(r.path or r.name) for r in problem.dataset.recordings)
-    with_profile = f"--profile {shlex.quote(profile)}"
+    named = shlex.quote(profile)
     commands = [
-        f"winchkit compare {runs} {with_profile}",
-        f"winchkit diagnose {runs} {with_profile} --html report.html",
+        f"winchkit compare {runs} --profile {named}",
+        f"winchkit diagnose {runs} --profile {named} --html report.html",
     ]
-    commands += [
-        f"winchkit add {step.effects[0]} {with_profile} --fit {runs} -o new.toml"
-        for step in diagnosis.steps[:1]
-    ]
+    for number, step in enumerate(diagnosis.steps, start=1):
+        better = f"better-{number}.toml"
+        effect = shlex.quote(step.effects[0])
+        commands.append(f"winchkit add {effect} --profile {named} --fit {runs} -o {better}")
+        named = better
     return commands

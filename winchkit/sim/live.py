@@ -25,7 +25,7 @@ from winchkit.units import suggest
 
 __all__ = ["LiveBench"]
 
-_TICK = 1e-3
+_TICK = 2e-3
 _OVERRUN = 0.02
 """A tick later than this is counted, s."""
 _SUSPENDED = 1.0
@@ -226,7 +226,7 @@ class LiveBench:
         return self._last
 
     def _run(self, bus: str) -> None:
-        """Serve one CAN bus: frames as they come, and a tick every millisecond.
+        """Serve one CAN bus: frames as they come, and a tick every two milliseconds.
 
         Frames that wait are taken before the tick, so that a stall of this process is not
         mistaken for a master that fell silent.
