@@ -110,7 +110,9 @@ def _draw_bench(random: Random, plan: Plan) -> _Bench:
                 kept = slice(0, len(time) - drop)
                 warm = _temperature(random, time, warms, late)
                 situations.append(
-                    Situation(time[kept] + start, motor[kept], mass, warm[kept], wander[kept], every)
+                    Situation(
+                        time[kept] + start, motor[kept], mass, warm[kept], wander[kept], every
+                    )
                 )
                 programmes.append(index)
     torque = 9.8 * heaviest * winch.radius / winch.ratio
@@ -212,7 +214,10 @@ def _snr(bench: _Bench, plain: list[Shown], hidden: Hidden) -> float:
         # Radius, ratio and layers are in reach of the length, an offset of the other outputs.
         inside = [kin, *[kin[:, :1]] * (len(parts) - 1)]
         parts = np.array(
-            [p - k @ np.linalg.lstsq(k, p, rcond=None)[0] for p, k in zip(parts, inside, strict=True)]
+            [
+                p - k @ np.linalg.lstsq(k, p, rcond=None)[0]
+                for p, k in zip(parts, inside, strict=True)
+            ]
         )
     return float(np.max(np.sqrt(np.mean(parts**2, axis=1))))
 
@@ -257,7 +262,9 @@ def _write(
         if bench.load == "load":
             channels["load"] = ideal.load + random.normal(0, bench.noise["load"], len(time))
         if bench.measures_temperature:
-            channels["temperature"] = run.temperature[:: run.every] + random.normal(0, 0.02, len(time))
+            channels["temperature"] = run.temperature[:: run.every] + random.normal(
+                0, 0.02, len(time)
+            )
         metadata = {"programme": f"moves-{number}"}
         if bench.load == "mass":
             metadata["load_mass"] = f"{run.mass} kg"
@@ -270,9 +277,7 @@ def _write(
         f"{len(paths)} runs {len(bench.situations[0].time)} steps of 1/{bench.situations[0].every} samples "
         f"masses {bench.scene.masses} warms {bench.warms} colour {bench.colour}"
     )
-    return Case(
-        seed, plan.kind, plan.snr, hidden, bench.noise, w, tuple(paths), profile, scene
-    )
+    return Case(seed, plan.kind, plan.snr, hidden, bench.noise, w, tuple(paths), profile, scene)
 
 
 def _noise(random: Random, count: int, rms: float, colour: float) -> Array:

@@ -163,7 +163,11 @@ def _shaped(effect: str, random: Random, winch: Winch, scene: Scene) -> Sized:
             return lambda z: {"fraction": 3e-3 * z, "time_constant": tau}
         case "pulley-stribeck":
             speed, more = random.uniform(0.01, 0.08), random.uniform(1.4, 2.5)
-            return lambda z: {"coulomb": 0.015 * z, "static": 0.015 * z * more, "stribeck_speed": speed}
+            return lambda z: {
+                "coulomb": 0.015 * z,
+                "static": 0.015 * z * more,
+                "stribeck_speed": speed,
+            }
         case "pulley-dahl":
             reach = random.uniform(3e-3, 3e-2)
             return lambda z: {"friction": 0.02 * z, "stiffness": 0.02 * z * low / reach}

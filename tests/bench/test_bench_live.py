@@ -270,3 +270,14 @@ def test_a_bench_whose_drive_does_not_exist(live: LiveBench) -> None:
         open_bench(ghost)
     with open_bench(spec) as bench:
         assert bench.snapshot.at_rest
+
+
+def test_a_stop_from_another_thread_ends_a_timed_jog(bench: Bench) -> None:
+    stopper = threading.Timer(0.4, bench.stop)
+    stopper.start()
+    begin = time.monotonic()
+    with pytest.raises(MotionError, match="somebody stopped it"):
+        bench.winch["A"].jog(-0.1, 30.0)
+    assert time.monotonic() - begin < 10
+    stopper.join()
+    assert bench.snapshot.at_rest

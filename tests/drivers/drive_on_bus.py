@@ -89,6 +89,10 @@ class DriveOnBus:
         self._thread.join()
         self._bus.shutdown()
 
+    def shout(self, identifier: int, data: bytes) -> None:
+        """Send any frame as if the drive had."""
+        self._send(identifier, data)
+
     def words(self) -> list[int]:
         """Control words that came in RPDO 1."""
         node = self.drive.node

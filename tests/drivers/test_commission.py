@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -154,6 +155,40 @@ def test_an_axis_moves_and_tells_si(rig: Rig) -> None:
     assert drive.shaft.motor_velocity == pytest.approx(0.0, abs=0.05)
     assert drive.drive.state.name == "SWITCH_ON_DISABLED"
     assert set(drive.words()[before + 1 :]) <= {0x00, 0x02}
+
+
+@pytest.mark.parametrize("code", [1, 2, 5, 6])
+def test_stops_end_disabled_whatever_605a_says(rig: Rig, code: int) -> None:
+    """Codes 5 to 8 stay in quick stop active until they are led out of it, at rest."""
+    drive, bus = rig
+    with drive.lock:
+        drive.drive.objects.put(0x605A, 0, code)
+    axis = axis_on(bus)
+    axis.commission()
+    run_cycles(bus, axis, Wish.ENABLE, 30, velocity=5.0)
+    assert drive.shaft.motor_velocity > 3.0
+    before = len(drive.words())
+    run_cycles(bus, axis, Wish.DISABLE, 60)
+    assert drive.drive.state.name == "SWITCH_ON_DISABLED"
+    assert set(drive.words()[before + 1 :]) <= {0x00, 0x02}
+    assert abs(drive.shaft.motor_velocity) < 0.05
+
+
+def test_garbage_on_the_bus_ends_nothing(rig: Rig) -> None:
+    """Frames of every length on every identifier that somebody listens to."""
+    drive, bus = rig
+    axis = axis_on(bus)
+    axis.commission()
+    noise = random.Random(7)
+    for _ in range(600):
+        identifier = noise.choice([0x081, 0x181, 0x281, 0x381, 0x581, 0x701, 0x000, 0x7FF])
+        drive.shout(identifier, noise.randbytes(noise.randint(0, 8)))
+    run_cycles(bus, axis, Wish.DISABLE, 10)
+    assert bus.fault is None
+    assert axis.short_frames > 0
+    assert axis.feedback is not None
+    assert axis.feedback.state is State.SWITCH_ON_DISABLED
+    axis.commission()
 
 
 def test_a_drive_left_enabled_is_stopped_before_anything_else(rig: Rig) -> None:

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import struct
+from functools import cache
 
 import pytest
 from hypothesis import given
@@ -21,6 +22,7 @@ def device(field: FieldSpec, count: int = 3, status: int | None = 0) -> DeviceSp
     return DeviceSpec("x", "m", "x", "test", "generic", modbus=modbus)
 
 
+@cache
 def laumas() -> Decoder:
     return Decoder(read_device(catalog.find("devices", "laumas-tlb")))
 

@@ -69,7 +69,9 @@ class Controller:
         self.done = True
         """Whether the last source has finished."""
         self.failure = ""
-        """Why the last source did not start."""
+        """Why the last source could not go on, when the drive is to blame."""
+        self.stopped = False
+        """Whether somebody stopped the last source before its end."""
         self.commanded = 0.0
         """Rope speed commanded last, m/s."""
         self._wanted: MotionSource | None = None
@@ -82,7 +84,7 @@ class Controller:
     def begin(self, source: MotionSource) -> None:
         """Start a source, enabling the drive first where needed; replaces the one before."""
         with self._lock:
-            self.done = False
+            self.done = self.stopped = False
             self.failure = ""
             self._wanted = source
 
@@ -117,7 +119,7 @@ class Controller:
     def _order(self, phase: Phase) -> None:
         with self._lock:
             if self._wanted is not None or (self.source is not None and not self.done):
-                self.failure = "the motion was stopped before its end"
+                self.stopped = True
             self._wanted = None
             if self._ordered is not Phase.STOPPING:
                 self._ordered = phase

@@ -113,14 +113,14 @@ class ControlLoop:
         self._send_sync(now)
         inputs = {name: _input(parts, now, self._count) for name, parts in self.winches.items()}
         blocked = self.supervisor.check(now, inputs)
-        snapshot = self._picture(now, inputs, blocked)
+        # Before anything is stopped: whoever sees a motion ended must see the trip that ended it.
+        self.snapshot = snapshot = self._picture(now, inputs, blocked)
         self._ask_callbacks(snapshot)
         if self.supervisor.tripped or self.failure is not None:
             for parts in self.winches.values():
                 if parts.controller.phase not in _STOPPED:
                     parts.controller.stop()
         self._command(now)
-        self.snapshot = snapshot
         for sample in self.samplers:
             sample(snapshot)
         return snapshot

@@ -10,7 +10,7 @@ from winchkit.bench.motion import DEAD_MAN, Jog, Move
 from winchkit.bench.snapshot import Phase, WinchSnapshot
 from winchkit.bench.supervisor import direction_of
 from winchkit.drivers.modbus.instrument import Instrument
-from winchkit.errors import DriveFault, NoReply, NotPermitted, UsageError
+from winchkit.errors import DriveFault, MotionError, NoReply, NotPermitted, UsageError
 from winchkit.schema.bench import WinchWiring
 
 if TYPE_CHECKING:
@@ -76,10 +76,12 @@ class Winch:
             return
         clock = self._bench.clock
         end = clock.now() + duration
-        while clock.now() < end:
+        self._refresh(speed, hold)
+        while self.moving and clock.now() < end:
             self._refresh(speed, min(hold, end - clock.now() + _POLL))
             clock.sleep(min(hold / 4, end - clock.now()))
-        self._refresh(0.0, _POLL)
+        if self.moving:
+            self._refresh(0.0, _POLL)
         self.wait()
 
     def move_to(
@@ -126,7 +128,10 @@ class Winch:
             self._bench.wait_at_rest((self.name,))
 
     def wait(self) -> None:
-        """Return when the motion is done; raises LimitTripped or DriveFault when it was stopped."""
+        """Return when the motion is done.
+
+        Raises LimitTripped or DriveFault for what has stopped it, MotionError where somebody did.
+        """
         while self.moving:
             self._bench.raise_trouble()
             self._bench.clock.sleep(_POLL)
@@ -135,6 +140,8 @@ class Winch:
             raise DriveFault(
                 f"winch {self.name}: {self._controller.failure}; {self._parts.axis.fault_text}"
             )
+        if self._controller.stopped:
+            raise MotionError(f"winch {self.name}: somebody stopped it before the motion's end")
         source = self._controller.source
         if source is None or not source.holds:
             self._bench.wait_at_rest((self.name,))

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 _ANGLE_AGREES = 0.02
 _LOAD_AGREES = 0.02
 _OVERLAP = 0.8
+_SAME_RATE = 0.05
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Repeats:
 
 def find_repeats(signals: list[Signals]) -> list[Repeats]:
     """Partition of all runs into sets of repeats; a run without any is a set of its own."""
-    sets: list[tuple[list[int], list[int]]] = []
+    sets: list[tuple[list[int], list[float]]] = []
     for index, run in enumerate(signals):
         for members, shifts in sets:
             shift = _shift(signals[members[0]], run)
@@ -42,7 +43,7 @@ def find_repeats(signals: list[Signals]) -> list[Repeats]:
                 shifts.append(shift)
                 break
         else:
-            sets.append(([index], [0]))
+            sets.append(([index], [0.0]))
     return [_lined_up(members, shifts, signals) for members, shifts in sets]
 
 
@@ -55,34 +56,52 @@ def mean_load(run: Signals) -> float | None:
     return None if run.tension is None else float(np.mean(run.tension))
 
 
-def _shift(first: Signals, other: Signals) -> int | None:
-    """Samples by which ``other`` is later than ``first``, or None where it is no repeat."""
+def _shift(first: Signals, other: Signals) -> float | None:
+    """Seconds by which ``other``'s clock is ahead of ``first``'s, or None where it is no repeat."""
+    if not _equally_loaded(first, other):
+        return None
+    step = float(np.median(np.diff(first.time)))
+    if abs(float(np.median(np.diff(other.time))) - step) > _SAME_RATE * step:
+        return None
+    begun = first.time[0], other.time[0]
+    a, b = (_evenly(run, step) for run in (first, other))
+    moved = np.diff(a), np.diff(b)
+    if not moved[0].any() or not moved[1].any():
+        return None
+    lag = int(np.argmax(correlate(moved[1], moved[0], mode="full"))) - (len(moved[0]) - 1)
+    start, stop = max(0, -lag), min(len(a), len(b) - lag)
+    if stop - start < _OVERLAP * min(len(a), len(b)):
+        return None
+    apart = a[start:stop] - b[start + lag : stop + lag]
+    spread = float(np.std(a[start:stop]))
+    if float(np.sqrt(np.mean(apart**2))) > _ANGLE_AGREES * spread:
+        return None
+    return lag * step + float(begun[1] - begun[0])
+
+
+def _equally_loaded(first: Signals, other: Signals) -> bool:
     loads = mean_load(first), mean_load(other)
-    if (loads[0] is None) != (loads[1] is None):
-        return None
-    if loads[0] is not None and loads[1] is not None:
-        larger = max(abs(loads[0]), abs(loads[1]))
-        if abs(loads[0] - loads[1]) > _LOAD_AGREES * larger:
-            return None
-    steps = np.median(np.diff(first.time)), np.median(np.diff(other.time))
-    if abs(steps[0] - steps[1]) > 0.01 * steps[0]:
-        return None
-    a, b = np.diff(first.motor_angle), np.diff(other.motor_angle)
-    if not a.any() or not b.any():
-        return None
-    lag = int(np.argmax(correlate(b, a, mode="full"))) - (len(a) - 1)
-    start, stop = max(0, -lag), min(len(first.time), len(other.time) - lag)
-    if stop - start < _OVERLAP * min(len(first.time), len(other.time)):
-        return None
-    apart = first.motor_angle[start:stop] - other.motor_angle[start + lag : stop + lag]
-    spread = float(np.std(first.motor_angle[start:stop]))
-    return lag if float(np.sqrt(np.mean(apart**2))) <= _ANGLE_AGREES * spread else None
+    if loads[0] is None or loads[1] is None:
+        return loads[0] is loads[1]
+    return abs(loads[0] - loads[1]) <= _LOAD_AGREES * max(abs(loads[0]), abs(loads[1]))
 
 
-def _lined_up(members: list[int], shifts: list[int], signals: list[Signals]) -> Repeats:
-    """Common samples of all members, counted on the first one's clock."""
-    counts = [len(signals[m].time) for m in members]
-    start = max(-shift for shift in shifts)
-    stop = min(count - shift for count, shift in zip(counts, shifts, strict=True))
-    rows = tuple(np.arange(start, stop) + shift for shift in shifts)
-    return Repeats(tuple(members), rows)
+def _evenly(run: Signals, step: float) -> Array:
+    """Motor angle on an even grid: logs of a live bench have gaps and jitter."""
+    grid = np.arange(run.time[0], run.time[-1], step)
+    return np.interp(grid, run.time, run.motor_angle)
+
+
+def _lined_up(members: list[int], shifts: list[float], signals: list[Signals]) -> Repeats:
+    """Samples of all members that stand nearest to the first one's, where all of them run."""
+    clocks = [signals[m].time - shift for m, shift in zip(members, shifts, strict=True)]
+    low, high = max(c[0] for c in clocks), min(c[-1] for c in clocks)
+    half = float(np.median(np.diff(clocks[0]))) / 2
+    common = clocks[0][(clocks[0] >= low - half) & (clocks[0] <= high + half)]
+    return Repeats(tuple(members), tuple(_nearest(clock, common) for clock in clocks))
+
+
+def _nearest(clock: Array, times: Array) -> NDArray[np.intp]:
+    """Index of the sample of ``clock`` nearest to each time."""
+    after = np.clip(np.searchsorted(clock, times), 1, len(clock) - 1)
+    return np.where(times - clock[after - 1] <= clock[after] - times, after - 1, after)

@@ -23,6 +23,7 @@ _SCORE_LEVEL = 0.99
 _GATE_LEVEL = 0.02
 _BETTER = 2.0
 _NO_WORSE = 1.02
+_MATTERS = 0.98
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,7 @@ def search(inquiry: Inquiry) -> Found:
         present, noise = _reconsider(inquiry, present, noise)
         scores = inquiry.scores(present, noise)
         still = _anything(inquiry.presence(present, noise), scores, threshold)
+    present, noise = _without_the_doubtful(inquiry, present, noise)
     return Found(
         begin=begin,
         begin_noise=begin_noise,
@@ -109,8 +111,10 @@ def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
     gain = held_out(problem, present, noise, groups) - held_out(problem, trial.fit, noise, groups)
     was = held_out_rms(problem, present, noise, groups)
     now = held_out_rms(problem, trial.fit, noise, groups)
-    worse = any(now[output] > _NO_WORSE * was[output] for output in problem.dataset.outputs)
-    return bool(np.sum(gain) > 0) and not worse
+    ratios = [now[output] / was[output] for output in problem.dataset.outputs]
+    # What is certain and changes nothing, such as a clock a millisecond off, is not worth a name.
+    matters = min(ratios) < _MATTERS and max(ratios) < _NO_WORSE
+    return bool(np.sum(gain) > 0) and matters
 
 
 def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
@@ -126,6 +130,18 @@ def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Nois
             present = best.fit
     present = _without_the_needless(inquiry, present, noise)
     return inquiry.settle(present.hypothesis, noise)
+
+
+def _without_the_doubtful(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+    """Drop additions that explain less than what is still missing: they may only imitate it."""
+    left = inquiry.presence(present, noise)
+    missing = float(np.sum(np.maximum(left.excess, 0.0)[left.rejected]))
+    doubtful = present
+    for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
+        without = inquiry.refit(present.hypothesis.without(index), noise)
+        if without.cost - present.cost < missing:
+            doubtful = inquiry.refit(doubtful.hypothesis.without(index), noise)
+    return (present, noise) if doubtful is present else inquiry.settle(doubtful.hypothesis, noise)
 
 
 def _without_the_needless(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:

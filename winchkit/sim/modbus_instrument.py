@@ -44,16 +44,15 @@ class ModbusInstrument:
     """One device on a Modbus line.
 
     ``measure`` gives the quantity now in the unit of the device. Nobody but :meth:`convert`
-    looks at it, at the instants of :attr:`next_conversion`. The filter is a moving average, and
-    registers show it when it is as old as the declared filter delay.
+    looks at it, at the instants of :attr:`next_conversion`. Registers show a
+    conversion when it is as old as the declared filter delay: the filter delays and does not
+    smooth, since a lag would be an effect of its own.
     """
 
     def __init__(self, spec: ModbusSpec, measure: Callable[[], float], *, now: float) -> None:
         self.spec = spec
         self._measure = measure
         self.next_conversion = now
-        taps = 1 + int(2 * spec.filter_delay * spec.rate)
-        self._window: deque[float] = deque(maxlen=taps)
         self._pipeline: deque[_Converted] = deque()
         self._shown = _Converted(now, 0.0)
         self._zero = self._tare = self._peak = 0.0
@@ -74,16 +73,10 @@ class ModbusInstrument:
             return
         value = self._measure()
         broken = "sensor break" in self.faults or not isfinite(value)
-        if broken:
-            self._window.clear()
-            self._pipeline.append(_Converted(now + self.spec.filter_delay, value, broken=True))
-            return
-        self._window.append(value)
-        mean = sum(self._window) / len(self._window)
-        age = (len(self._window) - 1) / (2 * self.spec.rate)
-        due = now - age + self.spec.filter_delay
-        self._pipeline.append(_Converted(due, mean, "overload" in self.faults))
-        self._average(mean)
+        due = now + self.spec.filter_delay
+        self._pipeline.append(_Converted(due, value, "overload" in self.faults, broken))
+        if not broken:
+            self._average(value)
 
     def _average(self, value: float) -> None:
         if self._fast is None or self._slow is None:

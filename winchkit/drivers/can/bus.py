@@ -24,13 +24,18 @@ _NMT = 0x000
 _HEARTBEAT = 0x700
 _SDO_REPLY = range(0x581, 0x600)
 _WAIT = 0.05
+_MAX_FAILURES = 5
+_FAILURE_PAUSE = 0.01
 
 for _library in ("canopen", "can"):
     logging.getLogger(_library).addHandler(logging.NullHandler())
 
 
 class CanBus:
-    """An open bus. ``fault`` says why it died, once it has."""
+    """An open bus. ``fault`` says why it died, once it has.
+
+    Handlers check what they are given and raise nothing: they run on the receive thread.
+    """
 
     def __init__(self, spec: BusSpec, name: str, clock: Clock) -> None:
         """Open the bus and start receiving; raises ConnectionLost."""
@@ -78,12 +83,20 @@ class CanBus:
         self.send(_HEARTBEAT + node, bytes((state,)))
 
     def _receive(self) -> None:
+        """Receive until closed; one unreadable frame is counted, many in a row end the bus."""
+        failures = 0
         while not self._stopping.is_set():
             try:
                 message = self._bus.recv(_WAIT)
             except (can.CanError, OSError) as error:
-                self.fault = f"cannot receive: {error}"
-                return
+                self.error_frames += 1
+                failures += 1
+                if failures >= _MAX_FAILURES:
+                    self.fault = f"cannot receive: {error}"
+                    return
+                self._stopping.wait(_FAILURE_PAUSE)
+                continue
+            failures = 0
             if message is not None:
                 self._dispatch(message)
 
