@@ -4,6 +4,7 @@ On a real bench only the first lines differ: ``with open_bench("bench.toml") as 
 """
 
 import math
+from functools import partial
 from pathlib import Path
 
 from winchkit import Bench, open_bench, read_run
@@ -12,6 +13,7 @@ from winchkit.catalog import find
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_simbench
 from winchkit.sim.live import LiveBench
+from winchkit.sim.pace import PacedClock
 
 PERIOD = 2.0
 """Of the waves, s."""
@@ -35,11 +37,18 @@ def heave(bench: Bench, duration: float) -> None:
 
 def main(path: str | Path = "heave.csv", duration: float = 2 * PERIOD) -> Run:
     """Heave for a while, log it, and say what the instruments saw."""
+    clock = PacedClock()  # keeps bench and simulation in step, however busy the machine is
+
+    def keep_pace(_: BenchSnapshot) -> None:
+        clock.beat("control")
+
+    declared = read_simbench(find("sim", "spiral-bench"))
     with (
-        LiveBench(read_simbench(find("sim", "spiral-bench"))) as simulated,
-        open_bench(simulated.bench_spec) as bench,
+        LiveBench(declared, clock=partial(clock.beat, "simulation")) as simulated,
+        open_bench(simulated.bench_spec, clock) as bench,
         bench.log(path),
     ):
+        bench.on_cycle(keep_pace)
         heave(bench, duration)
     run = read_run(path)
     length, tension = run["cable_length"], run["tension"]

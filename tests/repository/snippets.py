@@ -29,7 +29,7 @@ _FENCE = re.compile(
 _NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+−]?\d+)?")
 _PATIENCE = 120
 _STALLED = ("no complete feedback", "no load cell reading", "heartbeat is gone")
-"""What a bench says when this machine stood still for some tenths of a second; rightly, it stops."""
+"""What a bench says when this machine stood still for a moment; rightly, it stops."""
 _AGAIN = 3
 """How often a command that was stopped so is given anew."""
 

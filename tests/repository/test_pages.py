@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import textwrap
 import tomllib
 from pathlib import Path
 
@@ -31,6 +32,21 @@ def test_what_a_page_shows_is_what_happens(page: Path, tmp_path: Path) -> None:
     with Session(tmp_path) as session:
         for snippet in snippets_of(page):
             session.run(snippet)
+
+
+def test_the_formats_page_in_python(tmp_path: Path) -> None:
+    text = (ROOT / "docs/formats.md").read_text(encoding="utf-8")
+    indented = re.findall(r"(?:^(?: {4}.*)?\n)+", text, re.MULTILINE)
+    blocks = [textwrap.dedent(block).strip() for block in indented]
+    programmes = [block for block in blocks if block.startswith("from winchkit")]
+    assert len(programmes) == 2
+    shutil.copytree(ROOT / "profiles", tmp_path / "profiles")
+    recorded = "winchkit sim record demo-adequate -p programme-demo --rate '5 Hz' --format mcap"
+    with Session(tmp_path) as session:
+        session.run(Snippet(1, "console", "", f"$ {recorded}\n...", ""))
+        session.run(Snippet(1, "console", "", "$ mv demo-10kg-1.mcap lift.mcap\n", ""))
+        for programme in programmes:
+            session.run(Snippet(1, "python", "", programme, ""))
 
 
 def test_the_readme_begins_with_the_two_commands() -> None:

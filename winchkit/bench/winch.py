@@ -77,11 +77,12 @@ class Winch:
         clock = self._bench.clock
         end = clock.now() + duration
         self._refresh(speed, hold)
-        while self.moving and clock.now() < end:
-            self._refresh(speed, min(hold, end - clock.now() + _POLL))
-            clock.sleep(min(hold / 4, end - clock.now()))
-        if self.moving:
-            self._refresh(0.0, _POLL)
+        mine = self._jog
+        while mine is self._jog and self.moving and (left := end - clock.now()) > 0:
+            self._bench.permit(self.name, direction_of(speed))
+            if mine is not None:
+                mine.refresh(speed, clock.now() + min(hold, left))
+            clock.sleep(min(hold / 4, left))
         self.wait()
 
     def move_to(

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.diagnose import inquire, output_fits
+from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.result import Estimate, OutputFit
 from winchkit.diagnosis.signature import Score, missing_needs, score
 from winchkit.diagnosis.uncertainty import estimates, unknown_std
+from winchkit.diagnosis.verdict import output_fits
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.errors import UsageError

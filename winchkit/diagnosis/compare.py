@@ -40,7 +40,7 @@ def compare(
     residual = problem.residual(start)
     offset = None
     if problem.fits_offset:
-        column = problem.offset_column
+        column = problem.nuisance_columns[:, 0]
         offset = float(column @ residual / (column @ column))
         residual = residual - offset * column
     shares = follows(problem, residual)

@@ -14,6 +14,7 @@ from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.signature import Projected
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
+from winchkit.effects.effect import Effect
 
 __all__ = ["Confusion", "confusion_of"]
 
@@ -49,7 +50,7 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
         s
         for s in scores
         if s.atom.effect.id != own.effect.id
-        and Coordinates(s.atom.effect).freedom <= freedom
+        and (Coordinates(s.atom.effect).freedom <= freedom or _kindred(s.atom.effect, own.effect))
         and s.gain > mine - max(_NEAR, 0.1 * mine)
     ][:_RIVALS]
     blocks = inquiry.blocks
@@ -75,6 +76,12 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
         if term.effect.id != own.effect.id
     }
     return Confusion(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
+
+
+def _kindred(rival: Effect, own: Effect) -> bool:
+    """Whether one law of a family may stand for the other, neither being a case of the other."""
+    nested = own.id in rival.contains or rival.id in own.contains
+    return bool(own.family) and rival.family == own.family and not nested
 
 
 def _flip_chance(worse: Array) -> float:

@@ -16,12 +16,13 @@ from winchkit.diagnosis.admit import OUTPUTS, admit
 from winchkit.diagnosis.denoise import agreed, quiet
 from winchkit.diagnosis.repeats import Repeats, find_repeats
 from winchkit.diagnosis.spectrum import Band, torque_band
+from winchkit.model.derivatives import reach_of
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Dataset", "Recording", "prepare"]
+__all__ = ["Dataset", "Recording", "assemble", "prepare"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -82,6 +83,13 @@ def prepare(
     the filter all but removes tells nothing and is left out of fits, but belongs to an rms.
     """
     notes = admit(runs, profile)
+    return replace(assemble(runs, profile, band, skirt), notes=tuple(notes))
+
+
+def assemble(
+    runs: Sequence[Run], profile: WinchProfile, band: float | None = None, skirt: float = 1.0
+) -> Dataset:
+    """Build a dataset of runs that are known to fit the profile."""
     signals = [_signals(run) for run in runs]
     repeats = find_repeats(signals)
     smooth = _denoised(signals, repeats, profile)
@@ -89,7 +97,7 @@ def prepare(
         _recording(run, raw, quiet_one, profile, (band, skirt))
         for run, raw, quiet_one in zip(runs, signals, smooth, strict=True)
     )
-    return Dataset(profile, recordings, tuple(repeats), tuple(notes))
+    return Dataset(profile, recordings, tuple(repeats))
 
 
 def _bridged(values: Array) -> Array:
@@ -176,7 +184,12 @@ def _recording(
         values = run[output]
         cut_off = (band or torque_band(rate)) if output == "motor_torque" else None
         measured[output] = _bridged(values)
-        valid[output] = _away_from_gaps(np.isfinite(values) & inputs_ok, rate, cut_off)
+        good = np.isfinite(values) & inputs_ok
+        if output != "cable_length":
+            # Accelerations at the ends of a run are not known.
+            edge = 1 + reach_of(run.time)
+            good[:edge] = good[-edge:] = False
+        valid[output] = _away_from_gaps(good, rate, cut_off)
         bands[output] = Band(len(values), rate, cut_off, skirt)
     return Recording(
         name=run.name,

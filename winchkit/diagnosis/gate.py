@@ -29,6 +29,7 @@ __all__ = [
 Array = NDArray[np.float64]
 _BLOCKS = 48
 _TOUCHED = 0.02
+_RIDGE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -55,16 +56,39 @@ def blocks_of(problem: Problem, wanted: int = _BLOCKS) -> Folds:
     return Folds(of, first)
 
 
-def groups_of(problem: Problem, fewest_blocks: int = 5) -> Folds:
+def five_blocks(problem: Problem) -> Folds:
+    """Five stretches of time, one after another through all runs."""
+    blocks = blocks_of(problem)
+    return Folds(tuple((b * 5) // blocks.count for b in blocks.of), 5)
+
+
+def groups_of(problem: Problem) -> Folds:
     """Whole groups of programme and load; with one group only, five blocks of time."""
     groups = problem.dataset.repeats
     if len(groups) < 2:
-        blocks = blocks_of(problem)
-        merged = tuple((b * fewest_blocks) // blocks.count for b in blocks.of)
-        return Folds(merged, fewest_blocks)
+        return five_blocks(problem)
     of_run = {run: index for index, group in enumerate(groups) for run in group.runs}
     of = tuple(np.full(s.band.count, of_run[s.run], dtype=np.intp) for s in problem.segments)
     return Folds(of, len(groups))
+
+
+def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> float:
+    """Variance of a fold's prediction from the other folds, at most, in units of the noise's.
+
+    Above one the unknowns rest mainly on the fold that is left out.
+    """
+    columns = _in_time(problem, fit.jacobian * noise.weight(problem)[:, None])
+    fold = np.concatenate(folds.of)
+    size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
+    scaled = columns / size
+    whole = scaled.T @ scaled
+    worst = 0.0
+    for index in range(folds.count):
+        own = scaled[fold == index]
+        inner = own.T @ own
+        rest = np.linalg.inv(whole - inner + _RIDGE * np.eye(len(whole)))
+        worst = max(worst, float(np.trace(rest @ inner)) / len(own))
+    return worst
 
 
 def held_out(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.fit import Fit, fit
-from winchkit.diagnosis.gate import Folds, blocks_of, groups_of
+from winchkit.diagnosis.gate import Folds, blocks_of, extrapolation, five_blocks, groups_of
 from winchkit.diagnosis.noise import (
     Noise,
     Presence,
@@ -27,6 +27,7 @@ from winchkit.effects.effect import Effect
 __all__ = ["Inquiry", "Trial"]
 
 Array = NDArray[np.float64]
+_FEW = 2
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,23 @@ class Inquiry:
     def groups(self) -> Folds:
         """Whole groups of programme and load, to be held out."""
         return groups_of(self.problem)
+
+    def folds(self, fitted: Fit, noise: Noise) -> Folds:
+        """What to hold out for a fit: whole groups, or blocks where groups would not tell.
+
+        With two groups, say two loads, either may be the only one that determines an unknown: a
+        prediction that rests on nothing fails whether or not the effect is there.
+        """
+        if (
+            self.groups.count == _FEW
+            and extrapolation(self.problem, fitted, noise, self.groups) > 1
+        ):
+            return self._five_blocks
+        return self.groups
+
+    @cached_property
+    def _five_blocks(self) -> Folds:
+        return five_blocks(self.problem)
 
     @property
     def _known(self) -> Array:

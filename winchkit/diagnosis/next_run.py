@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ncx2
 
-from winchkit.diagnosis.dataset import Dataset, prepare
+from winchkit.diagnosis.dataset import Dataset, assemble
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.repeats import mean_load
 from winchkit.diagnosis.result import NextRun
@@ -111,11 +111,12 @@ def _separation(problem: Problem, first: Term, second: Term, noise: dict[str, fl
 
 def _imagined(dataset: Dataset, kind: Kind) -> Problem:
     """A problem whose runs follow a kind of programme and measure what the nominal line says."""
+    warm = all(r.signals.temperature is not None for r in dataset.recordings)
     runs = []
     for load in kind.loads:
-        for warmed in kind.warmed:
+        for warmed in kind.warmed if warm else (0.0,):
             runs.append(_run(dataset, kind, load, warmed))
-    return Problem(prepare(runs, dataset.profile))
+    return Problem(assemble(runs, dataset.profile))
 
 
 def _run(dataset: Dataset, kind: Kind, load: float, warmed: float) -> Run:

@@ -1,7 +1,8 @@
 """A dataset as one regression: the residual vector of a hypothesis, in frequency.
 
 Rows are the kept cosine coefficients of every output of every run. A hypothesis is a tuple of
-terms with one length offset and, for effects with memory, one initial state per run.
+terms with nuisances and, for effects with memory, one initial state per run. Nuisances are the
+length instrument's offset and, where a known weight is the load, how its acceleration is rounded.
 """
 
 from __future__ import annotations
@@ -38,10 +39,11 @@ class Segment:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Terms with their values, the length instrument's offset, and initial states."""
+    """Terms with their values, nuisances, and initial states."""
 
     terms: tuple[Term, ...] = ()
-    offset: float = 0.0
+    nuisances: tuple[float, ...] = ()
+    """One per column of :attr:`Problem.nuisance_columns`; none is all zero."""
     starts: tuple[tuple[float, ...], ...] = ()
     """Per term: one initial state per run where it has memory, else nothing."""
 
@@ -70,12 +72,12 @@ class Problem:
         self.segments = _segments(dataset)
         self.rows = self.segments[-1].rows.stop
         self.base = self._base()
-        self.offset_column = self._offset_column()
-
-    @property
-    def fits_offset(self) -> bool:
-        """Whether the length instrument's offset is among the unknowns."""
-        return bool(np.any(self.offset_column))
+        offset, rounding = self._offset_column(), self._rounding_column()
+        self.fits_offset = bool(np.any(offset))
+        """Whether the length instrument's offset is an unknown; it is the first one then."""
+        present = [column for column in (offset, rounding) if np.any(column)]
+        self.nuisance_columns = np.array(present).reshape(len(present), self.rows).T
+        """Linear in their unknowns, (rows, nuisances)."""
 
     @cached_property
     def band_of_row(self) -> NDArray[np.intp]:
@@ -120,23 +122,27 @@ class Problem:
 
     def residual(self, hypothesis: Hypothesis) -> Array:
         """Measured minus predicted, rows."""
-        return self.base - self.change(hypothesis) - hypothesis.offset * self.offset_column
+        residual = self.base - self.change(hypothesis)
+        if hypothesis.nuisances:
+            residual -= self.nuisance_columns @ np.array(hypothesis.nuisances)
+        return residual
 
     def in_time(self, rows: Array) -> list[Array]:
         """Rows back in time, one array per segment."""
         return [to_time(rows[s.rows], s.band) for s in self.segments]
 
     def vector(self, hypothesis: Hypothesis) -> Array:
-        """Everything to fit: offset, coordinates of the terms, initial states."""
-        parts = [np.array([hypothesis.offset])] if self.fits_offset else []
+        """Everything to fit: nuisances, coordinates of the terms, initial states."""
+        count = self.nuisance_columns.shape[1]
+        parts = [np.array(hypothesis.nuisances or (0.0,) * count)]
         parts += [Coordinates(t.effect).vector(t.values) for t in hypothesis.terms]
         parts += [np.array(start) for start in hypothesis.starts]
         return np.concatenate([np.zeros(0), *parts])
 
     def hypothesis(self, vector: Array, like: Hypothesis) -> Hypothesis:
         """A hypothesis of the same terms at a vector."""
-        at = 1 if self.fits_offset else 0
-        offset = float(vector[0]) if at else 0.0
+        at = self.nuisance_columns.shape[1]
+        nuisances = tuple(vector[:at].tolist())
         terms, starts = [], []
         for term in like.terms:
             coordinates = Coordinates(term.effect)
@@ -146,13 +152,14 @@ class Problem:
         for start in like.starts:
             starts.append(tuple(vector[at : at + len(start)].tolist()))
             at += len(start)
-        return Hypothesis(tuple(terms), offset, tuple(starts))
+        return Hypothesis(tuple(terms), nuisances, tuple(starts))
 
     def bounds(self, like: Hypothesis) -> tuple[Array, Array]:
         """Lower and upper ends of the vector."""
         pairs = [Coordinates(t.effect).bounds() for t in like.terms]
-        low = [np.full(int(self.fits_offset), -np.inf), *(pair[0] for pair in pairs)]
-        high = [np.full(int(self.fits_offset), np.inf), *(pair[1] for pair in pairs)]
+        count = self.nuisance_columns.shape[1]
+        low = [np.full(count, -np.inf), *(pair[0] for pair in pairs)]
+        high = [np.full(count, np.inf), *(pair[1] for pair in pairs)]
         for term, start in zip(like.terms, like.starts, strict=True):
             if start:
                 parameter = term.effect.parameter(_START)
@@ -166,10 +173,9 @@ class Problem:
         _, high = self.bounds(like)
         out = np.empty((self.rows, len(vector)))
         states = sum(len(start) for start in like.starts)
-        for index in range(len(vector) - states):
-            if index == 0 and self.fits_offset:
-                out[:, 0] = self.offset_column
-                continue
+        count = self.nuisance_columns.shape[1]
+        out[:, :count] = self.nuisance_columns
+        for index in range(count, len(vector) - states):
             step = 1e-3 * max(1.0, abs(vector[index]))
             if vector[index] + step > high[index]:
                 step = -step
@@ -215,6 +221,24 @@ class Problem:
             recording = self.dataset.recordings[segment.run]
             if segment.output == "cable_length" and not recording.zeroed:
                 out[segment.rows] = self._masked(segment, np.ones(segment.band.count))
+        return out
+
+    def _rounding_column(self) -> Array:
+        """What the outputs gain from a known weight's acceleration being a little less rounded.
+
+        Differences of the angle round the acceleration by its own curvature, by how much depends
+        on the sampling: without this unknown it is taken for a lag of the cell.
+        """
+        out = np.zeros(self.rows)
+        for run, recording in enumerate(self.dataset.recordings):
+            rounded = recording.raw.rounding
+            if rounded is None or recording.raw.load is None:
+                continue
+            line = Line(self.dataset.profile)
+            moved = line.predict(replace(recording.raw, load=recording.raw.load + rounded))
+            for segment in (s for s in self.segments if s.run == run):
+                gained = moved[segment.output] - recording.nominal[segment.output]
+                out[segment.rows] = self._masked(segment, gained)
         return out
 
     @cached_property

@@ -33,6 +33,7 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
     given = tuple(range(inquiry.given))
     added = tuple(range(inquiry.given, len(whole.terms)))
     names = [whole.terms[index].label for index in added]
+    folds = inquiry.folds(found.final, found.noise)
     known: dict[tuple[int, ...], Mapping[str, float]] = {
         given: {o: fit.heldout_rms_before for o, fit in diagnosis.outputs.items()},
         (*given, *added): {o: fit.heldout_rms_after for o, fit in diagnosis.outputs.items()},
@@ -42,7 +43,7 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
         kept = (*given, *terms)
         if kept not in known:
             fitted = inquiry.refit(_only(whole, kept), found.noise)
-            known[kept] = held_out_rms(inquiry.problem, fitted, found.noise, inquiry.groups)
+            known[kept] = held_out_rms(inquiry.problem, fitted, found.noise, folds)
         return known[kept]
 
     rungs = [("profile as it is", error())]
@@ -60,6 +61,6 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
 def _only(whole: Hypothesis, kept: tuple[int, ...]) -> Hypothesis:
     return Hypothesis(
         tuple(whole.terms[index] for index in kept),
-        whole.offset,
+        whole.nuisances,
         tuple(whole.starts[index] for index in kept),
     )

@@ -107,7 +107,7 @@ def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
     after = held_out(problem, trial.fit, noise, blocks)
     if np.sum(before - after) <= 0 or confidence(before, after) > _GATE_LEVEL:
         return False
-    groups = inquiry.groups
+    groups = inquiry.folds(trial.fit, noise)
     gain = held_out(problem, present, noise, groups) - held_out(problem, trial.fit, noise, groups)
     was = held_out_rms(problem, present, noise, groups)
     now = held_out_rms(problem, trial.fit, noise, groups)

@@ -34,7 +34,7 @@ def unknown_std(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Arra
 
 def estimates(problem: Problem, fit: Fit, std: Array) -> list[tuple[Term, dict[str, Estimate]]]:
     """Every term of a fit with its values, standard deviations and units."""
-    at = 1 if problem.fits_offset else 0
+    at = problem.nuisance_columns.shape[1]
     out = []
     for term in fit.hypothesis.terms:
         coordinates = Coordinates(term.effect)

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["is_calmer", "second_derivative", "smooth_sign", "wide_gradient"]
+__all__ = [
+    "is_calmer",
+    "reach_of",
+    "second_derivative",
+    "smooth_sign",
+    "span_of",
+    "wide_gradient",
+]
 
 Array = NDArray[np.float64]
 _CREEP_SHARE = 0.02
@@ -38,9 +45,19 @@ def is_calmer(measured: Array, differences: Array) -> bool:
     return float(np.std(np.diff(measured, 2))) < _CALMER * float(np.std(np.diff(differences, 2)))
 
 
+def reach_of(time: Array) -> int:
+    """Samples to either side over which accelerations are taken: at least 20 ms, at least one."""
+    return max(1, round(_LOAD_SPAN / float(np.median(np.diff(time)))))
+
+
+def span_of(time: Array) -> float:
+    """The same in seconds."""
+    return reach_of(time) * float(np.median(np.diff(time)))
+
+
 def wide_gradient(x: Array, time: Array) -> Array:
     """First derivative over at least ±20 ms, (n,)."""
-    step = max(1, round(_LOAD_SPAN / float(np.median(np.diff(time)))))
+    step = reach_of(time)
     if len(x) <= 2 * step:
         return np.zeros_like(x)
     inner = (x[2 * step :] - x[: -2 * step]) / (time[2 * step :] - time[: -2 * step])
@@ -49,7 +66,7 @@ def wide_gradient(x: Array, time: Array) -> Array:
 
 def second_derivative(x: Array, time: Array) -> Array:
     """Central second difference over at least ±20 ms, so that encoder noise stays small."""
-    step = max(1, round(_LOAD_SPAN / float(np.median(np.diff(time)))))
+    step = reach_of(time)
     if len(x) <= 2 * step:
         return np.zeros_like(x)
     before, after = time[step:-step] - time[: -2 * step], time[2 * step :] - time[step:-step]

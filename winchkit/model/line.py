@@ -14,7 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.model.derivatives import is_calmer, second_derivative, smooth_sign, wide_gradient
+from winchkit.model.derivatives import (
+    is_calmer,
+    second_derivative,
+    smooth_sign,
+    span_of,
+    wide_gradient,
+)
 from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage
 from winchkit.schema.winch import WinchProfile
@@ -39,6 +45,8 @@ class Motion:
     """The cell's reading, which stands in for the drum-side tension without a load, N."""
     load_mass: float | None = None
     """The weight whose acceleration makes the load, kg, where no instrument measures it."""
+    rounding: Array | None = None
+    """Curvature of that load over the span of its differences, N: how far it may be rounded."""
 
 
 @dataclass(frozen=True)
@@ -93,11 +101,12 @@ class Line:
         if jitter and signals.motor_velocity is not None:
             speed = speed + self._pace(angle) * (signals.motor_velocity - rate)
             rate = signals.motor_velocity
-        load, mass = signals.load, None
+        load, mass, rounding = signals.load, None, None
         if load is None and signals.load_mass is not None:
             mass = signals.load_mass
             bent = -wide_gradient(speed, time) if jitter else second_derivative(length, time)
             load = mass * (GRAVITY - bent)
+            rounding = span_of(time) ** 2 * second_derivative(load, time)
         tension = load if load is not None else signals.tension
         missing = np.full_like(time, np.nan)
         at = At(
@@ -115,7 +124,7 @@ class Line:
             tension=np.zeros_like(time) if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
         )
-        return Motion(at, load, signals.tension if load is None else None, mass)
+        return Motion(at, load, signals.tension if load is None else None, mass, rounding)
 
     def predict(self, motion: Motion) -> dict[str, Array]:
         """``cable_length``, ``motor_torque`` and, where a load is known, ``tension``."""

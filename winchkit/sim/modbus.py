@@ -93,6 +93,7 @@ class ModbusLine:
     async def _close(self) -> None:
         if self._server is not None:
             await self._server.shutdown()
+        await asyncio.sleep(0.01)  # a request that has just come becomes a task turns later
         tasks = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
         for task in tasks:
             task.cancel()

@@ -42,11 +42,13 @@ class SlowDevices:
         self._lines = tuple(lines)
         self._line_of = {id(item): line.name for line in lines for item in line.instruments}
         self._failure: Exception | None = None
+        self._closing = False
         self._thread = threading.Thread(target=self._run, name="slow-devices", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         """Stop polling and close the lines; raises what ended the polling before, if anything."""
+        self._closing = True
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(timeout=3.0)
         if self._failure is not None:
@@ -90,7 +92,8 @@ class SlowDevices:
 
     async def _poll(self, line: Line) -> None:
         client, lock = self._clients[line.name], self._locks[line.name]
-        while True:
+        # A cancellation that meets an answer is lost in asyncio.wait_for (Python 3.11).
+        while not self._closing:
             if not client.connected and not await self._connect(line, client):
                 await asyncio.sleep(_RECONNECT)
                 continue

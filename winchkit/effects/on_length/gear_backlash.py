@@ -1,4 +1,9 @@
-"""gear-backlash: the drum does not follow until the play of the gear is taken up."""
+"""gear-backlash: the drum does not follow until the play of the gear is taken up.
+
+While the drum stands in the play the motor turns freely, unless the load keeps the teeth on one
+flank: which of the two a gear does depends on its drag, so the share of the torque that is held
+there is fitted.
+"""
 
 import numpy as np
 
@@ -10,7 +15,7 @@ _ON_THE_FLANK = 1 - 1e-9
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Drum angle through a play; within the gap the drum stands and the motor turns freely.
+    """Drum angle through a play; within the gap the drum stands and a share of the torque is held.
 
     One state at rest says nothing of the gap: it is taken as meshing.
     """
@@ -19,7 +24,7 @@ def apply(path: Path, at: At, values: Values) -> Path:
         return path
     drum_angle = play(path.value, gap, values["start"])
     meshes = np.abs(drum_angle - path.value) >= gap / 2 * _ON_THE_FLANK
-    return Path(drum_angle, path.slope * meshes)
+    return Path(drum_angle, path.slope * np.where(meshes, 1.0, values["held"]))
 
 
 EFFECT = Effect(
@@ -27,18 +32,26 @@ EFFECT = Effect(
     stage=Stage.DRUM_ANGLE,
     parameters=(
         Parameter("gap", "rad", null=0.0, typical=4e-3, low=0.0, high=0.2),
+        Parameter("held", "1", null=1.0, typical=0.5, low=0.0, high=1.0),
         Parameter("start", "1", null=0.0, typical=0.25, low=-0.5, high=0.5, role="fixed"),
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
     what="Teeth have play: after a reversal the drum stands until the other flank bears.",
-    formula="play operator of gap b on φ; start: place in the gap at the run's start, −½ to ½",
+    formula="play operator of gap b on φ; held: share of the rope's torque within the play; "
+    "start: place in the gap at the run's start, −½ to ½",
     source="play operator (Krasnosel'skii and Pokrovskii, Systems with Hysteresis)",
-    looks_like="A step of the length after a reversal, whatever the speed, and no torque in it.",
+    looks_like="A step of the length after a reversal, whatever the speed.",
     confused_with=("length-time-offset", "cable-hysteresis"),
     told_apart="A ladder of speeds: the step stays, a time offset grows with the speed.",
     needs=("gearing",),
     order=2,
     memory=True,
-    probes=({"gap": 1e-3}, {"gap": 4e-3}, {"gap": 1.6e-2}),
+    probes=(
+        {"gap": 1e-3},
+        {"gap": 4e-3},
+        {"gap": 1.6e-2},
+        {"gap": 4e-3, "held": 0.0},
+        {"gap": 1.6e-2, "held": 0.0},
+    ),
 )

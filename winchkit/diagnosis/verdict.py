@@ -1,0 +1,133 @@
+"""The verdict: what may be named, what is left, and how every output stands before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from winchkit.diagnosis.admit import OUTPUT_UNITS
+from winchkit.diagnosis.compare import signal_rms
+from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.gate import held_out_rms
+from winchkit.diagnosis.inquiry import Inquiry
+from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.result import OutputFit, Verdict
+from winchkit.diagnosis.search import Found
+
+__all__ = ["Judgement", "judge", "output_fits"]
+
+_HALF = 0.5
+_GENERALISES = 0.15
+_TRACE = 0.25
+_NEGLIGIBLE = 0.02
+_AT_NOISE = 1.1
+_NEAR_NOISE = 1.5
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What a search came to."""
+
+    verdict: Verdict
+    share: float
+    """Of the excess over the noise, what is left unexplained."""
+    outputs: Mapping[str, OutputFit]
+    shown: Found
+    """What was found, without the additions that may not be named."""
+    notes: tuple[str, ...]
+
+
+def judge(inquiry: Inquiry, found: Found) -> Judgement:
+    """Decide the verdict; while something is unexplained no addition is named.
+
+    A name would be a guess then: something outside the catalogue is often imitated by an effect
+    inside it. The candidates stay, and a note says what came closest.
+    """
+    share = _unexplained(inquiry, found)
+    outputs = output_fits(inquiry, (found.begin, found.begin_noise), (found.final, found.noise))
+    verdict = _verdict(found, outputs, share)
+    added = found.final.labels[inquiry.given :]
+    if verdict == "explained" or not added:
+        return Judgement(verdict, share, outputs, found, ())
+    note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
+    shown = replace(found, final=found.begin, noise=found.begin_noise)
+    before = (found.begin, found.begin_noise)
+    return Judgement(verdict, share, output_fits(inquiry, before, before), shown, (note,))
+
+
+def _unexplained(inquiry: Inquiry, found: Found) -> float:
+    """Share of the excess over the noise that the final model leaves, in sample or held out."""
+    if not found.alarmed:
+        return 0.0
+    folds = inquiry.folds(found.final, found.noise)
+    held = [
+        held_out_rms(inquiry.problem, fitted, found.noise, folds)
+        for fitted in (found.begin, found.final)
+    ]
+    squares = [
+        sum(max(0.0, (rms[o] / noise) ** 2 - 1) for o, noise in found.noise.rms.items())
+        for rms in held
+    ]
+    left = squares[1] / squares[0] if squares[0] > 0 else 0.0
+    if found.noise.from_repeats:
+        # Both in units of the final noise, so that a re-estimated noise does not shift the share.
+        scale = found.begin_noise.power / found.noise.power
+        before = float(np.sum(np.maximum(found.begin_presence.excess * scale, 0.0)))
+        after = float(np.sum(np.maximum(found.presence.excess, 0.0)[found.presence.rejected]))
+        left = max(left if left > _GENERALISES else 0.0, after / before if before > 0 else 0.0)
+    return min(1.0, left)
+
+
+def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
+    if not found.alarmed:
+        return "adequate"
+    grown = len(found.final.hypothesis.terms) > len(found.begin.hypothesis.terms)
+    if not grown or share > _HALF:
+        return "unknown"
+    if not found.still or not found.noise.from_repeats:
+        return "explained" if share < _GENERALISES else "partly"
+    # A trace below the noise, such as a load that bounces on its rope, is told but changes nothing.
+    over = max(
+        fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
+        for fitted in outputs.values()
+    )
+    allowed = _TRACE if over < _AT_NOISE else _NEGLIGIBLE if over < _NEAR_NOISE else 0.0
+    return "explained" if share < allowed else "partly"
+
+
+def output_fits(
+    inquiry: Inquiry, begin: tuple[Fit, Noise], final: tuple[Fit, Noise]
+) -> dict[str, OutputFit]:
+    """Every output before and after, in sample and held out, beside its noise."""
+    problem, folds = inquiry.problem, inquiry.folds(*final)
+    before, after = _rms(problem, begin[0]), _rms(problem, final[0])
+    held_before = held_out_rms(problem, *begin, folds)
+    held_after = held_out_rms(problem, *final, folds)
+    noise = final[1]
+    source = "repeats" if noise.from_repeats else "saturated fit"
+    return {
+        output: OutputFit(
+            unit=OUTPUT_UNITS[output],
+            band=next(s.band.cut_off for s in problem.segments if s.output == output),
+            signal_rms=signal_rms(problem.dataset, output),
+            rms_before=before[output],
+            rms_after=after[output],
+            heldout_rms_before=held_before[output],
+            heldout_rms_after=held_after[output],
+            noise_rms=noise.rms[output],
+            noise_source=source,
+        )
+        for output in problem.dataset.outputs
+    }
+
+
+def _rms(problem: Problem, fitted: Fit) -> dict[str, float]:
+    out = {}
+    for output in problem.dataset.outputs:
+        own = [s for s in problem.segments if s.output == output]
+        total = sum(float(np.sum(fitted.residual[s.rows] ** 2)) for s in own)
+        out[output] = float(np.sqrt(total / sum(s.band.count for s in own)))
+    return out
