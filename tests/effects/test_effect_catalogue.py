@@ -21,7 +21,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "gear-ratio": {"ratio_error": ("1", 0)},
     "layer-thickness": {"thickness_error": ("m", 0)},
     "drum-eccentricity": {"eccentricity": ("m", 0), "phase": ("rad", SHAPE)},
-    "gear-backlash": {"gap": ("rad", 0)},
+    "gear-backlash": {"gap": ("rad", 0), "held": ("1", 1)},
     "gear-transmission-error": {
         "amplitude": ("rad", 0),
         "phase": ("rad", SHAPE),

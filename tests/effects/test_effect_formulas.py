@@ -198,7 +198,7 @@ CASES: dict[str, Case] = {
     "gear-ratio": ({"ratio_error": 0.01}, _ratio_error),
     "layer-thickness": ({"thickness_error": -2e-4}, _thickness_error),
     "drum-eccentricity": ({"eccentricity": 3e-4, "phase": 0.7}, _eccentricity),
-    "gear-backlash": ({"gap": 0.01}, _backlash),
+    "gear-backlash": ({"gap": 0.01, "held": 0.0}, _backlash),
     "gear-transmission-error": (
         {"amplitude": 3e-4, "phase": 0.4, "order": 3},
         _transmission_error,

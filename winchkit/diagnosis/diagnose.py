@@ -132,9 +132,7 @@ def _gains(inquiry: Inquiry, final: Fit, noise: Noise) -> list[float]:
             hypothesis.terms[:count], hypothesis.nuisances, hypothesis.starts[:count]
         )
         fitted = final if count == len(hypothesis.terms) else inquiry.refit(partial, noise)
-        squares.append(
-            float(np.sum(held_out(inquiry.problem, fitted, noise, inquiry.folds(final, noise))))
-        )
+        squares.append(float(np.sum(held_out(inquiry.problem, fitted, noise, folds))))
     return [1 - after / before for before, after in pairwise(squares)]
 
 

@@ -77,7 +77,7 @@ def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> flo
 
     Above one the unknowns rest mainly on the fold that is left out.
     """
-    columns = _in_time(problem, fit.jacobian * noise.weight(problem)[:, None])
+    columns = _in_time(problem, _shared(fit) * noise.weight(problem)[:, None])
     fold = np.concatenate(folds.of)
     size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
     scaled = columns / size
@@ -92,10 +92,13 @@ def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> flo
 
 
 def held_out(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Array:
-    """Whitened squares of every fold, predicted with unknowns fitted without it; (folds,)."""
+    """Whitened squares of every fold, predicted with unknowns fitted without it; (folds,).
+
+    The state in which a run began is its own, whatever is left out.
+    """
     weight = noise.weight(problem)
     residual = np.concatenate(problem.in_time(fit.residual * weight))
-    columns = _in_time(problem, fit.jacobian * weight[:, None])
+    columns = _in_time(problem, _shared(fit) * weight[:, None])
     fold = np.concatenate(folds.of)
     left = _left_out(residual, columns, fold, folds.count)
     return np.asarray(np.bincount(fold, weights=left**2, minlength=folds.count), dtype=float)
@@ -111,9 +114,13 @@ def left_out_steps(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Ar
 
 def held_out_rms(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
     """Held-out error per output, rms in SI."""
-    steps = left_out_steps(problem, fit, noise, folds)
+    weight = noise.weight(problem)
+    white = np.concatenate(problem.in_time(fit.residual * weight))
+    shared = _shared(fit)
+    columns = _in_time(problem, shared * weight[:, None])
+    steps = _steps(white, columns, np.concatenate(folds.of), folds.count)
     plain = np.concatenate(problem.in_time(fit.residual))
-    plain_columns = _in_time(problem, fit.jacobian)
+    plain_columns = _in_time(problem, shared)
     fold = np.concatenate(folds.of)
     left = plain - np.einsum("ij,ij->i", plain_columns, steps[fold])
     out, at = {}, 0
@@ -138,6 +145,12 @@ def confidence(before: Array, after: Array) -> float:
     if len(touched) < 5:
         return 1.0 if np.sum(change) <= 0 else 0.05
     return float(wilcoxon(touched, alternative="greater").pvalue)
+
+
+def _shared(fit: Fit) -> Array:
+    """Derivatives by the unknowns that all runs share, states left out."""
+    states = sum(len(start) for start in fit.hypothesis.starts)
+    return fit.jacobian[:, : fit.jacobian.shape[1] - states]
 
 
 def _in_time(problem: Problem, columns: Array) -> Array:

@@ -44,5 +44,6 @@ EFFECT = Effect(
     ),
     told_apart="At least four loads, the lowest near slack.",
     family="rope law",
+    contains=("cable-elongation-linear",),
     needs=("rope_force",),
 )
