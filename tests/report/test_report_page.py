@@ -15,10 +15,10 @@ from report_answers import FRICTION, answer_of, answered, recorded
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.report import report_html
-from winchkit.diagnosis.report_plots import plots_of
-from winchkit.diagnosis.report_sentence import sentence
-from winchkit.diagnosis.report_waterfall import waterfall_of
+from winchkit.diagnosis.report.page import report_html
+from winchkit.diagnosis.report.plots import plots_of
+from winchkit.diagnosis.report.sentence import sentence
+from winchkit.diagnosis.report.waterfall import waterfall_of
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
 HOSTILE = (

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from report_answers import CALM, FIVE_CORNERS, FRICTION, NOISY, RUBBING, STRETCH, told
 
-from winchkit.diagnosis.report_phrases import clause, estimate_text, listed
-from winchkit.diagnosis.report_sentence import sentence, telling, where_text
+from winchkit.diagnosis.report.phrases import clause, estimate_text, listed
+from winchkit.diagnosis.report.sentence import sentence, telling, where_text
 from winchkit.diagnosis.result import Estimate, Step, Where
 from winchkit.effects.catalogue import load_catalogue
 

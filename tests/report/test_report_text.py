@@ -11,8 +11,8 @@ from winchkit.catalog import find
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.report_sentence import sentence
-from winchkit.diagnosis.report_text import addition_text, compare_text, report_text
+from winchkit.diagnosis.report.sentence import sentence
+from winchkit.diagnosis.report.text import addition_text, compare_text, report_text
 from winchkit.diagnosis.result import Comparison, Diagnosis, NextRun, OutputError
 from winchkit.schema.read import read_winch
 

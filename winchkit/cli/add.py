@@ -49,7 +49,7 @@ def command(
     if as_json:
         echo_json(addition.to_json())
         return
-    from winchkit.diagnosis.report_text import addition_text
+    from winchkit.diagnosis.report.text import addition_text
 
     click.echo(addition_text(addition))
 

@@ -33,6 +33,6 @@ def command(
     if as_json:
         echo_json(comparison.to_json())
         return
-    from winchkit.diagnosis.report_text import compare_text
+    from winchkit.diagnosis.report.text import compare_text
 
     click.echo(compare_text(comparison))

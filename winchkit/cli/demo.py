@@ -98,34 +98,28 @@ class _Story:
 
 
 def _tell_findings(story: _Story, comparison: Comparison, findings: Findings) -> None:
-    from winchkit.diagnosis.report_sentence import sentence
-    from winchkit.diagnosis.wording import percent, quantity
+    from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
+    from winchkit.diagnosis.report.sentence import sentence
+    from winchkit.diagnosis.report.wording import percent, quantity
 
     for name, error in comparison.outputs.items():
-        follows = ", ".join(f"{v} {percent(s)}" for v, s in error.follows[:_FEEDS_SHOWN])
-        noise = (
-            f" beside {quantity(error.noise_rms, error.unit)} of noise" if error.noise_rms else ""
-        )
-        story.tell(
-            f"Nominal model, {name}: off by {quantity(error.rms, error.unit)} rms{noise}"
-            + (f"; it follows {follows}." if follows else ".")
-        )
+        told = f"Nominal model, {OUTPUT_NAMES[name]}: off by {quantity(error.rms, error.unit)} rms"
+        if error.noise_rms is not None:
+            told += f" where repeats differ by {quantity(error.noise_rms, error.unit)}"
+        follows = [f"{VARIABLE_NAMES.get(v, v)} {percent(s)}" for v, s in error.follows]
+        if follows:
+            told += f"; it follows {', '.join(follows[:_FEEDS_SHOWN])}"
+        story.tell(told + ".")
     story.tell(sentence(findings.answer.diagnosis))
-    if findings.addition is None:
-        return
-    for name, fitted in findings.addition.outputs.items():
-        if fitted.heldout_rms_after < 0.95 * fitted.heldout_rms_before:
-            story.tell(
-                f"Held out, {name}: {quantity(fitted.heldout_rms_before, fitted.unit)} became "
-                f"{quantity(fitted.heldout_rms_after, fitted.unit)}; the noise is "
-                f"{quantity(fitted.noise_rms or float('nan'), fitted.unit)}."
-            )
+    if findings.addition is not None:
+        added = findings.addition.added[0].effect.id
+        story.tell(f"Added {added} to a copy of the profile: improved.toml beside nominal.toml.")
 
 
 def _write_report(
     out: Path, story: _Story, findings: Findings, profile_name: str, hidden: str
 ) -> Path:
-    from winchkit.diagnosis.report import report_html
+    from winchkit.diagnosis.report.page import report_html
 
     path = out / "report.html"
     page = report_html(

@@ -37,7 +37,7 @@ def command(
     declared = read_winch(find("profiles", profile))
     answer = diagnose(read_runs(runs, winch), declared, catalogue_of(effect_files), band)
     if html:
-        from winchkit.diagnosis.report import report_html
+        from winchkit.diagnosis.report.page import report_html
 
         title = f"{declared.name}: {', '.join(Path(run).name for run in runs)}"
         Path(html).write_text(report_html(answer, title, profile=profile), encoding="utf-8")
@@ -45,6 +45,6 @@ def command(
     if as_json:
         echo_json(answer.diagnosis.to_json())
         return
-    from winchkit.diagnosis.report_text import report_text
+    from winchkit.diagnosis.report.text import report_text
 
     click.echo(report_text(answer))

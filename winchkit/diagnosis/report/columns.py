@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from textwrap import wrap
 
-from winchkit.diagnosis.wording import unbroken
+from winchkit.diagnosis.report.wording import unbroken
 
 __all__ = ["aligned", "paragraph"]
 

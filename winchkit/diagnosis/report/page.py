@@ -7,10 +7,10 @@ from datetime import date
 from importlib.resources import files
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.report_json import inline
-from winchkit.diagnosis.report_markup import Markup, element
-from winchkit.diagnosis.report_plots import OutputPlots, plots_of
-from winchkit.diagnosis.report_sections import sections
+from winchkit.diagnosis.report.embed import inline
+from winchkit.diagnosis.report.markup import Markup, element
+from winchkit.diagnosis.report.plots import OutputPlots, plots_of
+from winchkit.diagnosis.report.sections import sections
 
 __all__ = ["report_html"]
 
@@ -63,8 +63,8 @@ def _script(name: str) -> Markup:
 
 
 def _asset(name: str) -> str:
-    """A file of the folder ``report_assets`` beside this module."""
-    return (files("winchkit.diagnosis") / "report_assets" / name).read_text(encoding="utf-8")
+    """A file of the folder ``assets`` beside this module."""
+    return (files("winchkit.diagnosis.report") / "assets" / name).read_text(encoding="utf-8")
 
 
 def _data(plots: Sequence[OutputPlots]) -> dict[str, object]:

@@ -7,18 +7,18 @@ from itertools import chain
 from math import degrees, isfinite
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.report_markup import Markup, details, element, join, table
-from winchkit.diagnosis.report_phrases import (
+from winchkit.diagnosis.report.markup import Markup, details, element, join, table
+from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
     clause,
     estimate_text,
     listed,
     parameter_name,
 )
-from winchkit.diagnosis.report_power import unseen, visible
-from winchkit.diagnosis.report_waterfall import Waterfall
+from winchkit.diagnosis.report.shown import unseen, visible
+from winchkit.diagnosis.report.waterfall import Waterfall
+from winchkit.diagnosis.report.wording import Scale, grouped, quantity, scale_for, significant
 from winchkit.diagnosis.result import Candidate, Diagnosis, OutputFit
-from winchkit.diagnosis.wording import Scale, grouped, quantity, scale_for, significant
 from winchkit.effects.effect import Effect
 
 __all__ = ["candidates", "confusion", "detectable", "figures", "named", "output_scale", "waterfall"]

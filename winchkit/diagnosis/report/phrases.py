@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from winchkit.diagnosis.report.wording import with_std
 from winchkit.diagnosis.result import Estimate
-from winchkit.diagnosis.wording import with_std
 
 __all__ = [
     "OUTPUT_NAMES",

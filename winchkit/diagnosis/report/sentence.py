@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from winchkit.diagnosis.report_phrases import (
+from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
     VARIABLE_NAMES,
     clause,
     estimate_text,
     listed,
 )
+from winchkit.diagnosis.report.wording import percent, quantity, significant
 from winchkit.diagnosis.result import Diagnosis, OutputFit, Step, Where
-from winchkit.diagnosis.wording import percent, quantity, significant
 
 __all__ = ["moved_outputs", "sentence", "telling", "where_text"]
 

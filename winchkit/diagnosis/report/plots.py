@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.follows import Followed, follows, harmonics, variables_of
 from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.report_phrases import OUTPUT_NAMES, VARIABLE_NAMES
-from winchkit.diagnosis.report_thin import bin_means, filled_edges, thin, thin_points
-from winchkit.diagnosis.wording import Scale, percent, scale_for
+from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.diagnosis.report.thin import bin_means, filled_edges, thin, thin_points
+from winchkit.diagnosis.report.wording import Scale, percent, scale_for
 
 __all__ = ["OutputPlots", "Plot", "plots_of"]
 

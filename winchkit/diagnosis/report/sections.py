@@ -8,18 +8,18 @@ from importlib.metadata import version
 from math import isnan
 from platform import python_version
 
-from winchkit.diagnosis import report_tables as tables
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.report_json import compact
-from winchkit.diagnosis.report_markup import Markup, details, element, join, section, table
-from winchkit.diagnosis.report_phrases import OUTPUT_NAMES, VERDICT_NAMES, listed
-from winchkit.diagnosis.report_plots import OutputPlots, Plot
-from winchkit.diagnosis.report_power import effects_of, smallest_shown
-from winchkit.diagnosis.report_sentence import moved_outputs, sentence, where_text
-from winchkit.diagnosis.report_waterfall import waterfall_of
+from winchkit.diagnosis.report import tables
+from winchkit.diagnosis.report.embed import compact
+from winchkit.diagnosis.report.markup import Markup, details, element, join, section, table
+from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VERDICT_NAMES, listed
+from winchkit.diagnosis.report.plots import OutputPlots, Plot
+from winchkit.diagnosis.report.sentence import moved_outputs, sentence, where_text
+from winchkit.diagnosis.report.shown import effects_of, smallest_shown
+from winchkit.diagnosis.report.waterfall import waterfall_of
+from winchkit.diagnosis.report.wording import percent, unbroken
 from winchkit.diagnosis.result import Diagnosis
-from winchkit.diagnosis.wording import percent, unbroken
 
 __all__ = ["sections"]
 

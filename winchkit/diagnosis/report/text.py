@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
-from winchkit.diagnosis.report_columns import aligned, paragraph
-from winchkit.diagnosis.report_phrases import (
+from winchkit.diagnosis.report.columns import aligned, paragraph
+from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
     VARIABLE_NAMES,
     VERDICT_NAMES,
@@ -15,10 +15,10 @@ from winchkit.diagnosis.report_phrases import (
     estimate_text,
     listed,
 )
-from winchkit.diagnosis.report_power import smallest_shown
-from winchkit.diagnosis.report_sentence import sentence, telling, where_text
+from winchkit.diagnosis.report.sentence import sentence, telling, where_text
+from winchkit.diagnosis.report.shown import smallest_shown
+from winchkit.diagnosis.report.wording import grouped, percent, quantity, scale_for
 from winchkit.diagnosis.result import Comparison, Diagnosis, OutputFit
-from winchkit.diagnosis.wording import grouped, percent, quantity, scale_for
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition

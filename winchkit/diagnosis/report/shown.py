@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from math import ceil, isclose, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.report_phrases import listed, parameter_name, parameter_unit
+from winchkit.diagnosis.report.phrases import listed, parameter_name, parameter_unit
+from winchkit.diagnosis.report.wording import quantity
 from winchkit.diagnosis.result import Detectable
 from winchkit.diagnosis.signature import missing_needs
-from winchkit.diagnosis.wording import quantity
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 

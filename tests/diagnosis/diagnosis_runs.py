@@ -1,0 +1,125 @@
+"""Runs that the tests of the diagnosis share: made by the model, or recorded by the plant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.catalog import find
+from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.problem import Problem
+from winchkit.effects.bind import Term, modifiers_of
+from winchkit.effects.catalogue import load_catalogue
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.read import read_programme, read_simbench
+from winchkit.schema.winch import (
+    CableSpec,
+    DrumSpec,
+    GearboxSpec,
+    PulleySpec,
+    ReferenceSpec,
+    WinchProfile,
+)
+from winchkit.sim.bench import hiding, profiles_of, programme_path
+from winchkit.sim.record import record
+
+Array = NDArray[np.float64]
+
+CATALOGUE = load_catalogue()
+UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
+NOISE = {"cable_length": 3e-4, "tension": 0.8, "motor_torque": 5e-3}
+"""Of the instruments, as on the simulated benches."""
+GROOVED = WinchProfile(
+    name="grooved",
+    drum=DrumSpec("grooved", 0.06, groove_pitch=0.005),
+    gearbox=GearboxSpec(20.4),
+    reference=ReferenceSpec(0.0, 4.0, 4.0),
+    cable=CableSpec(diameter=0.004, dead_length=1.5),
+    pulley=(PulleySpec(0.04, pi / 2), PulleySpec(0.04, pi / 3)),
+)
+SPIRAL = replace(GROOVED, name="spiral", drum=DrumSpec("spiral", 0.06, layer_growth=8e-5))
+
+
+@dataclass(frozen=True)
+class Ride:
+    """How the motor moves: back and forth by a stroke."""
+
+    samples: int = 400
+    rate: float = 50.0
+    stroke: float = 400.0
+    """rad."""
+    period: float = 4.0
+
+    @property
+    def time(self) -> Array:
+        return np.asarray(np.arange(self.samples) / self.rate)
+
+    @property
+    def angle(self) -> Array:
+        return np.asarray(self.stroke / 2 * (1 - np.cos(2 * pi * self.time / self.period)))
+
+
+def term(effect_id: str, **values: float) -> Term:
+    effect = CATALOGUE[effect_id]
+    return Term(effect, effect.null | values)
+
+
+def made(
+    seed: int = 0,
+    profile: WinchProfile = GROOVED,
+    terms: Sequence[Term] = (),
+    noise: Mapping[str, float] = NOISE,
+    load_mass: float | None = 10.0,
+    ride: Ride = Ride(),  # noqa: B008, it is frozen
+    **metadata: str,
+) -> Run:
+    """What the line predicts along a ride with white noise on the outputs that noise names."""
+    random = np.random.default_rng(seed)
+    time, angle = ride.time, ride.angle
+    line = Line(profile, modifiers_of(terms))
+    predicted = line.predict(line.motion(Signals(time, angle, load_mass=load_mass)))
+    channels = {"motor_angle": Channel(angle, "rad")}
+    for output, size in noise.items():
+        if output in predicted:
+            values = predicted[output] + size * random.standard_normal(len(time))
+            channels[output] = Channel(values, UNITS[output])
+    known = {} if load_mass is None else {"load_mass": f"{load_mass!r} kg"}
+    return Run(f"run-{seed}", time, channels, known | metadata)
+
+
+def with_channel(run: Run, name: str, values: Array, unit: str = "N") -> Run:
+    return replace(run, channels={**run.channels, name: Channel(values, unit)})
+
+
+def without(run: Run, *names: str) -> Run:
+    return replace(run, channels={k: v for k, v in run.channels.items() if k not in names})
+
+
+def length_problem(
+    residuals: Sequence[Array], ride: Ride, profile: WinchProfile = GROOVED
+) -> Problem:
+    """One output only, the length, whose residual is given; all runs are repeats."""
+    runs = []
+    for seed, residual in enumerate(residuals):
+        run = made(seed, profile, noise={"cable_length": 0.0}, ride=ride)
+        runs.append(with_channel(run, "cable_length", run["cable_length"] + residual, "m"))
+    return Problem(prepare(runs, profile))
+
+
+@cache
+def recorded(*physics: str, seed: int = 7, bench: str = "spiral-bench") -> tuple[Run, ...]:
+    """Runs of the demo's two programmes under two loads, twice, with physics hidden."""
+    declared = hiding(read_simbench(find("sim", bench)), physics)
+    profiles = profiles_of(declared)
+    return tuple(
+        run
+        for name in ("programme-demo-fast", "programme-demo-slow")
+        for run in record(declared, profiles, read_programme(programme_path(name)), seed=seed)
+    )
