@@ -31,18 +31,28 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.programme import Programme, Step
 from winchkit.schema.read import read_simbench
 from winchkit.sim.live import LiveBench
+from winchkit.sim.pace import PacedClock
+
+pytestmark = pytest.mark.realtime
 
 
 @pytest.fixture
-def live() -> Iterator[LiveBench]:
+def clock() -> PacedClock:
+    """Stands still while this machine is busy elsewhere."""
+    return PacedClock()
+
+
+@pytest.fixture
+def live(clock: PacedClock) -> Iterator[LiveBench]:
     declared = read_simbench(catalog.find("sim", "spiral-bench"))
-    with LiveBench(declared, seed=3) as running:
+    with LiveBench(declared, seed=3, clock=clock.simulation) as running:
         yield running
 
 
 @pytest.fixture
-def bench(live: LiveBench) -> Iterator[Bench]:
-    with open_bench(live.bench_spec) as opened:
+def bench(live: LiveBench, clock: PacedClock) -> Iterator[Bench]:
+    with open_bench(live.bench_spec, clock) as opened:
+        opened.on_cycle(clock.control)
         yield opened
 
 
@@ -75,28 +85,32 @@ def test_jog_move_log_and_the_instruments_agree(bench: Bench, tmp_path: Path) ->
     assert np.nanstd(measured - expected) < 1e-3
 
 
-def test_a_jog_ends_without_its_beats_and_other_errors_stop_it(live: LiveBench) -> None:
-    with open_bench(live.bench_spec) as bench:
+def test_a_jog_ends_without_its_beats_and_other_errors_stop_it(
+    live: LiveBench, clock: PacedClock
+) -> None:
+    with open_bench(live.bench_spec, clock) as bench:
         winch = bench.winch["A"]
         winch.jog(-0.2)
         until(lambda: winch.snapshot.phase is Phase.MOVING)
         until(lambda: winch.snapshot.phase is Phase.DISABLED)
         assert not winch.moving
     with pytest.raises(ZeroDivisionError):
-        fail_while_moving(live.bench_spec)
+        fail_while_moving(live.bench_spec, clock)
     with live.up_to_date():
         assert live.winches["A"].drive.state.name == "SWITCH_ON_DISABLED"
         assert abs(live.winches["A"].plant.motor_velocity) < 1e-3
 
 
-def fail_while_moving(spec: BenchSpec) -> None:
-    with open_bench(spec) as bench:
+def fail_while_moving(spec: BenchSpec, clock: PacedClock) -> None:
+    with open_bench(spec, clock) as bench:
         bench.winch["A"].jog(-0.2, hold=1.0)
         until(lambda: abs(bench.winch["A"].snapshot.speed) > 0.1)
         raise ZeroDivisionError
 
 
-def test_a_callback_steers_and_its_error_comes_out_of_the_block(live: LiveBench) -> None:
+def test_a_callback_steers_and_its_error_comes_out_of_the_block(
+    live: LiveBench, clock: PacedClock
+) -> None:
     seen: list[float] = []
 
     def steer(snapshot: object) -> dict[str, float]:
@@ -105,7 +119,7 @@ def test_a_callback_steers_and_its_error_comes_out_of_the_block(live: LiveBench)
             raise KeyError("user's own")
         return {"A": -0.1}
 
-    bench = open_bench(live.bench_spec)
+    bench = open_bench(live.bench_spec, clock)
     start = bench.winch["A"].cable_length
     bench.on_cycle(steer)
     until(lambda: bench.loop.failure is not None)
@@ -203,9 +217,9 @@ def test_a_station_that_goes_away_lets_go(bench: Bench) -> None:
         server.close()
 
 
-def test_stop_without_an_owner_acts_on_the_bus(live: LiveBench) -> None:
+def test_stop_without_an_owner_acts_on_the_bus(live: LiveBench, clock: PacedClock) -> None:
     """The drive is left moving by an owner that died: here its loop is simply ended."""
-    bench = open_bench(live.bench_spec)
+    bench = open_bench(live.bench_spec, clock)
     bench.winch["A"].jog(-0.2, hold=1.0)
     until(lambda: bench.winch["A"].snapshot.speed < -0.1)
     bench.loop.close()

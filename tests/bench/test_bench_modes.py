@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit import catalog, open_bench
+from winchkit.bench.bench import Bench
 from winchkit.bench.series import Series
 from winchkit.cli.keys import HeldKey, split_keys
 from winchkit.errors import NotPermitted
@@ -20,6 +23,7 @@ from winchkit.runs import read_run
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import SimBench
 from winchkit.sim.live import LiveBench
+from winchkit.sim.pace import PacedClock
 
 
 def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:
@@ -45,9 +49,22 @@ def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:
     )
 
 
+@contextmanager
+def paced(declaration: SimBench) -> Iterator[tuple[LiveBench, Bench]]:
+    """A live bench and its owner, whose time stands still while this machine is busy."""
+    clock = PacedClock()
+    with (
+        LiveBench(declaration, clock=clock.simulation) as live,
+        open_bench(live.bench_spec, clock) as bench,
+    ):
+        bench.on_cycle(clock.control)
+        yield live, bench
+
+
+@pytest.mark.realtime
 @pytest.mark.parametrize("mode", ["CSP", "PV"])
 def test_the_same_motion_in_another_mode(mode: str, tmp_path: Path) -> None:
-    with LiveBench(declared(tmp_path, mode)) as live, open_bench(live.bench_spec) as bench:
+    with paced(declared(tmp_path, mode)) as (live, bench):
         winch = bench.winch["A"]
         winch.move_to(3.7, 0.3)
         with live.up_to_date():
@@ -57,8 +74,9 @@ def test_the_same_motion_in_another_mode(mode: str, tmp_path: Path) -> None:
         assert not bench.snapshot.tripped
 
 
+@pytest.mark.realtime
 def test_two_winches_move_together_and_share_a_log(tmp_path: Path) -> None:
-    with LiveBench(declared(tmp_path, winches="AB")) as live, open_bench(live.bench_spec) as bench:
+    with paced(declared(tmp_path, winches="AB")) as (live, bench):
         path = tmp_path / "two.csv"
         with bench.log(path):
             bench.winch["A"].move_to(3.7, 0.3, wait=False)

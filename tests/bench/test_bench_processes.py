@@ -17,7 +17,10 @@ import pytest
 from winchkit.runs import read_run
 from winchkit.sim.live_client import tell
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+pytestmark = [
+    pytest.mark.realtime,
+    pytest.mark.skipif(os.name != "posix", reason="signals of POSIX"),
+]
 
 WINCHKIT = [sys.executable, "-c", "from winchkit.cli import main; main()"]
 

@@ -77,7 +77,7 @@ def made(
     terms: Sequence[Term] = (),
     noise: Mapping[str, float] = NOISE,
     load_mass: float | None = 10.0,
-    ride: Ride = Ride(),  # noqa: B008, it is frozen
+    ride: Ride = Ride(),
     **metadata: str,
 ) -> Run:
     """What the line predicts along a ride with white noise on the outputs that noise names."""

@@ -13,7 +13,6 @@ import pytest
 from snippets import ROOT, Session, Snippet, said, snippets_of
 
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
-RUN = [page for page in PAGES if any(not s.reason for s in snippets_of(page))]
 _LINK = re.compile(r"\]\((?!\w+://)([^)\s]+)\)")
 _PATH = re.compile(
     r"`((?:winchkit|devices|profiles|sim|tests|docs|examples|\.ci|benchmarks)/[\w./-]*)`"
@@ -25,8 +24,19 @@ def name(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
+def sessions() -> list[object]:
+    """Pages with something to run; those that serve a bench beside it move it in real time."""
+    found = []
+    for page in PAGES:
+        marks = {s.mark for s in snippets_of(page) if not s.reason}
+        live = [pytest.mark.realtime] if "first-terminal" in marks else []
+        if marks:
+            found.append(pytest.param(page, id=name(page), marks=live))
+    return found
+
+
 @pytest.mark.skipif(os.name != "posix", reason="sessions are written for a POSIX shell")
-@pytest.mark.parametrize("page", RUN, ids=name)
+@pytest.mark.parametrize("page", sessions())
 def test_what_a_page_shows_is_what_happens(page: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     with Session(tmp_path) as session:

@@ -26,6 +26,9 @@ from winchkit.sim.live_control import ControlServer, obey
 COUNT = 2 * 3.141592653589793 / 65536
 
 
+pytestmark = pytest.mark.realtime
+
+
 @pytest.fixture(scope="module")
 def declared() -> SimBench:
     return replace(read_simbench(find("sim", "spiral-bench")), noise=NoiseSpec())

@@ -173,13 +173,13 @@ class Supervisor:
         self, name: str, cell: Instrumented, limits: LimitSpec, now: float
     ) -> Iterator[Trip]:
         high, slack, tension = limits.tension_high, limits.tension_slack, cell.value
-        # A tare must not hide an overload: the rope carries the gross value.
-        highest = max(tension, cell.gross) if math.isfinite(cell.gross) else tension
-        if high is not None and highest > high:
+        # The rope carries the gross value: a tare neither hides an overload nor makes it slack.
+        tension = cell.gross if math.isfinite(cell.gross) else tension
+        if high is not None and tension > high:
             yield Trip(
                 "tension high",
                 name,
-                f"tension {highest:.1f} N is above tension_high {high:g} N; only paying out is "
+                f"tension {tension:.1f} N is above tension_high {high:g} N; only paying out is "
                 "allowed until it falls",
                 Direction.WIND_IN,
             )

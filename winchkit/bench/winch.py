@@ -67,10 +67,16 @@ class Winch:
 
         Call it again within that time to keep going; without another call it ramps to rest and
         disables. With ``duration`` it does so itself for that many seconds and returns at rest.
-        Raises NotPermitted, LimitTripped, DriveFault.
+        Raises UsageError, NotPermitted, LimitTripped, DriveFault.
         """
         if not math.isfinite(speed) or not 0 < hold <= 1:
             raise UsageError(f"a jog at {speed} m/s held for {hold} s cannot be meant")
+        limit = self.wiring.limits.speed
+        if abs(speed) > limit:
+            raise UsageError(
+                f"winch {self.name}: {abs(speed):g} m/s exceeds limits.speed {limit:g} m/s;"
+                " jog slower"
+            )
         if duration is None:
             self._refresh(speed, hold)
             return

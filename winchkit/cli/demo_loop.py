@@ -7,7 +7,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme, Step
     from winchkit.schema.simbench import SimBench
-    from winchkit.sim.pace import PacedClock
 
 __all__ = ["Findings", "Told", "learn", "programmes", "record", "truth_of"]
 
@@ -88,11 +86,10 @@ def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
     written: list[Path] = []
     patience = _Patience(told)
     clock = PacedClock()
-    simulation = partial(clock.beat, "simulation")
-    with _quick_turns(), LiveBench(bench, seed=seed, clock=simulation) as live:
+    with _quick_turns(), LiveBench(bench, seed=seed, clock=clock.simulation) as live:
         told("commissioning the drive")
         with open_bench(live.bench_spec, clock) as opened:
-            opened.on_cycle(lambda _snapshot: _beaten(clock))
+            opened.on_cycle(clock.control)
             for programme in programmes():
                 _go_to_start(opened, programme)
 
@@ -105,10 +102,6 @@ def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
                     again=patience.again,
                 )
     return written
-
-
-def _beaten(clock: PacedClock) -> None:
-    clock.beat("control")
 
 
 def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:

@@ -45,10 +45,10 @@ def command(programme: str, bench: str, out: Path, suffix: str, yes: bool, as_js
     from winchkit.bench.bench import open_bench
     from winchkit.bench.programme import run_programme
     from winchkit.bench.server import StationServer
-    from winchkit.catalog import find
     from winchkit.schema.read import read_programme
+    from winchkit.sim.bench import programme_path
 
-    declared = read_programme(find("sim", programme))
+    declared = read_programme(programme_path(programme))
     with open_bench(bench) as opened:
         server = StationServer(opened)
         try:

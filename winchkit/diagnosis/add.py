@@ -8,8 +8,10 @@ from typing import Any
 
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
+from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Estimate, OutputFit
 from winchkit.diagnosis.signature import Score, missing_needs, score
 from winchkit.diagnosis.uncertainty import estimates, unknown_std
@@ -20,7 +22,7 @@ from winchkit.errors import UsageError
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Addition", "add"]
+__all__ = ["Addition", "Grown", "add", "grow"]
 
 _STARTS = 4
 
@@ -65,6 +67,18 @@ class Addition:
         }
 
 
+@dataclass(frozen=True)
+class Grown:
+    """An addition with everything behind it, for reports."""
+
+    problem: Problem
+    begin: Fit
+    """The effects that the profile had, refitted."""
+    final: Fit
+    """With the new one."""
+    addition: Addition
+
+
 def add(
     effect_id: str,
     runs: Sequence[Run],
@@ -77,6 +91,17 @@ def add(
     Raises UsageError for an effect that is unknown, there already, or cannot be seen in the runs,
     RunError with every fault of every run.
     """
+    return grow(effect_id, runs, profile, catalogue, band).addition
+
+
+def grow(
+    effect_id: str,
+    runs: Sequence[Run],
+    profile: WinchProfile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+) -> Grown:
+    """As :func:`add`, with the fits that the figures were taken from."""
     catalogue = catalogue or load_catalogue()
     effect = catalogue[effect_id]
     if not effect.repeatable and any(table.id == effect_id for table in profile.effect):
@@ -96,7 +121,8 @@ def add(
     std = unknown_std(inquiry.problem, final, final_noise, inquiry.blocks)
     outputs = output_fits(inquiry, (begin, noise), (final, final_noise))
     terms = tuple(estimates(inquiry.problem, final, std))
-    return Addition(outputs, terms, inquiry.problem.dataset.notes)
+    addition = Addition(outputs, terms, inquiry.problem.dataset.notes)
+    return Grown(inquiry.problem, begin, final, addition)
 
 
 def _atoms(inquiry: Inquiry, effect_id: str, noise: Noise) -> list[Score]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,20 @@ from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["begin_hypothesis", "compare", "signal_rms"]
+__all__ = ["Compared", "begin_hypothesis", "compare", "compared", "signal_rms"]
 
 Array = NDArray[np.float64]
 _WHOLE_FILTER = 3.0
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A comparison with everything behind it, for reports."""
+
+    problem: Problem
+    residual: Array
+    """Measured less predicted, (rows,)."""
+    comparison: Comparison
 
 
 def compare(
@@ -35,6 +46,16 @@ def compare(
 
     Raises RunError with every fault of every run.
     """
+    return compared(runs, profile, catalogue, band).comparison
+
+
+def compared(
+    runs: Sequence[Run],
+    profile: WinchProfile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+) -> Compared:
+    """As :func:`compare`, with the residual that the figures were taken from."""
     problem = Problem(prepare(runs, profile, band, skirt=_WHOLE_FILTER))
     start = begin_hypothesis(profile, catalogue, problem)
     residual = problem.residual(start)
@@ -60,7 +81,7 @@ def compare(
             noise_rms=noise.get(output),
             follows=tuple((f.variable, f.share) for f in shares if f.output == output),
         )
-    return Comparison(outputs, offset, problem.dataset.notes)
+    return Compared(problem, residual, Comparison(outputs, offset, problem.dataset.notes))
 
 
 def begin_hypothesis(

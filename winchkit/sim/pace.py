@@ -47,10 +47,13 @@ class PacedClock:
             self._beats[who] = self._advance(), self._wall
             return self._time
 
-    def leave(self, who: str) -> None:
-        """Keep pace no longer."""
-        with self._lock:
-            self._beats.pop(who, None)
+    def simulation(self) -> float:
+        """Beat as the simulation: the clock to hand to a ``LiveBench``."""
+        return self.beat("simulation")
+
+    def control(self, _snapshot: object) -> None:
+        """Beat as the control loop: the callback to hand to ``Bench.on_cycle``."""
+        self.beat("control")
 
     def _advance(self) -> float:
         wall = time.monotonic()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isclose
 from typing import Any
@@ -9,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.admit import OUTPUT_UNITS
 from winchkit.diagnosis.follows import Followed, follows, harmonics, variables_of
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
 from winchkit.diagnosis.report.thin import bin_means, filled_edges, thin, thin_points
 from winchkit.diagnosis.report.wording import Scale, percent, scale_for
 
-__all__ = ["OutputPlots", "Plot", "plots_of"]
+__all__ = ["OutputPlots", "Plot", "Residuals", "plots_of"]
 
 Array = NDArray[np.float64]
 _POINTS = 2000
@@ -31,6 +32,18 @@ _SPREAD = 0.2
 _PER_PERIOD = 8
 _DEGREES = 360.0
 _TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What to draw: residuals of a problem, (rows,), and the noise beside them."""
+
+    problem: Problem
+    before: Array
+    after: Array | None
+    """None where the model was not changed."""
+    noise: Mapping[str, float | None]
+    """Rms per output, SI; None where it is unknown."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +64,12 @@ class OutputPlots:
     scale: Scale
     over_time: Plot
     over_variable: Plot | None
-    """None where the residual follows nothing that was measured."""
+    followed: Followed | None
+    """What the residual is drawn over; None where it follows nothing that was measured."""
 
 
 @dataclass(frozen=True)
-class _Residuals:
+class _Curves:
     """Residuals of one output, all its runs one after another, in the unit shown."""
 
     output: str
@@ -68,21 +82,21 @@ class _Residuals:
     """How to colour a residual that nothing changes: ``residual`` at the noise, else ``before``."""
 
 
-def plots_of(answer: Answer) -> tuple[OutputPlots, ...]:
-    """Drawings per output; ``after`` only where effects are named that change the output."""
-    problem = answer.inquiry.problem
-    begin = answer.found.begin.residual
-    strongest = _strongest(problem, begin)
+def plots_of(residuals: Residuals) -> tuple[OutputPlots, ...]:
+    """Drawings per output; ``after`` only of outputs that the change of the model changed."""
+    problem = residuals.problem
+    strongest = _strongest(problem, residuals.before)
     out = []
     for output in problem.dataset.outputs:
-        residuals = _residuals(answer, output)
+        curves = _curves(residuals, output)
         followed = strongest.get(output)
         out.append(
             OutputPlots(
                 output,
-                residuals.scale,
-                _over_time(problem, residuals),
-                _over_variable(problem, residuals, followed) if followed else None,
+                curves.scale,
+                _over_time(problem, curves),
+                _over_variable(problem, curves, followed) if followed else None,
+                followed,
             )
         )
     return tuple(out)
@@ -100,8 +114,8 @@ def _strongest(problem: Problem, residual: Array) -> dict[str, Followed]:
     return out
 
 
-def _residuals(answer: Answer, output: str) -> _Residuals:
-    problem, diagnosis = answer.inquiry.problem, answer.diagnosis
+def _curves(residuals: Residuals, output: str) -> _Curves:
+    problem, noise = residuals.problem, residuals.noise.get(output)
     recordings = problem.dataset.recordings
     own = [i for i, s in enumerate(problem.segments) if s.output == output]
 
@@ -112,61 +126,67 @@ def _residuals(answer: Answer, output: str) -> _Residuals:
             for i in own
         )
 
-    before = in_runs(answer.found.begin.residual)
-    fit = diagnosis.outputs[output]
-    changed = diagnosis.steps and not isclose(fit.rms_after, fit.rms_before, rel_tol=_SAME)
-    after = in_runs(answer.found.final.residual) if changed else None
-    scale = scale_for(3 * fit.rms_before, fit.unit)
-    return _Residuals(
+    before = in_runs(residuals.before)
+    after = None if residuals.after is None else in_runs(residuals.after)
+    size = _rms(before)
+    if after is not None and isclose(_rms(after), size, rel_tol=_SAME):
+        after = None
+    scale = scale_for(3 * size, OUTPUT_UNITS[output])
+    return _Curves(
         output,
         scale,
         tuple(problem.segments[i].run for i in own),
         tuple(part / scale.worth for part in before),
         None if after is None else tuple(part / scale.worth for part in after),
-        None if fit.noise_rms is None else fit.noise_rms / scale.worth,
-        "residual" if fit.rms_before < _AT_NOISE * (fit.noise_rms or 0.0) else "before",
+        None if noise is None else noise / scale.worth,
+        "residual" if size < _AT_NOISE * (noise or 0.0) else "before",
     )
 
 
-def _over_time(problem: Problem, residuals: _Residuals) -> Plot:
+def _rms(parts: Sequence[Array]) -> float:
+    """Rms of the compared samples of all runs."""
+    return float(np.sqrt(np.nanmean(np.concatenate(parts) ** 2)))
+
+
+def _over_time(problem: Problem, curves: _Curves) -> Plot:
     """All runs one after another, at most ``_POINTS`` samples."""
     recordings = problem.dataset.recordings
-    share = max(2, _POINTS // len(residuals.runs))
+    share = max(2, _POINTS // len(curves.runs))
     parts: list[tuple[Array, list[Array]]] = []
     marks, begin = [], 0.0
-    for position, run in enumerate(residuals.runs):
+    for position, run in enumerate(curves.runs):
         time = recordings[run].signals.time - recordings[run].signals.time[0]
         marks.append({"at": _number(begin), "name": recordings[run].name})
-        lines = [residuals.before[position]]
-        if residuals.after is not None:
-            lines.append(residuals.after[position])
+        lines = [curves.before[position]]
+        if curves.after is not None:
+            lines.append(curves.after[position])
         parts.append(thin(begin + time, lines, share))
-        begin += float(time[-1]) + recordings[run].bands[residuals.output].rate ** -1
+        begin += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
     x = np.concatenate([part[0] for part in parts])
     lines = [np.concatenate([part[1][i] for part in parts]) for i in range(len(parts[0][1]))]
-    name = OUTPUT_NAMES.get(residuals.output, residuals.output)
-    band = "" if residuals.noise is None else "; the grey band is the noise, ± its rms"
+    name = OUTPUT_NAMES.get(curves.output, curves.output)
+    band = "" if curves.noise is None else "; the grey band is the noise, ± its rms"
     return Plot(
-        f"time-{residuals.output}",
+        f"time-{curves.output}",
         f"Measured less predicted {name} over time, all runs one after another{band}.",
         {
             "kind": "time",
             "x": _numbers(x, 6),
             "xLabel": "time, runs one after another [s]",
-            "yLabel": _labelled("residual", residuals.scale.label),
-            "unit": residuals.scale.label,
-            "series": _series(lines, residuals.tone),
+            "yLabel": _labelled("residual", curves.scale.label),
+            "unit": curves.scale.label,
+            "series": _series(lines, curves.tone),
             "marks": marks,
-            "noise": None if residuals.noise is None else _number(residuals.noise),
+            "noise": None if curves.noise is None else _number(curves.noise),
         },
     )
 
 
-def _over_variable(problem: Problem, residuals: _Residuals, followed: Followed) -> Plot | None:
+def _over_variable(problem: Problem, curves: _Curves, followed: Followed) -> Plot:
     """Samples as dots and means over bins as lines."""
-    variable, label, logarithmic = _axis(problem, residuals, followed)
-    before = np.concatenate(residuals.before)
-    lines = [before] if residuals.after is None else [before, np.concatenate(residuals.after)]
+    variable, label, logarithmic = _axis(problem, curves, followed)
+    before = np.concatenate(curves.before)
+    lines = [before] if curves.after is None else [before, np.concatenate(curves.after)]
     good = np.isfinite(before) & np.isfinite(variable)
     x, lines = variable[good], [line[good] for line in lines]
     dots = thin_points(x, _DOTS)
@@ -177,23 +197,23 @@ def _over_variable(problem: Problem, residuals: _Residuals, followed: Followed) 
     nothing_here, nothing_there = np.full(len(centres), np.nan), np.full(len(dots), np.nan)
     drawn = [np.concatenate([line[dots], nothing_here])[order] for line in lines]
     binned = [np.concatenate([nothing_there, mean])[order] for mean in means]
-    output = OUTPUT_NAMES.get(residuals.output, residuals.output)
+    output = OUTPUT_NAMES.get(curves.output, curves.output)
     name = VARIABLE_NAMES.get(followed.variable, followed.variable)
     often = "" if followed.order is None else f", {followed.order} per turn"
     return Plot(
-        f"over-{residuals.output}",
+        f"over-{curves.output}",
         f"Residual of the {output} over the {name}{often}, which takes "
         f"{percent(followed.share)} of it. Dots are samples, lines their means.",
         {
             "kind": "over",
             "x": _numbers(whole[order], 5),
             "xLabel": label,
-            "yLabel": _labelled("residual", residuals.scale.label),
-            "unit": residuals.scale.label,
-            "series": _series(drawn, residuals.tone),
-            "means": _series(binned, residuals.tone),
+            "yLabel": _labelled("residual", curves.scale.label),
+            "unit": curves.scale.label,
+            "series": _series(drawn, curves.tone),
+            "means": _series(binned, curves.tone),
             "log": logarithmic,
-            "noise": None if residuals.noise is None else _number(residuals.noise),
+            "noise": None if curves.noise is None else _number(curves.noise),
         },
     )
 
@@ -214,11 +234,11 @@ def _spread(values: Array) -> Array:
     return out
 
 
-def _axis(problem: Problem, residuals: _Residuals, followed: Followed) -> tuple[Array, str, bool]:
+def _axis(problem: Problem, curves: _Curves, followed: Followed) -> tuple[Array, str, bool]:
     """Values of a variable along the runs as people read them, its label, and if it is a power."""
     recordings = problem.dataset.recordings
     values = np.concatenate(
-        [variables_of(recordings[run])[followed.variable] for run in residuals.runs]
+        [variables_of(recordings[run])[followed.variable] for run in curves.runs]
     )
     name = VARIABLE_NAMES.get(followed.variable, followed.variable)
     if followed.order is not None:

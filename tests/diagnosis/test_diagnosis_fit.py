@@ -1,0 +1,138 @@
+"""The fit, against scipy's general solver on the same residual."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
+from scipy.optimize import least_squares
+
+from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.fit import fit
+from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.effects.bind import Term
+
+RIDE = Ride(samples=400)
+TRUE = {
+    "one": (term("drum-radius", radius_error=4e-4),),
+    "stiffness": (term("cable-elongation-linear", axial_stiffness=2e5),),
+    "three": (
+        term("cable-elongation-linear", axial_stiffness=1.5e5),
+        term("motor-coulomb", torque=0.02),
+        term("cell-gain", gain_error=0.02),
+    ),
+    "wave": (term("drum-eccentricity", eccentricity=4e-4, phase=1.0),),
+    "memory": (term("pulley-dahl", friction=0.02, stiffness=3000.0),),
+}
+
+
+def problem_of(terms: tuple[Term, ...]) -> tuple[Problem, np.ndarray]:
+    runs = [
+        made(2 * mass + seed, GROOVED, terms, load_mass=float(mass), ride=RIDE)
+        for mass in (10, 25)
+        for seed in range(2)
+    ]
+    problem = Problem(prepare(runs, GROOVED))
+    weight = np.empty(problem.rows)
+    for segment in problem.segments:
+        weight[segment.rows] = 1 / NOISE[segment.output]
+    return problem, weight
+
+
+def from_usual(terms: tuple[Term, ...], problem: Problem) -> Hypothesis:
+    """The same effects at half their usual size, where a fit may begin."""
+    start = Hypothesis()
+    for true in terms:
+        effect = CATALOGUE[true.effect.id]
+        values = {
+            p.name: 2 * p.typical if p.reciprocal else p.typical
+            for p in effect.parameters
+            if p.role != "fixed"
+        }
+        start = start.with_term(Term(effect, effect.null | values), problem.runs)
+    return start
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_a_fit_is_where_a_general_solver_ends(name: str) -> None:
+    problem, weight = problem_of(TRUE[name])
+    start = from_usual(TRUE[name], problem)
+    ours = fit(problem, start, weight)
+    low, high = problem.bounds(start)
+    theirs = least_squares(
+        lambda x: problem.residual(problem.hypothesis(x, start)) * weight,
+        np.clip(problem.vector(start), low, high),
+        bounds=(low, high),
+        x_scale="jac",
+        xtol=1e-12,
+        ftol=1e-12,
+        gtol=1e-12,
+        max_nfev=60,
+    )
+    assert ours.freedom == len(theirs.x)
+    # Within a hundredth of what noise alone moves the sum of squares by.
+    assert ours.cost == pytest.approx(2 * theirs.cost, abs=0.05)
+    curvature = np.sqrt(np.diag(np.linalg.pinv(theirs.jac.T @ theirs.jac)))
+    assert np.all(np.abs(ours.vector - theirs.x) < 0.25 * curvature + 1e-9)
+    assert ours.cost == pytest.approx(problem.rows, rel=0.15)
+
+
+@pytest.mark.parametrize("name", ["one", "stiffness", "three", "wave"])
+def test_a_fit_finds_the_truth(name: str) -> None:
+    problem, weight = problem_of(TRUE[name])
+    found = fit(problem, from_usual(TRUE[name], problem), weight)
+    for true, got in zip(TRUE[name], found.hypothesis.terms, strict=True):
+        for parameter in true.effect.parameters:
+            if parameter.role == "amplitude":
+                usual = abs(parameter.typical)
+                off = abs(got.values[parameter.name] - true.values[parameter.name])
+                assert off < 0.1 * max(usual, abs(true.values[parameter.name]))
+
+
+def test_a_fit_carries_its_own_residual_and_derivative() -> None:
+    problem, weight = problem_of(TRUE["three"])
+    found = fit(problem, from_usual(TRUE["three"], problem), weight)
+    assert np.allclose(found.residual, problem.residual(found.hypothesis))
+    assert found.cost == pytest.approx(float(np.sum((found.residual * weight) ** 2)))
+    assert found.labels == ("cable-elongation-linear", "motor-coulomb", "cell-gain")
+    assert np.allclose(problem.vector(found.hypothesis), found.vector, rtol=1e-6)
+    gradient = (found.jacobian * weight[:, None]).T @ (found.residual * weight)
+    size = np.sqrt(np.sum((found.jacobian * weight[:, None]) ** 2, axis=0))
+    assert np.all(np.abs(gradient / size) < 0.5)
+
+
+def test_bounds_are_kept() -> None:
+    """Data that ask for a rope that shortens under load get one that does not stretch."""
+    backwards = (term("cable-elongation-linear", axial_stiffness=2e5),)
+    problem, weight = problem_of(())
+    stretch = problem.change(Hypothesis().with_term(backwards[0], problem.runs))
+    problem.base = problem.base - stretch
+    found = fit(problem, Hypothesis().with_term(backwards[0], problem.runs), weight)
+    assert found.hypothesis.terms[0].values["axial_stiffness"] > 1e9
+
+
+def test_unknowns_that_cannot_be_told_apart_stay_small() -> None:
+    """A radius and a ratio do the same on a grooved drum: no kilometres are invented."""
+    terms = (term("drum-radius", radius_error=3e-4), term("gear-ratio", ratio_error=0.0))
+    problem, weight = problem_of((terms[0],))
+    start = Hypothesis()
+    for item in terms:
+        start = start.with_term(Term(item.effect, item.effect.null), problem.runs)
+    found = fit(problem, start, weight)
+    assert found.cost == pytest.approx(problem.rows, rel=0.15)
+    assert abs(found.hypothesis.terms[0].values["radius_error"]) < 1e-3
+
+
+def test_the_derivative_is_that_of_the_prediction() -> None:
+    problem, _ = problem_of(TRUE["three"])
+    start = from_usual(TRUE["three"], problem)
+    x = problem.vector(start)
+    jacobian = problem.jacobian(x, start)
+    here = problem.residual(start)
+    for index in range(len(x)):
+        moved = x.copy()
+        moved[index] += 1e-5
+        column = -(problem.residual(problem.hypothesis(moved, start)) - here) / 1e-5
+        size = np.linalg.norm(column)
+        assert size > 0
+        assert np.linalg.norm(jacobian[:, index] - column) < 2e-3 * size
