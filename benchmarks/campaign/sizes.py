@@ -124,71 +124,153 @@ _SOFT = {
 }
 
 
+@dataclass(frozen=True)
+class _Shape:
+    """What an effect's shape is drawn from."""
+
+    random: Random
+    winch: Winch
+    scene: Scene
+    phase: float
+
+    @property
+    def low(self) -> float:
+        """Smallest load, N."""
+        return 9.8 * min(self.scene.masses)
+
+    @property
+    def high(self) -> float:
+        """Largest load, N."""
+        return 9.8 * max(self.scene.masses)
+
+
 def _shaped(effect: str, random: Random, winch: Winch, scene: Scene) -> Sized:
-    phase = random.uniform(-pi, pi)
-    low, high = 9.8 * min(scene.masses), 9.8 * max(scene.masses)
-    match effect:
-        case "drum-eccentricity":
-            return lambda z: {"eccentricity": 2e-4 * z, "phase": phase}
-        case "gear-transmission-error":
-            order = float(random.choice([1, 2, 3, 4, 6, 8, 12]))
-            return lambda z: {"amplitude": 2e-4 * z, "phase": phase, "order": order}
-        case "gear-backlash":
-            # Whether the motor feels no load within the play, or is held on a flank.
-            opens = float(random.integers(0, 2))
-            return lambda z: {"gap": 4e-3 * z, "opens": opens}
-        case "motor-cogging":
-            order = float(random.choice([2, 4, 6, 12]))
-            return lambda z: {"amplitude": 0.01 * z, "phase": phase, "order": order}
-        case "encoder-slip":
-            when, sign = random.uniform(0.2, 0.8) * scene.seconds, random.choice([-1.0, 1.0])
-            return lambda z: {"step": sign * 0.02 * z, "time": when}
-        case "guide-offset":
-            aside, back = random.uniform(-0.02, 0.02), random.choice([-1.0, 1.0])
-            return lambda z: {"offset": aside * z**0.5, "mismatch": back * 1e-3 * z**0.5}
-        case "cable-elongation-quartic":
-            b2, b3 = random.uniform(100, 600), random.uniform(0, 1e5)
-            return lambda z: {"k1": 2e5 / z, "b2": b2 / z, "b3": b3 / z**2, "b4": 0.0}
-        case "cable-elongation-exponential":
-            scale = random.uniform(0.3, 2) * low
-            return lambda z: {"strain_scale": 1e-3 * z, "force_scale": scale}
-        case "cable-hysteresis":
-            fraction = random.uniform(0.005, 0.05)
-            return lambda z: {"stiffness": 2e5 / z, "fraction": fraction}
-        case "cable-creep":
-            tau = random.uniform(0.08, 0.6) * scene.seconds
-            return lambda z: {"creep_stiffness": 1e6 / z, "time_constant": tau}
-        case "cell-creep":
-            tau = random.uniform(0.08, 0.6) * scene.seconds
-            return lambda z: {"fraction": 3e-3 * z, "time_constant": tau}
-        case "pulley-stribeck":
-            speed, more = random.uniform(0.01, 0.08), random.uniform(1.4, 2.5)
-            return lambda z: {
-                "coulomb": 0.015 * z,
-                "static": 0.015 * z * more,
-                "stribeck_speed": speed,
-            }
-        case "pulley-dahl":
-            reach = random.uniform(3e-3, 3e-2)
-            return lambda z: {"friction": 0.02 * z, "stiffness": 0.02 * z * low / reach}
-        case "motor-stribeck":
-            speed = random.uniform(1.0, 6.0)
-            return lambda z: {"torque": 0.02 * z, "stribeck_speed": speed}
-        case "gear-efficiency":
-            return lambda z: {"efficiency": float(np.exp(-0.1 * z))}
-        case "outside-harmonic":
-            return lambda z: {"amplitude": 3e-4 * z, "phase": phase}
-        case "outside-sticky-place":
-            part = random.uniform(0.3, 0.7)
-            place = winch.length_reference + part * scene.stroke
-            return lambda z: {"force": 3.0 * z, "place": place, "width": 0.06 * scene.stroke}
-        case "outside-mis-spooling":
-            gone = random.uniform(0.3, 0.7) * scene.stroke / winch.radius
-            angle = 2 * pi * winch.wound_turns - gone
-            return lambda z: {"jump": 1e-4 * z, "angle": angle}
-        case "outside-joint":
-            force = random.uniform(0.62, 0.8) * high
-            return lambda z: {"force": force, "stiffness": 2e5 / z}
-        case "outside-clipping":
-            return lambda z: {"most": high * (1.02 - 0.04 * min(z, 20.0))}
-    raise KeyError(effect)
+    return _SHAPED[effect](_Shape(random, winch, scene, random.uniform(-pi, pi)))
+
+
+def _eccentricity(d: _Shape) -> Sized:
+    return lambda z: {"eccentricity": 2e-4 * z, "phase": d.phase}
+
+
+def _transmission_error(d: _Shape) -> Sized:
+    order = float(d.random.choice([1, 2, 3, 4, 6, 8, 12]))
+    return lambda z: {"amplitude": 2e-4 * z, "phase": d.phase, "order": order}
+
+
+def _backlash(d: _Shape) -> Sized:
+    # Whether the motor feels no load within the play, or is held on a flank.
+    opens = float(d.random.integers(0, 2))
+    return lambda z: {"gap": 4e-3 * z, "opens": opens}
+
+
+def _cogging(d: _Shape) -> Sized:
+    order = float(d.random.choice([2, 4, 6, 12]))
+    return lambda z: {"amplitude": 0.01 * z, "phase": d.phase, "order": order}
+
+
+def _slip(d: _Shape) -> Sized:
+    when = d.random.uniform(0.2, 0.8) * d.scene.seconds
+    sign = float(d.random.choice([-1.0, 1.0]))
+    return lambda z: {"step": sign * 0.02 * z, "time": when}
+
+
+def _guide(d: _Shape) -> Sized:
+    aside = d.random.uniform(-0.02, 0.02)
+    back = float(d.random.choice([-1.0, 1.0]))
+    return lambda z: {"offset": aside * z**0.5, "mismatch": back * 1e-3 * z**0.5}
+
+
+def _quartic(d: _Shape) -> Sized:
+    b2, b3 = d.random.uniform(100, 600), d.random.uniform(0, 1e5)
+    return lambda z: {"k1": 2e5 / z, "b2": b2 / z, "b3": b3 / z**2, "b4": 0.0}
+
+
+def _exponential(d: _Shape) -> Sized:
+    scale = d.random.uniform(0.3, 2) * d.low
+    return lambda z: {"strain_scale": 1e-3 * z, "force_scale": scale}
+
+
+def _rope_loop(d: _Shape) -> Sized:
+    fraction = d.random.uniform(0.005, 0.05)
+    return lambda z: {"stiffness": 2e5 / z, "fraction": fraction}
+
+
+def _rope_creep(d: _Shape) -> Sized:
+    tau = d.random.uniform(0.08, 0.6) * d.scene.seconds
+    return lambda z: {"creep_stiffness": 1e6 / z, "time_constant": tau}
+
+
+def _cell_creep(d: _Shape) -> Sized:
+    tau = d.random.uniform(0.08, 0.6) * d.scene.seconds
+    return lambda z: {"fraction": 3e-3 * z, "time_constant": tau}
+
+
+def _pulley_stribeck(d: _Shape) -> Sized:
+    speed, more = d.random.uniform(0.01, 0.08), d.random.uniform(1.4, 2.5)
+    return lambda z: {
+        "coulomb": 0.015 * z,
+        "static": 0.015 * z * more,
+        "stribeck_speed": speed,
+    }
+
+
+def _pulley_dahl(d: _Shape) -> Sized:
+    reach, low = d.random.uniform(3e-3, 3e-2), d.low
+    return lambda z: {"friction": 0.02 * z, "stiffness": 0.02 * z * low / reach}
+
+
+def _motor_stribeck(d: _Shape) -> Sized:
+    speed = d.random.uniform(1.0, 6.0)
+    return lambda z: {"torque": 0.02 * z, "stribeck_speed": speed}
+
+
+def _efficiency(_: _Shape) -> Sized:
+    return lambda z: {"efficiency": float(np.exp(-0.1 * z))}
+
+
+def _harmonic(d: _Shape) -> Sized:
+    return lambda z: {"amplitude": 3e-4 * z, "phase": d.phase}
+
+
+def _sticky_place(d: _Shape) -> Sized:
+    place = d.winch.length_reference + d.random.uniform(0.3, 0.7) * d.scene.stroke
+    return lambda z: {"force": 3.0 * z, "place": place, "width": 0.06 * d.scene.stroke}
+
+
+def _mis_spooling(d: _Shape) -> Sized:
+    gone = d.random.uniform(0.3, 0.7) * d.scene.stroke / d.winch.radius
+    angle = 2 * pi * d.winch.wound_turns - gone
+    return lambda z: {"jump": 1e-4 * z, "angle": angle}
+
+
+def _joint(d: _Shape) -> Sized:
+    force = d.random.uniform(0.62, 0.8) * d.high
+    return lambda z: {"force": force, "stiffness": 2e5 / z}
+
+
+def _clipping(d: _Shape) -> Sized:
+    return lambda z: {"most": d.high * (1.02 - 0.04 * min(z, 20.0))}
+
+
+_SHAPED: dict[str, Callable[[_Shape], Sized]] = {
+    "drum-eccentricity": _eccentricity,
+    "gear-transmission-error": _transmission_error,
+    "gear-backlash": _backlash,
+    "motor-cogging": _cogging,
+    "encoder-slip": _slip,
+    "guide-offset": _guide,
+    "cable-elongation-quartic": _quartic,
+    "cable-elongation-exponential": _exponential,
+    "cable-hysteresis": _rope_loop,
+    "cable-creep": _rope_creep,
+    "cell-creep": _cell_creep,
+    "pulley-stribeck": _pulley_stribeck,
+    "pulley-dahl": _pulley_dahl,
+    "motor-stribeck": _motor_stribeck,
+    "gear-efficiency": _efficiency,
+    "outside-harmonic": _harmonic,
+    "outside-sticky-place": _sticky_place,
+    "outside-mis-spooling": _mis_spooling,
+    "outside-joint": _joint,
+    "outside-clipping": _clipping,
+}

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from campaign.memory import dahl, lag, play, stack
 from campaign.winch import Winch
 
-__all__ = ["Hidden", "Shown", "Situation", "show"]
+__all__ = ["OUTPUTS", "Hidden", "Shown", "Situation", "show"]
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 Hidden = Mapping[str, Values]
+OUTPUTS = ("cable_length", "tension", "motor_torque")
 G = 9.80665
 TURN = 2 * np.pi
 

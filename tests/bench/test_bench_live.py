@@ -56,7 +56,7 @@ def bench(live: LiveBench, clock: PacedClock) -> Iterator[Bench]:
         yield opened
 
 
-def until(condition: Callable[[], bool], within: float = 3.0) -> None:
+def until(condition: Callable[[], bool], within: float = 15.0) -> None:
     deadline = time.monotonic() + within
     while not condition():
         assert time.monotonic() < deadline, "it did not come to that"

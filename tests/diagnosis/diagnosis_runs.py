@@ -36,6 +36,8 @@ CATALOGUE = load_catalogue()
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 NOISE = {"cable_length": 3e-4, "tension": 0.8, "motor_torque": 5e-3}
 """Of the instruments, as on the simulated benches."""
+ENCODER = 1e-4
+"""Noise of the motor's angle, rad."""
 GROOVED = WinchProfile(
     name="grooved",
     drum=DrumSpec("grooved", 0.06, groove_pitch=0.005),
@@ -49,7 +51,7 @@ SPIRAL = replace(GROOVED, name="spiral", drum=DrumSpec("spiral", 0.06, layer_gro
 
 @dataclass(frozen=True)
 class Ride:
-    """How the motor moves: back and forth by a stroke."""
+    """How the motor moves: back and forth by a stroke, with a rest before and after each."""
 
     samples: int = 400
     rate: float = 50.0
@@ -63,7 +65,9 @@ class Ride:
 
     @property
     def angle(self) -> Array:
-        return np.asarray(self.stroke / 2 * (1 - np.cos(2 * pi * self.time / self.period)))
+        part = (self.time / self.period) % 1.0
+        there, back = (np.clip((part - x) / 0.35, 0.0, 1.0) for x in (0.1, 0.55))
+        return np.asarray(self.stroke / 2 * (np.cos(pi * back) - np.cos(pi * there)))
 
 
 def term(effect_id: str, **values: float) -> Term:
@@ -78,14 +82,16 @@ def made(
     noise: Mapping[str, float] = NOISE,
     load_mass: float | None = 10.0,
     ride: Ride = Ride(),
+    encoder: float = ENCODER,
     **metadata: str,
 ) -> Run:
-    """What the line predicts along a ride with white noise on the outputs that noise names."""
+    """What the line predicts along a ride, with white noise on the outputs that are named."""
     random = np.random.default_rng(seed)
     time, angle = ride.time, ride.angle
     line = Line(profile, modifiers_of(terms))
     predicted = line.predict(line.motion(Signals(time, angle, load_mass=load_mass)))
-    channels = {"motor_angle": Channel(angle, "rad")}
+    read = angle + encoder * random.standard_normal(len(time))
+    channels = {"motor_angle": Channel(read, "rad")}
     for output, size in noise.items():
         if output in predicted:
             values = predicted[output] + size * random.standard_normal(len(time))
@@ -108,7 +114,7 @@ def length_problem(
     """One output only, the length, whose residual is given; all runs are repeats."""
     runs = []
     for seed, residual in enumerate(residuals):
-        run = made(seed, profile, noise={"cable_length": 0.0}, ride=ride)
+        run = made(seed, profile, noise={"cable_length": 0.0}, ride=ride, encoder=0.0)
         runs.append(with_channel(run, "cable_length", run["cable_length"] + residual, "m"))
     return Problem(prepare(runs, profile))
 

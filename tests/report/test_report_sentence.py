@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from report_answers import CALM, FIVE_CORNERS, FRICTION, NOISY, RUBBING, STRETCH, told
 
-from winchkit.diagnosis.report.phrases import clause, estimate_text, listed
+from winchkit.diagnosis.report.phrases import clause, estimate_text, kind, listed
 from winchkit.diagnosis.report.sentence import sentence, telling, where_text
 from winchkit.diagnosis.result import Estimate, Step, Where
 from winchkit.effects.catalogue import load_catalogue
@@ -29,6 +29,37 @@ def test_a_confusion_set_is_told_as_one_and_no_name_is_chosen() -> None:
     )
     assert "motor torque falls from 16.5 mN m to 3.04 mN m (noise 2.88 mN m)" in text
     assert text.index("motor torque") < text.index("cable length"), "the largest fall comes first"
+
+
+def test_laws_of_one_kind_are_told_once() -> None:
+    laws = ("cable-elongation-linear", "cable-elongation-exponential", "cable-elongation-quartic")
+    stretch = replace(STRETCH, effects=laws)
+    text = sentence(told("explained", stretch))
+    assert text.startswith(
+        "Your rope stretches: EA = 249.9 ± 7.0 kN; these runs cannot tell it from "
+        "cable-elongation-exponential and cable-elongation-quartic. Add it and the held-out"
+    )
+    both = sentence(told("explained", stretch, FRICTION))
+    assert "your rope stretches (EA = 249.9 ± 7.0 kN; these runs cannot tell it from" in both
+
+
+def test_kinds_that_cannot_be_told_apart_stand_beside_each_other() -> None:
+    mixed = Step(
+        ("cable-elongation-linear", "frame-compliance", "cable-elongation-quartic"),
+        STRETCH.parameters,
+        0.95,
+    )
+    assert sentence(told("explained", mixed)).startswith(
+        "Your rope stretches (EA = 249.9 ± 7.0 kN, or as cable-elongation-quartic) or your frame "
+        "gives way to the load – these runs cannot tell which. Add one of them"
+    )
+
+
+def test_variants_without_the_plain_one_are_still_of_one_kind() -> None:
+    curved = kind("cable-elongation-quartic")
+    assert curved == kind("cable-elongation-exponential") == kind("cable-elongation-linear")
+    assert kind("motor-stribeck") == kind("motor-coulomb") != kind("pulley-coulomb")
+    assert kind("my-spring") == clause("my-spring")
 
 
 def test_several_effects_are_counted() -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.html_option import given_options, html_option, page_title, write_page
 from winchkit.cli.output import echo_json
 from winchkit.cli.runs_option import ManyValues, catalogue_of, model_options, read_runs
 
@@ -22,6 +23,7 @@ __all__ = ["command", "write_addition"]
 @click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs to fit.")
 @click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
 @model_options
+@html_option
 def command(
     effect: str,
     runs: Sequence[str],
@@ -31,6 +33,7 @@ def command(
     winch: str | None,
     band: float | None,
     as_json: bool,
+    html: str | None,
 ) -> None:
     """Fit EFFECT beside the effects of a profile on runs, and write the better profile.
 
@@ -38,14 +41,24 @@ def command(
     deviation, the runs and the date.
     """
     from winchkit.catalog import find
-    from winchkit.diagnosis.add import add
+    from winchkit.diagnosis.add import grow
     from winchkit.schema.read import read_winch
 
     source = find("profiles", profile)
-    catalogue = catalogue_of(effect_files)
-    addition = add(effect, read_runs(runs, winch), read_winch(source), catalogue, band)
-    write_addition(source, addition, [Path(run).name for run in runs], Path(output))
+    declared, catalogue = read_winch(source), catalogue_of(effect_files)
+    grown = grow(effect, read_runs(runs, winch), declared, catalogue, band)
+    write_addition(source, grown.addition, [Path(run).name for run in runs], Path(output))
     click.echo(f"written: {output}", err=True)
+    _tell(grown.addition, as_json)
+    if html:
+        from winchkit.diagnosis.report.page import addition_html
+
+        title = page_title(declared.name, runs, effect)
+        options = given_options(effect_files, winch, band)
+        write_page(html, addition_html(grown, title, profile, output, options=options))
+
+
+def _tell(addition: Addition, as_json: bool) -> None:
     if as_json:
         echo_json(addition.to_json())
         return

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.html_option import given_options, html_option, page_title, write_page
 from winchkit.cli.output import echo_json
 from winchkit.cli.runs_option import catalogue_of, model_options, read_runs
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.result import Comparison
 
 __all__ = ["command"]
 
@@ -15,6 +20,7 @@ __all__ = ["command"]
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
+@html_option
 def command(
     runs: Sequence[str],
     profile: str,
@@ -22,14 +28,25 @@ def command(
     winch: str | None,
     band: float | None,
     as_json: bool,
+    html: str | None,
 ) -> None:
     """Compare runs with a profile at its file values; only the length offset is fitted."""
     from winchkit.catalog import find
-    from winchkit.diagnosis.compare import compare
+    from winchkit.diagnosis.compare import compared
     from winchkit.schema.read import read_winch
 
     declared = read_winch(find("profiles", profile))
-    comparison = compare(read_runs(runs, winch), declared, catalogue_of(effect_files), band)
+    answer = compared(read_runs(runs, winch), declared, catalogue_of(effect_files), band)
+    _tell(answer.comparison, as_json)
+    if html:
+        from winchkit.diagnosis.report.page import comparison_html
+
+        title = page_title(declared.name, runs)
+        options = given_options(effect_files, winch, band)
+        write_page(html, comparison_html(answer, title, profile, options=options))
+
+
+def _tell(comparison: Comparison, as_json: bool) -> None:
     if as_json:
         echo_json(comparison.to_json())
         return

@@ -20,6 +20,10 @@ __all__ = ["command"]
 
 _RECORDING_SECONDS = 62.0
 _FEEDS_SHOWN = 2
+_OPENING = (
+    "A simulated bench with seed {seed}: a winch, a CiA 402 drive on CAN, a load cell, a length "
+    "and a temperature instrument on Modbus. Its truth hides something, or nothing."
+)
 
 
 @click.command()
@@ -51,10 +55,7 @@ def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
     story = _Story(quiet=as_json)
     bench = choose_bench(seed)
     profile_name = next(iter(bench.bench.winch.values())).profile
-    story.tell(
-        f"A simulated bench with seed {seed}: a winch, a CiA 402 drive on CAN, a load cell, a "
-        "length and a temperature instrument on Modbus. Its truth hides something, or nothing."
-    )
+    story.tell(_OPENING.format(seed=seed))
     with _progress(_RECORDING_SECONDS) as told:
         paths = demo_loop.record(bench, seed, out / "runs", told)
         told("thinking")
@@ -74,7 +75,7 @@ def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
     seconds = time.monotonic() - begun
     story.say(f"Report: {report}   ({seconds:.0f} s)")
     if as_json:
-        echo_json(_outcome(seed, findings, truth, right, seconds, out))
+        echo_json(_outcome(seed, findings, truth, seconds, out))
     ctx.exit(0 if right else 1)
 
 
@@ -134,7 +135,7 @@ def _write_report(
 
 
 def _outcome(
-    seed: int, findings: Findings, truth: tuple[str, ...], right: bool, seconds: float, out: Path
+    seed: int, findings: Findings, truth: tuple[str, ...], seconds: float, out: Path
 ) -> dict[str, Any]:
     addition = findings.addition
     return {
@@ -142,7 +143,7 @@ def _outcome(
         "seed": seed,
         "truth": truth,
         "found": findings.named,
-        "right": right,
+        "right": findings.right(truth),
         "held_out_over_noise": findings.worst_held_out,
         "diagnosis": findings.answer.diagnosis.to_json(),
         "addition": addition.to_json() if addition else None,

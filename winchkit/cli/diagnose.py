@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.html_option import given_options, html_option, page_title, write_page
 from winchkit.cli.output import echo_json
 from winchkit.cli.runs_option import catalogue_of, model_options, read_runs
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.diagnose import Answer
 
 __all__ = ["command"]
 
@@ -16,7 +20,7 @@ __all__ = ["command"]
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
-@click.option("--html", metavar="FILE", help="Also write the report as one page.")
+@html_option
 def command(
     runs: Sequence[str],
     profile: str,
@@ -36,12 +40,16 @@ def command(
 
     declared = read_winch(find("profiles", profile))
     answer = diagnose(read_runs(runs, winch), declared, catalogue_of(effect_files), band)
+    _tell(answer, as_json)
     if html:
         from winchkit.diagnosis.report.page import report_html
 
-        title = f"{declared.name}: {', '.join(Path(run).name for run in runs)}"
-        Path(html).write_text(report_html(answer, title, profile=profile), encoding="utf-8")
-        click.echo(f"report: {html}", err=True)
+        title = page_title(declared.name, runs)
+        options = given_options(effect_files, winch, band)
+        write_page(html, report_html(answer, title, profile=profile, options=options))
+
+
+def _tell(answer: Answer, as_json: bool) -> None:
     if as_json:
         echo_json(answer.diagnosis.to_json())
         return

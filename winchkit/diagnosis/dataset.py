@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.admit import OUTPUTS, admit
-from winchkit.diagnosis.denoise import agreed, quiet
+from winchkit.diagnosis.calm import calm_motions
 from winchkit.diagnosis.repeats import Repeats, find_repeats
 from winchkit.diagnosis.spectrum import Band, torque_band
 from winchkit.model.derivatives import reach_of
@@ -26,6 +26,9 @@ __all__ = ["Dataset", "Recording", "assemble", "prepare"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Filtered = tuple[float | None, float]
+"""Low-pass of the torque, Hz, or None for the usual one; and how far beyond it is kept."""
+
 _GAP = 2.5
 _SHAKEN = 0.25
 
@@ -92,10 +95,12 @@ def assemble(
     """Build a dataset of runs that are known to fit the profile."""
     signals = [_signals(run) for run in runs]
     repeats = find_repeats(signals)
-    smooth = _denoised(signals, repeats, profile)
+    line = Line(profile)
+    raw = [line.motion(own) for own in signals]
+    smooth = calm_motions(line, signals, raw, repeats)
     recordings = tuple(
-        _recording(run, raw, quiet_one, profile, (band, skirt))
-        for run, raw, quiet_one in zip(runs, signals, smooth, strict=True)
+        _recording(run, own, (motion, calm), line, (band, skirt))
+        for run, own, motion, calm in zip(runs, signals, raw, smooth, strict=True)
     )
     return Dataset(profile, recordings, tuple(repeats))
 
@@ -124,87 +129,46 @@ def _signals(run: Run) -> Signals:
     )
 
 
-def _denoised(
-    signals: list[Signals], repeats: list[Repeats], profile: WinchProfile
-) -> list[Signals]:
-    """Signals whose load (or tension) and temperature carry no noise."""
-    out = list(signals)
-    line = Line(profile)
-    for group in repeats:
-        for name in ("load", "tension"):
-            values = [getattr(signals[index], name) for index in group.runs]
-            if any(value is None for value in values):
-                continue
-            followed = [
-                _followed(line, signals[i], v) for i, v in zip(group.runs, values, strict=True)
-            ]
-            rest = [v - f for v, f in zip(values, followed, strict=True)]
-            shared = agreed(rest, group.rows)
-            for index, f, s in zip(group.runs, followed, shared, strict=True):
-                calm = f + s
-                out[index] = (
-                    replace(out[index], load=calm)
-                    if name == "load"
-                    else replace(out[index], tension=calm)
-                )
-        for index in group.runs:
-            temperature = signals[index].temperature
-            if temperature is not None:
-                out[index] = replace(out[index], temperature=quiet(temperature))
-    return out
-
-
-def _followed(line: Line, signals: Signals, force: Array) -> Array:
-    """The part of a force that is constant or follows the rope's nominal acceleration."""
-    inert = replace(signals, load=None, tension=None, load_mass=1.0)
-    weight = line.motion(inert).load
-    assert weight is not None
-    columns = np.column_stack([np.ones_like(force), weight - weight.mean()])
-    return np.asarray(columns @ np.linalg.lstsq(columns, force, rcond=None)[0])
-
-
 def _recording(
-    run: Run,
-    raw: Signals,
-    smooth: Signals,
-    profile: WinchProfile,
-    filtered: tuple[float | None, float],
+    run: Run, signals: Signals, motions: tuple[Motion, Motion], line: Line, filtered: Filtered
 ) -> Recording:
-    line = Line(profile)
-    motion, motion_smooth = line.motion(raw), line.motion(smooth)
-    nominal = line.predict(motion)
-    rate, (band, skirt) = 1 / run.interval, filtered
-    measured, valid, bands = {}, {}, {}
-    inputs_ok = np.isfinite(run["motor_angle"]) & _away_from_time_gaps(run.time)
-    if motion.load is not None and "load" in run:
-        inputs_ok &= np.isfinite(run["load"])
-    for output in OUTPUTS:
-        if output not in run or output not in nominal:
-            continue
-        values = run[output]
-        cut_off = (band or torque_band(rate)) if output == "motor_torque" else None
-        measured[output] = _bridged(values)
-        good = np.isfinite(values) & inputs_ok
-        if output != "cable_length":
-            # Accelerations at the ends of a run are not known.
-            edge = 1 + reach_of(run.time)
-            good[:edge] = good[-edge:] = False
-        valid[output] = _away_from_gaps(good, rate, cut_off)
-        bands[output] = Band(len(values), rate, cut_off, skirt)
+    raw, smooth = motions
+    nominal = line.predict(raw)
+    outputs = [output for output in OUTPUTS if output in run and output in nominal]
+    bands = {output: _band(run, output, filtered) for output in outputs}
     return Recording(
         name=run.name,
-        signals=raw,
-        measured=measured,
-        valid=valid,
+        signals=signals,
+        measured={output: _bridged(run[output]) for output in outputs},
+        valid={output: _valid(run, output, raw, bands[output]) for output in outputs},
         bands=bands,
         zeroed=run.length_zeroed,
-        raw=motion,
-        smooth=motion_smooth,
+        raw=raw,
+        smooth=smooth,
         nominal=nominal,
-        nominal_smooth=line.predict(motion_smooth),
+        nominal_smooth=line.predict(smooth),
         programme=run.metadata.get("programme", ""),
         path=run.path,
     )
+
+
+def _band(run: Run, output: str, filtered: Filtered) -> Band:
+    rate, (band, skirt) = 1 / run.interval, filtered
+    cut_off = (band or torque_band(rate)) if output == "motor_torque" else None
+    return Band(len(run), rate, cut_off, skirt)
+
+
+def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
+    """Samples of an output that may be compared: measured, with known inputs."""
+    good = np.isfinite(run[output]) & np.isfinite(run["motor_angle"])
+    good &= _away_from_time_gaps(run.time)
+    if motion.load is not None and "load" in run:
+        good &= np.isfinite(run["load"])
+    if output != "cable_length":
+        # Accelerations at the ends of a run are not known.
+        edge = 1 + reach_of(run.time)
+        good[:edge] = good[-edge:] = False
+    return _away_from_gaps(good, band.rate, band.cut_off)
 
 
 def _away_from_time_gaps(time: Array) -> Mask:

@@ -16,6 +16,7 @@ from scipy.stats import f as f_distribution
 
 from winchkit.diagnosis.denoise import contrasts
 from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.spectrum import smoothed
 
 __all__ = ["Noise", "Presence", "noise_from_repeats", "noise_saturated", "presence"]
 
@@ -83,7 +84,8 @@ def noise_from_repeats(problem: Problem, residual: Array, known: Array) -> Noise
             difference = (whitened - basis @ (basis.T @ whitened)) / weight
             freedom = freedom - _sums(np.sum(basis**2, axis=1), split.difference_band, count)
             power = _power(problem, difference, split.difference_band, np.maximum(freedom, 1.0))
-    return Noise(power, np.maximum(freedom, 1.0), _rms(problem, power), from_repeats=True)
+    power, freedom = _smooth(problem, power, np.maximum(freedom, 0.1))
+    return Noise(power, freedom, _rms(problem, power), from_repeats=True)
 
 
 def noise_saturated(problem: Problem, residual: Array, columns: Array) -> Noise:
@@ -104,6 +106,7 @@ def noise_saturated(problem: Problem, residual: Array, columns: Array) -> Noise:
         left = (whitened - basis @ (basis.T @ whitened)) / weight
         freedom = np.maximum(total - _sums(np.sum(basis**2, axis=1), bands, count), 1.0)
         power = _power(problem, left, bands, freedom)
+    power, freedom = _smooth(problem, power, freedom)
     return Noise(power, freedom, _rms(problem, power), from_repeats=False)
 
 
@@ -210,6 +213,15 @@ def _orthonormal(columns: Array) -> Array:
 
 def _sums(values: Array, bands: NDArray[np.intp], count: int) -> Array:
     return np.asarray(np.bincount(bands, weights=values, minlength=count))
+
+
+def _smooth(problem: Problem, power: Array, freedom: Array) -> tuple[Array, Array]:
+    """Every output's spectrum smoothed over its bands."""
+    power, freedom = power.copy(), freedom.copy()
+    for output in problem.dataset.outputs:
+        own = np.array([band[0] == output for band in problem.bands])
+        power[own], freedom[own] = smoothed(power[own], freedom[own])
+    return power, freedom
 
 
 def _even(problem: Problem, residual: Array) -> Array:

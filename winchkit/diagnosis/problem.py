@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.dataset import Dataset
-from winchkit.diagnosis.spectrum import Band, band_edges, to_frequency, to_time
+from winchkit.diagnosis.spectrum import Band, narrow_edges, to_frequency, to_time
 from winchkit.effects.bind import Term, modifiers_of
 from winchkit.effects.coordinates import Coordinates
 from winchkit.model.line import Line
@@ -243,14 +243,12 @@ class Problem:
 
     @cached_property
     def _bands(self) -> tuple[NDArray[np.intp], list[tuple[str, float, float]]]:
-        repeated = self.dataset.repeated
-        copies = max(1, sum(len(group.runs) - 1 for group in repeated))
         ids = np.zeros(self.rows, dtype=np.intp)
         bands: list[tuple[str, float, float]] = []
         for output in self.dataset.outputs:
             own = [s for s in self.segments if s.output == output]
             longest = max(own, key=lambda s: s.band.count)
-            edges = band_edges(longest.band.frequency, copies)
+            edges = narrow_edges(longest.band.frequency)
             for segment in own:
                 inside = np.searchsorted(edges, segment.band.frequency, side="right") - 1
                 ids[segment.rows] = len(bands) + inside

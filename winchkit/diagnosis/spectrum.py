@@ -12,12 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct, idct
 
-__all__ = ["Band", "band_edges", "low_pass", "to_frequency", "to_time", "torque_band"]
+__all__ = [
+    "Band",
+    "band_edges",
+    "low_pass",
+    "narrow_edges",
+    "smoothed",
+    "to_frequency",
+    "to_time",
+    "torque_band",
+]
 
 Array = NDArray[np.float64]
 _BUTTERWORTH_ORDER = 4
 _TORQUE_BAND = 20.0
 _BANDS = 14
+_NARROW = 24
+_BEND = 0.25
+_ITERATIONS = 25
 _FEWEST = 8
 
 
@@ -76,6 +88,43 @@ def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
     frequency = np.arange(len(signal)) * rate / (2 * len(signal))
     gain = 1 / (1 + (frequency / cut_off) ** (2 * _BUTTERWORTH_ORDER))
     return np.asarray(idct(full * gain, type=2, norm="ortho"))
+
+
+def narrow_edges(frequency: Array) -> Array:
+    """Edges of narrow logarithmic bands, none without a coefficient of ``frequency`` (Hz, sorted).
+
+    Returns shape (bands + 1,), open ends.
+    """
+    positive = frequency[frequency > 0]
+    if len(positive) < 2:
+        return np.array([-np.inf, np.inf])
+    wanted = np.geomspace(positive[0], positive[-1], _NARROW + 1)[1:-1]
+    owner = np.searchsorted(positive, wanted)
+    inner = wanted[np.diff(owner, prepend=0, append=len(positive))[:-1] > 0]
+    return np.array([-np.inf, *inner.tolist(), np.inf])
+
+
+def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
+    """A spectrum whose logarithm bends slowly from band to band, and its degrees of freedom.
+
+    Low bands hold few coefficients, and the noise of instruments has no lines there: penalised
+    maximum likelihood of gamma-distributed powers (Whittle), by iterated least squares. A band
+    with many coefficients keeps what it shows.
+    """
+    count = len(power)
+    if count < 3:
+        return power, freedom
+    bend = np.diff(np.eye(count), 2, axis=0)
+    stiff = bend.T @ bend / _BEND**2
+    weight = np.diag(np.maximum(freedom, 1e-6) / 2)
+    level = np.log(power)
+    eta = np.linalg.solve(weight + stiff, weight @ level)
+    for _ in range(_ITERATIONS):
+        # A band far below its neighbours may pull the logarithm down by one step only.
+        working = eta + np.clip(power / np.exp(eta) - 1, -1.0, 3.0)
+        eta = np.linalg.solve(weight + stiff, weight @ working)
+    covariance = np.linalg.inv(weight + stiff)
+    return np.exp(eta), 2 / np.diag(covariance)
 
 
 def band_edges(frequency: Array, copies: int) -> Array:

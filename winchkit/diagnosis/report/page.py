@@ -1,20 +1,20 @@
-"""A diagnosis as one self-contained page: no network, nothing beside it."""
+"""A diagnosis, a comparison or an addition as one self-contained page."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from datetime import date
-from importlib.resources import files
 
+from winchkit.diagnosis.add import Grown
+from winchkit.diagnosis.compare import Compared
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.report.embed import inline
-from winchkit.diagnosis.report.markup import Markup, element
-from winchkit.diagnosis.report.plots import OutputPlots, plots_of
+from winchkit.diagnosis.report.addition_sections import addition_sections
+from winchkit.diagnosis.report.comparison_sections import comparison_sections
+from winchkit.diagnosis.report.plots import Residuals, plots_of
+from winchkit.diagnosis.report.repeat import Command
 from winchkit.diagnosis.report.sections import sections
+from winchkit.diagnosis.report.shell import page
 
-__all__ = ["report_html"]
-
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+__all__ = ["addition_html", "comparison_html", "report_html", "residuals_of"]
 
 
 def report_html(
@@ -23,50 +23,48 @@ def report_html(
     story: Sequence[str] = (),
     truth: Mapping[str, object] | None = None,
     profile: str = "",
+    *,
+    options: Sequence[str] = (),
 ) -> str:
     """The page of a diagnosis.
 
     ``story`` tells in sentences what was done; ``truth`` is what a simulated bench hid, revealed
-    last; ``profile`` is the profile as the user named it, for the commands that repeat all this.
+    last; ``profile`` is the profile as the user named it and ``options`` what else the command
+    was given, for the commands that repeat all this.
     """
-    plots = plots_of(answer)
-    head = element(
-        "header", element("h1", title), element("p", f"winchkit, {date.today()}", class_="quiet")
-    )
-    noscript = element("noscript", element("p", "The plots need JavaScript; all else is here."))
-    body = element(
-        "body",
-        element("main", head, noscript, sections(answer, plots, story, truth, profile)),
-        Markup(f'<script type="application/json" id="plots">{inline(_data(plots))}</script>'),
-        _script("uPlot.iife.min.js"),
-        _script("report.js"),
-    )
-    return f'<!DOCTYPE html>\n<html lang="en">{_head(title)}{body}</html>\n'
+    residuals = residuals_of(answer)
+    plots = plots_of(residuals)
+    command = Command(residuals.problem.dataset, profile, options)
+    return page(title, plots, sections(answer, plots, story, truth, command))
 
 
-def _head(title: str) -> Markup:
-    policy = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
-    return element(
-        "head",
-        Markup('<meta charset="utf-8">'),
-        Markup(policy),
-        Markup('<meta name="viewport" content="width=device-width, initial-scale=1">'),
-        Markup('<meta name="color-scheme" content="light dark">'),
-        element("title", title),
-        Markup(f"<!-- The plots are drawn by uPlot:\n{_asset('uPlot.LICENSE')}-->"),
-        Markup(f"<style>{_asset('uPlot.min.css')}{_asset('report.css')}</style>"),
+def residuals_of(answer: Answer) -> Residuals:
+    """What the page of a diagnosis draws; an ``after`` only where something was named."""
+    diagnosis, found = answer.diagnosis, answer.found
+    return Residuals(
+        answer.inquiry.problem,
+        found.begin.residual,
+        found.final.residual if diagnosis.steps else None,
+        {name: output.noise_rms for name, output in diagnosis.outputs.items()},
     )
 
 
-def _script(name: str) -> Markup:
-    return Markup(f"<script>{_asset(name)}</script>")
+def comparison_html(
+    compared: Compared, title: str, profile: str = "", *, options: Sequence[str] = ()
+) -> str:
+    """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`."""
+    noise = {name: error.noise_rms for name, error in compared.comparison.outputs.items()}
+    plots = plots_of(Residuals(compared.problem, compared.residual, None, noise))
+    command = Command(compared.problem.dataset, profile, options)
+    return page(title, plots, comparison_sections(compared.comparison, plots, command))
 
 
-def _asset(name: str) -> str:
-    """A file of the folder ``assets`` beside this module."""
-    return (files("winchkit.diagnosis.report") / "assets" / name).read_text(encoding="utf-8")
-
-
-def _data(plots: Sequence[OutputPlots]) -> dict[str, object]:
-    both = [plot for own in plots for plot in (own.over_time, own.over_variable) if plot]
-    return {plot.id: plot.data for plot in both}
+def addition_html(
+    grown: Grown, title: str, profile: str = "", better: str = "", *, options: Sequence[str] = ()
+) -> str:
+    """The page of an addition; ``better`` is the profile that was written, the rest as above."""
+    noise = {name: output.noise_rms for name, output in grown.addition.outputs.items()}
+    plots = plots_of(Residuals(grown.problem, grown.begin.residual, grown.final.residual, noise))
+    command = Command(grown.problem.dataset, profile, options)
+    better = better or "better.toml"
+    return page(title, plots, addition_sections(grown.addition, plots, command, better))

@@ -11,7 +11,9 @@ __all__ = [
     "VERDICT_NAMES",
     "clause",
     "estimate_text",
+    "kind",
     "listed",
+    "meaning",
     "parameter_name",
     "parameter_unit",
 ]
@@ -89,7 +91,18 @@ _SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")
 
 def clause(effect: str) -> str:
     """What an effect means, in lower case; an effect that is not winchkit's keeps its id."""
-    return _CLAUSES.get(effect, f"the effect {effect} is missing")
+    return meaning(effect) or f"the effect {effect} is missing"
+
+
+def meaning(effect: str) -> str:
+    """What an effect of winchkit's own means; empty for any other."""
+    return _CLAUSES.get(effect, "")
+
+
+def kind(effect: str) -> str:
+    """What an effect shares with its variants: that a rope stretches, by whichever law."""
+    words = clause(effect)
+    return min((c for c in (*_CLAUSES.values(), words) if words.startswith(c)), key=len)
 
 
 def parameter_name(parameter: str) -> str:

@@ -17,9 +17,11 @@ from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
 from winchkit.diagnosis.report.thin import bin_means, filled_edges, thin, thin_points
 from winchkit.diagnosis.report.wording import Scale, percent, scale_for
 
-__all__ = ["OutputPlots", "Plot", "Residuals", "plots_of"]
+__all__ = ["AT_NOISE", "OutputPlots", "Plot", "Residuals", "plots_of"]
 
 Array = NDArray[np.float64]
+AT_NOISE = 1.15
+"""Up to how many times its noise an error counts as noise."""
 _POINTS = 2000
 _DOTS = 600
 _BINS = 20
@@ -27,7 +29,6 @@ _WORTH_DRAWING = 0.05
 _CLEAR_ORDER = 0.2
 _DIGITS = 4
 _SAME = 1e-3
-_AT_NOISE = 1.15
 _SPREAD = 0.2
 _PER_PERIOD = 8
 _DEGREES = 360.0
@@ -139,7 +140,7 @@ def _curves(residuals: Residuals, output: str) -> _Curves:
         tuple(part / scale.worth for part in before),
         None if after is None else tuple(part / scale.worth for part in after),
         None if noise is None else noise / scale.worth,
-        "residual" if size < _AT_NOISE * (noise or 0.0) else "before",
+        "residual" if size < AT_NOISE * (noise or 0.0) else "before",
     )
 
 

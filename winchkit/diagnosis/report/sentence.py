@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
     VARIABLE_NAMES,
     clause,
     estimate_text,
+    kind,
     listed,
 )
 from winchkit.diagnosis.report.wording import percent, quantity, significant
 from winchkit.diagnosis.result import Diagnosis, OutputFit, Step, Where
 
-__all__ = ["moved_outputs", "sentence", "telling", "where_text"]
+__all__ = [
+    "capital",
+    "gain_text",
+    "moved_outputs",
+    "often_per_turn",
+    "sentence",
+    "still_text",
+    "telling",
+    "where_text",
+    "worse_text",
+]
 
 _MOVED = 1.05
 _CLEAR = 0.2
 _ABOVE = 1.5
+_NO_GAIN = "Adding it leaves the held-out errors as they are."
 _COUNTS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
 
 
@@ -27,7 +39,9 @@ def sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "adequate":
         return _adequate(diagnosis)
     if diagnosis.steps:
-        parts = [_named(diagnosis.steps), _gain(diagnosis), _still(diagnosis)]
+        steps, outputs = diagnosis.steps, diagnosis.outputs
+        gain = gain_text(outputs, f"Add {_them(steps)} and") or _NO_GAIN
+        parts = [_named(steps), gain, still_text(outputs)]
         if diagnosis.verdict == "partly":
             parts.append(_rest(diagnosis, "Something else is still missing"))
         return " ".join(part for part in parts if part)
@@ -41,13 +55,18 @@ def where_text(where: Where) -> str:
     output = OUTPUT_NAMES.get(where.output, where.output)
     variable = VARIABLE_NAMES.get(where.variable, where.variable)
     if where.order is not None:
-        turn = variable.removesuffix(" angle")
-        often = "once" if where.order == 1 else f"{where.order} times"
-        return f"{output}, {often} per {turn} turn ({percent(where.share)} of its error)"
+        often = often_per_turn(where.variable, where.order)
+        return f"{output}, {often} ({percent(where.share)} of its error)"
     if where.frequency is not None:
         hertz = significant(where.frequency, 2)
         return f"{output}, around {hertz} Hz ({percent(where.share)} of all above the noise)"
     return f"{output}, following the {variable} ({percent(where.share)} of its error)"
+
+
+def often_per_turn(angle: str, order: int) -> str:
+    """``5 times per drum turn``."""
+    turn = VARIABLE_NAMES.get(angle, angle).removesuffix(" angle")
+    return f"{'once' if order == 1 else f'{order} times'} per {turn} turn"
 
 
 def telling(places: Sequence[Where]) -> list[Where]:
@@ -61,14 +80,54 @@ def telling(places: Sequence[Where]) -> list[Where]:
     return list(first.values())
 
 
-def moved_outputs(diagnosis: Diagnosis) -> list[str]:
+def moved_outputs(outputs: Mapping[str, OutputFit]) -> list[str]:
     """Outputs whose held-out error fell noticeably, the largest fall first."""
     falls = {
         name: output.heldout_rms_before / output.heldout_rms_after
-        for name, output in diagnosis.outputs.items()
+        for name, output in outputs.items()
         if output.heldout_rms_after > 0
     }
     return sorted((n for n, fall in falls.items() if fall > _MOVED), key=lambda n: -falls[n])
+
+
+def gain_text(outputs: Mapping[str, OutputFit], opening: str) -> str:
+    """``Add it and the held-out error of … falls from … to …``; empty where none falls."""
+    moved = moved_outputs(outputs)
+    if not moved:
+        return ""
+    if len(moved) == 1:
+        output = outputs[moved[0]]
+        error = f"the held-out error of the {OUTPUT_NAMES.get(moved[0], moved[0])}"
+        return f"{opening} {error} {_fall(output)}{_beside(output)}."
+    falls = [_in_one(name, outputs[name]) for name in moved]
+    return f"{opening} the held-out error {listed(falls)}."
+
+
+def worse_text(outputs: Mapping[str, OutputFit]) -> str:
+    """Outputs whose held-out error rose; empty where none did."""
+    rises = [
+        f"of the {OUTPUT_NAMES.get(name, name)} "
+        f"from {quantity(output.heldout_rms_before, output.unit)} "
+        f"to {quantity(output.heldout_rms_after, output.unit)}"
+        for name, output in outputs.items()
+        if output.heldout_rms_after > _MOVED * output.heldout_rms_before
+    ]
+    return f"It raises the held-out error {listed(rises)}." if rises else ""
+
+
+def still_text(outputs: Mapping[str, OutputFit]) -> str:
+    """Outputs that stay well above their noise, which an explained error need not fall to."""
+    above = {
+        name: output.heldout_rms_after / output.noise_rms
+        for name, output in outputs.items()
+        if output.noise_rms
+    }
+    told = [
+        f"the {OUTPUT_NAMES.get(name, name)} at {significant(ratio, 2)} times its noise"
+        for name, ratio in above.items()
+        if ratio > _ABOVE
+    ]
+    return f"That leaves {listed(told)}." if told else ""
 
 
 def _adequate(diagnosis: Diagnosis) -> str:
@@ -89,37 +148,44 @@ def _adequate(diagnosis: Diagnosis) -> str:
 
 def _named(steps: tuple[Step, ...]) -> str:
     if len(steps) == 1:
-        return _capital(_step(steps[0])) + "."
+        return capital(_step(steps[0])) + "."
     count = _COUNTS.get(len(steps), str(len(steps)))
     return f"{count} effects are missing: {listed([_step(step, ' ({})') for step in steps])}."
 
 
+def _them(steps: Sequence[Step]) -> str:
+    if len(steps) > 1:
+        return "them"
+    return "one of them" if len(_kinds(steps[0])) > 1 else "it"
+
+
+def _kinds(step: Step) -> list[list[str]]:
+    """Effects of a set by kind, parsimonious ones first: a rope stretches by several laws."""
+    kinds: dict[str, list[str]] = {}
+    for effect in step.effects:
+        kinds.setdefault(kind(effect), []).append(effect)
+    return list(kinds.values())
+
+
 def _step(step: Step, form: str = ": {}") -> str:
-    if len(step.effects) == 1:
-        return _with_values(step, step.effects[0], form)
-    either = listed([_with_values(step, effect, " ({})") for effect in step.effects], "or")
-    return f"{either} – these runs cannot tell which"
+    kinds = _kinds(step)
+    if len(kinds) == 1:
+        ((first, *others),) = kinds
+        beside = f"these runs cannot tell it from {listed(others)}" if others else ""
+        return _with_values(step, first, form, beside, "; ")
+    either = [
+        _with_values(step, first, " ({})", f"or as {listed(others, 'or')}" if others else "", ", ")
+        for first, *others in kinds
+    ]
+    return f"{listed(either, 'or')} – these runs cannot tell which"
 
 
-def _with_values(step: Step, effect: str, form: str) -> str:
+def _with_values(step: Step, effect: str, form: str, beside: str, link: str) -> str:
+    """An effect in words with its values, and what is to be said beside them."""
     values = step.parameters.get(effect, {})
     told = ", ".join(estimate_text(name, value) for name, value in values.items())
-    return clause(effect) + (form.format(told) if told else "")
-
-
-def _gain(diagnosis: Diagnosis) -> str:
-    moved = moved_outputs(diagnosis)
-    if not moved:
-        return "Adding it leaves the held-out errors as they are."
-    several = len(diagnosis.steps) > 1
-    either = not several and len(diagnosis.steps[0].effects) > 1
-    them = "them" if several else "one of them" if either else "it"
-    if len(moved) == 1:
-        output = diagnosis.outputs[moved[0]]
-        error = f"the held-out error of the {OUTPUT_NAMES.get(moved[0], moved[0])}"
-        return f"Add {them} and {error} {_fall(output)}{_beside(output)}."
-    falls = [_in_one(name, diagnosis.outputs[name]) for name in moved]
-    return f"Add {them} and the held-out error {listed(falls)}."
+    inside = link.join(part for part in (told, beside) if part)
+    return clause(effect) + (form.format(inside) if inside else "")
 
 
 def _fall(output: OutputFit) -> str:
@@ -142,21 +208,6 @@ def _in_one(name: str, output: OutputFit) -> str:
     return f"{text} (noise {quantity(output.noise_rms, output.unit)})"
 
 
-def _still(diagnosis: Diagnosis) -> str:
-    """Outputs that stay well above their noise, which an explained error need not fall to."""
-    above = {
-        name: output.heldout_rms_after / output.noise_rms
-        for name, output in diagnosis.outputs.items()
-        if output.noise_rms
-    }
-    told = [
-        f"the {OUTPUT_NAMES.get(name, name)} at {significant(ratio, 2)} times its noise"
-        for name, ratio in above.items()
-        if ratio > _ABOVE
-    ]
-    return f"That leaves {listed(told)}." if told else ""
-
-
 def _rest(diagnosis: Diagnosis, opening: str) -> str:
     left = f"{percent(diagnosis.unexplained_share)} of what stood above the noise is left"
     places = [where_text(where) for where in telling(diagnosis.where)[:2]]
@@ -168,5 +219,6 @@ def _from_repeats(diagnosis: Diagnosis) -> bool:
     return all(output.noise_source == "repeats" for output in diagnosis.outputs.values())
 
 
-def _capital(text: str) -> str:
+def capital(text: str) -> str:
+    """With its first letter large."""
     return text[:1].upper() + text[1:]

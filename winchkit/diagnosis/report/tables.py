@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from math import degrees, isfinite
 
@@ -18,7 +18,7 @@ from winchkit.diagnosis.report.phrases import (
 from winchkit.diagnosis.report.shown import unseen, visible
 from winchkit.diagnosis.report.waterfall import Waterfall
 from winchkit.diagnosis.report.wording import Scale, grouped, quantity, scale_for, significant
-from winchkit.diagnosis.result import Candidate, Diagnosis, OutputFit
+from winchkit.diagnosis.result import Candidate, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect
 
 __all__ = ["candidates", "confusion", "detectable", "figures", "named", "output_scale", "waterfall"]
@@ -52,13 +52,13 @@ def figures(diagnosis: Diagnosis) -> Markup:
     return table(caption, [*head, "noise", "error / noise"], rows)
 
 
-def named(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
-    """What every named effect is, with its formula, values and source."""
+def named(
+    found: Iterable[tuple[Effect | None, str, Mapping[str, Estimate]]],
+) -> Markup:
+    """What every named effect is, with its values, formula and source; one unknown has no words."""
     entries: list[Markup] = []
-    for effect_id in chain.from_iterable(step.effects for step in diagnosis.steps):
-        effect = effects.get(effect_id)
-        step = next(s for s in diagnosis.steps if effect_id in s.effects)
-        values = [estimate_text(n, e) for n, e in step.parameters.get(effect_id, {}).items()]
+    for effect, effect_id, estimates in found:
+        values = [estimate_text(name, estimate) for name, estimate in estimates.items()]
         entries.append(element("dt", element("code", effect_id), " ", ", ".join(values)))
         if effect is not None:
             words = join([effect.what, " ", element("span", effect.formula, class_="formula")])

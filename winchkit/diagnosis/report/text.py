@@ -7,17 +7,16 @@ from math import degrees, isnan
 from typing import TYPE_CHECKING
 
 from winchkit.diagnosis.report.columns import aligned, paragraph
+from winchkit.diagnosis.report.comparison_rows import HEAD, followed, offset_text, size_rows
 from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
-    VARIABLE_NAMES,
     VERDICT_NAMES,
     clause,
     estimate_text,
-    listed,
 )
 from winchkit.diagnosis.report.sentence import sentence, telling, where_text
 from winchkit.diagnosis.report.shown import smallest_shown
-from winchkit.diagnosis.report.wording import grouped, percent, quantity, scale_for
+from winchkit.diagnosis.report.wording import grouped, percent, scale_for
 from winchkit.diagnosis.result import Comparison, Diagnosis, OutputFit
 
 if TYPE_CHECKING:
@@ -28,7 +27,6 @@ __all__ = ["addition_text", "compare_text", "report_text"]
 
 _MOST_LINES = 40
 _FEW = 3
-_FOLLOWED = 3
 
 
 def report_text(answer: Answer) -> str:
@@ -52,34 +50,17 @@ def report_text(answer: Answer) -> str:
 
 def compare_text(comparison: Comparison) -> str:
     """How far the profile is off per output, and what the error follows."""
-    rows = [["error", "rms", "bias", "largest", "noise", "measured, rms"]]
-    followed: list[str] = []
+    followings: list[str] = []
     for name, error in comparison.outputs.items():
-        scale = scale_for(error.rms, error.unit)
-        noise = "unknown" if error.noise_rms is None else scale.text(error.noise_rms)
-        sizes = [
-            scale.text(value)
-            for value in (error.rms, _noticeable(error.bias, error.rms), error.max)
-        ]
-        signal = quantity(error.signal_rms, error.unit)
-        rows.append([OUTPUT_NAMES.get(name, name), *sizes, noise, signal])
-        shares = [
-            f"{VARIABLE_NAMES.get(variable, variable)} {percent(share)}"
-            for variable, share in error.follows[:_FOLLOWED]
-        ]
-        told = listed(shares) if shares else "nothing that was measured"
-        followed += paragraph(f"{OUTPUT_NAMES.get(name, name)} follows {told}", "  ", "    ")
-    blocks = [aligned(rows), ["what the errors follow", *followed] if followed else []]
+        told = f"{OUTPUT_NAMES.get(name, name)} follows {followed(error)}"
+        followings += paragraph(told, "  ", "    ")
+    blocks = [aligned([HEAD, *size_rows(comparison)])]
+    if followings:
+        blocks.append(["what the errors follow", *followings])
     if comparison.offset is not None:
-        offset = quantity(comparison.offset, "m")
-        blocks.append([f"offset of the length instrument, fitted: {offset}"])
+        blocks.append([offset_text(comparison.offset)])
     blocks.append(_notes(comparison.notes))
     return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
-
-
-def _noticeable(bias: float, rms: float) -> float:
-    """A bias, zero where it is only what rounding leaves of a fitted offset."""
-    return 0.0 if abs(bias) < 1e-6 * rms else bias
 
 
 def addition_text(addition: Addition) -> str:

@@ -43,7 +43,7 @@ _LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
     "1": ((float("inf"), "", 1.0),),
 }
 """Per SI unit: below which size which label, and the label's worth in SI."""
-_WITHIN_A_FIGURE = pattern(r"(?<=[\d±]) | (?=±)|(?<=N) (?=m\b)|(?<=m) (?=s\b)")
+_WITHIN_A_FIGURE = pattern(r"(?<=[\d±=]) | (?=±)|(?<=N) (?=m\b)|(?<=m) (?=s\b)")
 _SIGNS = str.maketrans("-", "−")
 
 

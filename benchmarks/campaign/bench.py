@@ -1,0 +1,133 @@
+"""A bench: a winch with its instruments' noise, its programmes and its loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.motion import programme
+from campaign.sizes import Scene
+from campaign.truth import Situation
+from campaign.winch import Winch, draw_winch, turns_for
+
+__all__ = ["Bench", "draw_bench"]
+
+Array = NDArray[np.float64]
+Random = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A winch and all its runs, SI."""
+
+    winch: Winch
+    situations: tuple[Situation, ...]
+    programmes: tuple[int, ...]
+    """Which programme each run follows."""
+    scene: Scene
+    load: str
+    """How the load is told: ``load`` (a channel), ``mass`` (metadata) or ``cell`` (not at all)."""
+    warms: bool
+    measures_temperature: bool
+    noise: dict[str, float]
+    """Rms per channel."""
+    colour: float
+    """Share of the noise's power that is AR(1)."""
+
+    @property
+    def words(self) -> str:
+        """The bench in a line."""
+        w, first = self.winch, self.situations[0]
+        return (
+            f"{w.kind} dir {w.direction} ratio {w.ratio} pulleys {len(w.wraps)} {self.load} "
+            f"{len(self.situations)} runs {len(first.time)} steps of 1/{first.every} samples "
+            f"masses {self.scene.masses} warms {self.warms} colour {self.colour}"
+        )
+
+
+def draw_bench(random: Random, repeats: bool, small: bool) -> Bench:
+    """Any bench; with ``repeats`` every run is recorded twice, perfectly or imperfectly."""
+    winch = draw_winch(random)
+    # Physics in finer steps than the samples, or in steps as coarse as they are.
+    every = int(random.choice([1, 4]))
+    rate = every * float(random.choice([20.0, 25.0, 50.0]))
+    seconds = float(random.uniform(60, 100 if small else 200))
+    stroke = float(random.uniform(0.5, 5))
+    # The rope stays on the drum and its first layer.
+    stroke = min(stroke, 0.8 * 2 * np.pi * winch.wound_turns * winch.radius)
+    heaviest = float(random.uniform(15, 60))
+    masses = tuple(
+        round(heaviest * part, 2) for part in (1.0, 0.35, 0.6)[: int(random.integers(2, 4))]
+    )
+    load = str(random.choice(["load", "mass", "load", "mass", "cell"]))
+    late = repeats and str(random.choice(["perfect", "imperfect"])) == "imperfect"
+    warms = bool(random.random() < 0.5)
+    moves = [programme(random, rate, seconds, stroke) for _ in range(int(random.integers(1, 3)))]
+    wander = _slow_curve(random, len(moves[0][0]))
+    situations, programmes = [], []
+    for index, (time, wound) in enumerate(moves):
+        angle = turns_for(winch, 1.0) * wound
+        motor = winch.motor_reference + winch.direction * winch.ratio * angle
+        for mass in masses if index == 0 else masses[:2]:
+            whole = Situation(time, motor, mass, np.zeros_like(time), wander, every)
+            for again in range(2 if repeats else 1):
+                situations.append(_one_run(random, whole, rate, warms, bool(again and late)))
+                programmes.append(index)
+    return Bench(
+        winch=winch,
+        situations=tuple(situations),
+        programmes=tuple(programmes),
+        scene=Scene(seconds, stroke, masses),
+        load=load,
+        warms=warms,
+        measures_temperature=bool(warms or random.random() < 0.3),
+        noise=_noise_of_instruments(random, 9.8 * heaviest * winch.radius / winch.ratio),
+        colour=float(random.choice([0.0, 0.3, 0.6])),
+    )
+
+
+def _one_run(random: Random, whole: Situation, rate: float, warms: bool, late: bool) -> Situation:
+    """A run of a programme; a ``late`` one has another clock, length and temperature."""
+    every = whole.every
+    drop = every * int(random.integers(0, rate / every)) if late else 0
+    start = float(random.uniform(0, 9)) if late else 0.0
+    kept = slice(0, len(whole.time) - drop)
+    warm = _temperature(random, whole.time, warms, late)
+    return Situation(
+        time=whole.time[kept] + start,
+        motor_angle=whole.motor_angle[kept],
+        mass=whole.mass,
+        temperature=warm[kept],
+        wander=whole.wander[kept],
+        every=every,
+    )
+
+
+def _noise_of_instruments(random: Random, torque: float) -> dict[str, float]:
+    """Rms per channel; ``torque`` is the largest, N m."""
+    return {
+        "cable_length": float(random.uniform(5e-5, 3e-4)),
+        "tension": float(random.uniform(0.2, 1.5)),
+        "motor_torque": float(random.uniform(0.003, 0.01) * torque),
+        "load": float(random.uniform(0.1, 1.0)),
+    }
+
+
+def _slow_curve(random: Random, count: int) -> Array:
+    knots = np.cumsum(random.normal(size=7))
+    curve = np.interp(np.linspace(0, 6, count), np.arange(7), knots)
+    width = count // 8
+    padded = np.pad(curve, width, mode="edge")
+    curve = np.convolve(padded, np.hanning(width) / np.hanning(width).sum(), mode="same")
+    curve = curve[width:-width] - curve.mean()
+    return np.asarray(curve / np.std(curve))
+
+
+def _temperature(random: Random, time: Array, warms: bool, late: bool) -> Array:
+    level = 20.0 + (random.uniform(-3, 6) if late else random.uniform(0, 1))
+    if not warms:
+        return np.full_like(time, level)
+    span = random.uniform(4, 12)
+    return np.asarray(level + span * np.sin(np.pi * time / time[-1] * random.uniform(0.8, 1.7)))

@@ -1,0 +1,51 @@
+"""A miniature of benchmarks/diagnosis_campaign.py: cases made by another physics than the model."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from campaign.case import Plan
+from campaign.run import run_case
+
+NOTHING = (101, 102, 103, 104, 105, 106)
+ONE = {
+    "layer-thickness": 201,
+    "drum-eccentricity": 202,
+    "frame-compliance": 203,
+    "length-time-offset": 204,
+    "pulley-coulomb": 205,
+    "cell-gain": 206,
+    "cell-drift": 207,
+    "torque-constant": 208,
+    "motor-coulomb": 209,
+    "cable-elongation-linear": 210,
+}
+STRANGE = {"outside-harmonic": 301, "outside-sticky-place": 302, "outside-crosstalk": 303}
+
+
+@pytest.mark.parametrize("seed", NOTHING)
+def test_nothing_hidden_nothing_named(seed: int, tmp_path: Path) -> None:
+    score = run_case(seed, Plan("none", 3.0, small=True), tmp_path)
+    assert score is not None
+    assert score.verdict == "adequate"
+    assert score.steps == ()
+
+
+@pytest.mark.parametrize(("effect", "seed"), ONE.items())
+def test_one_effect_is_in_the_first_set(effect: str, seed: int, tmp_path: Path) -> None:
+    score = run_case(seed, Plan("single", 3.0, (effect,), small=True), tmp_path)
+    assert score is not None
+    assert score.verdict == "explained"
+    assert effect in score.steps[0]
+    assert len(score.steps) == 1
+
+
+@pytest.mark.parametrize(("kind", "seed"), STRANGE.items())
+def test_what_no_effect_explains_gets_no_name(kind: str, seed: int, tmp_path: Path) -> None:
+    score = run_case(seed, Plan("outside", 3.0, (kind,), small=True), tmp_path)
+    assert score is not None
+    assert score.verdict in {"unknown", "partly"}
+    assert score.steps == ()

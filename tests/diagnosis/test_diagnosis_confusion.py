@@ -1,0 +1,99 @@
+"""Which effects data cannot tell apart, and which run would."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from diagnosis_runs import GROOVED, SPIRAL, Ride, made, term
+
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.result import Diagnosis
+from winchkit.effects.bind import Term
+from winchkit.schema.winch import WinchProfile
+
+HIDDEN = {
+    "radius": term("drum-radius", radius_error=3e-4),
+    "gain": term("cell-gain", gain_error=0.02),
+    "drag": term("motor-coulomb", torque=0.02),
+    "rope": term("cable-elongation-linear", axial_stiffness=2e5),
+}
+
+
+@cache
+def answer(hidden: str, masses: tuple[float, ...], drum: str = "grooved") -> Diagnosis:
+    profile: WinchProfile = GROOVED if drum == "grooved" else SPIRAL
+    own: tuple[Term, ...] = (HIDDEN[hidden],)
+    ride = Ride(samples=400, stroke=800.0 if drum == "spiral" else 400.0)
+    runs = [
+        made(int(10 * mass) + seed, profile, own, load_mass=mass, ride=ride)
+        for mass in masses
+        for seed in range(2)
+    ]
+    return diagnose(runs, profile).diagnosis
+
+
+def test_a_radius_and_a_ratio_are_one_set_on_a_grooved_drum() -> None:
+    found = answer("radius", (10.0, 25.0))
+    assert found.verdict == "explained"
+    (step,) = found.steps
+    assert set(step.effects) == {"drum-radius", "gear-ratio"}
+    (angle,) = step.angles.values()
+    assert angle < 0.01
+    # The same length by either: Δr/r = −e/(1 + e), with the lead of the grooves in between.
+    radius = step.parameters["drum-radius"]["radius_error"].value
+    ratio = step.parameters["gear-ratio"]["ratio_error"].value
+    assert radius == pytest.approx(3e-4, rel=0.05)
+    assert radius / 0.06 == pytest.approx(-ratio / (1 + ratio), rel=0.01)
+    named = {run.separates for run in found.next_runs}
+    assert all(set(pair) == {"drum-radius", "gear-ratio"} for pair in named)
+    assert named
+
+
+def test_a_gain_of_the_cell_stands_alone_with_several_loads() -> None:
+    found = answer("gain", (10.0, 20.0, 40.0))
+    assert found.verdict == "explained"
+    (step,) = found.steps
+    assert step.effects == ("cell-gain",)
+    estimate = step.parameters["cell-gain"]["gain_error"]
+    assert abs(estimate.value - 0.02) < 4 * estimate.std
+    assert found.next_runs == ()
+
+
+def test_under_one_load_a_gain_is_not_more_certain_than_it_is() -> None:
+    one, several = answer("gain", (10.0,)), answer("gain", (10.0, 20.0, 40.0))
+    assert "cell-gain" in one.steps[0].effects
+    assert len(one.steps[0].effects) >= len(several.steps[0].effects)
+    assert any(note.startswith("one load only") for note in one.notes)
+
+
+@pytest.mark.parametrize("hidden", ["drag", "rope"])
+def test_a_set_of_one_has_no_angles_and_no_next_run(hidden: str) -> None:
+    found = answer(hidden, (10.0, 25.0), "spiral")
+    (step,) = found.steps
+    assert step.effects == (HIDDEN[hidden].effect.id,)
+    assert step.angles == {}
+    assert found.next_runs == ()
+
+
+@pytest.mark.parametrize(
+    ("hidden", "masses", "drum"),
+    [
+        ("radius", (10.0, 25.0), "grooved"),
+        ("gain", (10.0,), "grooved"),
+        ("gain", (10.0, 20.0, 40.0), "grooved"),
+    ],
+)
+def test_the_parsimonious_one_comes_first_and_values_are_of_all(
+    hidden: str, masses: tuple[float, ...], drum: str
+) -> None:
+    for step in answer(hidden, masses, drum).steps:
+        assert list(step.parameters) == list(step.effects)
+        assert set(step.angles) == set(step.effects) - {HIDDEN[hidden].effect.id}
+        assert all(0 <= angle <= np.pi / 2 for angle in step.angles.values())
+        sizes = [len(values) for values in step.parameters.values()]
+        assert sizes == sorted(sizes)
+        own = step.parameters[HIDDEN[hidden].effect.id]
+        assert all(estimate.std > 0 for estimate in own.values())
+        assert 0 < step.heldout_gain < 1

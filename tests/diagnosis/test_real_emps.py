@@ -1,0 +1,147 @@
+"""A real drive, recorded by others, whose friction the model lacks: EMPS.
+
+A. Janot, M. Gautier, M. Brunot, "Data Set and Reference Models of EMPS", Workshop on Nonlinear
+System Identification Benchmarks, 2019. The data carry no licence and are no part of the project:
+they are looked for in the folder that WINCHKIT_EMPS names, and beside the checkout in
+``shared/data/emps``; the tests are skipped where there are none.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from winchkit.cli.add import write_addition
+from winchkit.diagnosis.add import Addition, add
+from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.diagnose import diagnose, inquire
+from winchkit.diagnosis.result import Diagnosis
+from winchkit.effects.bind import line_of, modifiers_of
+from winchkit.effects.catalogue import load_catalogue
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
+from winchkit.runs import read_run
+from winchkit.runs.run import Run
+from winchkit.schema.read import read_winch
+from winchkit.schema.winch import WinchProfile
+
+VARIABLE = "WINCHKIT_EMPS"
+PROFILE = """\
+schema = 1
+kind = "winch"
+name = "emps"
+
+[drum]
+kind = "grooved"
+winding_radius = "1 m"
+groove_pitch = "0 mm"
+
+[gearbox]
+ratio = 1
+
+[reference]
+wound_turns = 0
+
+[[effect]]
+id = "rotor-inertia"
+inertia = "95.11 kg m^2"
+
+[[effect]]
+id = "motor-viscous"
+viscosity = "203.5 N m s"
+"""
+
+
+def folder() -> Path | None:
+    """Where the data are, if they are anywhere."""
+    beside = [parent / "shared" / "data" / "emps" for parent in Path(__file__).resolve().parents]
+    told = os.environ.get(VARIABLE)
+    for place in [Path(told)] if told else beside:
+        if (place / "train.csv").is_file() and (place / "test.csv").is_file():
+            return place
+    return None
+
+
+DATA = folder()
+pytestmark = pytest.mark.skipif(
+    DATA is None, reason=f"the EMPS data are not here; {VARIABLE} names the folder that has them"
+)
+
+
+@cache
+def run_of(name: str) -> Run:
+    assert DATA is not None
+    return read_run(DATA / f"{name}.csv")
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("emps") / "emps.toml"
+    path.write_text(PROFILE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def profile(source: Path) -> WinchProfile:
+    return read_winch(source)
+
+
+@pytest.fixture(scope="module")
+def answer(profile: WinchProfile) -> Diagnosis:
+    return diagnose([run_of("train")], profile).diagnosis
+
+
+@pytest.fixture(scope="module")
+def addition(profile: WinchProfile) -> Addition:
+    return add("motor-coulomb", [run_of("train")], profile)
+
+
+def error_on_test(line: Line) -> float:
+    """Rms of the torque's residual over rms of the torque, both low-passed; the oracle's own."""
+    run = run_of("test")
+    predicted = line.predict(line.motion(Signals(run.time, run["motor_angle"])))["motor_torque"]
+    sections = butter(4, 20.0, fs=1 / run.interval, output="sos")
+
+    def filtered(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(sosfiltfilt(sections, signal))
+
+    measured = filtered(run["motor_torque"])
+    left = measured - filtered(predicted)
+    return float(np.sqrt(np.mean(left**2) / np.mean(measured**2)))
+
+
+def test_coulomb_friction_is_named_first(answer: Diagnosis) -> None:
+    first = answer.steps[0].effects if answer.steps else ()
+    assert first
+    assert set(first) <= {"motor-coulomb", "motor-coulomb-asymmetry"}
+    assert first[0] == "motor-coulomb"
+    assert any("no run repeats another" in note for note in answer.notes)
+
+
+def test_without_friction_even_a_refitted_model_misses_a_sixth(profile: WinchProfile) -> None:
+    inquiry = inquire(prepare([run_of("train")], profile), load_catalogue())
+    fitted, _ = inquiry.settle(inquiry.begin)
+    error = error_on_test(Line(profile, modifiers_of(fitted.hypothesis.terms)))
+    assert 0.16 < error < 0.20
+
+
+def test_with_friction_the_error_falls_under_nine_percent(
+    source: Path, addition: Addition, tmp_path: Path
+) -> None:
+    better = tmp_path / "better.toml"
+    write_addition(source, addition, ["train.csv"], better)
+    assert error_on_test(line_of(read_winch(better))) < 0.09
+
+
+def test_the_sizes_are_those_that_others_found(addition: Addition) -> None:
+    """Janot and others identify 95.1 kg, 203.5 N s/m and 20.4 N; the drum has a radius of 1 m."""
+    values = {term.effect.id: dict(term.values) for term, _ in addition.terms}
+    assert values["rotor-inertia"]["inertia"] == pytest.approx(95.1, rel=0.02)
+    assert values["motor-viscous"]["viscosity"] == pytest.approx(203.5, rel=0.1)
+    assert values["motor-coulomb"]["torque"] == pytest.approx(20.4, rel=0.15)

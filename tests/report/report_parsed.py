@@ -1,0 +1,51 @@
+"""A page taken apart, for the tests of all pages."""
+
+from __future__ import annotations
+
+import json
+from html.parser import HTMLParser
+from typing import Any
+
+VOID = {"meta", "br", "hr", "img", "link", "input"}
+HOSTILE = (
+    '</script><script>alert("x")</script><img src=http://evil.example/a onerror=alert(1)>&<!--'
+)
+
+
+class Page(HTMLParser):
+    """A page taken apart: elements, text outside scripts, scripts; every element must close."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.scripts: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open[-1:] == ["script"]:
+            self.scripts.append(data)
+        elif self.open[-1:] != ["style"]:
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join("".join(self.words).replace("\u00a0", " ").split())
+
+    @property
+    def plots(self) -> dict[str, Any]:
+        return json.loads(self.scripts[0])
+
+    def count(self, tag: str) -> int:
+        return sum(name == tag for name, _ in self.elements)

@@ -1,0 +1,59 @@
+"""The option ``--html`` of compare, diagnose and add: the answer as a page beside the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from winchkit.errors import Fault, FileError
+
+__all__ = ["given_options", "html_option", "page_title", "write_page"]
+
+html_option = click.option("--html", metavar="FILE", help="Also write the answer as one page.")
+_PAGE_BEGINS = b"<!DOCTYPE html>"
+
+
+def write_page(path: str, page: str) -> None:
+    """Write a page and say so on stderr; the folder is made where its parent exists.
+
+    Raises FileError where it cannot be written, and for a file there that is no page: a run
+    named after ``--html`` by mistake stays what it is.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(exist_ok=True)
+        if target.is_file() and not _may_be_replaced(target):
+            raise FileError(
+                Fault("holds something else than a page and was left alone; name another", path)
+            )
+        target.write_text(page, encoding="utf-8")
+    except OSError as error:
+        reason = error.strerror or error
+        raise FileError(
+            Fault(f"the page cannot be written: {reason}; name another file for --html", path)
+        ) from error
+    click.echo(f"report: {path}", err=True)
+
+
+def page_title(profile: str, runs: Sequence[str], effect: str = "") -> str:
+    """``bench-spiral: a.csv, b.csv``."""
+    added = f" with {effect}" if effect else ""
+    return f"{profile}{added}: {', '.join(Path(run).name for run in runs)}"
+
+
+def given_options(
+    effect_files: Sequence[str], winch: str | None, band: float | None
+) -> tuple[str, ...]:
+    """What a command was given beside runs and profile, as words to repeat it with."""
+    out = [word for path in effect_files for word in ("--effects", path)]
+    out += [] if winch is None else ["--winch", winch]
+    out += [] if band is None else ["--band", f"{band:g}"]
+    return tuple(out)
+
+
+def _may_be_replaced(target: Path) -> bool:
+    """Whether a file is empty or an earlier page."""
+    with target.open("rb") as there:
+        return there.read(len(_PAGE_BEGINS)) in {b"", _PAGE_BEGINS}

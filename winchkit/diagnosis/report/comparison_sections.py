@@ -1,0 +1,102 @@
+"""The sections of a comparison's page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from winchkit.diagnosis.follows import Followed
+from winchkit.diagnosis.report.comparison_rows import HEAD, followed, offset_text, size_rows
+from winchkit.diagnosis.report.markup import Markup, element, join, section, table
+from winchkit.diagnosis.report.parts import bullets, drawings, lead
+from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.diagnosis.report.plots import AT_NOISE, OutputPlots
+from winchkit.diagnosis.report.repeat import Command, repeat
+from winchkit.diagnosis.report.sentence import capital, often_per_turn
+from winchkit.diagnosis.report.wording import percent, quantity, significant, unbroken
+from winchkit.diagnosis.result import Comparison, OutputError
+
+__all__ = ["comparison_sections", "distance_text"]
+
+_NEXT = (
+    "A comparison tells how far off the model is, not why: winchkit diagnose, as written below, "
+    "names the effect that is missing, or says that none is."
+)
+
+
+def comparison_sections(
+    comparison: Comparison, plots: Sequence[OutputPlots], command: Command
+) -> Markup:
+    """Everything below the title."""
+    profile = command.profile
+    return join(
+        [
+            _lead(comparison, plots),
+            section("residuals", "Where the model fails", *drawings(plots)),
+            section("notes", "Notes", bullets(comparison.notes)),
+            repeat(
+                command,
+                [command.compare(profile), command.diagnose(profile)],
+                "comparison",
+                comparison.to_json(),
+            ),
+        ]
+    )
+
+
+def distance_text(name: str, error: OutputError, over: Followed | None) -> str:
+    """How far one output is off, beside its noise, and what the error follows."""
+    off = f"The {OUTPUT_NAMES.get(name, name)} is off by {quantity(error.rms, error.unit)} rms"
+    if error.noise_rms is None:
+        return f"{off}, its noise unknown without a repeated run; {_following(over)}."
+    noise = f"its noise of {quantity(error.noise_rms, error.unit)}"
+    if _at_noise(error):
+        return f"{off}, about {noise}."
+    ratio = error.rms / error.noise_rms if error.noise_rms else None
+    beside = "beside" if ratio is None else f"{significant(ratio, 2)} times"
+    return f"{off}, {beside} {noise}; {_following(over)}."
+
+
+def _following(over: Followed | None) -> str:
+    if over is None:
+        return "it hardly follows anything that was measured"
+    share = f"({percent(over.share)} of the error)"
+    if over.order is not None:
+        return f"it repeats {often_per_turn(over.variable, over.order)} {share}"
+    return f"it follows the {VARIABLE_NAMES.get(over.variable, over.variable)} {share}"
+
+
+def _lead(comparison: Comparison, plots: Sequence[OutputPlots]) -> Markup:
+    over = {own.output: own.followed for own in plots}
+    outputs = comparison.outputs
+    told = [distance_text(name, error, over.get(name)) for name, error in outputs.items()]
+    rows = [
+        [name, _trends(error), *sizes, _ratio(error)]
+        for (name, *sizes), error in zip(size_rows(comparison), outputs.values(), strict=True)
+    ]
+    caption = "Measured less predicted, the profile's values as they are in the file."
+    inside = [table(caption, ["output", "trends with", *HEAD[1:], "rms / noise"], rows, words=2)]
+    if comparison.offset is not None:
+        inside.append(element("p", f"{capital(offset_text(comparison.offset))}."))
+    return lead(*_chip(list(outputs.values())), told, *inside, element("p", _NEXT, class_="quiet"))
+
+
+def _trends(error: OutputError) -> str:
+    """What the error follows; an order within a turn is no trend, and stands in the sentence."""
+    return unbroken(followed(error)) if error.follows else "–"
+
+
+def _ratio(error: OutputError) -> str:
+    return f"{error.rms / error.noise_rms:.2f}" if error.noise_rms else "–"
+
+
+def _chip(errors: Sequence[OutputError]) -> tuple[str, str]:
+    """The comparison in a word, and its tone."""
+    if any(error.noise_rms is not None and not _at_noise(error) for error in errors):
+        return "Above the noise", "partly"
+    if any(error.noise_rms is None for error in errors):
+        return "Noise unknown", "partly"
+    return "At the noise", "adequate"
+
+
+def _at_noise(error: OutputError) -> bool:
+    return error.noise_rms is not None and error.rms < AT_NOISE * error.noise_rms

@@ -1,0 +1,58 @@
+"""Parts that the pages of a diagnosis, a comparison and an addition share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from winchkit.diagnosis.report.markup import Markup, element
+from winchkit.diagnosis.report.phrases import OUTPUT_NAMES
+from winchkit.diagnosis.report.plots import OutputPlots, Plot
+from winchkit.diagnosis.report.sentence import capital
+from winchkit.diagnosis.report.wording import unbroken
+
+__all__ = ["bullets", "drawings", "lead"]
+
+
+def lead(chip: str, tone: str, sentences: Sequence[str], *inside: Markup) -> Markup:
+    """What a page comes to: a word, plain sentences, and the figures behind them.
+
+    ``tone`` colours it as the verdicts are: adequate, explained, partly, unknown.
+    """
+    told = [element("p", unbroken(text), class_="sentence") for text in sentences]
+    return element(
+        "section",
+        element("h2", chip, id="verdict-heading", class_="chip"),
+        *told,
+        *inside,
+        id="verdict",
+        class_=f"verdict {tone}",
+        aria_labelledby="verdict-heading",
+    )
+
+
+def bullets(lines: Sequence[str]) -> Markup:
+    """A list of sentences; nothing where there is none."""
+    items = [element("li", capital(line)) for line in lines]
+    return element("ul", *items) if items else Markup("")
+
+
+def drawings(plots: Sequence[OutputPlots], first: Sequence[str] = ()) -> list[Markup]:
+    """The figures of every output; some outputs come first."""
+    ordered = sorted(
+        plots, key=lambda p: first.index(p.output) if p.output in first else len(first)
+    )
+    return [_output(own) for own in ordered]
+
+
+def _output(own: OutputPlots) -> Markup:
+    title = element("h3", capital(OUTPUT_NAMES.get(own.output, own.output)))
+    if own.over_variable is None:
+        words = element("p", "It hardly follows anything that was measured.", class_="quiet")
+        return element("div", title, _figure(own.over_time), words, class_="output")
+    pair = element("div", _figure(own.over_time), _figure(own.over_variable), class_="pair")
+    return element("div", title, pair, class_="output")
+
+
+def _figure(plot: Plot) -> Markup:
+    canvas = element("div", class_="plot", data_plot=plot.id, role="img", aria_label=plot.caption)
+    return element("figure", canvas, element("figcaption", unbroken(plot.caption)))
