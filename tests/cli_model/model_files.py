@@ -45,6 +45,7 @@ KINK = Effect(
 """
 """A user's own effect, which no catalogue has."""
 HEIGHT = 1.5e-3
+SHIPPED = Path(__file__).parents[2] / "profiles" / "bench-spiral.toml"
 
 
 def invoke(*arguments: object) -> Result:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -135,6 +136,15 @@ def refused(code: int, said: str, *arguments: object) -> None:
 
 def test_the_good_run_is_good(good: Path) -> None:
     assert invoke("compare", good, "-p", "bench-spiral").exit_code == 0
+
+
+@pytest.mark.xfail(
+    reason="one run alone: the catalogue's columns explain narrow low bands whole, and what is "
+    "left there is taken for the noise"
+)
+def test_the_good_run_alone_lacks_nothing(good: Path) -> None:
+    result = invoke("diagnose", good, "-p", "bench-spiral", "--json")
+    assert json.loads(result.stdout)["verdict"] == "adequate"
 
 
 def test_faults_of_all_files_come_at_once(good: Path, tmp_path: Path) -> None:

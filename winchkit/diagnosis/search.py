@@ -55,9 +55,8 @@ def search(inquiry: Inquiry) -> Found:
     begin_scores = scores = inquiry.scores(present, noise)
     chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
     threshold = max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
-    alarmed = still = _anything(begin_presence, begin_scores, threshold)
     for _ in range(_MOST_STEPS):
-        if not still or not scores or scores[0].value <= threshold:
+        if not scores or scores[0].value <= threshold:
             break
         grown = _grow(inquiry, present, noise, scores)
         if grown is None:
@@ -66,26 +65,32 @@ def search(inquiry: Inquiry) -> Found:
         present, noise = inquiry.settle(grown.hypothesis, noise)
         present, noise = _reconsider(inquiry, present, noise)
         scores = inquiry.scores(present, noise)
-        still = _anything(inquiry.presence(present, noise), scores, threshold)
     present, noise = _without_the_doubtful(inquiry, present, noise)
+    grew = len(present.hypothesis.terms) > inquiry.given
+    end_presence = inquiry.presence(present, noise)
     return Found(
         begin=begin,
         begin_noise=begin_noise,
         begin_presence=begin_presence,
-        alarmed=alarmed,
+        alarmed=grew or _missing(begin_presence, begin_scores, threshold),
         final=present,
         noise=noise,
-        presence=inquiry.presence(present, noise),
-        still=still,
+        presence=end_presence,
+        still=_missing(end_presence, inquiry.scores(present, noise), threshold),
         scores=tuple(begin_scores),
         threshold=threshold,
     )
 
 
-def _anything(presence: Presence, scores: list[Score], threshold: float) -> bool:
-    """Whether the residual holds more than noise."""
-    by_score = bool(scores) and scores[0].value > threshold
-    return by_score or presence.p_value < _PRESENCE_LEVEL
+def _missing(presence: Presence, scores: list[Score], threshold: float) -> bool:
+    """Whether the residual holds more than noise.
+
+    With repeats that is measured. A high score of an effect that then fails out of sample is no
+    evidence beside it; without repeats it is all there is.
+    """
+    if np.isfinite(presence.p_value):
+        return presence.p_value < _PRESENCE_LEVEL
+    return bool(scores) and scores[0].value > threshold
 
 
 def _grow(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> Fit | None:
