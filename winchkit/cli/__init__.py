@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, NoReturn
 
 import click
@@ -11,6 +12,11 @@ from winchkit.cli.lazy import At, LazyGroup
 from winchkit.cli.outcome import finish
 
 __all__ = ["main"]
+
+# The matrices here are small: threads of a linear algebra library spin longer than they work, and
+# take the processor from a bench in real time. They read this once, when numpy is imported.
+for _library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 COMMANDS: dict[str, At] = {
     "demo": At("winchkit.cli.demo", "Find a hidden effect on a simulated bench, start to end."),

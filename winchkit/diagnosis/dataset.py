@@ -16,6 +16,7 @@ from winchkit.diagnosis.admit import OUTPUTS, admit
 from winchkit.diagnosis.calm import calm_motions
 from winchkit.diagnosis.repeats import Repeats, find_repeats
 from winchkit.diagnosis.spectrum import Band, torque_band
+from winchkit.errors import UsageError
 from winchkit.model.derivatives import reach_of
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
@@ -85,6 +86,8 @@ def prepare(
     ``band`` overrides the torque's low-pass, Hz; ``skirt`` is how far beyond it is kept: what
     the filter all but removes tells nothing and is left out of fits, but belongs to an rms.
     """
+    if band is not None and not 0 < band < np.inf:
+        raise UsageError(f"a low-pass at {band} Hz cannot be meant; give a frequency above zero")
     notes = admit(runs, profile)
     return replace(assemble(runs, profile, band, skirt), notes=tuple(notes))
 

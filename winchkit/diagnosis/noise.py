@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 _KNOWN_DIFFERENCES = 6
 _NOTICEABLE = 0.02
 _REWEIGHTED = 3
+_ROWS_EACH = 4
 
 
 @dataclass(frozen=True)
@@ -75,15 +76,16 @@ def noise_from_repeats(problem: Problem, residual: Array, known: Array) -> Noise
     count = len(problem.bands)
     freedom = _sums(np.ones_like(split.difference), split.difference_band, count)
     power = _power(problem, split.difference, split.difference_band, freedom)
-    difference = split.difference
-    if known.size:
-        weight = 1 / np.sqrt(power[split.difference_band])
+    whole = freedom
+    for _ in range(_REWEIGHTED if known.size else 0):
+        # What differs for a known reason made the first weights: they are drawn anew without it.
+        weight = 1 / np.sqrt(_smooth(problem, power, np.maximum(freedom, 0.1))[0])
+        weight = weight[split.difference_band]
         basis = _noticeable(problem, known, weight)
-        if basis.shape[1]:
-            whitened = difference * weight
-            difference = (whitened - basis @ (basis.T @ whitened)) / weight
-            freedom = freedom - _sums(np.sum(basis**2, axis=1), split.difference_band, count)
-            power = _power(problem, difference, split.difference_band, np.maximum(freedom, 1.0))
+        whitened = split.difference * weight
+        left = (whitened - basis @ (basis.T @ whitened)) / weight
+        freedom = whole - _sums(np.sum(basis**2, axis=1), split.difference_band, count)
+        power = _power(problem, left, split.difference_band, np.maximum(freedom, 1.0))
     power, freedom = _smooth(problem, power, np.maximum(freedom, 0.1))
     return Noise(power, freedom, _rms(problem, power), from_repeats=True)
 
@@ -101,12 +103,11 @@ def noise_saturated(problem: Problem, residual: Array, columns: Array) -> Noise:
     power = _even(problem, residual)
     for _ in range(_REWEIGHTED):
         weight = 1 / np.sqrt(power[bands])
-        basis = _orthonormal(columns * weight[:, None])
+        basis = _orthonormal(columns * weight[:, None], _fewest_rows(problem) // _ROWS_EACH)
         whitened = residual * weight
         left = (whitened - basis @ (basis.T @ whitened)) / weight
         freedom = np.maximum(total - _sums(np.sum(basis**2, axis=1), bands, count), 1.0)
         power = _power(problem, left, bands, freedom)
-    power, freedom = _smooth(problem, power, freedom)
     return Noise(power, freedom, _rms(problem, power), from_repeats=False)
 
 
@@ -200,14 +201,28 @@ def _nearest(weight: Array, split: _Split) -> Array:
     return power[split.mean_band]
 
 
-def _orthonormal(columns: Array) -> Array:
-    """Orthonormal basis of columns, those that add nothing left out; (rows, rank)."""
+def _fewest_rows(problem: Problem) -> int:
+    """Rows of the output that has fewest."""
+    rows = dict.fromkeys(problem.dataset.outputs, 0)
+    for segment in problem.segments:
+        rows[segment.output] += len(segment.band.frequency)
+    return min(rows.values())
+
+
+def _orthonormal(columns: Array, most: int | None = None) -> Array:
+    """Orthonormal basis of columns, those that add nothing left out; (rows, rank).
+
+    Of more than ``most`` directions the strongest are kept: as many columns as a short run has
+    rows would leave no noise at all.
+    """
     size = np.sqrt(np.sum(columns**2, axis=0))
     scaled = columns[:, size > 0] / size[size > 0]
     if not scaled.shape[1]:
         return np.zeros((len(columns), 0))
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
     kept = values > 1e-8 * values[-1]
+    if most is not None:
+        kept[: max(0, len(values) - most)] = False
     return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.dataset import Dataset
-from winchkit.diagnosis.spectrum import Band, narrow_edges, to_frequency, to_time
+from winchkit.diagnosis.spectrum import Band, band_edges, narrow_edges, to_frequency, to_time
 from winchkit.effects.bind import Term, modifiers_of
 from winchkit.effects.coordinates import Coordinates
 from winchkit.model.line import Line
@@ -248,7 +248,10 @@ class Problem:
         for output in self.dataset.outputs:
             own = [s for s in self.segments if s.output == output]
             longest = max(own, key=lambda s: s.band.count)
-            edges = narrow_edges(longest.band.frequency)
+            # Repeats are smoothed over narrow bands; what a saturated fit leaves is not.
+            frequency = longest.band.frequency
+            repeated = bool(self.dataset.repeated)
+            edges = narrow_edges(frequency) if repeated else band_edges(frequency, 1)
             for segment in own:
                 inside = np.searchsorted(edges, segment.band.frequency, side="right") - 1
                 ids[segment.rows] = len(bands) + inside

@@ -65,18 +65,31 @@ def _shift(first: Signals, other: Signals) -> float | None:
         return None
     begun = first.time[0], other.time[0]
     a, b = (_evenly(run, step) for run in (first, other))
-    moved = np.diff(a), np.diff(b)
-    if not moved[0].any() or not moved[1].any():
+    if not np.ptp(a) or not np.ptp(b):
         return None
-    lag = int(np.argmax(correlate(moved[1], moved[0], mode="full"))) - (len(moved[0]) - 1)
+    lag = _best_lag(a, b)
     start, stop = max(0, -lag), min(len(a), len(b) - lag)
-    if stop - start < _OVERLAP * min(len(a), len(b)):
-        return None
     apart = a[start:stop] - b[start + lag : stop + lag]
     spread = float(np.std(a[start:stop]))
     if float(np.sqrt(np.mean(apart**2))) > _ANGLE_AGREES * spread:
         return None
     return lag * step + float(begun[1] - begun[0])
+
+
+def _best_lag(a: Array, b: Array) -> int:
+    """Samples by which b is behind a where their mean square difference is least.
+
+    Not where they correlate most: that is another lag where a log begins or ends in motion.
+    """
+    lags = np.arange(1 - len(a), len(b))
+    start, stop = np.maximum(0, -lags), np.minimum(len(a), len(b) - lags)
+    mean = a.mean()
+    a, b = a - mean, b - mean
+    within_a, within_b = (np.concatenate([[0.0], np.cumsum(x**2)]) for x in (a, b))
+    squares = within_a[stop] - within_a[start] + within_b[stop + lags] - within_b[start + lags]
+    apart = (squares - 2 * correlate(b, a, mode="full")) / (stop - start)
+    enough = stop - start >= _OVERLAP * min(len(a), len(b))
+    return int(lags[np.argmin(np.where(enough, apart, np.inf))])
 
 
 def _equally_loaded(first: Signals, other: Signals) -> bool:

@@ -48,6 +48,7 @@ _NEEDED = {
     "gearing": "a gearbox",
 }
 _UNIDENTIFIABLE = 1e-7
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,9 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
                 place = slice(len(columns), len(columns) + len(own))
                 atoms.append(Atom(effect, shape, place, tuple(secant for secant, _ in own)))
                 columns += [column for _, column in own]
-    stacked = np.array(columns).T if columns else np.zeros((problem.rows, 0))
+    stacked = np.empty((problem.rows, len(columns)))
+    for index in reversed(range(len(columns))):
+        stacked[:, index] = columns.pop()
     return Signatures(tuple(atoms), stacked, _gram(problem, stacked))
 
 
@@ -203,6 +206,11 @@ class Projected:
         atom = self.found.atoms[index]
         return np.asarray(root @ (root.T @ products[atom.columns]))
 
+    def strength(self, index: int) -> float:
+        """λ for one usual size of an atom; zero where it cannot be identified."""
+        first = self.found.atoms[index].columns.start
+        return float(self.inner[first, first]) if self._roots[index].shape[1] else 0.0
+
     def simulated(self, samples: int = _SIMULATIONS) -> Array:
         """Products that noise alone would give, its power known only so well; (p, samples)."""
         random = np.random.default_rng(0)
@@ -218,6 +226,9 @@ class Projected:
     def _root(self, atom: Atom, plain: Array) -> Array:
         """R with R Rᵀ the inverse of an atom's inner products, where they can be identified."""
         inner = self.inner[atom.columns, atom.columns]
+        if np.max(plain[atom.columns]) < _ROUNDING:
+            # What a usual size moves by less than rounding would let chance reach any level.
+            return np.zeros((len(inner), 0))
         size = np.sqrt(np.maximum(plain[atom.columns], _NOTHING))
         values, vectors = np.linalg.eigh(inner / np.outer(size, size))
         kept = values > _UNIDENTIFIABLE
@@ -250,7 +261,7 @@ def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
     for index, gain in enumerate(projected.gains(products).tolist()):
         atom = projected.found.atoms[index]
         value = gain - atom.freedom * float(np.log(rows))
-        strength = float(projected.inner[atom.columns.start, atom.columns.start])
+        strength = projected.strength(index)
         out.append(Score(atom, gain, value, projected.amplitudes(index, products), strength))
     return sorted(out, key=lambda s: -s.value)
 

@@ -67,7 +67,8 @@ def record(
         label = "-".join(f"{mass:g}kg" for mass in dict.fromkeys(run_plan.load_mass.values()))
         seen[label] += 1
         name = f"{programme.name}-{label}-{seen[label]}"
-        rows = _Recording(bench, profiles, run_plan, f"{seed}/{programme.name}/{index}", rate).rows()
+        own_seed = f"{seed}/{programme.name}/{index}"
+        rows = _Recording(bench, profiles, run_plan, own_seed, rate).rows()
         yield _as_run(name, rows, bench, programme, run_plan)
 
 
