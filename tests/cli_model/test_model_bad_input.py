@@ -138,10 +138,6 @@ def test_the_good_run_is_good(good: Path) -> None:
     assert invoke("compare", good, "-p", "bench-spiral").exit_code == 0
 
 
-@pytest.mark.xfail(
-    reason="one run alone: the catalogue's columns explain narrow low bands whole, and what is "
-    "left there is taken for the noise"
-)
 def test_the_good_run_alone_lacks_nothing(good: Path) -> None:
     result = invoke("diagnose", good, "-p", "bench-spiral", "--json")
     assert json.loads(result.stdout)["verdict"] == "adequate"

@@ -144,10 +144,6 @@ def test_a_wave_that_does_not_repeat_is_noise() -> None:
     assert 2 * SIZE < noise.rms["cable_length"] < 1.05 * SIZE * np.sqrt(1 + 9)
 
 
-@pytest.mark.xfail(
-    reason="the known difference is estimated with weights that it made itself; once more with the "
-    "weights of what is left would do"
-)
 def test_what_differs_for_a_known_reason_is_no_noise() -> None:
     random = np.random.default_rng(7)
     slope = np.linspace(-1, 1, RIDE.samples)

@@ -133,13 +133,7 @@ def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
     "encoder",
     [
         1e-4,
-        pytest.param(
-            0.0,
-            marks=pytest.mark.xfail(
-                reason="a candidate that moves the prediction by rounding only lets chance reach "
-                "any level, so that nothing is found"
-            ),
-        ),
+        0.0,
     ],
     ids=["a noisy encoder", "an encoder that is still at rest"],
 )

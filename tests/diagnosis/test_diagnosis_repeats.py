@@ -55,7 +55,6 @@ def test_repeats_line_up_whatever_their_clocks_starts_ends_and_gaps(
     assert np.count_nonzero(~exact) <= len(lost) + 2
 
 
-@pytest.mark.xfail(reason="the lag of most correlation is not that of least difference")
 def test_a_log_that_began_in_motion_is_a_repeat() -> None:
     runs = signals(EVEN), signals(EVEN[EVEN >= 2.0])
     (group,) = find_repeats(list(runs))

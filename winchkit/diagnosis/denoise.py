@@ -47,19 +47,23 @@ def quiet(signal: Array) -> Array:
 
 
 def agreed(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
-    """What repeats agree on of each signal, on its own samples; zero where they do not overlap."""
+    """What its repeats know of each signal, on its own samples; zero where they do not overlap.
+
+    A signal's own noise takes no part: it is in what the signal predicts as well, and what is
+    left of it would be taken for a lag or a loop that denoises it.
+    """
     if len(signals) < 2:
         return [quiet(signal) for signal in signals]
     aligned = np.array([signal[index] for signal, index in zip(signals, rows, strict=True)])
-    mean, differences = contrasts(aligned)
-    full = np.asarray(dct(mean, type=2, norm="ortho"))
+    _, differences = contrasts(aligned)
     noise = np.mean(np.asarray(dct(differences, type=2, norm="ortho", axis=1)) ** 2, axis=0)
-    shared = _gained(full, full**2, noise) / np.sqrt(len(signals))
     out = []
-    for signal, index in zip(signals, rows, strict=True):
-        own = np.zeros_like(signal)
-        own[index] = shared
-        out.append(own)
+    for own, (signal, index) in enumerate(zip(signals, rows, strict=True)):
+        others, _ = contrasts(np.delete(aligned, own, axis=0))
+        full = np.asarray(dct(others, type=2, norm="ortho"))
+        shared = np.zeros_like(signal)
+        shared[index] = _gained(full, full**2, noise) / np.sqrt(len(signals) - 1)
+        out.append(shared)
     return out
 
 

@@ -29,6 +29,7 @@ __all__ = [
 Array = NDArray[np.float64]
 _BLOCKS = 48
 _TOUCHED = 0.02
+_AT_LEAST = 8
 _RIDGE = 1e-12
 
 
@@ -73,21 +74,30 @@ def groups_of(problem: Problem) -> Folds:
 
 
 def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> float:
-    """Variance of a fold's prediction from the other folds, at most, in units of the noise's.
+    """Variance of a fold's prediction from the other folds, at most, over the noise's.
 
-    Above one the unknowns rest mainly on the fold that is left out.
+    Per output and in its unit, as held-out errors are told: noise that is strongest at low
+    frequencies makes a level or a slope, known from the other folds only, far less sure than
+    whitened rows say.
     """
-    columns = _in_time(problem, _shared(fit) * noise.weight(problem)[:, None])
+    shared = _shared(fit)
+    columns = _in_time(problem, shared * noise.weight(problem)[:, None])
+    plain = _in_time(problem, shared)
     fold = np.concatenate(folds.of)
+    output = np.concatenate([np.full(s.band.count, s.output) for s in problem.segments])
     size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
-    scaled = columns / size
-    whole = scaled.T @ scaled
+    columns, plain = columns / size, plain / size
+    whole = columns.T @ columns
     worst = 0.0
     for index in range(folds.count):
-        own = scaled[fold == index]
-        inner = own.T @ own
-        rest = np.linalg.inv(whole - inner + _RIDGE * np.eye(len(whole)))
-        worst = max(worst, float(np.trace(rest @ inner)) / len(own))
+        own = fold == index
+        rest = whole - columns[own].T @ columns[own] + _RIDGE * np.eye(len(whole))
+        covariance = np.linalg.inv(rest)
+        for name, rms in noise.rms.items():
+            rows = plain[own & (output == name)]
+            if len(rows):
+                variance = float(np.mean(np.einsum("ij,jk,ik->i", rows, covariance, rows)))
+                worst = max(worst, variance / rms**2)
     return worst
 
 
@@ -141,9 +151,10 @@ def confidence(before: Array, after: Array) -> float:
     """
     change = before - after
     size = np.abs(change)
-    touched = change[size > _TOUCHED * size.max()] if size.max() > 0 else change[:0]
-    if len(touched) < 5:
-        return 1.0 if np.sum(change) <= 0 else 0.05
+    if size.max() == 0 or len(size) < _AT_LEAST:
+        return 1.0
+    # Fewer could not be certain by rank, however much each gains.
+    touched = change[size >= min(_TOUCHED * size.max(), np.sort(size)[-_AT_LEAST])]
     return float(wilcoxon(touched, alternative="greater").pvalue)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,9 @@ from winchkit.effects.effect import Effect
 __all__ = ["Inquiry", "Trial"]
 
 Array = NDArray[np.float64]
-_FEW = 2
+_UNSURE = 0.2
+_BY_ITSELF = 0.5
+_HALVINGS = 7
 
 
 @dataclass(frozen=True)
@@ -77,15 +79,11 @@ class Inquiry:
     def folds(self, fitted: Fit, noise: Noise) -> Folds:
         """What to hold out for a fit: whole groups, or blocks where groups would not tell.
 
-        With two groups, say two loads, either may be the only one that determines an unknown: a
-        prediction that rests on nothing fails whether or not the effect is there.
+        With few groups, say two loads, one may be what determines an unknown: a prediction that
+        rests on little fails whether or not the effect is there.
         """
-        if (
-            self.groups.count == _FEW
-            and extrapolation(self.problem, fitted, noise, self.groups) > 1
-        ):
-            return self._five_blocks
-        return self.groups
+        unsure = extrapolation(self.problem, fitted, noise, self.groups) > _UNSURE
+        return self._five_blocks if unsure else self.groups
 
     @cached_property
     def _five_blocks(self) -> Folds:
@@ -154,10 +152,69 @@ class Inquiry:
         for index in reversed(range(self.given, len(hypothesis.terms))):
             if hypothesis.terms[index].effect.id in effect.contains:
                 hypothesis = hypothesis.without(index)
-        begun = hypothesis.with_term(Term(effect, _starting_values(item)), self.problem.runs)
-        fitted = fit(self.problem, begun, noise.weight(self.problem))
-        price = np.inf if _in_disguise(fitted.hypothesis.terms[-1]) else self.criterion(fitted)
+        weight = noise.weight(self.problem)
+        begun = [
+            hypothesis.with_term(Term(effect, values), self.problem.runs)
+            for values in self._placed(hypothesis, present, item, weight)
+        ]
+        fitted = min((fit(self.problem, start, weight) for start in begun), key=lambda f: f.cost)
+        price = self.criterion(fitted)
+        if _in_disguise(fitted.hypothesis.terms[-1]) or (
+            price < self.criterion(present) and self._rests_on_states(hypothesis, fitted, noise)
+        ):
+            price = np.inf
         return Trial(effect, fitted, float(price))
+
+    def _placed(
+        self, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array
+    ) -> list[dict[str, float]]:
+        """Where fits begin; a moment is first sought between the points of its grid.
+
+        A step far from its moment has no gradient towards it, but its gain rises all the way.
+        """
+        begun = _starting_values(item)
+        places = [p for p in Coordinates(item.atom.effect).shapes if p.grid and p.low == 0.0]
+        if not places or len(begun) > 1:
+            return begun
+        place, values = places[0], begun[0]
+        here = self.problem.change(hypothesis)
+        residual, jacobian = present.residual * weight, present.jacobian * weight[:, None]
+
+        def gain(at: float) -> float:
+            term = Term(item.atom.effect, {**values, place.name: at})
+            column = self.problem.change(hypothesis.with_term(term, self.problem.runs)) - here
+            column = column * weight
+            column = column - jacobian @ np.linalg.lstsq(jacobian, column)[0]
+            size = float(column @ column)
+            return float((column @ residual) ** 2) / size if size else 0.0
+
+        at, step = values[place.name], _gap(place.grid, values[place.name])
+        best = gain(at)
+        for _ in range(_HALVINGS):
+            step /= 2
+            tried = {gain(x): x for x in (at - step, at + step) if place.low <= x <= place.high}
+            if tried and max(tried) > best:
+                best = max(tried)
+                at = tried[best]
+        return [{**values, place.name: at}]
+
+    def _rests_on_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
+        """Whether the last term explains mainly by the states in which the runs began.
+
+        A free state per run is a free level per load: creep far slower than the runs would
+        explain whatever depends on the load. What remembers must show by how it changes.
+        """
+        hypothesis = fitted.hypothesis
+        if not hypothesis.starts[-1]:
+            return False
+        weight, last = noise.weight(self.problem), len(hypothesis.terms) - 1
+        base = self.refit(without, noise)
+        at_rest = replace(hypothesis, starts=(*hypothesis.starts[:-1], ()))
+        column = self.problem.change(at_rest) - self.problem.change(hypothesis.without(last))
+        present, column = base.jacobian * weight[:, None], column * weight
+        column = column - present @ np.linalg.lstsq(present, column)[0]
+        alone = (column @ (base.residual * weight)) ** 2 / max(float(column @ column), 1e-300)
+        return bool(alone < _BY_ITSELF * (base.cost - fitted.cost))
 
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """Fit a hypothesis under a given noise."""
@@ -188,19 +245,24 @@ def _in_disguise(term: Term) -> bool:
     return bool(np.any(ends[shapes]))
 
 
-def _starting_values(item: Score) -> dict[str, float]:
-    """Values at which a fit of an atom begins: its linear amplitudes, within bounds."""
+def _gap(grid: tuple[float, ...], at: float) -> float:
+    """Distance from a point of a grid to its farther neighbour."""
+    index = grid.index(at)
+    return max(abs(grid[i] - at) for i in (index - 1, index + 1) if 0 <= i < len(grid))
+
+
+def _starting_values(item: Score) -> list[dict[str, float]]:
+    """Values at which fits of an atom begin: its linear amplitudes within bounds, or its probes."""
     atom = item.atom
     coordinates = Coordinates(atom.effect)
     base = {**atom.effect.null, **atom.shape}
     usual = [{**base, **secant} for secant in atom.secants]
     if atom.effect.probes:
-        best = int(np.argmax(np.abs(item.amplitudes)))
-        return usual[best]
+        return usual
     null = coordinates.vector(base)
     vector = null + sum(
         amplitude * (coordinates.vector(values) - null)
         for amplitude, values in zip(item.amplitudes, usual, strict=True)
     )
     low, high = coordinates.bounds()
-    return coordinates.values(np.clip(vector, low, high), base)
+    return [coordinates.values(np.clip(vector, low, high), base)]

@@ -159,7 +159,7 @@ def _as_run(
     if temperature is not None:
         channels["temperature"] = Channel(temperature, "degC")
     for output in dataset.outputs:
-        if output in predicted and np.ptp(predicted[output]) > 0:
+        if output in predicted:
             channels[output] = Channel(predicted[output], "")
     metadata = {} if mass is None else {"load_mass": f"{mass!r} kg"}
     return Run("imagined", time, channels, metadata)

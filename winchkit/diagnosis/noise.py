@@ -43,6 +43,20 @@ class Noise:
         """1/σ of every row."""
         return np.asarray(1 / np.sqrt(self.power[problem.band_of_row]))
 
+    def uncertainty(self, problem: Problem) -> dict[str, float]:
+        """By how much (relative, two deviations) mean squares may exceed the noise's by chance.
+
+        Coloured noise has few independent values: most of its power is in its lowest bands.
+        """
+        rows = _sums(np.ones(problem.rows), problem.band_of_row, len(self.power))
+        total, spread = self.power * rows, (self.power * rows) ** 2
+        out = {}
+        for output in self.rms:
+            own = np.array([band[0] == output for band in problem.bands])
+            variance = 2 * np.sum((spread * (1 / self.freedom + 1 / np.maximum(rows, 1.0)))[own])
+            out[output] = float(2 * np.sqrt(variance) / np.sum(total[own]))
+        return out
+
 
 @dataclass(frozen=True)
 class Presence:

@@ -10,7 +10,7 @@ import numpy as np
 from winchkit.diagnosis.admit import OUTPUT_UNITS
 from winchkit.diagnosis.compare import signal_rms
 from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.gate import held_out_rms
+from winchkit.diagnosis.gate import Folds, held_out_rms
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.problem import Problem
@@ -47,7 +47,10 @@ def judge(inquiry: Inquiry, found: Found) -> Judgement:
     inside it. The candidates stay, and a note says what came closest.
     """
     share = _unexplained(inquiry, found)
-    outputs = output_fits(inquiry, (found.begin, found.begin_noise), (found.final, found.noise))
+    folds = _folds(inquiry, found)
+    outputs = output_fits(
+        inquiry, (found.begin, found.begin_noise), (found.final, found.noise), folds
+    )
     verdict = _verdict(found, outputs, share)
     added = found.final.labels[inquiry.given :]
     if verdict == "explained" or not added:
@@ -62,13 +65,18 @@ def _unexplained(inquiry: Inquiry, found: Found) -> float:
     """Share of the excess over the noise that the final model leaves, in sample or held out."""
     if not found.alarmed:
         return 0.0
-    folds = inquiry.folds(found.final, found.noise)
+    folds = _folds(inquiry, found)
     held = [
         held_out_rms(inquiry.problem, fitted, found.noise, folds)
         for fitted in (found.begin, found.final)
     ]
+    # Where the bands hold nothing more, what an output is over its noise may be chance.
+    chance = {} if found.still else found.noise.uncertainty(inquiry.problem)
     squares = [
-        sum(max(0.0, (rms[o] / noise) ** 2 - 1) for o, noise in found.noise.rms.items())
+        sum(
+            max(0.0, (rms[o] / noise) ** 2 - 1 - chance.get(o, 0.0))
+            for o, noise in found.noise.rms.items()
+        )
         for rms in held
     ]
     left = squares[1] / squares[0] if squares[0] > 0 else 0.0
@@ -79,6 +87,11 @@ def _unexplained(inquiry: Inquiry, found: Found) -> float:
         after = float(np.sum(np.maximum(found.presence.excess, 0.0)[found.presence.rejected]))
         left = max(left if left > _GENERALISES else 0.0, after / before if before > 0 else 0.0)
     return min(1.0, left)
+
+
+def _folds(inquiry: Inquiry, found: Found) -> Folds:
+    """Whole groups while something is left: an imitation fails there. Else what tells."""
+    return inquiry.groups if found.still else inquiry.folds(found.final, found.noise)
 
 
 def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
@@ -99,10 +112,13 @@ def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Ve
 
 
 def output_fits(
-    inquiry: Inquiry, begin: tuple[Fit, Noise], final: tuple[Fit, Noise]
+    inquiry: Inquiry,
+    begin: tuple[Fit, Noise],
+    final: tuple[Fit, Noise],
+    folds: Folds | None = None,
 ) -> dict[str, OutputFit]:
     """Every output before and after, in sample and held out, beside its noise."""
-    problem, folds = inquiry.problem, inquiry.folds(*final)
+    problem, folds = inquiry.problem, folds or inquiry.folds(*final)
     before, after = _rms(problem, begin[0]), _rms(problem, final[0])
     held_before = held_out_rms(problem, *begin, folds)
     held_after = held_out_rms(problem, *final, folds)

@@ -36,5 +36,9 @@ EFFECT = Effect(
     told_apart="Shift the guide by a known amount; or the torque at constant weight.",
     needs=("guide",),
     order=1,
-    probes=({"mismatch": 1e-3}, {"offset": 0.01, "mismatch": 1e-3}),
+    probes=(
+        {"mismatch": 1e-3},
+        {"offset": 0.01, "mismatch": 1e-3},
+        {"offset": -0.02, "mismatch": 1e-3},
+    ),
 )

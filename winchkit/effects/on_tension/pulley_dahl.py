@@ -30,7 +30,7 @@ EFFECT = Effect(
             "N/m",
             null=2e3,
             typical=2e3,
-            low=10.0,
+            low=0.1,
             high=1e7,
             role="shape",
             grid=(300.0, 1e3, 3e3, 1e4),
