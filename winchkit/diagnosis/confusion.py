@@ -59,9 +59,7 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
     for rival in rivals:
         trial = inquiry.trial(base, rival, noise)
         fitted = trial.fit
-        # A law of the same family that runs to its bound is not determined here: that is no
-        # reason to leave it out.
-        if not (np.isfinite(trial.criterion) or _kindred(rival.atom.effect, own.effect)):
+        if not np.isfinite(trial.criterion):
             continue
         theirs = held_out(inquiry.problem, fitted, noise, blocks)
         if base.cost - fitted.cost < _SHARE * (base.cost - final.cost):

@@ -87,7 +87,7 @@ def prepare(
     the filter all but removes tells nothing and is left out of fits, but belongs to an rms.
     """
     if band is not None and not 0 < band < np.inf:
-        raise UsageError(f"a low-pass at {band} Hz cannot be meant; give a frequency above zero")
+        raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
     notes = admit(runs, profile)
     return replace(assemble(runs, profile, band, skirt), notes=tuple(notes))
 

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 _ANGLE_AGREES = 0.02
 _LOAD_AGREES = 0.02
 _OVERLAP = 0.8
+_AS_GOOD = 1e-6
 _SAME_RATE = 0.05
 
 
@@ -89,7 +90,10 @@ def _best_lag(a: Array, b: Array) -> int:
     squares = within_a[stop] - within_a[start] + within_b[stop + lags] - within_b[start + lags]
     apart = (squares - 2 * correlate(b, a, mode="full")) / (stop - start)
     enough = stop - start >= _OVERLAP * min(len(a), len(b))
-    return int(lags[np.argmin(np.where(enough, apart, np.inf))])
+    apart = np.where(enough, apart, np.inf)
+    # A motion that repeats within itself fits at several lags: then the one with most in common.
+    fits = apart <= apart.min() + _AS_GOOD * float(np.mean(a**2))
+    return int(lags[fits][np.argmax((stop - start)[fits])])
 
 
 def _equally_loaded(first: Signals, other: Signals) -> bool:
