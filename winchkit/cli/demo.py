@@ -69,7 +69,8 @@ def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
     _tell_findings(story, comparison, findings)
     truth = demo_loop.truth_of(bench)
     right = findings.right(truth)
-    hidden = _tell_truth(story, findings, truth)
+    hidden = ", ".join(truth) or "nothing"
+    story.tell(f"The truth: {hidden} was hidden. {'Found.' if right else 'Not found.'}")
     report = _write_report(out, story, findings, profile_name, hidden)
     seconds = time.monotonic() - begun
     story.say(f"Report: {report}   ({seconds:.0f} s)")
@@ -114,16 +115,6 @@ def _tell_findings(story: _Story, comparison: Comparison, findings: Findings) ->
     if findings.addition is not None:
         added = findings.addition.added[0].effect.id
         story.tell(f"Added {added} to a copy of the profile: improved.toml beside nominal.toml.")
-
-
-def _tell_truth(story: _Story, findings: Findings, truth: tuple[str, ...]) -> str:
-    """Reveal what was hidden; returns it in words."""
-    hidden = ", ".join(truth) or "nothing"
-    found = "Found." if findings.right(truth) else "Not found."
-    story.tell(f"The truth: {hidden} was hidden. {found}")
-    for trace in findings.traces:
-        story.tell(f"A trace was named beside it, {trace}: this bench hides no such effect.")
-    return hidden
 
 
 def _write_report(

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
     from winchkit.diagnosis.add import Addition
     from winchkit.diagnosis.diagnose import Answer
-    from winchkit.diagnosis.result import Step as Found
     from winchkit.errors import MotionError
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme, Step
@@ -29,7 +28,6 @@ Told = Callable[[str], None]
 
 PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
 _AT_NOISE = 1.3
-_TRACE = 0.1
 _TURN = 5e-4
 _APPROACH = 0.5
 _TRIES = 4
@@ -44,23 +42,10 @@ class Findings:
     """The effect named first, added to the profile."""
 
     @property
-    def main(self) -> Found | None:
-        """The step that buys most out of sample; None where nothing is missing."""
-        return max(self.answer.diagnosis.steps, key=lambda s: s.heldout_gain, default=None)
-
-    @property
     def named(self) -> tuple[str, ...]:
-        """Effects of that step, as the data leave them; empty where nothing is missing."""
-        return self.main.effects if self.main else ()
-
-    @property
-    def traces(self) -> tuple[str, ...]:
-        """What was named beside it and buys less than a tenth as much."""
-        if self.main is None:
-            return ()
-        enough = _TRACE * self.main.heldout_gain
+        """Effects of the first step, as the data leave them; empty where nothing is missing."""
         steps = self.answer.diagnosis.steps
-        return tuple(s.effects[0] for s in steps if s is not self.main and s.heldout_gain < enough)
+        return steps[0].effects if steps else ()
 
     @property
     def worst_held_out(self) -> float:
@@ -72,15 +57,11 @@ class Findings:
         )
 
     def right(self, truth: tuple[str, ...]) -> bool:
-        """Whether the hidden effect, and beside it traces only, was found, and the error is noise.
-
-        The bench is real time: what a busy machine does to it is in the data, and may be seen.
-        """
+        """Whether the hidden effect, and nothing else, was found, and the error is noise now."""
         steps = self.answer.diagnosis.steps
         if not truth:
             return not steps and self.answer.diagnosis.verdict == "adequate"
-        alone = len(steps) == 1 + len(self.traces)
-        return alone and truth[0] in self.named and self.worst_held_out <= _AT_NOISE
+        return len(steps) == 1 and truth[0] in self.named and self.worst_held_out <= _AT_NOISE
 
 
 def programmes() -> list[Programme]:
@@ -137,7 +118,7 @@ def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
     answer = diagnose(runs, profile)
     if not answer.diagnosis.steps:
         return Findings(answer, None)
-    addition = add(Findings(answer, None).named[0], runs, profile)
+    addition = add(answer.diagnosis.steps[0].effects[0], runs, profile)
     write_addition(nominal, addition, [run.name for run in runs], out / "improved.toml")
     return Findings(answer, addition)
 
