@@ -64,7 +64,7 @@ def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) ->
             for name, estimate in values.items() if effect in case.hidden else ():
                 true, std = case.hidden[effect].get(name), estimate["std"]
                 if true is not None and std is not None and np.isfinite(std) and std > 0:
-                    off = _apart(name, estimate["value"], true)
+                    off = _apart(effect, name, estimate["value"], true)
                     covered[0] += abs(off) <= 1.96 * std
                     covered[1] += 1
     ratios = [
@@ -103,8 +103,9 @@ def refused(case: Case, message: str, seconds: float) -> Score:
     return score(case, nothing, float("nan"), seconds)
 
 
-def _apart(name: str, value: float, true: float) -> float:
-    off = value - true
+def _apart(effect: str, name: str, value: float, true: float) -> float:
+    """How far off; a guide's path is the same with offset and mismatch both negative."""
+    off = abs(value) - abs(true) if effect == "guide-offset" else value - true
     return float((off + np.pi) % (2 * np.pi) - np.pi) if name == "phase" else off
 
 

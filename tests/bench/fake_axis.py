@@ -12,7 +12,7 @@ from winchkit.bench.supervisor import Supervisor
 from winchkit.drivers.can.axis import AxisFeedback
 from winchkit.drivers.can.cia402 import State, Wish, control_word
 from winchkit.drivers.can.heartbeat import HeartbeatWatch
-from winchkit.drivers.modbus.reading import Quality, Reading
+from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import LimitSpec
 
@@ -85,7 +85,15 @@ class FakeAxis:
         )
         self._sync = (sync, now)
 
-    def send(self, wish: Wish, *, velocity: float = 0.0, angle: float | None = None) -> int:
+    def send(
+        self,
+        wish: Wish,
+        *,
+        velocity: float = 0.0,
+        angle: float | None = None,
+        start: bool = False,
+    ) -> int:
+        assert not start, "it makes no motion of its own"
         assert self.feedback is not None
         previous = self.words[-1] if self.words else 0
         fresh = self.feedback.sync >= self._sync[0] - 1

@@ -1,8 +1,7 @@
-"""Other motion modes, several winches, and parts of the recorder and the keyboard by themselves."""
+"""Other motion modes, several winches, and parts of the keyboard by themselves."""
 
 from __future__ import annotations
 
-import math
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,12 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
-from winchkit.bench.series import Series
 from winchkit.cli.keys import HeldKey, split_keys
 from winchkit.errors import NotPermitted
 from winchkit.runs import read_run
@@ -102,37 +98,6 @@ def test_a_drive_without_the_mode_is_not_opened(tmp_path: Path) -> None:
             live.winches["A"].drive.objects.put(0x6502, 0, 0x01)
         with pytest.raises(NotPermitted, match="no mode CSV"):
             open_bench(live.bench_spec)
-
-
-@given(
-    steps=st.lists(st.floats(1e-3, 0.09), min_size=3, max_size=40),
-    slope=st.floats(-5, 5),
-    moments=st.lists(st.floats(0, 1), min_size=1, max_size=20),
-)
-def test_a_straight_line_is_interpolated_exactly(
-    steps: list[float], slope: float, moments: list[float]
-) -> None:
-    series = Series(max_gap=0.1)
-    times = np.cumsum(steps)
-    for time in times:
-        series.append(float(time), slope * float(time) + 1)
-    for moment in sorted(times[0] + share * (times[-1] - times[0]) for share in moments):
-        assert series.at(float(moment)) == pytest.approx(slope * moment + 1, abs=1e-9)
-
-
-def test_no_value_without_neighbours() -> None:
-    series = Series(max_gap=0.1)
-    assert math.isnan(series.at(0.0))
-    for time, value in ((1.0, 1.0), (1.05, 2.0), (1.5, 3.0), (1.52, math.nan), (1.54, 5.0)):
-        series.append(time, value)
-    series.append(1.5, 99.0)
-    assert math.isnan(series.at(0.9)), "before the first"
-    assert series.at(1.0) == 1.0
-    assert math.isnan(series.at(1.2)), "a gap is not bridged"
-    assert math.isnan(series.at(1.51)), "nor is a missing value"
-    assert series.at(1.54) == 5.0
-    assert math.isnan(series.at(1.6)), "after the last"
-    assert not series.reaches(1.6)
 
 
 def test_a_held_key_refreshes_shortly_and_a_single_press_lasts() -> None:

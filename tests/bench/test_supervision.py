@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from winchkit.bench.motion import Jog
 from winchkit.bench.snapshot import Phase
 from winchkit.drivers.can.cia402 import State
-from winchkit.drivers.modbus.reading import Quality
+from winchkit.drivers.reading import Quality
 from winchkit.schema.bench import LimitSpec
 
 LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0), tension_high=500.0, tension_slack=20.0)

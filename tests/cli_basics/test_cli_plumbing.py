@@ -89,6 +89,12 @@ def test_the_version() -> None:
     assert (result.exit_code, result.output) == (0, f"winchkit, version {winchkit.__version__}\n")
 
 
+def test_the_package_is_the_command_line_too() -> None:
+    command = [sys.executable, "-m", "winchkit", "--version"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout
+    assert told == f"winchkit, version {winchkit.__version__}\n"
+
+
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_command_of_the_table_is_there(name: str) -> None:
     result = CliRunner().invoke(main, [name, "--help"])

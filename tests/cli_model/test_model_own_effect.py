@@ -49,8 +49,8 @@ def test_an_own_effect_is_added_and_then_belongs_to_the_profile(
     bent: list[Path], mine: Path, profile: Path, tmp_path: Path
 ) -> None:
     new = tmp_path / "new.toml"
-    arguments = ("-p", profile, "--effects", mine, "--fit", *bent, "-o", new)
-    found = answer("add", "kinked-rope", *arguments)
+    arguments = ("-p", profile, "--effects", mine, "kinked-rope", "--fit", *bent, "-o", new)
+    found = answer("add", *arguments)
     after = found["outputs"]["cable_length"]
     assert after["heldout_rms_after"] < 1.3 * after["noise_rms"]
     compared = answer("compare", *bent, "-p", new, "--effects", mine)["outputs"]

@@ -11,7 +11,8 @@ from scipy.stats import norm
 
 from winchkit.diagnosis.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.next_run import KINDS, next_runs
+from winchkit.diagnosis.kinds import KINDS
+from winchkit.diagnosis.next_run import next_runs
 from winchkit.diagnosis.power import detectable
 from winchkit.diagnosis.result import Detectable, NextRun
 from winchkit.diagnosis.signature import chance_level

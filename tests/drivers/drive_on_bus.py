@@ -20,6 +20,9 @@ from winchkit.sim.drive import SimDrive
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
 from winchkit.sim.servo import DriveCommand
 
+INERTIA = 0.01
+"""Of the flywheel, kg m²."""
+
 _channels = itertools.count()
 
 
@@ -48,7 +51,10 @@ class Flywheel:
             wish = command.speed
             if command.angle is not None:
                 wish += 25.0 * (command.angle - self.motor_angle)
-        self.motor_velocity += (wish - self.motor_velocity) * -math.expm1(-duration / 0.004)
+        if command.power and command.torque is not None:
+            self.motor_velocity += command.torque / INERTIA * duration
+        else:
+            self.motor_velocity += (wish - self.motor_velocity) * -math.expm1(-duration / 0.004)
         self.motor_angle += self.motor_velocity * duration
 
     def measure(self) -> Flywheel:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Peer:
-    """Answers FC 3 and FC 6 on 127.0.0.1; ``behave`` may change, delay or swallow an answer."""
+    """Answers FC 3, 6 and 16 on 127.0.0.1; ``behave`` may change, delay or swallow an answer."""
 
     registers: dict[int, int] = field(default_factory=dict)
     end: int = 200
@@ -21,6 +21,8 @@ class Peer:
     """Unit, number of the request, answer PDU -> delay (s) and PDU, or None for silence."""
     requests: list[tuple[int, int, int, int]] = field(default_factory=list)
     """Unit, function, address, count or value."""
+    written: Callable[[Peer, int, int], None] = lambda _peer, _address, _value: None
+    """Called with every register that is written."""
     connections: int = 0
     port: int = 0
     _loop: asyncio.AbstractEventLoop = field(default_factory=asyncio.new_event_loop)
@@ -86,9 +88,18 @@ class Peer:
         function, address, number = struct.unpack_from(">BHH", pdu)
         self.requests.append((unit, function, address, number))
         if function == 6:
-            self.registers[address] = number
+            self._write(address, number)
             return pdu
+        if function == 16:
+            for k, value in enumerate(struct.unpack_from(f">{number}H", pdu, 6)):
+                self.requests[-1] = (unit, function, address, value)
+                self._write(address + k, value)
+            return pdu[:5]
         if address + number > self.end:
             return bytes((function | 0x80, 2))
         words = [self.registers.get(address + k, 0) for k in range(number)]
         return struct.pack(f">BB{number}H", function, 2 * number, *words)
+
+    def _write(self, address: int, value: int) -> None:
+        self.registers[address] = value
+        self.written(self, address, value)

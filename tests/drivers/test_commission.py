@@ -37,7 +37,8 @@ def rig() -> Iterator[Rig]:
 
 
 def axis_on(bus: CanBus, *, brake: bool = True, node: int = 1, cycle: float = 0.004) -> Cia402Axis:
-    return Cia402Axis(bus, node, device(), WatchSpec(127, 0.05, cycle, brake), CLOCK)
+    watch = WatchSpec(127, 0.05, cycle, brake, prove=False)
+    return Cia402Axis(bus, node, device(), watch, CLOCK)
 
 
 def run_cycles(bus: CanBus, axis: Cia402Axis, wish: Wish, count: int, velocity: float = 0) -> None:
@@ -195,10 +196,11 @@ def test_a_drive_left_enabled_is_stopped_before_anything_else(rig: Rig) -> None:
     drive, bus = rig
     axis = axis_on(bus)
     axis.commission()
+    other = axis_on(bus)
     run_cycles(bus, axis, Wish.ENABLE, 30, velocity=2.0)
     assert drive.shaft.motor_velocity > 1.0
     drive.frames.clear()
-    axis_on(bus).commission()
+    other.commission()
     controls = [w for w in sdo_writes(drive) if w[0] == 0x6040]
     assert controls
     assert all(value & 0xFFFF == 2 for _, _, value in controls)
@@ -220,3 +222,30 @@ def test_no_snapshot_is_made_of_two_syncs(rig: Rig) -> None:
     time.sleep(0.02)
     assert axis.feedback.time == 5.0, "without a SYNC nothing new was sampled"
     assert math.isfinite(axis.feedback.torque)
+
+
+def test_offsets_that_another_master_left_do_not_move_the_drive(rig: Rig) -> None:
+    """60B1h is added to the target velocity: at zero the motor would turn."""
+    drive, bus = rig
+    with drive.lock:
+        for index in (0x60B0, 0x60B1, 0x60B2):
+            drive.drive.objects.put(index, 0, 3000)
+    axis = axis_on(bus)
+    axis.commission()
+    assert [drive.drive.objects.number(index) for index in (0x60B0, 0x60B1, 0x60B2)] == [0, 0, 0]
+    run_cycles(bus, axis, Wish.ENABLE, 30)
+    assert axis.state is State.OPERATION_ENABLED
+    assert drive.shaft.motor_velocity == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_drive_that_boots_while_it_is_waited_for_can_be_moved(rig: Rig) -> None:
+    """Its boot-up comes after commissioning began, and before anything was set up."""
+    drive, bus = rig
+    axis = axis_on(bus)
+    with drive.lock:
+        drive.drive.power_on(time.monotonic(), boot_time=0.2)
+    axis.commission()
+    assert axis.heartbeat.boot_ups == 1
+    assert not axis.mapping_lost
+    run_cycles(bus, axis, Wish.ENABLE, 20)
+    assert axis.state is State.OPERATION_ENABLED

@@ -13,8 +13,9 @@ from modbus_peer import Peer
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.modbus.instrument import Instrument
-from winchkit.drivers.modbus.reading import Reading
-from winchkit.drivers.modbus.service import Line, SlowDevices
+from winchkit.drivers.modbus.line import ModbusLine
+from winchkit.drivers.reading import Reading
+from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.read import read_device
@@ -36,7 +37,7 @@ def weigh(peer: Peer, counts: int, status: int = 1 << 11) -> None:
 @contextmanager
 def polled(peer: Peer, *instruments: Instrument, timeout: float = 0.1) -> Iterator[SlowDevices]:
     spec = BusSpec("modbus-tcp", host="127.0.0.1", port=peer.port, timeout=timeout)
-    slow = SlowDevices([Line("cells", spec, instruments)], CLOCK)
+    slow = SlowDevices([ModbusLine("cells", spec, instruments, CLOCK)])
     try:
         yield slow
     finally:
@@ -87,7 +88,8 @@ def test_a_late_reply_is_never_taken_for_the_next_request() -> None:
         weigh(peer, 1000)
         readings = collected(instrument)
         with polled(peer, instrument, timeout=0.05):
-            until(lambda: instrument.counters.timeouts >= 3, within=6.0)
+            until(lambda: instrument.counters.late >= 3, within=6.0)
+    assert instrument.counters.timeouts >= 3
     assert {reading.raw for reading in readings} == {1000}
 
 
@@ -101,7 +103,7 @@ def test_a_short_reply_is_refused() -> None:
         weigh(peer, 1000)
         readings = collected(instrument)
         with polled(peer, instrument):
-            until(lambda: instrument.counters.timeouts >= 1)
+            until(lambda: instrument.counters.malformed >= 1)
         assert isinstance(instrument.problem, NoReply)
     assert {reading.raw for reading in readings} == {1000}
 
@@ -167,13 +169,44 @@ def test_nobody_listens() -> None:
         assert f"127.0.0.1:{peer.port}" in str(instrument.problem)
 
 
-def test_commands_reach_the_device_between_polls() -> None:
+def obey(peer: Peer, address: int, value: int) -> None:
+    """Tare sets the bit of the net value in the status."""
+    if (address, value) == (5, 7):
+        peer.registers[6] |= 1 << 10
+
+
+def test_commands_reach_the_device_between_polls_and_are_seen_obeyed() -> None:
+    instrument = cell()
+    with Peer(written=obey) as peer:
+        weigh(peer, 1000)
+        with polled(peer, instrument) as slow:
+            until(lambda: instrument.latest is not None)
+            slow.command(instrument, "tare")
+            assert (1, 16, 5, 7) in peer.requests
+            assert instrument.tared
+            with pytest.raises(NotPermitted, match=r"no command .weigh.; its device file has tare"):
+                slow.command(instrument, "weigh")
+
+
+def test_a_command_that_is_taken_and_not_obeyed_is_told() -> None:
     instrument = cell()
     with Peer() as peer:
         weigh(peer, 1000)
         with polled(peer, instrument) as slow:
             until(lambda: instrument.latest is not None)
-            slow.command(instrument, "tare")
-            assert (1, 6, 5, 7) in peer.requests
-            with pytest.raises(NotPermitted, match=r"no command .weigh.; its device file has tare"):
-                slow.command(instrument, "weigh")
+            with pytest.raises(DeviceRefused, match=r"did not obey within 1 s.*'net' to come"):
+                slow.command(instrument, "tare")
+
+
+def test_the_eeprom_is_written_on_purpose_only() -> None:
+    instrument = cell()
+    with Peer() as peer:
+        weigh(peer, 1000)
+        with polled(peer, instrument) as slow:
+            until(lambda: instrument.latest is not None)
+            with pytest.raises(NotPermitted, match="EEPROM"):
+                slow.command(instrument, "store")
+            assert not any(function == 16 for _, function, _, _ in peer.requests)
+            instrument.may_store = True
+            slow.command(instrument, "store")
+            assert (1, 16, 5, 99) in peer.requests

@@ -10,7 +10,7 @@ from winchkit.drivers.can.emergency import error_text, parse_emergency
 from winchkit.drivers.can.heartbeat import HeartbeatProducer, HeartbeatWatch, NmtState
 from winchkit.drivers.can.pdo import MappedObject, PdoCodec, parse_object
 from winchkit.errors import FileError
-from winchkit.schema.device import PdoSpec
+from winchkit.schema.device_servo import PdoSpec
 
 
 @st.composite

@@ -160,5 +160,5 @@ def test_a_device_is_of_one_kind(file: Path) -> None:
     head = 'schema = 1\nkind = "device"\nname = "d"\nmaker = "m"\nmodel = "x"\nsource = "s"\n'
     faults = faults_of(file, head + 'trust = "manual"\n')
     assert [message for *_, message in faults] == [
-        "a device has exactly one of the tables [servo] and [modbus]"
+        "a device has exactly one of the tables [servo], [modbus], [stream] and [process]"
     ]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from model_lines import line_with, profile_with, swing
 
+from winchkit.model.derivatives import sharp_gradient
 from winchkit.model.line import GRAVITY, Line
 from winchkit.model.stages import Modifier, Signals, Stage
 from winchkit.schema.winch import (
@@ -184,3 +185,17 @@ def test_without_modifiers_tension_is_the_load_itself() -> None:
     time, angle = swing()
     load = 50 + 10 * np.sin(time)
     assert line.predict(line.motion(Signals(time, angle, load=load)))["tension"] is load
+
+
+def test_the_sharp_gradient_follows_a_ripple_and_keeps_straight_lines() -> None:
+    random = np.random.default_rng(3)
+    even = np.arange(200) * 0.02
+    uneven = even + random.uniform(-2e-3, 2e-3, 200)
+    line = 3.0 - 2.0 * uneven
+    assert sharp_gradient(line, uneven) == pytest.approx(np.full(200, -2.0), abs=1e-9)
+    ripple = np.sin(40.0 * even)
+    found = sharp_gradient(ripple, even)[3:-3]
+    assert found == pytest.approx(40.0 * np.cos(40.0 * even)[3:-3], abs=0.12)
+    cubic = even**3 - even
+    assert sharp_gradient(cubic, even)[3:-3] == pytest.approx((3 * even**2 - 1)[3:-3], abs=1e-9)
+    assert sharp_gradient(even[:5] ** 2, even[:5])[1:-1] == pytest.approx(2 * even[1:4])

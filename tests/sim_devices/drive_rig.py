@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 from typing import Any
 
 import canopen
 
 from winchkit.catalog import find
+from winchkit.schema.device_servo import QuirkSpec, ServoSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.drive import SimDrive
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
@@ -25,6 +26,11 @@ ENTRIES = read_eds(EDS, NODE)
 _DEVICE = read_device(find("devices", "generic-cia402"))
 assert _DEVICE.servo is not None
 SERVO = _DEVICE.servo
+
+
+def with_quirks(quirks: QuirkSpec) -> ServoSpec:
+    """The generic drive, departing from the standard."""
+    return replace(SERVO, quirks=quirks)
 
 
 @dataclass
@@ -63,7 +69,13 @@ class Rig:
     """A drive on a bus without a wire: the master's frames arrive at once, and time is ours."""
 
     def __init__(
-        self, shaft: Any = None, *, brake: bool = True, boot: bool = True, smoothing: float = 0.0
+        self,
+        shaft: Any = None,
+        *,
+        brake: bool = True,
+        boot: bool = True,
+        smoothing: float = 0.0,
+        servo: ServoSpec = SERVO,
     ) -> None:
         self.now = 100.0
         self.shaft: Any = Flywheel() if shaft is None else shaft
@@ -71,7 +83,7 @@ class Rig:
         self.drive = SimDrive(
             self._from_drive,
             NODE,
-            SERVO,
+            servo,
             ObjectDictionary(ENTRIES),
             self.shaft,
             brake=brake,

@@ -114,7 +114,9 @@ def test_enable_takes_a_pending_shutdown_back() -> None:
     assert rig.shaft.motor_velocity == pytest.approx(SPEED * COUNT)
 
 
-@pytest.mark.parametrize(("option", "rate"), [(0, None), (1, SLOW), (2, QUICK), (3, HARD)])
+@pytest.mark.parametrize(
+    ("option", "rate"), [(0, None), (1, SLOW), (2, QUICK), (3, HARD), (4, HARD)]
+)
 def test_fault_reaction_follows_605e(option: int, rate: int | None) -> None:
     rig = moving()
     rig.write(0x605E, 0, option)

@@ -16,7 +16,7 @@ from pymodbus.exceptions import ModbusException
 
 from winchkit.catalog import find
 from winchkit.errors import ConnectionLost
-from winchkit.schema.device import ModbusSpec
+from winchkit.schema.device_modbus import ModbusSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.modbus import ModbusLine
 from winchkit.sim.modbus_instrument import ModbusInstrument
@@ -89,14 +89,15 @@ def test_two_instruments_answer_by_their_units(client: ModbusTcpClient) -> None:
 
 def test_commands_act_on_the_device(served: Line, client: ModbusTcpClient) -> None:
     client.read_holding_registers(6, count=7, device_id=1)
-    assert not client.write_register(5, 7, device_id=1).isError()
+    assert client.write_register(5, 7, device_id=1).exception_code == 1
+    assert not client.write_registers(5, [7], device_id=1).isError()
     served.force = 300.0
     registers = client.read_holding_registers(6, count=7, device_id=1).registers
     assert registers[1:3] == [0, 30_000]
     assert registers[3:5] == [0, 5_000]
     assert not client.write_registers(5, [9], device_id=1).isError()
-    assert client.write_register(5, 4242, device_id=1).exception_code == 3
-    assert client.write_register(9, 1, device_id=1).isError()
+    assert client.write_registers(5, [4242], device_id=1).exception_code == 3
+    assert client.write_registers(9, [1], device_id=1).isError()
 
 
 def test_exceptions_say_what_is_wrong(client: ModbusTcpClient) -> None:

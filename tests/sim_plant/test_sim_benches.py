@@ -22,7 +22,8 @@ from winchkit.sim.plant import WinchPlant
 from winchkit.sim.schedule import schedule
 
 BENCHES = [row["name"] for row in listed_benches()]
-VARIANTS = [name for name in BENCHES if name not in ("spiral-bench", "grooved-bench")]
+WIRED_OTHERWISE = ("spiral-bench", "grooved-bench", "serial-bench")
+VARIANTS = [name for name in BENCHES if name not in WIRED_OTHERWISE]
 
 
 @pytest.mark.parametrize("name", BENCHES)

@@ -36,7 +36,7 @@ def test_dahl_agrees_with_a_solver(shape: float, travels: list[float]) -> None:
         force = relax(force, travel, LIMIT, SLOPE, shape)
         expected = by_solver(expected, travel, shape)
     # A shape below 1 reaches the sliding force in finite travel, where the law has a corner.
-    assert force == pytest.approx(expected, abs=2e-2 if shape < 1 else 2e-4)
+    assert force == pytest.approx(expected, abs=2e-3 if shape < 1 else 2e-4)
 
 
 @given(st.floats(-5, 5), st.floats(-0.01, 0.01), st.floats(1.0, 3.0))

@@ -9,34 +9,42 @@ from types import TracebackType
 from typing import Self
 
 from winchkit.bench.loop import Callback, ControlLoop
+from winchkit.bench.origin import origin
 from winchkit.bench.owner import Ownership
 from winchkit.bench.recorder import Recorder
-from winchkit.bench.snapshot import BenchSnapshot, Direction, Phase
+from winchkit.bench.resetting import reset
+from winchkit.bench.snapshot import BenchSnapshot, Direction
+from winchkit.bench.together import begin_together, wait_together
+from winchkit.bench.waiting import (
+    await_cycles,
+    await_feedback,
+    await_rest,
+    await_sensors,
+)
 from winchkit.bench.winch import Winch
 from winchkit.bench.wiring import Wired, wire
+from winchkit.drivers.can.axis import Cia402Axis
+from winchkit.drivers.can.health import BusHealth
+from winchkit.drivers.can.scan import Found, named_after, scan
 from winchkit.drivers.clock import Clock, MonotonicClock
-from winchkit.drivers.modbus.instrument import Instrument
+from winchkit.drivers.reading import Sensor
 from winchkit.errors import (
     ConnectionLost,
     DriveFault,
     LimitTripped,
     MotionError,
-    NoReply,
     NotPermitted,
     UsageError,
-    WinchkitError,
 )
+from winchkit.runs.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
 from winchkit.units import suggest
 
 __all__ = ["Bench", "open_bench"]
 
-_POLL = 0.01
-_FIRST_FEEDBACK = 2.0
-_FIRST_READING = 1.5
-_REST_TIME = 5.0
 _RELEASE = 0.5
-_RESET_TIME = 2.0
+_LISTEN = 1.1
+"""For heartbeats of nodes that are no winch, s."""
 
 
 class Bench:
@@ -52,6 +60,7 @@ class Bench:
             stack.callback(Ownership(spec).close)
             self._wired: Wired = wire(spec, clock, stack)
             self.loop: ControlLoop = self._wired.loop
+            self.axes: Mapping[str, Cia402Axis] = self._wired.axes
             self.winch: dict[str, Winch] = {
                 name: Winch(self, name, spec.winch[name], parts, dict(self._wired.sensors[name]))
                 for name, parts in self.loop.winches.items()
@@ -59,8 +68,9 @@ class Bench:
             self.loop.on_jog = self._jog_from_callback
             stack.callback(self.loop.close)
             self.loop.start()
-            self._await_feedback()
-            self._await_sensors()
+            await_feedback(self.loop, self.axes, clock)
+            every = (item for one in self.winch.values() for item in one.sensors.values())
+            await_sensors(every, clock)
             self._stack = stack.pop_all()
 
     def __enter__(self) -> Self:
@@ -82,6 +92,11 @@ class Bench:
         assert self.loop.snapshot is not None, "an open bench has had a cycle"
         return self.loop.snapshot
 
+    @property
+    def bus_health(self) -> dict[str, BusHealth]:
+        """What happened on each CAN bus since it was opened, by name."""
+        return {name: bus.health for name, bus in self._wired.buses.items()}
+
     def on_cycle(self, callback: Callback) -> Callable[[], None]:
         """Call a function with every cycle's snapshot, on the control thread.
 
@@ -99,46 +114,74 @@ class Bench:
 
     def stop(self, *, wait: bool = True) -> None:
         """Ramp every winch to rest, then disable. Always allowed."""
-        for winch in self.winch.values():
-            winch.stop(wait=False)
-        if wait:
-            self.wait_at_rest(self.winch)
+        self._run_down(self.winch, wait=wait)
+
+    def stop_with(self, name: str, *, wait: bool = True) -> None:
+        """Ramp this winch to rest, and with it all others unless ``stop_together`` is false."""
+        self._run_down(self.winch if self.spec.stop_together else (name,), wait=wait)
 
     def stop_now(self, *, wait: bool = True) -> None:
         """Quick-stop every winch. Whoever still holds a jog must let go before the next one."""
         self._released = self.clock.now() + _RELEASE
-        for parts in self.loop.winches.values():
-            parts.controller.stop()
+        with self.loop.ordering:
+            for parts in self.loop.winches.values():
+                parts.controller.stop()
         if wait:
             self.wait_at_rest(self.winch)
+
+    def move_together(
+        self,
+        lengths: Mapping[str, float],
+        speed: float | None = None,
+        acceleration: float | None = None,
+        *,
+        wait: bool = True,
+        hold: bool = False,
+    ) -> None:
+        """Move several winches to cable lengths (m by name), as one motion.
+
+        They start in the same control cycle, once every drive is enabled, and the shorter moves
+        are stretched to last as long as the longest. Else as :meth:`Winch.move_to`.
+        """
+        targets = {self.named(name): length for name, length in lengths.items()}
+        begin_together(self.loop, targets, speed, acceleration, hold=hold)
+        if wait:
+            wait_together(self.loop, tuple(targets), self.clock)
 
     def reset(self) -> None:
         """Clear trips and drive faults; drives that lost their set-up are commissioned again.
 
-        Nothing is enabled by it. Raises LimitTripped naming what still forbids any motion.
+        A bus that went down is opened again. Nothing is enabled by any of it. Raises LimitTripped
+        naming what still forbids any motion, ConnectionLost.
         """
-        self.wait_at_rest(self.winch)
-        tripped = {(trip.kind, trip.winch) for trip in self.snapshot.tripped}
-        for name, axis in self._wired.axes.items():
-            if {("boot-up", name), ("heartbeat", name), ("nmt", name), ("mode", name)} & tripped:
-                axis.commission()
-        self._await_feedback()
-        self._clear_faults()
-        beats = {name: axis.heartbeat.boot_ups for name, axis in self._wired.axes.items()}
-        self.loop.supervisor.reset(beats)
-        self._await_cycles(3)
-        still = [trip for trip in self.snapshot.blocked if trip.blocks is Direction.BOTH]
-        if still:
-            raise LimitTripped("still not free to move: " + "; ".join(map(str, still)))
+        reset(self._wired, self.spec, self.clock)
 
-    def log(self, path: str | Path, metadata: Mapping[str, str] | None = None) -> Recorder:
-        """Start logging to a file; ``with bench.log("lift.csv"):`` ends it."""
+    def scan(self) -> list[Found]:
+        """Who is on the CAN buses; reads only. Raises ConnectionLost."""
+        wiring = {name: one.servo for name, one in self.spec.winch.items()}
+        found = []
+        for name, bus in self._wired.buses.items():
+            own = {ref.node or 1: self.axes[w] for w, ref in wiring.items() if ref.bus == name}
+            found += scan(bus, self.spec.bus[name], self.clock, _LISTEN, own)
+        return named_after(self.spec, found)
+
+    def log(
+        self,
+        path: str | Path,
+        metadata: Mapping[str, str] | None = None,
+        rotate: str | None = None,
+    ) -> Recorder:
+        """Start logging to a file; ``with bench.log("lift.csv"):`` ends it.
+
+        With ``rotate`` (``"100MB"`` or ``"10min"``) it goes on in ``lift.002.csv`` and so on.
+        """
         recorder = Recorder(
             path,
             {name: winch.sensors for name, winch in self.winch.items()},
             self.clock,
-            {**self._wired.metadata, **(metadata or {})},
+            {**self._wired.metadata, **origin(self.spec), **(metadata or {})},
             self._stop_feeding,
+            rotation=None if rotate is None else Rotation.parse(rotate),
         )
         self._recorders.append(recorder)
         self.loop.samplers.append(recorder.feed)
@@ -148,6 +191,8 @@ class Bench:
         """Stop every winch in a controlled way and let the buses go. Twice does no harm."""
         with self._stack:
             if self.loop.alive:
+                # A function that still asks for motion is no longer heard.
+                self.loop.on_jog = lambda _name, _speed: None
                 self._come_to_rest()
                 self._wired.disarm()
             for recorder in tuple(self._recorders):
@@ -183,29 +228,9 @@ class Bench:
 
     def wait_at_rest(self, names: Iterable[str]) -> None:
         """Return when these winches are disabled and stand still; raises MotionError if not."""
-        deadline = self.clock.now() + _REST_TIME
-        controllers = {name: self.loop.winches[name].controller for name in names}
-        self._await_cycles(2)
-        while True:
-            seen = self.snapshot.winch
-            busy = [
-                name
-                for name, item in controllers.items()
-                if item.phase is not Phase.DISABLED or seen[name].phase is not Phase.DISABLED
-            ]
-            if not busy or not self.loop.alive:
-                return
-            if self.clock.now() > deadline:
-                for name in busy:
-                    controllers[name].stop()
-                state = self.snapshot.winch[busy[0]].state
-                raise MotionError(
-                    f"winch {busy[0]} did not come to rest within {_REST_TIME:g} s "
-                    f"(drive: {state}); use the emergency stop and look at the drive"
-                )
-            self.clock.sleep(_POLL)
+        await_rest(self.loop, names, self.clock)
 
-    def command(self, instrument: Instrument, name: str) -> None:
+    def command(self, instrument: Sensor, name: str) -> None:
         """Send a command of its device file to an instrument."""
         self._wired.command(instrument, name)
 
@@ -218,6 +243,13 @@ class Bench:
             what = f"no winch '{name}'" if name else "which winch?"
             raise UsageError(f"{what}; it has {', '.join(known)}" + suggest(name or "", known))
         return self.winch[name]
+
+    def _run_down(self, names: Iterable[str], *, wait: bool) -> None:
+        with self.loop.ordering:
+            for name in names:
+                self.winch[name].run_down()
+        if wait:
+            self.wait_at_rest(names)
 
     def _jog_from_callback(self, name: str, speed: float) -> None:
         try:
@@ -237,49 +269,7 @@ class Bench:
             self.stop()
         except MotionError:
             self.stop_now(wait=False)
-            self._await_cycles(50)
-
-    def _clear_faults(self) -> None:
-        for parts in self.loop.winches.values():
-            parts.controller.reset()
-        self._await_cycles(3)
-        deadline = self.clock.now() + _RESET_TIME
-        while self.clock.now() < deadline:
-            if all(p.controller.phase is not Phase.RESETTING for p in self.loop.winches.values()):
-                return
-            self.clock.sleep(_POLL)
-
-    def _await_feedback(self) -> None:
-        """Wait until every drive answers to SYNC."""
-        deadline = self.clock.now() + _FIRST_FEEDBACK
-        for name, axis in self._wired.axes.items():
-            while axis.feedback is None or self.loop.snapshot is None:
-                if self.loop.failure is not None:
-                    raise self.loop.failure
-                if self.clock.now() > deadline:
-                    raise NoReply(
-                        f"winch {name} ({axis.name}): the drive answers SDO but sends no PDOs on "
-                        f"SYNC within {_FIRST_FEEDBACK:g} s; check its PDO mapping and SYNC id 80h"
-                    )
-                self.clock.sleep(_POLL)
-        self._await_cycles(2)
-
-    def _await_sensors(self) -> None:
-        """Give every sensor time for its first answer; a silent one is told when it matters."""
-        deadline = self.clock.now() + _FIRST_READING
-        sensors = [item for winch in self.winch.values() for item in winch.sensors.values()]
-        while any(item.latest is None and item.problem is None for item in sensors):
-            if self.clock.now() > deadline:
-                return
-            self.clock.sleep(_POLL)
-
-    def _await_cycles(self, count: int) -> None:
-        """Let the loop take notice of what was just ordered."""
-        start, deadline = self.loop.count, self.clock.now() + 1.0
-        while self.loop.alive and self.loop.count < start + count:
-            if self.clock.now() > deadline:
-                raise WinchkitError("the control loop hangs; the drives stop by their heartbeat")
-            self.clock.sleep(self.spec.cycle / 2)
+            await_cycles(self.loop, self.clock, 50)
 
 
 def open_bench(bench: str | Path | BenchSpec, clock: Clock | None = None) -> Bench:

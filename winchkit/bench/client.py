@@ -9,6 +9,8 @@ from typing import Any
 
 from winchkit import errors
 from winchkit.bench.owner import connect_to_owner
+from winchkit.drivers.can.fitting import Identity
+from winchkit.drivers.can.scan import Found
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
@@ -52,9 +54,42 @@ class RemoteStation:
         """Start to change the cable length."""
         self._call("step", winch, change, speed)
 
+    def move(
+        self,
+        winch: str | None,
+        to: float | None,
+        by: float | None,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start a move to a cable length, or by a change of it."""
+        self._call("move", winch, to, by, speed, acceleration)
+
+    def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
+        """Bytes of an object of a drive."""
+        found = self._call("read_object", winch, index, sub)
+        return None if found is None else bytes.fromhex(found)
+
+    def scan(self) -> list[Found]:
+        """Who is on the buses."""
+        return [
+            Found(**{**item, "identity": Identity(**item["identity"])})
+            for item in self._call("scanned")
+        ]
+
     def moving(self, winch: str | None) -> bool:
         """Whether a motion is under way."""
         return bool(self._call("moving", winch))
+
+    def home(
+        self, winch: str | None, method: int | None, at: float | None, speed: float | None
+    ) -> None:
+        """Start to home a winch."""
+        self._call("home", winch, method, at, speed)
+
+    def homing(self) -> bool:
+        """Whether the homing is under way."""
+        return bool(self._call("homing"))
 
     def stop(self) -> None:
         """Quick-stop every winch."""
@@ -68,9 +103,9 @@ class RemoteStation:
         """Tare a load cell."""
         return float(self._call("tare", winch))
 
-    def start_log(self, path: str) -> None:
+    def start_log(self, path: str, rotate: str | None = None) -> None:
         """Log to a file in the owner's process."""
-        self._call("start_log", path)
+        self._call("start_log", path, rotate)
 
     def log_rows(self) -> int:
         """Rows written so far."""
@@ -79,6 +114,10 @@ class RemoteStation:
     def end_log(self) -> int:
         """Finish the log."""
         return int(self._call("end_log"))
+
+    def counters(self) -> dict[str, dict[str, Any]]:
+        """What was counted by instrument, and for the log."""
+        return dict(self._call("counters"))
 
     def close(self) -> None:
         """Go away; the owner ends what was started here."""

@@ -15,7 +15,7 @@ from winchkit.bench.supervisor import Instrumented, Supervisor, WinchInput
 from winchkit.drivers.can.cia402 import State
 from winchkit.drivers.can.heartbeat import HeartbeatProducer, NmtState
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.modbus.reading import Reading
+from winchkit.drivers.reading import Reading
 from winchkit.errors import ConnectionLost
 
 __all__ = ["BusPort", "Callback", "ControlLoop", "SensorPort", "WinchParts"]
@@ -23,6 +23,10 @@ __all__ = ["BusPort", "Callback", "ControlLoop", "SensorPort", "WinchParts"]
 Callback = Callable[[BenchSnapshot], Mapping[str, float] | None]
 
 _STOPPED = (Phase.DISABLED, Phase.STOPPING, Phase.RESETTING)
+_DEAF = (
+    "the drive does not heed the stop; the host's heartbeat is withheld, so that the watchdogs of "
+    "all drives stop them; look at the drive before the reset"
+)
 _FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
 
 
@@ -43,10 +47,16 @@ class BusPort(Protocol):
 class SensorPort(Protocol):
     """What the loop needs of an instrument."""
 
-    latest: Reading | None
-    problem: ConnectionLost | None
     max_age: float
     """A reading older than this is stale, s."""
+
+    @property
+    def latest(self) -> Reading | None:
+        """Newest reading."""
+
+    @property
+    def problem(self) -> ConnectionLost | None:
+        """Why there is no new reading, while there is none."""
 
 
 @dataclass
@@ -70,8 +80,13 @@ class ControlLoop:
         supervisor: Supervisor,
         clock: Clock,
         cycle: float,
+        *,
+        stop_together: bool = True,
     ) -> None:
-        """Take buses with the host's node id and heartbeat period, and winches by name."""
+        """Take buses with the host's node id and heartbeat period, and winches by name.
+
+        With ``stop_together`` all winches stop where the drive of one cannot go on.
+        """
         self.winches = winches
         self.supervisor = supervisor
         self.callbacks: list[Callback] = []
@@ -81,8 +96,17 @@ class ControlLoop:
         """What a callback or the loop itself raised."""
         self.snapshot: BenchSnapshot | None = None
         self.overruns = 0
+        self.ordering = threading.Lock()
+        """Hold it to order several winches: what is ordered under it takes effect in one cycle."""
+        self.beating = True
+        """Whether the host's heartbeat is sent."""
+        self.listening = True
+        """Whether it ends where a drive heeds no stop; not while drives are set up anew."""
+        self._stop_together = stop_together
         self._buses = [(bus, node, HeartbeatProducer(period)) for bus, node, period in buses]
-        self._clock, self._cycle, self._count = clock, cycle, 0
+        self.cycle = cycle
+        """Period of control, s."""
+        self._clock, self._count = clock, 0
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -110,29 +134,47 @@ class ControlLoop:
     def step(self, now: float) -> BenchSnapshot:
         """One control cycle at ``now`` (s)."""
         self._count += 1
+        self._listen_for_stops(now)
         self._send_sync(now)
         inputs = {name: _input(parts, now, self._count) for name, parts in self.winches.items()}
         blocked = self.supervisor.check(now, inputs)
         # Before anything is stopped: whoever sees a motion ended must see the trip that ended it.
         self.snapshot = snapshot = self._picture(now, inputs, blocked)
         self._ask_callbacks(snapshot)
-        if self.supervisor.tripped or self.failure is not None:
-            for parts in self.winches.values():
-                if parts.controller.phase not in _STOPPED:
-                    parts.controller.stop()
-        self._command(now)
+        with self.ordering:
+            reason = self._failing()
+            if self.supervisor.tripped or self.failure is not None or reason:
+                for parts in self.winches.values():
+                    if parts.controller.phase not in _STOPPED:
+                        parts.controller.stop(reason)
+            self._command(now)
         for sample in self.samplers:
             sample(snapshot)
         return snapshot
+
+    def _listen_for_stops(self, now: float) -> None:
+        """Fall silent where a drive does not heed a stop: its own watchdog is what is left."""
+        if not (self.beating and self.listening):
+            return
+        for name, parts in self.winches.items():
+            if parts.controller.unheeded(now):
+                self.beating = False
+                self.supervisor.latch(Trip("deaf", name, _DEAF, latches=True))
+
+    def _failing(self) -> str:
+        """Which winch must go down because its drive could not go on, and why, in words."""
+        new = {name: parts.controller.new_failure() for name, parts in self.winches.items()}
+        words = "; ".join(f"winch {name}: {failure}" for name, failure in new.items() if failure)
+        return words if self._stop_together else ""
 
     def _run(self) -> None:
         due = self._clock.now()
         try:
             while not self._stopping.is_set():
                 self.step(self._clock.now())
-                due += self._cycle
+                due += self.cycle
                 late = self._clock.now() - due
-                if late > self._cycle:
+                if late > self.cycle:
                     self.overruns += 1
                     due += late
                 self._clock.sleep(due - self._clock.now())
@@ -145,17 +187,17 @@ class ControlLoop:
         for bus, node, producer in self._buses:
             try:
                 bus.sync()
-                if producer.due(now):
+                if producer.due(now) and self.beating:
                     bus.heartbeat(node, NmtState.OPERATIONAL)
             except ConnectionLost as error:
                 self._latch_bus(error)
             if bus.fault:
-                self._latch_bus(ConnectionLost(f"CAN bus: {bus.fault}; reopen the bench"))
+                self._latch_bus(ConnectionLost(f"CAN bus: {bus.fault}; reset opens it again"))
 
     def _command(self, now: float) -> None:
         for parts in self.winches.values():
             try:
-                parts.controller.step(now, self._count * self._cycle)
+                parts.controller.step(now, self._count * self.cycle)
             except ConnectionLost as error:
                 self._latch_bus(error)
 

@@ -44,6 +44,8 @@ class Target:
     speed: float
     """Of the rope, m/s."""
     done: bool = False
+    start: bool = False
+    """Whether the drive is to make a motion of its own, a homing."""
 
 
 class MotionSource(Protocol):
@@ -178,13 +180,14 @@ class Move:
         if limits.length is not None and not limits.length[0] <= length <= limits.length[1]:
             raise NotPermitted(
                 f"a cable length of {length:g} m is beyond the limits {limits.length[0]:g} m to "
-                f"{limits.length[1]:g} m; change winch.….limits.length only if the rope allows it"
+                f"{limits.length[1]:g} m; change its limits.length only if the rope allows it"
             )
         if not math.isfinite(length):
             raise NotPermitted("a cable length must be a finite number of metres")
         self._start = 0.0
         self._from = length
         self._knots: list[float] = []
+        self._stretched = 0.0
 
     def prepare(self, angle: float) -> None:
         """Plan from a motor angle (rad); called off the control thread, before ``start``."""
@@ -197,8 +200,12 @@ class Move:
 
     @property
     def duration(self) -> float:
-        """Time of the planned move, s."""
-        return self._plan.duration
+        """Time of the planned move, s; known once prepared."""
+        return max(self._plan.duration, self._stretched)
+
+    def stretch(self, duration: float) -> None:
+        """Take ``duration`` (s) where the plan is quicker; slower in the same proportion."""
+        self._stretched = duration
 
     def start(self, time: float, angle: float, _speed: float) -> None:
         """Begin at rest; plans anew where the winch has moved since ``prepare``."""
@@ -209,10 +216,12 @@ class Move:
     def target(self, time: float, angle: float, _now: float) -> Target:
         """Where the plan is, with the position loop's correction for speed control."""
         elapsed = time - self._start
-        position, speed, _ = (float(value) for value in self._plan.at(elapsed))
+        pace = self._plan.duration / self.duration if self._stretched else 1.0
+        position, speed, _ = (float(value) for value in self._plan.at(elapsed * pace))
+        speed *= pace
         planned, slope = self._angle_at(position)
         velocity = speed * slope + _GAIN * (planned - angle)
-        late = elapsed - self._plan.duration
+        late = elapsed - self.duration
         arrived = late >= 0 and abs(planned - angle) <= _SETTLED * abs(slope)
         return Target(velocity, planned, -speed, done=arrived or late >= _SETTLE_TIME)
 

@@ -187,17 +187,21 @@ class _Execution:
             clock.sleep(min(0.02, left))
 
     def _move(self, step: Step) -> None:
+        """Move one winch or, started in one cycle and lasting equally long, all of them."""
         chosen = self._winches(step.winch)
-        for winch in chosen:
-            length = winch.cable_length + step.by if step.by is not None else step.to
-            if length is None:
-                raise UsageError(f"a step of '{self._programme.name}' has nothing to do")
-            winch.move_to(length, step.speed, step.acceleration, wait=False, hold=True)
-        for winch in chosen:
-            winch.wait()
+        lengths = {name: self._target(step, winch) for name, winch in chosen.items()}
+        self._bench.move_together(lengths, step.speed, step.acceleration, hold=True)
 
-    def _winches(self, name: str) -> list[Winch]:
-        return list(self._bench.winch.values()) if name == "all" else [self._bench.named(name)]
+    def _target(self, step: Step, winch: Winch) -> float:
+        length = winch.cable_length + step.by if step.by is not None else step.to
+        if length is None:
+            raise UsageError(f"a step of '{self._programme.name}' has nothing to do")
+        return length
+
+    def _winches(self, name: str) -> dict[str, Winch]:
+        if name == "all":
+            return self._bench.winch
+        return {name: self._bench.named(name)}
 
 
 def _declared_load(bench: Bench) -> float | None:

@@ -1,112 +1,112 @@
-"""Logs a bench: one row per reading of its slowest instrument, everything at that moment.
+"""Logs a bench: every channel with its own time stamps (MCAP), or rows (CSV), by the file's name.
 
-A row stands at the reading's estimated moment of sampling; every other channel is interpolated
-there between its own two neighbouring samples, and is NaN where it has none. The log begins
-when every channel has come, or after half a second.
+In rows, one stands at each reading's estimated moment of sampling of the slowest instrument; every
+other channel is interpolated there between its own two neighbouring samples, and is NaN where it
+has none. The log begins when every channel has come, or after half a second. A log by channels is
+brought to the same rows when it is read (``winchkit.runs.align``).
+
+The control thread only hands over its snapshot. One thread writes, another waits for the disk; what
+goes wrong there ends the log, never the control loop.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import logging
 import math
 import threading
-from collections import deque
+import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
-from winchkit.bench.series import Series
-from winchkit.bench.snapshot import BenchSnapshot, Phase
+from winchkit.bench.feed import CHANNELS, Feed
+from winchkit.bench.snapshot import BenchSnapshot
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.modbus.instrument import Instrument
-from winchkit.drivers.modbus.reading import Reading
-from winchkit.runs.writer import open_writer
+from winchkit.drivers.reading import Sensor
+from winchkit.errors import Fault, FileError
+from winchkit.runs.log_writer import open_log
+from winchkit.runs.rotation import Rotation
+from winchkit.runs.sync import Syncer
 
-__all__ = ["CHANNELS", "Recorder"]
+__all__ = ["CHANNELS", "Recorder", "counters_of"]
 
-CHANNELS: dict[str, tuple[str, str]] = {
-    "cell": ("tension", "N"),
-    "load": ("load", "N"),
-    "length": ("cable_length", "m"),
-    "temperature": ("temperature", "degC"),
-}
-"""Channel and unit by role of the sensor."""
-
-_FAST = {"motor_angle": "rad", "motor_velocity": "rad/s", "motor_torque": "N m"}
-_FAST_ATTRIBUTES = tuple(_FAST)
-_PERIOD = 0.05
-_PATIENCE = 0.5
-_FAST_GAP = 0.1
-_BARE_PERIOD = 0.01
-_UNPOWERED = (Phase.DISABLED, Phase.ENABLING, Phase.RESETTING)
+_LOGGER = logging.getLogger(__name__)
+_PERIOD = {".csv": 0.05}
+_CHUNK_PERIOD = 0.125
+"""Half of what a log by channels may lose: each chunk is whole on its own."""
+_COUNT_PERIOD = 1.0
 
 
 class Recorder:
-    """Writes one run; a context manager. ``feed`` is called by the control loop."""
+    """Writes one log; a context manager. ``feed`` is called by the control loop."""
 
     def __init__(
         self,
         path: str | Path,
-        sensors: Mapping[str, Mapping[str, Instrument]],
+        sensors: Mapping[str, Mapping[str, Sensor]],
         clock: Clock,
         metadata: Mapping[str, str],
         detach: Callable[[Recorder], None] = lambda _recorder: None,
+        *,
+        rotation: Rotation | None = None,
     ) -> None:
         """Log winches with their sensors by role. Raises FileError where it cannot write."""
-        self.rows = 0
-        self.path = Path(path)
-        self._clock, self._detach = clock, detach
-        prefix = {name: f"{name}." if len(sensors) > 1 else "" for name in sensors}
-        self._series: dict[str, Series] = {}
-        self._fast = {
-            name: [self._add(prefix[name] + key, _FAST_GAP) for key in _FAST] for name in sensors
-        }
-        columns = [("time", "s")]
-        columns += [(prefix[name] + key, unit) for name in sensors for key, unit in _FAST.items()]
-        self._listening: list[tuple[Instrument, Callable[[Reading], None]]] = []
-        self._moments: deque[float] = deque()
-        self._base = _slowest(sensors)
-        for name, by_role in sensors.items():
-            for role, instrument in by_role.items():
-                channel, unit = CHANNELS[role]
-                columns.append((prefix[name] + channel, unit))
-                self._listen(prefix[name] + channel, instrument)
-        self._start: float | None = None
-        self._opened = clock.now()
-        self._last = self._last_time = -math.inf
-        self._writer = open_writer(path, columns, metadata)
+        self._sensors, self._clock, self._detach = sensors, clock, detach
+        self._offset = _utc_less(clock)
+        self._feed = Feed(sensors, clock.now())
+        layout = dataclasses.replace(self._feed.layout, clock_offset=self._offset)
+        about = {**metadata, "clock_offset": f"{self._offset / 1e9:.6f} s"}
+        self._syncer = Syncer()
+        try:
+            self._log = open_log(Path(path), layout, about, rotation, self._syncer.watch)
+        except BaseException:
+            self._feed.close()
+            self._syncer.close()
+            raise
+        self.path = self._log.parts[0]
+        """Of its first part."""
+        self._said: tuple[Any, ...] = ()
+        self._counted = -math.inf
         self._error: BaseException | None = None
         self._stopping = threading.Event()
+        self._period = _PERIOD.get(self.path.suffix.lower(), _CHUNK_PERIOD)
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
+    @property
+    def rows(self) -> int:
+        """Rows of the run so far."""
+        return self._log.rows
+
+    @property
+    def parts(self) -> tuple[Path, ...]:
+        """Files so far, the last one being written."""
+        return tuple(self._log.parts)
+
     def feed(self, snapshot: BenchSnapshot) -> None:
-        """Take the drives' newest values; cheap, for the control thread."""
-        for name, series in self._fast.items():
-            winch = snapshot.winch[name]
-            if math.isfinite(winch.time):
-                for item, key in zip(series, _FAST_ATTRIBUTES, strict=True):
-                    # While the brake holds the rope the drive's torque says nothing of it.
-                    unknown = key == "motor_torque" and winch.phase in _UNPOWERED
-                    item.append(winch.time, math.nan if unknown else getattr(winch, key))
-        if self._base is None and snapshot.time - self._last >= _BARE_PERIOD:
-            self._last = snapshot.time
-            self._moments.append(snapshot.time)
+        """Take a cycle; cheap, for the control thread."""
+        if self._error is None:
+            self._feed.give(snapshot)
 
     def check(self) -> None:
         """Raise what has ended the writing, e.g. FileError for a full disk."""
         if self._error is not None:
             raise self._error
 
+    def counters(self) -> dict[str, dict[str, Any]]:
+        """What was counted so far, by instrument (``A.cell``) and for the log itself."""
+        log = {"rows": self.rows, "parts": len(self.parts), "drops": self._feed.lost}
+        return {**counters_of(self._sensors), "log": log}
+
     def close(self) -> None:
         """Write what is pending and finish the file; raises what the writing raised."""
         self._detach(self)
-        for instrument, listener in self._listening:
-            instrument.listeners.remove(listener)
-        self._listening.clear()
+        self._feed.close()
         self._stopping.set()
         self._thread.join()
-        self._writer.close()
         if self._error is not None:
             error, self._error = self._error, None
             raise error
@@ -122,64 +122,67 @@ class Recorder:
     ) -> None:
         self.close()
 
-    def _add(self, column: str, max_gap: float) -> Series:
-        return self._series.setdefault(column, Series(max_gap))
-
-    def _listen(self, column: str, instrument: Instrument) -> None:
-        series = self._add(column, max(_FAST_GAP, 5 * instrument.period))
-        base = instrument is self._base
-
-        def take(reading: Reading) -> None:
-            series.append(reading.t_sample, reading.value)
-            if base:
-                self._moments.append(reading.t_sample)
-
-        self._listening.append((instrument, take))
-        instrument.listeners.append(take)
-
     def _run(self) -> None:
         try:
-            while not self._stopping.wait(_PERIOD):
-                self._write_rows()
-            self._write_rows(final=True)
-        except BaseException as error:  # noqa: BLE001 - kept, and raised by close
+            while not self._stopping.wait(self._period):
+                self._write()
+            self._write()
+            self._log.close({"clock_offset": f"{_utc_less(self._clock) / 1e9:.6f} s"})
+        except BaseException as error:  # noqa: BLE001 - kept, and raised by check and close
             self._error = error
+            self._feed.abandon()
+            with suppress(FileError):  # the disk has refused already
+                self._log.close({"ended": str(error)})
+            _LOGGER.error("the log has ended, the bench goes on: %s", error)  # noqa: TRY400
+        finally:
+            self._syncer.close()
 
-    def _write_rows(self, final: bool = False) -> None:
-        """Write every row whose channels are complete; one that has gone silent is not awaited.
-
-        At the end the rows that still wait for a channel are dropped.
-        """
+    def _write(self) -> None:
+        if self._syncer.error is not None:
+            message = f"the disk refuses it: {self._syncer.error.strerror}"
+            raise FileError(Fault(message, str(self.parts[-1])))
         now = self._clock.now()
-        awaited = [item for item in self._series.values() if item.reaches(now - _PATIENCE)]
-        while self._moments:
-            moment = self._moments[0]
-            if not all(item.reaches(moment) for item in awaited):
-                break
-            self._moments.popleft()
-            self._write_row(moment)
-        if final:
-            self._moments.clear()
-        self._writer.flush()
+        pieces, snapshots = self._feed.take()
+        for snapshot in snapshots:
+            self._note_changes(snapshot)
+        if now - self._counted >= _COUNT_PERIOD:
+            self._counted = now
+            self._log.count(now, self.counters())
+        self._log.write(pieces, now)
 
-    def _write_row(self, moment: float) -> None:
-        if moment <= self._last_time or moment < self._opened:
+    def _note_changes(self, snapshot: BenchSnapshot) -> None:
+        """Write an event when a phase, a state, a trip or the count of overruns has changed."""
+        winches = tuple((item.phase, item.state) for item in snapshot.winch.values())
+        said = (winches, snapshot.tripped, snapshot.overruns)
+        if said == self._said:
             return
-        row = {column: series.at(moment) for column, series in self._series.items()}
-        if self._start is None:
-            slow = {k: v for k, v in row.items() if not k.endswith("motor_torque")}
-            if moment < self._opened + _PATIENCE and any(map(math.isnan, slow.values())):
-                return
-            self._start = moment
-        self._last_time = moment
-        self._writer.append({"time": moment - self._start, **row})
-        self.rows += 1
+        self._said = said
+        self._log.tell(
+            snapshot.time,
+            {
+                "winch": {
+                    name: {"phase": item.phase.value, "state": item.state}
+                    for name, item in snapshot.winch.items()
+                },
+                "tripped": [str(trip) for trip in snapshot.tripped],
+                "overruns": snapshot.overruns,
+            },
+        )
 
 
-def _slowest(sensors: Mapping[str, Mapping[str, Instrument]]) -> Instrument | None:
-    """The instrument that sets the rows: the slowest load cell, else length, else load."""
-    for role in ("cell", "length", "load"):
-        there = [by_role[role] for by_role in sensors.values() if role in by_role]
-        if there:
-            return max(there, key=lambda item: item.period)
-    return None
+def counters_of(sensors: Mapping[str, Mapping[str, Sensor]]) -> dict[str, dict[str, Any]]:
+    """What was counted so far, by instrument (``A.cell``)."""
+    return {
+        f"{name}.{role}": dataclasses.asdict(instrument.counters)
+        for name, by_role in sensors.items()
+        for role, instrument in by_role.items()
+    }
+
+
+def _utc_less(clock: Clock) -> int:
+    """UTC less the bench's clock, ns: of several tries the one that was least disturbed."""
+    tries = []
+    for _ in range(5):
+        before, utc, after = clock.now(), time.time_ns(), clock.now()
+        tries.append((after - before, utc - round((before + after) / 2 * 1e9)))
+    return min(tries)[1]

@@ -19,13 +19,19 @@ OPERATIONS = (
     "status",
     "jog",
     "step",
+    "move",
     "moving",
+    "home",
+    "homing",
     "stop",
     "reset",
     "tare",
     "start_log",
     "log_rows",
     "end_log",
+    "counters",
+    "read_object",
+    "scanned",
 )
 """Methods of a station that may be called from outside."""
 

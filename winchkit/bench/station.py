@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from dataclasses import asdict
 from typing import Any, Protocol
 
 from winchkit.bench.bench import Bench
-from winchkit.bench.recorder import Recorder
+from winchkit.bench.homing import HomingRequest, homing
+from winchkit.bench.recorder import Recorder, counters_of
 from winchkit.bench.snapshot import to_dict
+from winchkit.bench.winch import Winch
+from winchkit.errors import UsageError
 
-__all__ = ["LocalStation", "Station"]
+__all__ = ["ALL", "LocalStation", "Station"]
+
+ALL = "all"
+"""Stands for every winch, as in a motion programme."""
 
 
 class Station(Protocol):
@@ -18,7 +26,7 @@ class Station(Protocol):
         """Winches there are."""
 
     def status(self) -> dict[str, Any]:
-        """Newest snapshot as JSON has it."""
+        """Newest snapshot and the health of the CAN buses, as JSON has them."""
 
     def jog(self, winch: str | None, speed: float, hold: float) -> None:
         """Keep moving for ``hold`` seconds (rope speed, m/s, positive winds in)."""
@@ -26,8 +34,26 @@ class Station(Protocol):
     def step(self, winch: str | None, change: float, speed: float | None) -> None:
         """Start to change the cable length by ``change`` (m)."""
 
+    def move(
+        self,
+        winch: str | None,
+        to: float | None,
+        by: float | None,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start a move to a cable length, or by a change of it (m); "all" moves all as one."""
+
     def moving(self, winch: str | None) -> bool:
         """Whether a motion is under way; raises what stopped it."""
+
+    def home(
+        self, winch: str | None, method: int | None, at: float | None, speed: float | None
+    ) -> None:
+        """Start to home a winch: a method of 6098h, the cable length (m) there, speed (m/s)."""
+
+    def homing(self) -> bool:
+        """Whether the homing is under way, and lead it on; raises what ended it."""
 
     def stop(self) -> None:
         """Quick-stop every winch; returns at rest."""
@@ -38,14 +64,17 @@ class Station(Protocol):
     def tare(self, winch: str | None) -> float:
         """Tare a load cell; returns the tension after it, N."""
 
-    def start_log(self, path: str) -> None:
-        """Log to a file in the owner's process."""
+    def start_log(self, path: str, rotate: str | None = None) -> None:
+        """Log to a file in the owner's process, in parts of a size such as ``100MB``."""
 
     def log_rows(self) -> int:
         """Rows written so far."""
 
     def end_log(self) -> int:
         """Finish the log; returns its rows."""
+
+    def counters(self) -> dict[str, dict[str, Any]]:
+        """What was counted by instrument (``A.cell``), and for the log of this station."""
 
     def close(self) -> None:
         """Stop what was started here, finish the log."""
@@ -58,6 +87,7 @@ class LocalStation:
         self._bench = bench
         self._recorder: Recorder | None = None
         self._started: set[str] = set()
+        self._homing: Generator[None] | None = None
 
     def names(self) -> list[str]:
         """Winches there are."""
@@ -65,7 +95,10 @@ class LocalStation:
 
     def status(self) -> dict[str, Any]:
         """Newest snapshot as JSON has it."""
-        return to_dict(self._bench.snapshot)
+        buses = {name: asdict(item) for name, item in self._bench.bus_health.items()}
+        for item in buses.values():
+            item["state"] = item["state"].value
+        return {**to_dict(self._bench.snapshot), "bus": buses}
 
     def jog(self, winch: str | None, speed: float, hold: float) -> None:
         """Keep moving for ``hold`` seconds."""
@@ -79,12 +112,48 @@ class LocalStation:
         self._started.add(chosen.name)
         chosen.move_by(change, speed, wait=False)
 
+    def move(
+        self,
+        winch: str | None,
+        to: float | None,
+        by: float | None,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start a move to a cable length, or by a change of it."""
+        if (to is None) == (by is None):
+            raise UsageError("a move goes either to a cable length or by a change of it")
+        lengths = {
+            item.name: item.cable_length + by if by is not None else float(to or 0.0)
+            for item in self._chosen(winch)
+        }
+        self._started |= set(lengths)
+        self._bench.move_together(lengths, speed, acceleration, wait=False)
+
     def moving(self, winch: str | None) -> bool:
         """Whether a motion is under way."""
-        chosen = self._bench.named(winch)
-        if chosen.moving:
+        chosen = self._chosen(winch)
+        if any(item.moving for item in chosen):
             return True
-        chosen.wait()
+        for item in chosen:
+            item.wait()
+        return False
+
+    def home(
+        self, winch: str | None, method: int | None, at: float | None, speed: float | None
+    ) -> None:
+        """Start to home a winch."""
+        asked = HomingRequest(method, at, speed)
+        self._homing = homing(self._bench, self._bench.named(winch), asked)
+        next(self._homing, None)
+
+    def homing(self) -> bool:
+        """Whether the homing is under way, and lead it on."""
+        if self._homing is None:
+            return False
+        for _ in self._homing:
+            return True
+        self._homing = None
         return False
 
     def stop(self) -> None:
@@ -99,10 +168,10 @@ class LocalStation:
         """Tare a load cell."""
         return self._bench.named(winch).tare()
 
-    def start_log(self, path: str) -> None:
+    def start_log(self, path: str, rotate: str | None = None) -> None:
         """Start a log, ending the one before."""
         self.end_log()
-        self._recorder = self._bench.log(path)
+        self._recorder = self._bench.log(path, rotate=rotate)
 
     def log_rows(self) -> int:
         """Rows written so far; raises what has ended the writing."""
@@ -119,9 +188,32 @@ class LocalStation:
         recorder.close()
         return recorder.rows
 
+    def read_object(self, winch: str, index: int, sub: int) -> str | None:
+        """Bytes of an object of a winch's drive in hexadecimal; None where it has none."""
+        name = self._bench.named(winch).name
+        data = self._bench.axes[name].objects.upload_if_there(index, sub)
+        return None if data is None else data.hex()
+
+    def scanned(self) -> list[dict[str, Any]]:
+        """Who is on the buses, as JSON has it."""
+        return [asdict(item) for item in self._bench.scan()]
+
+    def counters(self) -> dict[str, dict[str, Any]]:
+        """What was counted by instrument, and for the log."""
+        if self._recorder is not None:
+            return self._recorder.counters()
+        return counters_of({name: winch.sensors for name, winch in self._bench.winch.items()})
+
     def close(self) -> None:
         """Ramp down what this station set in motion, finish its log."""
+        if self._homing is not None:
+            self._homing.close()
         for name in self._started:
             if self._bench.winch[name].moving:
                 self._bench.winch[name].stop(wait=False)
         self.end_log()
+
+    def _chosen(self, winch: str | None) -> list[Winch]:
+        """One winch, or with "all" every one."""
+        every = list(self._bench.winch.values())
+        return every if winch == ALL else [self._bench.named(winch)]

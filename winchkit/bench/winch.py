@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from winchkit.bench.homing import HomingRequest, homing
 from winchkit.bench.loop import WinchParts
-from winchkit.bench.motion import DEAD_MAN, Jog, Move
+from winchkit.bench.motion import DEAD_MAN, Jog, MotionSource, Move
+from winchkit.bench.rope import RopeMap
 from winchkit.bench.snapshot import Phase, WinchSnapshot
+from winchkit.bench.start_gate import StartGate
 from winchkit.bench.supervisor import direction_of
-from winchkit.drivers.modbus.instrument import Instrument
+from winchkit.drivers.reading import Sensor
 from winchkit.errors import DriveFault, MotionError, NoReply, NotPermitted, UsageError
 from winchkit.schema.bench import WinchWiring
 
@@ -32,7 +35,7 @@ class Winch:
         name: str,
         wiring: WinchWiring,
         parts: WinchParts,
-        sensors: dict[str, Instrument],
+        sensors: dict[str, Sensor],
     ) -> None:
         self.name = name
         self.wiring = wiring
@@ -56,6 +59,19 @@ class Winch:
     def tension(self) -> float:
         """Newest reading of the load cell, N; NaN where there is none."""
         return self.snapshot.tension
+
+    @property
+    def rope(self) -> RopeMap:
+        """Between its motor and its rope."""
+        return self._parts.rope
+
+    def length_at(self, motor_angle: float) -> float:
+        """Cable length (m) at a motor angle (rad), by the profile."""
+        return self._parts.rope.line.cable_length(motor_angle)
+
+    def motor_angle_at(self, length: float) -> float:
+        """Motor angle (rad) at a cable length (m), by the profile."""
+        return self._parts.rope.line.motor_angle(length)
 
     @property
     def moving(self) -> bool:
@@ -105,6 +121,56 @@ class Winch:
         With ``hold`` the drive stays enabled there until ``stop``. Raises NotPermitted,
         LimitTripped, DriveFault.
         """
+        self.begin(self.planned(length, speed, acceleration, hold=hold))
+        if wait:
+            self.wait()
+
+    def move_by(
+        self, change: float, speed: float | None = None, *, wait: bool = True, hold: bool = False
+    ) -> None:
+        """Change the cable length by ``change`` (m, positive pays out); else as ``move_to``."""
+        self.move_to(self.cable_length + change, speed, wait=wait, hold=hold)
+
+    def home(
+        self, method: int | None = None, *, at: float | None = None, speed: float | None = None
+    ) -> None:
+        """Let the drive find its zero by a method of 6098h, searching at ``speed`` (m/s).
+
+        ``at`` is the cable length (m) at that zero; without a method it is the present one, and
+        nothing moves. Raises UsageError, NotPermitted, DeviceRefused, DriveFault, LimitTripped.
+        """
+        for _ in homing(self._bench, self, HomingRequest(method, at, speed)):
+            self._bench.clock.sleep(_POLL)
+
+    def stop(self, *, wait: bool = True) -> None:
+        """Ramp to rest, then disable. Always allowed.
+
+        The bench's other winches stop with it, unless its ``stop_together`` is false.
+        """
+        self._bench.stop_with(self.name, wait=wait)
+
+    def wait(self) -> None:
+        """Return when the motion is done.
+
+        Raises LimitTripped or DriveFault for what has stopped it, MotionError where somebody did.
+        """
+        while self.moving:
+            self.raise_trouble()
+            self._bench.clock.sleep(_POLL)
+        self.raise_end()
+        source = self._controller.source
+        if source is None or not source.holds:
+            self._bench.wait_at_rest((self.name,))
+
+    def planned(
+        self,
+        length: float,
+        speed: float | None = None,
+        acceleration: float | None = None,
+        *,
+        hold: bool = False,
+    ) -> Move:
+        """The move that ``move_to`` would make; nothing begins. Raises as that does."""
         move = Move(
             self._parts.rope.line,
             self.wiring.limits,
@@ -116,42 +182,37 @@ class Winch:
         here = self.snapshot
         self._bench.permit(self.name, direction_of(here.cable_length - length))
         move.prepare(here.motor_angle)
+        return move
+
+    def begin(self, source: MotionSource, gate: StartGate | None = None) -> None:
+        """Begin a planned motion; with a gate not before that opens."""
         self._jog = None
-        self._controller.begin(move)
-        if wait:
-            self.wait()
+        self._controller.begin(source, gate)
 
-    def move_by(
-        self, change: float, speed: float | None = None, *, wait: bool = True, hold: bool = False
-    ) -> None:
-        """Change the cable length by ``change`` (m, positive pays out); else as ``move_to``."""
-        self.move_to(self.cable_length + change, speed, wait=wait, hold=hold)
+    def ready_for(self, move: Move) -> bool:
+        """Whether the drive is enabled and waits for nothing but this move's gate."""
+        return self._controller.ready_for(move)
 
-    def stop(self, *, wait: bool = True) -> None:
-        """Ramp to rest, then disable. Always allowed."""
+    def run_down(self) -> None:
+        """Order the ramp to rest, of this winch alone."""
         self._jog = None
         self._controller.run_down()
-        if wait:
-            self._bench.wait_at_rest((self.name,))
 
-    def wait(self) -> None:
-        """Return when the motion is done.
-
-        Raises LimitTripped or DriveFault for what has stopped it, MotionError where somebody did.
-        """
-        while self.moving:
-            self._bench.raise_trouble()
-            self._bench.clock.sleep(_POLL)
+    def raise_trouble(self) -> None:
+        """Raise what has stopped the bench, if anything has."""
         self._bench.raise_trouble()
+
+    def raise_end(self) -> None:
+        """Raise what ended the last motion before its end, if anything did."""
+        self.raise_trouble()
         if self._controller.failure:
             raise DriveFault(
                 f"winch {self.name}: {self._controller.failure}; {self._parts.axis.fault_text}"
             )
+        if self._controller.stopped and self._controller.reason:
+            raise DriveFault(f"winch {self.name} was stopped with {self._controller.reason}")
         if self._controller.stopped:
             raise MotionError(f"winch {self.name}: somebody stopped it before the motion's end")
-        source = self._controller.source
-        if source is None or not source.holds:
-            self._bench.wait_at_rest((self.name,))
 
     def tare(self) -> float:
         """Tare the load cell with its own command, at rest; returns the tension that it then
@@ -167,9 +228,9 @@ class Winch:
         self._bench.command(cell, "tare")
         return self._tared(cell)
 
-    def _tared(self, cell: Instrument) -> float:
+    def _tared(self, cell: Sensor) -> float:
         """Wait for readings after the tare and make sure that the device took it."""
-        clock, decoder = self._bench.clock, cell.decoder
+        clock = self._bench.clock
         sent, seen, deadline = clock.now(), 0, clock.now() + _TARE_TIME
         last = sent
         while clock.now() < deadline:
@@ -178,8 +239,7 @@ class Winch:
             if reading is None or reading.t_request <= last:
                 continue
             last, seen = reading.t_request, seen + 1
-            tared = "net" not in decoder.spec.status or decoder.has("net", cell.status)
-            if seen >= _SETTLING and tared and reading.quality.usable:
+            if seen >= _SETTLING and cell.tared is not False and reading.quality.usable:
                 return reading.value
         raise NoReply(
             f"winch {self.name}: {cell.name} did not confirm the tare within {_TARE_TIME:g} s; "

@@ -11,29 +11,32 @@ from datetime import UTC, datetime
 
 from winchkit import __version__, catalog
 from winchkit.bench.controller import Controller
+from winchkit.bench.instruments import can_buses, device_of, instruments
 from winchkit.bench.loop import ControlLoop, WinchParts
 from winchkit.bench.rope import RopeMap
+from winchkit.bench.snapshot import Phase
 from winchkit.bench.supervisor import Supervisor
 from winchkit.drivers.can.axis import Cia402Axis
 from winchkit.drivers.can.bus import CanBus
 from winchkit.drivers.can.commission import WatchSpec
+from winchkit.drivers.can.limits import LimitsAtShaft
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.modbus.instrument import Instrument
-from winchkit.drivers.modbus.service import Line, SlowDevices
+from winchkit.drivers.reading import Sensor
+from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import ConnectionLost, Fault, FileError
-from winchkit.schema.bench import BenchSpec, DeviceRef, WinchWiring
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["READ_RATE", "Wired", "wire"]
+__all__ = ["Wired", "wire"]
 
-READ_RATE = 100.0
-"""Readings a second of every instrument, unless its own rate is lower."""
 _STALE_BEATS = 2
 """Feedback may be this many heartbeats old: the bench file says how soon silence must count."""
+_FURTHER = 0.02
+"""Of rope, by which the drive's own length limits lie beyond the bench's, m."""
+_FELT = 0.02
+"""Rope speed at which the counts of a good cell cannot stand still, m/s."""
 _HEADROOM = 4.0
 """Of a drive's own ramps in a profile mode over those that the host makes."""
-_ROLES = ("cell", "load", "length", "temperature")
 
 
 @dataclass(frozen=True)
@@ -42,15 +45,20 @@ class Wired:
 
     loop: ControlLoop
     axes: Mapping[str, Cia402Axis]
-    sensors: Mapping[str, Mapping[str, Instrument]]
-    command: Callable[[Instrument, str], None]
+    buses: Mapping[str, CanBus]
+    sensors: Mapping[str, Mapping[str, Sensor]]
+    command: Callable[[Sensor, str], None]
     metadata: Mapping[str, str]
 
     def disarm(self) -> None:
-        """Tell the drives, at rest, not to mind that the host's heartbeat ends."""
-        for axis in self.axes.values():
-            with suppress(ConnectionLost):
-                axis.disarm()
+        """Tell the drives that are at rest not to mind that the host's heartbeat ends.
+
+        Any other keeps its watchdog, which stops it.
+        """
+        for name, axis in self.axes.items():
+            if self.loop.winches[name].controller.phase is Phase.DISABLED:
+                with suppress(ConnectionLost):
+                    axis.disarm()
 
 
 def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
@@ -63,8 +71,10 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
     axes = {
         name: _axis(spec, winch, ropes[name], buses, clock) for name, winch in spec.winch.items()
     }
-    sensors, lines = _instruments(spec, clock)
-    slow = SlowDevices(lines, clock)
+    sensors, lines = instruments(
+        spec, clock, buses, {name: _moving(axes[name], ropes[name]) for name in spec.winch}
+    )
+    slow = SlowDevices(lines)
     stack.callback(slow.close)
     for axis in axes.values():
         axis.commission()
@@ -80,8 +90,22 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
     stale = max(_STALE_BEATS * spec.bus[name].heartbeat for name in buses)
     supervisor = Supervisor({name: w.limits for name, w in spec.winch.items()}, stale)
     hosts = [(bus, spec.bus[name].node, spec.bus[name].heartbeat) for name, bus in buses.items()]
-    loop = ControlLoop(hosts, winches, supervisor, clock, spec.cycle)
-    return Wired(loop, axes, sensors, slow.command, _metadata(spec, profiles))
+    loop = ControlLoop(
+        hosts, winches, supervisor, clock, spec.cycle, stop_together=spec.stop_together
+    )
+    return Wired(loop, axes, buses, sensors, slow.command, _metadata(spec, profiles))
+
+
+def _moving(axis: Cia402Axis, rope: RopeMap) -> Callable[[], bool]:
+    """Whether a winch moves fast enough for its cells to feel it."""
+
+    def moves() -> bool:
+        feedback = axis.feedback
+        if feedback is None:
+            return False
+        return abs(feedback.velocity * rope.line.arm(feedback.angle)) > _FELT
+
+    return moves
 
 
 def _profile(spec: BenchSpec, winch: WinchWiring) -> WinchProfile:
@@ -90,18 +114,14 @@ def _profile(spec: BenchSpec, winch: WinchWiring) -> WinchProfile:
     return read_winch(catalog.find("profiles", winch.profile, spec.path or None))
 
 
-def _device(spec: BenchSpec, ref: DeviceRef) -> DeviceSpec:
-    from winchkit.schema.read import read_device
-
-    return read_device(catalog.find("devices", ref.device, spec.path or None))
-
-
 def _open_buses(spec: BenchSpec, clock: Clock, stack: ExitStack) -> dict[str, CanBus]:
-    """Every CAN bus that a servo is on."""
+    """Every CAN bus that a servo or an instrument is on."""
     buses: dict[str, CanBus] = {}
-    for name in dict.fromkeys(winch.servo.bus for winch in spec.winch.values()):
+    servos = dict.fromkeys(winch.servo.bus for winch in spec.winch.values())
+    for name in servos:
         if spec.bus[name].kind != "can":
             raise FileError(Fault(f"servos need a CAN bus; '{name}' is none", spec.path))
+    for name in servos | dict.fromkeys(can_buses(spec)):
         buses[name] = CanBus(spec.bus[name], name, clock)
         stack.callback(buses[name].close)
     return buses
@@ -120,46 +140,29 @@ def _axis(
         raise FileError(Fault(f"servo '{ref.device}' needs its node number", spec.path))
     arm = abs(rope.line.arm(0.0))
     acceleration = _HEADROOM * winch.limits.acceleration / arm
-    watch = WatchSpec(bus.node, bus.heartbeat, spec.cycle, winch.brake, acceleration)
-    return Cia402Axis(buses[ref.bus], ref.node, _device(spec, ref), watch, clock)
+    watch = WatchSpec(
+        bus.node,
+        bus.heartbeat,
+        spec.cycle,
+        winch.brake,
+        acceleration,
+        limits=_at_shaft(rope, winch.limits),
+        options=winch.options,
+    )
+    return Cia402Axis(buses[ref.bus], ref.node, device_of(spec, ref), watch, clock)
 
 
-def _instruments(
-    spec: BenchSpec, clock: Clock
-) -> tuple[dict[str, dict[str, Instrument]], list[Line]]:
-    """Instruments by winch and role; two roles on one device share the instrument."""
-    found: dict[tuple[str, int], Instrument] = {}
-    sensors: dict[str, dict[str, Instrument]] = {name: {} for name in spec.winch}
-    for name, winch in spec.winch.items():
-        for role in _ROLES:
-            ref: DeviceRef | None = getattr(winch, role)
-            if ref is None:
-                continue
-            if not spec.bus[ref.bus].kind.startswith("modbus"):
-                raise FileError(
-                    Fault(
-                        f"winch {name}: its {role} is on bus '{ref.bus}' of kind "
-                        f"'{spec.bus[ref.bus].kind}'; use modbus-rtu or modbus-tcp",
-                        spec.path,
-                    )
-                )
-            key = (ref.bus, ref.unit or 1)
-            if key not in found:
-                label = f"{role} of winch {name} (bus '{key[0]}' unit {key[1]})"
-                found[key] = Instrument(
-                    label,
-                    _device(spec, ref),
-                    key[1],
-                    clock,
-                    rate=READ_RATE,
-                    timeout=spec.bus[ref.bus].timeout,
-                )
-            sensors[name][role] = found[key]
-    by_bus: dict[str, list[Instrument]] = {}
-    for (bus, _), instrument in found.items():
-        by_bus.setdefault(bus, []).append(instrument)
-    lines = [Line(bus, spec.bus[bus], tuple(items)) for bus, items in by_bus.items()]
-    return sensors, lines
+def _at_shaft(rope: RopeMap, limits: LimitSpec) -> LimitsAtShaft:
+    """What the drive itself is to keep, where the wiring file says so."""
+    angle = None
+    if limits.in_drive and limits.length is not None:
+        low, high = limits.length
+        ends = (max(0.0, low - _FURTHER), high + _FURTHER)
+        first, second = sorted(map(rope.line.motor_angle, ends))
+        angle = (first, second)
+    error = limits.following_error
+    following = None if error is None else error / abs(rope.line.arm(0.0))
+    return LimitsAtShaft(angle=angle, following_error=following, torque=limits.torque)
 
 
 def _metadata(spec: BenchSpec, profiles: Mapping[str, WinchProfile]) -> dict[str, str]:

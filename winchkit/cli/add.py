@@ -69,13 +69,8 @@ def _tell(addition: Addition, as_json: bool) -> None:
 
 def write_addition(source: Path, addition: Addition, runs: Sequence[str], out: Path) -> None:
     """Write a fitted addition into a copy of a profile, with its provenance."""
-    from datetime import UTC, datetime
+    from winchkit.cli.provenance import provenance
+    from winchkit.effects.profile_file import write_fitted
 
-    from winchkit.effects.profile_file import Fitted, write_fitted
-
-    today = datetime.now(UTC).date()
-    fitted = [
-        Fitted(term, {name: e.std for name, e in values.items()}, runs, today)
-        for term, values in addition.terms
-    ]
-    write_fitted(source, fitted, out)
+    fitted, judged = provenance(addition.terms, addition.outputs, runs)
+    write_fitted(source, fitted, out, judged)

@@ -82,11 +82,24 @@ def _run(file: str) -> Verdict:
 
 
 def _declaration(file: str) -> Verdict:
+    from winchkit.cli.check_drives import faults_and_warnings
+    from winchkit.cli.check_drums import stroke_of, warnings_of_drums
+    from winchkit.cli.check_robots import faults_and_warnings as of_robots
     from winchkit.schema.read import load
 
     declaration = load(file)
-    faults = tuple(dict.fromkeys(_effect_faults(_profiles(declaration.value))))
-    return Verdict(file, declaration.kind, declaration.value.name, "", faults, declaration.warnings)
+    drive_faults, drive_warnings = faults_and_warnings(declaration.value)
+    robot_faults, robot_warnings = of_robots(file, declaration.value)
+    effect_faults = dict.fromkeys(_effect_faults(_profiles(declaration.value)))
+    faults = (*effect_faults, *drive_faults, *robot_faults)
+    warnings = (
+        *declaration.warnings,
+        *warnings_of_drums(file, declaration.value),
+        *drive_warnings,
+        *robot_warnings,
+    )
+    said = stroke_of(declaration.value)
+    return Verdict(file, declaration.kind, declaration.value.name, said, faults, warnings)
 
 
 def _profiles(value: Declared) -> list[WinchProfile]:

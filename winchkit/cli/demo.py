@@ -120,6 +120,7 @@ def _tell_findings(story: _Story, comparison: Comparison, findings: Findings) ->
 def _write_report(
     out: Path, story: _Story, findings: Findings, profile_name: str, hidden: str
 ) -> Path:
+    from winchkit.cli.html_option import save_page
     from winchkit.diagnosis.report.page import report_html
 
     path = out / "report.html"
@@ -130,7 +131,7 @@ def _write_report(
         truth={"hidden": hidden},
         profile=profile_name,
     )
-    path.write_text(page, encoding="utf-8")
+    save_page(str(path), page)
     return path
 
 

@@ -6,7 +6,7 @@ import re
 
 from winchkit.units import parse
 
-__all__ = ["quantity", "seconds"]
+__all__ = ["optional", "quantity", "seconds"]
 
 _NUMBER = re.compile(r"^\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)$")
 
@@ -16,6 +16,11 @@ def quantity(text: str, dimension: str) -> float:
     return parse(_NUMBER.sub(r"\1 \2", text).strip(), dimension)
 
 
+def optional(text: str | None, dimension: str) -> float | None:
+    """A quantity; None where none is given."""
+    return None if text is None else quantity(text, dimension)
+
+
 def seconds(text: str | None) -> float | None:
     """A duration; None where none is given."""
-    return None if text is None else quantity(text, "time")
+    return optional(text, "time")

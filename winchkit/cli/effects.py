@@ -1,4 +1,4 @@
-"""``winchkit effects``: the catalogue of effects, and the card of one."""
+"""``winchkit effects``: the catalogue of effects, the card of one, a file for one of your own."""
 
 from __future__ import annotations
 
@@ -7,17 +7,43 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.lazy import At, LazyGroup
 from winchkit.cli.output import echo_json
 
 if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue
 
-__all__ = ["command"]
+__all__ = ["command", "show"]
 
 _OUTPUTS = ("cable_length", "tension", "motor_torque")
 
 
-@click.command("effects")
+class _Effects(LazyGroup):
+    """``effects new …`` is a command; anything else is an effect to show, or all of them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Send whatever is no command to ``show``."""
+        if not args or (args[0] not in self.table and args[0] not in ctx.help_option_names):
+            args = ["show", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group(
+    "effects",
+    cls=_Effects,
+    table={
+        "show": At("winchkit.cli.effects", "List the effects, or show the card of one.", "show"),
+        "new": At("winchkit.cli.effects_new", "Write a file for an effect of your own."),
+    },
+)
+def command() -> None:
+    """List the effects that a model may lack, show the card of one, or begin one of your own.
+
+    'winchkit effects' and 'winchkit effects ID' are short for 'winchkit effects show [ID]'.
+    """
+
+
+@click.command("show")
 @click.argument("effect_id", metavar="[ID]", required=False)
 @click.option(
     "--effects",
@@ -27,7 +53,7 @@ _OUTPUTS = ("cable_length", "tension", "motor_torque")
     help="Python file with effects of your own; may be given several times.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, complete, in SI units.")
-def command(effect_id: str | None, files: Sequence[str], as_json: bool) -> None:
+def show(effect_id: str | None, files: Sequence[str], as_json: bool) -> None:
     """List the effects that a model may lack, or show the card of one."""
     from winchkit.effects.card import card, card_data
     from winchkit.effects.catalogue import load_catalogue

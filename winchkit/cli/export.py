@@ -10,25 +10,29 @@ __all__ = ["command"]
 
 
 @click.command()
-@click.argument("run", metavar="RUN")
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True)
 @click.option(
-    "-o", "--output", required=True, metavar="FILE", help="Where to: a .csv or .mcap file."
+    "-o",
+    "--output",
+    required=True,
+    metavar="FILE",
+    help="Where to: a .csv, .mcap, .parquet or .mf4 file.",
 )
 @click.option("--winch", metavar="NAME", help="Only this winch, its columns without its name.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
-def command(run: str, output: str, winch: str | None, as_json: bool) -> None:
-    """Convert RUN between CSV and MCAP, in SI units.
+def command(runs: tuple[str, ...], output: str, winch: str | None, as_json: bool) -> None:
+    """Convert RUN to CSV, MCAP, Parquet or MF4, in SI units; several are the parts of one log.
 
     A line on stderr says how many rows there are, at what rate, and what is missing.
     """
-    from winchkit.runs import read_run, write_run
+    from winchkit.runs.export import export
     from winchkit.runs.summary import summary_of
 
-    recording = read_run(run).of_winch(winch or "")
+    recording = export(runs, output, winch or "")
     for note in recording.notes:
-        click.echo(f"{run}: {note} (warning)", err=True)
-    write_run(recording, output)
+        click.echo(f"{recording.path}: {note} (warning)", err=True)
     summary = summary_of(recording)
     click.echo(f"{output}: {summary.text}", err=True)
     if as_json:
+        run = runs[0] if len(runs) == 1 else list(runs)
         echo_json({"schema": 1, "run": run, "output": output, "summary": summary})

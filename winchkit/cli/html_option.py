@@ -9,14 +9,20 @@ import click
 
 from winchkit.errors import Fault, FileError
 
-__all__ = ["given_options", "html_option", "page_title", "write_page"]
+__all__ = ["given_options", "html_option", "page_title", "save_page", "write_page"]
 
 html_option = click.option("--html", metavar="FILE", help="Also write the answer as one page.")
 _PAGE_BEGINS = b"<!DOCTYPE html>"
 
 
 def write_page(path: str, page: str) -> None:
-    """Write a page and say so on stderr; the folder is made where its parent exists.
+    """Write a page as :func:`save_page` does and say so on stderr."""
+    save_page(path, page)
+    click.echo(f"report: {path}", err=True)
+
+
+def save_page(path: str, page: str) -> None:
+    """Write a page; the folder is made where its parent exists.
 
     Raises FileError where it cannot be written, and for a file there that is no page: a run
     named after ``--html`` by mistake stays what it is.
@@ -34,7 +40,6 @@ def write_page(path: str, page: str) -> None:
         raise FileError(
             Fault(f"the page cannot be written: {reason}; name another file for --html", path)
         ) from error
-    click.echo(f"report: {path}", err=True)
 
 
 def page_title(profile: str, runs: Sequence[str], effect: str = "") -> str:

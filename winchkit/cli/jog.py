@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.bench_option import bench_option, dry_run_option, winch_argument
+from winchkit.cli.output import echo_json
+from winchkit.cli.status_line import status_line
 from winchkit.errors import ConnectionLost, UsageError, WinchkitError
 
 if TYPE_CHECKING:
@@ -23,8 +26,8 @@ _HELP = "hold up: wind in, down: pay out · space: stop · + −: speed · r: re
 
 
 @click.command()
-@click.argument("winch", required=False)
-@click.option("-b", "--bench", required=True, metavar="FILE", help="Wiring file of the bench.")
+@winch_argument
+@bench_option
 @click.option(
     "--speed",
     default="0.05 m/s",
@@ -39,6 +42,10 @@ _HELP = "hold up: wind in, down: pay out · space: stop · + −: speed · r: re
     "--step", metavar="LENGTH", help="Without keys: wind in so much rope (negative pays out)."
 )
 @click.option("--reset", is_flag=True, help="First clear trips and drive faults.")
+@dry_run_option
+@click.option(
+    "--json", "as_json", is_flag=True, help="Without keys: print where it stands as JSON."
+)
 def command(
     winch: str | None,
     *,
@@ -47,6 +54,8 @@ def command(
     duration: str | None,
     step: str | None,
     reset: bool,
+    dry_run: bool,
+    as_json: bool,
 ) -> None:
     """Move WINCH (the only one where there is one) by hand.
 
@@ -55,15 +64,13 @@ def command(
     Space stops, q stops and quits. Attaches to the process that owns the bench where there is
     one. The software is no emergency stop.
     """
-    from winchkit.bench.session import at_station
+    from winchkit.cli.dry_run import station_for
     from winchkit.cli.duration import quantity, seconds
 
     velocity, limit = quantity(speed, "speed"), seconds(duration)
-    if limit is None and step is None and not sys.stdin.isatty():
-        raise UsageError(
-            "the input is no terminal to hold a key on; use --for TIME or --step LENGTH"
-        )
-    with at_station(bench) as station:
+    if limit is None and step is None and (dry_run or not sys.stdin.isatty()):
+        raise UsageError("there is no terminal to hold a key on; use --for TIME or --step LENGTH")
+    with station_for(bench, dry_run=dry_run, as_json=as_json) as station:
         if reset:
             station.reset()
         if step is not None:
@@ -74,7 +81,10 @@ def command(
         else:
             _jog_by_keys(station, winch, velocity)
             return
-        click.echo(_line(station.status()))
+        if as_json and not dry_run:
+            echo_json(station.status())
+        elif not dry_run:
+            click.echo(status_line(station.status()))
 
 
 def _jog_for(station: Station, winch: str | None, speed: float, duration: float) -> None:
@@ -108,7 +118,9 @@ def _jog_by_keys(station: Station, winch: str | None, speed: float) -> None:
                     speed *= _FASTER if key == "+" else 1 / _FASTER
                 else:
                     _act(station, winch, key, speed, held)
-            click.echo(f"\r{_line(station.status())}  [{speed:.3f} m/s]\x1b[K", nl=False, err=True)
+            click.echo(
+                f"\r{status_line(station.status())}  [{speed:.3f} m/s]\x1b[K", nl=False, err=True
+            )
 
 
 def _act(station: Station, winch: str | None, key: str, speed: float, held: HeldKey) -> None:
@@ -125,18 +137,3 @@ def _act(station: Station, winch: str | None, key: str, speed: float, held: Held
         raise
     except WinchkitError as error:
         click.echo(f"\n{error}", err=True)
-
-
-def _line(status: dict[str, Any]) -> str:
-    """The winches of a snapshot in one line."""
-    parts = []
-    for name, winch in status["winch"].items():
-        text = f"{name}: {_number(winch['cable_length'])} m {_number(winch['speed'])} m/s"
-        if winch["tension"] is not None:
-            text += f" {_number(winch['tension'], 1)} N"
-        parts.append(f"{text} {winch['phase']}")
-    return "  ".join(parts)
-
-
-def _number(value: float | None, digits: int = 3) -> str:
-    return "—" if value is None else f"{value:.{digits}f}"

@@ -1,47 +1,151 @@
-"""``winchkit log``: records a bench to a file until told to end."""
+"""``winchkit log``: records a bench, and looks after what was recorded."""
 
 from __future__ import annotations
 
+import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.completing import complete_bench
+from winchkit.cli.lazy import At, LazyGroup
 from winchkit.cli.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.bench.live_sinks import LiveSink
+    from winchkit.bench.station import Station
 
 __all__ = ["command"]
 
-_PERIOD = 0.1
+COMMANDS = {
+    "info": At("winchkit.cli.log_info", "What a log holds: channels, rates, gaps, counters."),
+    "recover": At("winchkit.cli.log_recover", "Save what is whole of a log that was cut off."),
+    "export": At("winchkit.cli.export", "Convert a log to CSV, MCAP, Parquet or MF4."),
+    "replay": At("winchkit.cli.log_replay", "Play a log as if it came from the bench."),
+}
+_CHECK_PERIOD = 0.1
+_SHOW_PERIOD = 0.5
 
 
-@click.command()
-@click.option("-b", "--bench", required=True, metavar="FILE", help="Wiring file of the bench.")
+@click.group(cls=LazyGroup, table=COMMANDS, invoke_without_command=True)
 @click.option(
-    "-o", "--output", required=True, metavar="FILE", help="Where to: a .csv or .mcap file."
+    "-b",
+    "--bench",
+    metavar="FILE",
+    shell_complete=complete_bench,
+    help="Wiring file of the bench.",
 )
+@click.option("-o", "--output", metavar="FILE", help="Where to: a .csv or .mcap file.")
+@click.option("--rotate", metavar="LIMIT", help="Go on in a new file, e.g. after 100MB or 10min.")
 @click.option("--for", "duration", metavar="TIME", help="End after this time, e.g. 10s or '2 min'.")
+@click.option("--jsonl", is_flag=True, help="Print live pictures to stdout, one JSON a line.")
+@click.option("--udp", metavar="HOST:PORT", help="Send live pictures as JSON, e.g. to PlotJuggler.")
+@click.option("--period", default="0.02 s", show_default=True, help="Between two live pictures.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def command(bench: str, output: str, duration: str | None, as_json: bool) -> None:
+@click.pass_context
+def command(
+    context: click.Context,
+    *,
+    bench: str | None,
+    output: str | None,
+    rotate: str | None,
+    duration: str | None,
+    jsonl: bool,
+    udp: str | None,
+    period: str,
+    as_json: bool,
+) -> None:
     """Log every winch of a bench until Ctrl-C, or for a time.
 
-    A row stands for each reading of the load cell (else of the length instrument). Attaches to
-    the process that owns the bench where there is one; logging never moves anything.
+    MCAP holds every channel with its own time stamps. In CSV a row stands for each reading of the
+    load cell (else of the length instrument). Attaches to the process that owns the bench where
+    there is one; logging never moves anything.
     """
+    if context.invoked_subcommand is not None:
+        return
+    if bench is None:
+        raise click.UsageError("Missing option '-b' / '--bench'.")
+    _refuse(output, rotate, jsonl=jsonl, udp=udp, as_json=as_json)
     from winchkit.bench.session import at_station
-    from winchkit.cli.duration import seconds
+    from winchkit.cli.duration import quantity, seconds
+    from winchkit.cli.live_output import live_sinks
 
-    limit = seconds(duration)
-    with at_station(bench) as station:
-        station.start_log(str(Path(output).absolute()))
-        start = time.monotonic()
-        try:
-            while limit is None or time.monotonic() - start < limit:
-                time.sleep(min(_PERIOD, limit or _PERIOD))
-                station.log_rows()
-        except KeyboardInterrupt:
-            click.echo("ending the log", err=True)
-        rows = station.end_log()
+    limit, pause = seconds(duration), quantity(period, "time")
+    with live_sinks(jsonl=jsonl, udp=udp) as sinks, at_station(bench) as station:
+        if output:
+            station.start_log(str(Path(output).absolute()), rotate)
+        with _counter_row(station) as show:
+            _follow(station, limit, pause if sinks else _CHECK_PERIOD, sinks, show)
+        counted = station.counters()
+        rows = station.end_log() if output else 0
     if as_json:
-        echo_json({"schema": 1, "output": output, "rows": rows})
-    else:
+        echo_json({"schema": 1, "output": output, "rows": rows, "counters": counted})
+    elif output and not jsonl:
         click.echo(f"{output}: {rows} rows")
+
+
+def _refuse(
+    output: str | None, rotate: str | None, *, jsonl: bool, udp: str | None, as_json: bool
+) -> None:
+    """Raise UsageError for options that cannot be meant together, before anything is opened."""
+    if not (output or jsonl or udp):
+        raise click.UsageError("Missing option '-o' / '--output' (or '--jsonl', '--udp').")
+    if jsonl and as_json:
+        raise click.UsageError("'--jsonl' and '--json' both print to stdout; choose one.")
+    if rotate is not None:
+        from winchkit.runs.rotation import Rotation
+
+        Rotation.parse(rotate)
+
+
+def _follow(
+    station: Station,
+    limit: float | None,
+    pause: float,
+    sinks: list[LiveSink],
+    show: Callable[[], None],
+) -> None:
+    """Watch over the log, and show every new picture, until the time is over."""
+    start, seen = time.monotonic(), -1
+    try:
+        while limit is None or time.monotonic() - start < limit:
+            time.sleep(min(pause, limit or pause))
+            station.log_rows()
+            status = station.status() if sinks else {"cycle": seen}
+            if status["cycle"] != seen:
+                seen = status["cycle"]
+                for sink in sinks:
+                    sink(status)
+            show()
+    except KeyboardInterrupt:
+        click.echo("ending the log", err=True)
+
+
+@contextmanager
+def _counter_row(station: Station) -> Iterator[Callable[[], None]]:
+    """A live table of what is counted, where somebody sees it."""
+    if not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.console import Console
+    from rich.live import Live
+
+    from winchkit.cli.counter_table import counter_table
+
+    shown = 0.0
+
+    with Live(console=Console(stderr=True), auto_refresh=False) as live:
+
+        def show() -> None:
+            nonlocal shown
+            now = time.monotonic()
+            if now - shown >= _SHOW_PERIOD:
+                shown = now
+                counted: dict[str, dict[str, Any]] = station.counters()
+                live.update(counter_table(counted), refresh=True)
+
+        yield show

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.bench_option import bench_option
 from winchkit.cli.output import echo_json
 
 if TYPE_CHECKING:
@@ -14,11 +16,11 @@ if TYPE_CHECKING:
 
     from winchkit.bench.station import Station
 
-__all__ = ["command"]
+__all__ = ["command", "status_table"]
 
 
 @click.command()
-@click.option("-b", "--bench", required=True, metavar="FILE", help="Wiring file of the bench.")
+@bench_option
 @click.option("--period", default="0.2 s", show_default=True, help="Between two pictures.")
 @click.option("--for", "duration", metavar="TIME", help="End after this time.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line.")
@@ -45,9 +47,9 @@ def _show(station: Station, pause: float, end: float | None, as_json: bool) -> N
     from rich.console import Console
     from rich.live import Live
 
-    with Live(_table(station.status()), console=Console(stderr=True), screen=False) as live:
+    with Live(status_table(station.status()), console=Console(stderr=True), screen=False) as live:
         while _again(pause, end):
-            live.update(_table(station.status()))
+            live.update(status_table(station.status()))
 
 
 def _again(pause: float, end: float | None) -> bool:
@@ -57,10 +59,18 @@ def _again(pause: float, end: float | None) -> bool:
     return end is None or time.monotonic() < end
 
 
-def _table(status: dict[str, Any]) -> Table:
+def status_table(status: Mapping[str, Any]) -> Table:
+    """The winches of a picture, a row each."""
     from rich.table import Table
 
-    trouble = dict.fromkeys([*status["tripped"], *status["blocked"]])
+    buses = status.get("bus", {}).items()
+    trouble = dict.fromkeys(
+        [
+            *status["tripped"],
+            *status["blocked"],
+            *(f"bus {n}: {t}" for n, b in buses if (t := _lost(b))),
+        ]
+    )
     table = Table(
         title=f"cycle {status['cycle']}, overruns {status['overruns']}",
         caption="\n".join(trouble) or "no trips",
@@ -83,11 +93,18 @@ def _table(status: dict[str, Any]) -> Table:
     return table
 
 
+def _lost(bus: Mapping[str, Any]) -> str:
+    """What went wrong on a CAN bus; empty while nothing has."""
+    counts = {key: count for key, count in bus.items() if key in _LOSSES and count}
+    return ", ".join(f"{key.replace('_', ' ')} {count}" for key, count in counts.items())
+
+
 def _complaints(quality: dict[str, str]) -> list[str]:
     """Sensors about which there is something to say."""
     return [f"{role} {text}" for role, text in quality.items() if text not in _FINE]
 
 
+_LOSSES = ("error_frames", "bus_off", "error_passive", "overruns", "dropped", "unsent", "reopened")
 _FINE = ("good", "duplicate")
 
 

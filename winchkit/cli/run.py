@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.bench_option import bench_option, dry_run_option
+from winchkit.cli.completing import complete_programme
 from winchkit.cli.output import echo_json
 
 if TYPE_CHECKING:
-    from winchkit.schema.programme import Step
+    from winchkit.schema.programme import Programme, Step
 
 __all__ = ["command"]
 
+_POLL = 0.05
+
 
 @click.command()
-@click.argument("programme")
-@click.option("-b", "--bench", required=True, metavar="FILE", help="Wiring file of the bench.")
+@click.argument("programme", shell_complete=complete_programme)
+@bench_option
 @click.option(
     "-o",
     "--out",
@@ -36,40 +42,68 @@ __all__ = ["command"]
     is_flag=True,
     help="Answer every question with yes; a simulated bench does what is asked.",
 )
+@dry_run_option
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
-def command(programme: str, bench: str, out: Path, suffix: str, yes: bool, as_json: bool) -> None:
+def command(
+    programme: str,
+    *,
+    bench: str,
+    out: Path,
+    suffix: str,
+    yes: bool,
+    dry_run: bool,
+    as_json: bool,
+) -> None:
     """Execute PROGRAMME (a file, or a shipped name) on a bench, one log per load and repeat.
 
     Ctrl-C, a trip or a fault stops the winches; what was logged until then is kept.
     """
-    from winchkit.bench.bench import open_bench
-    from winchkit.bench.programme import run_programme
-    from winchkit.bench.server import StationServer
     from winchkit.schema.read import read_programme
     from winchkit.sim.bench import programme_path
 
     declared = read_programme(programme_path(programme))
-    with open_bench(bench) as opened:
-        server = StationServer(opened)
-        try:
-            written = run_programme(
-                opened,
-                declared,
-                out,
-                partial(_agree, bench) if yes else _ask,
-                suffix=f".{suffix}",
-                progress=lambda repeat, number, step: click.echo(
-                    f"{declared.name} {repeat}/{declared.repeat}, step {number}: {_words(step)}",
-                    err=True,
-                ),
-            )
-        finally:
-            server.close()
+    if dry_run:
+        _rehearse(bench, declared, as_json=as_json)
+        return
+    written = _execute(bench, declared, out, f".{suffix}", partial(_agree, bench) if yes else _ask)
     if as_json:
         echo_json({"schema": 1, "programme": declared.name, "runs": written})
     else:
         for path in written:
             click.echo(path)
+
+
+def _execute(
+    bench: str, programme: Programme, out: Path, suffix: str, ask: Callable[[Step], None]
+) -> list[Path]:
+    """Run it as the bench's owner; other commands may attach meanwhile."""
+    from winchkit.bench.bench import open_bench
+    from winchkit.bench.programme import run_programme
+    from winchkit.bench.server import StationServer
+
+    def tell(repeat: int, number: int, step: Step) -> None:
+        place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
+        click.echo(f"{place}: {_words(step)}", err=True)
+
+    with open_bench(bench) as opened:
+        server = StationServer(opened)
+        try:
+            return run_programme(opened, programme, out, ask, suffix=suffix, progress=tell)
+        finally:
+            server.close()
+
+
+def _rehearse(bench: str, programme: Programme, *, as_json: bool) -> None:
+    """Make the moves of one repeat on simulated drives, leaving out holds and questions."""
+    from winchkit.cli.dry_run import station_for
+
+    with station_for(bench, dry_run=True, as_json=as_json) as station:
+        for step in programme.step:
+            if step.to is None and step.by is None:
+                continue
+            station.move(step.winch, step.to, step.by, step.speed, step.acceleration)
+            while station.moving(step.winch):
+                time.sleep(_POLL)
 
 
 def _ask(step: Step) -> None:

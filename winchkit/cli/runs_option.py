@@ -17,11 +17,12 @@ __all__ = ["ManyValues", "catalogue_of", "model_options", "read_runs"]
 
 
 class ManyValues(click.Command):
-    """A command whose repeatable options take several values: ``--fit a.csv b.csv``."""
+    """A command whose options shown as ``RUN...`` take several values: ``--fit a.csv b.csv``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Spell ``--fit a b`` as ``--fit a --fit b`` before click reads it."""
-        many = {name for p in self.params if getattr(p, "multiple", False) for name in p.opts}
+        several = [p for p in self.params if str(p.metavar or "").endswith("...")]
+        many = {name for p in several if isinstance(p, click.Option) for name in p.opts}
         out: list[str] = []
         current: str | None = None
         for arg in args:

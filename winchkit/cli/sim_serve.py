@@ -46,7 +46,7 @@ _TURN = 5e-4
 def command(
     *, bench: str, seed: int, bench_file: Path | None, interface: Interface, hidden: tuple[str, ...]
 ) -> None:
-    """Run a simulated BENCH live until Ctrl-C: its drives on CAN, its instruments on Modbus.
+    """Run a simulated BENCH live until Ctrl-C: drives on CAN, instruments on Modbus or serial.
 
     Prints the wiring file to connect to. Takes lines on its input: load A 32 kg, fault A.cell
     silence, recover A.cell, status, quit. While it runs, 'winchkit run --yes' with that wiring

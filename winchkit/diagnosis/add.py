@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.follows import variables_of
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.problem import Problem
@@ -18,11 +19,13 @@ from winchkit.diagnosis.uncertainty import estimates, unknown_std
 from winchkit.diagnosis.verdict import output_fits
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.effect import Effect
+from winchkit.effects.empirical import EMPIRICAL, placed, variable_of
 from winchkit.errors import UsageError
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Addition", "Grown", "add", "grow"]
+__all__ = ["Addition", "Grown", "add", "fitted_json", "grow"]
 
 _STARTS = 4
 
@@ -42,29 +45,32 @@ class Addition:
 
     def to_json(self) -> dict[str, Any]:
         """As ``winchkit add --json`` prints it."""
-        kept = (
-            "unit",
-            "rms_before",
-            "rms_after",
-            "heldout_rms_before",
-            "heldout_rms_after",
-            "noise_rms",
-            "noise_source",
-        )
-        outputs = {
-            name: {key: getattr(output, key) for key in kept}
-            for name, output in self.outputs.items()
-        }
-        parameters = {
-            term.label: {name: vars(e) for name, e in values.items()} for term, values in self.terms
-        }
-        return {
-            "schema": 1,
-            "effect": self.added[0].effect.id,
-            "outputs": outputs,
-            "parameters": parameters,
-            "notes": list(self.notes),
-        }
+        return fitted_json(self.added[0].effect.id, self.outputs, self.terms, self.notes)
+
+
+def fitted_json(
+    effect_id: str,
+    outputs: Mapping[str, OutputFit],
+    terms: Sequence[tuple[Term, Mapping[str, Estimate]]],
+    notes: Sequence[str],
+) -> dict[str, Any]:
+    """What one effect more or less did to a profile, as ``add`` and ``remove`` print it."""
+    kept = (
+        "unit",
+        "rms_before",
+        "rms_after",
+        "heldout_rms_before",
+        "heldout_rms_after",
+        "noise_rms",
+        "noise_source",
+    )
+    return {
+        "schema": 1,
+        "effect": effect_id,
+        "outputs": {o: {key: getattr(f, key) for key in kept} for o, f in outputs.items()},
+        "parameters": {t.label: {n: vars(e) for n, e in v.items()} for t, v in terms},
+        "notes": list(notes),
+    }
 
 
 @dataclass(frozen=True)
@@ -106,7 +112,9 @@ def grow(
     effect = catalogue[effect_id]
     if not effect.repeatable and any(table.id == effect_id for table in profile.effect):
         raise UsageError(f"profile '{profile.name}' has the effect '{effect_id}' already")
-    inquiry = inquire(prepare(runs, profile, band), catalogue)
+    dataset = prepare(runs, profile, band)
+    candidates = Catalogue([*catalogue, _placed(effect, dataset)])
+    inquiry = inquire(dataset, candidates)
     lacking = missing_needs(effect, inquiry.problem)
     if lacking:
         raise UsageError(
@@ -123,6 +131,17 @@ def grow(
     terms = tuple(estimates(inquiry.problem, final, std))
     addition = Addition(outputs, terms, inquiry.problem.dataset.notes)
     return Grown(inquiry.problem, begin, final, addition)
+
+
+def _placed(effect: Effect, dataset: Dataset) -> Effect:
+    """An empirical curve over what its variable covers in the data; any other effect as it is."""
+    if effect.id not in EMPIRICAL:
+        return effect
+    name = variable_of(effect)
+    ranges = [variables_of(r)[name] for r in dataset.recordings if name in variables_of(r)]
+    if not ranges:
+        return effect
+    return placed(effect, min(float(x.min()) for x in ranges), max(float(x.max()) for x in ranges))
 
 
 def _atoms(inquiry: Inquiry, effect_id: str, noise: Noise) -> list[Score]:

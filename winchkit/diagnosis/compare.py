@@ -14,16 +14,15 @@ from winchkit.diagnosis.denoise import contrasts
 from winchkit.diagnosis.follows import follows
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.result import Comparison, OutputError
-from winchkit.diagnosis.spectrum import low_pass
+from winchkit.diagnosis.spectrum import WHOLE_FILTER, low_pass
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Compared", "begin_hypothesis", "compare", "compared", "signal_rms"]
+__all__ = ["Compared", "begin_hypothesis", "compare", "compared", "repeat_noise", "signal_rms"]
 
 Array = NDArray[np.float64]
-_WHOLE_FILTER = 3.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ def compared(
     band: float | None = None,
 ) -> Compared:
     """As :func:`compare`, with the residual that the figures were taken from."""
-    problem = Problem(prepare(runs, profile, band, skirt=_WHOLE_FILTER))
+    problem = Problem(prepare(runs, profile, band, skirt=WHOLE_FILTER))
     start = begin_hypothesis(profile, catalogue, problem)
     residual = problem.residual(start)
     offset = None
@@ -65,7 +64,7 @@ def compared(
         offset = float(column @ residual / (column @ column))
         residual = residual - offset * column
     shares = follows(problem, residual)
-    noise = _repeat_noise(problem, residual)
+    noise = repeat_noise(problem, residual)
     outputs = {}
     for output in problem.dataset.outputs:
         error = _error(problem, residual, output)
@@ -119,7 +118,7 @@ def _error(problem: Problem, residual: Array, output: str) -> Array:
     return np.concatenate(parts)
 
 
-def _repeat_noise(problem: Problem, residual: Array) -> dict[str, float]:
+def repeat_noise(problem: Problem, residual: Array) -> dict[str, float]:
     """Rms of the differences of repeats per output; empty without repeats."""
     times = {
         (s.run, s.output): time

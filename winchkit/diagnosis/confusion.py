@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
 
-__all__ = ["Confusion", "confusion_of"]
+__all__ = ["Confusion", "confusion_of", "pairs_of"]
 
 Array = NDArray[np.float64]
 _RIVALS = 6
@@ -110,3 +111,8 @@ def _cosine(inner: Array, a: slice, b: slice) -> float:
         roots.append(vectors[:, kept] / np.sqrt(values[kept]))
     across = roots[0].T @ inner[a, b] @ roots[1]
     return float(np.linalg.svd(across, compute_uv=False)[0]) if across.size else 0.0
+
+
+def pairs_of(sets: Sequence[Confusion]) -> list[tuple[Term, Term]]:
+    """The effects that runs so far cannot tell apart, two by two."""
+    return [(c.term, rival) for c in sets for rival in c.terms if rival is not c.term]

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from winchkit.diagnosis.compare import begin_hypothesis
-from winchkit.diagnosis.confusion import Confusion, confusion_of
+from winchkit.diagnosis.confusion import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.dataset import Dataset, prepare
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.follows import follows, harmonics
@@ -43,9 +43,17 @@ _WHERE = 6
 class Answer:
     """A diagnosis with everything behind it, for reports and for adding effects."""
 
-    def __init__(self, inquiry: Inquiry, found: Found, diagnosis: Diagnosis) -> None:
+    def __init__(
+        self,
+        inquiry: Inquiry,
+        found: Found,
+        diagnosis: Diagnosis,
+        sets: Sequence[Confusion] = (),
+    ) -> None:
         self.inquiry = inquiry
         self.found = found
+        self.sets = tuple(sets)
+        """What cannot be told apart, a set for each effect that was found."""
         self.diagnosis = diagnosis
 
 
@@ -66,7 +74,7 @@ def diagnose(
     shown = judgement.shown
     added = range(inquiry.given, len(shown.final.hypothesis.terms))
     sets = [confusion_of(inquiry, shown.final, shown.noise, index) for index in added]
-    pairs = [(c.term, rival) for c in sets for rival in c.terms if rival is not c.term]
+    pairs = pairs_of(sets)
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,
@@ -82,7 +90,7 @@ def diagnose(
             *judgement.notes,
         ),
     )
-    return Answer(inquiry, shown, diagnosis)
+    return Answer(inquiry, shown, diagnosis, sets)
 
 
 def inquire(dataset: Dataset, catalogue: Catalogue) -> Inquiry:

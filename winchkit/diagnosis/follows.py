@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.problem import Problem
-from winchkit.model.recurrence import play
+from winchkit.model.variables import ANGLES, VARIABLES
 
 __all__ = ["Followed", "follows", "harmonics", "variables_of"]
 
@@ -17,7 +17,6 @@ Array = NDArray[np.float64]
 _BINS = 16
 _ORDERS = 40
 _WORTH = 0.02
-_CREEP = 1e-4
 
 
 @dataclass(frozen=True)
@@ -34,35 +33,15 @@ class Followed:
 
 def variables_of(recording: Recording) -> dict[str, Array]:
     """The variables that a residual may follow along one run, (n,) each."""
-    at = recording.raw.at
-    out = {
-        "drum_angle": at.drum_angle,
-        "motor_angle": at.motor_angle,
-        "speed": at.speed,
-        "direction": np.sign(np.where(np.abs(at.speed) > _CREEP, at.speed, 0.0)),
-        "cable_length": at.free_length,
-        "time": at.time,
-        "reversal_distance": _reversal_distance(at.free_length),
-    }
+    known = [name for name in VARIABLES if name not in ("load", "tension", "temperature")]
+    out = {name: VARIABLES[name](recording.raw.at) for name in known}
     if recording.raw.load is not None:
-        out["load"] = recording.smooth.at.tension
+        out["load"] = VARIABLES["load"](recording.smooth.at)
     elif recording.raw.drum_tension is not None:
-        out["tension"] = recording.smooth.at.tension
+        out["tension"] = VARIABLES["tension"](recording.smooth.at)
     if recording.signals.temperature is not None:
-        out["temperature"] = recording.smooth.at.temperature
+        out["temperature"] = VARIABLES["temperature"](recording.smooth.at)
     return out
-
-
-def _reversal_distance(length: Array) -> Array:
-    """Logarithm (base 10) of the distance run since the last change of direction, m."""
-    # A play of twice the creep length keeps encoder noise at standstill from counting as turns.
-    moved = np.diff(play(length, 2 * _CREEP), prepend=length[:1])
-    index = np.arange(len(moved))
-    sign = np.sign(moved)
-    held = sign[np.maximum.accumulate(np.where(sign != 0, index, 0))]
-    turned = np.maximum.accumulate(np.where(np.diff(held, prepend=held[:1]) != 0, index, 0))
-    travelled = np.cumsum(np.abs(moved))
-    return np.asarray(np.log10(np.maximum(travelled - travelled[turned], 1e-5)))
 
 
 def follows(problem: Problem, residual: Array) -> list[Followed]:
@@ -93,9 +72,9 @@ def harmonics(problem: Problem, residual: Array) -> list[Followed]:
     for output in problem.dataset.outputs:
         own = [(s, t) for s, t in zip(problem.segments, times, strict=True) if s.output == output]
         error = np.concatenate([t for _, t in own])
-        for name in ("drum_angle", "motor_angle"):
+        for name in ANGLES:
             angle = np.concatenate(
-                [getattr(problem.dataset.recordings[s.run].raw.at, name) for s, _ in own]
+                [VARIABLES[name](problem.dataset.recordings[s.run].raw.at) for s, _ in own]
             )
             shares = [_harmonic_share(angle * order, error) for order in range(1, _ORDERS + 1)]
             best = int(np.argmax(shares))

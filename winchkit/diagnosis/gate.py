@@ -133,15 +133,12 @@ def held_out_rms(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> dict
     plain_columns = _in_time(problem, shared)
     fold = np.concatenate(folds.of)
     left = plain - np.einsum("ij,ij->i", plain_columns, steps[fold])
-    out, at = {}, 0
-    squares: dict[str, list[float]] = {}
+    squares, at = dict.fromkeys(problem.dataset.outputs, 0.0), 0
     for segment in problem.segments:
         part = left[at : at + segment.band.count]
         at += segment.band.count
-        squares.setdefault(segment.output, []).extend([float(part @ part), len(part)])
-    for output, sums in squares.items():
-        out[output] = float(np.sqrt(sum(sums[::2]) / sum(sums[1::2])))
-    return out
+        squares[segment.output] += float(part @ part)
+    return {o: float(np.sqrt(total / problem.samples(o))) for o, total in squares.items()}
 
 
 def confidence(before: Array, after: Array) -> float:

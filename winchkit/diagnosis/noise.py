@@ -275,5 +275,5 @@ def _rms(problem: Problem, power: Array) -> dict[str, float]:
     for output in problem.dataset.outputs:
         own = [s for s in problem.segments if s.output == output]
         total = sum(float(np.sum(power[problem.band_of_row[s.rows]])) for s in own)
-        out[output] = float(np.sqrt(total / sum(s.band.count for s in own)))
+        out[output] = float(np.sqrt(total / problem.samples(output)))
     return out

@@ -14,7 +14,10 @@ _POWER_QUANTILE = 1.2816
 
 
 def detectable(scores: tuple[Score, ...], price: float, threshold: float) -> tuple[Detectable, ...]:
-    """Smallest main parameter per effect, found with 90 % power against what noise alone scores."""
+    """Smallest main parameter per effect, found with 90 % power against what noise alone scores.
+
+    NaN where no size within the parameter's bounds would be found.
+    """
     out = []
     for item in scores:
         effect = item.atom.effect
@@ -33,6 +36,9 @@ def detectable(scores: tuple[Score, ...], price: float, threshold: float) -> tup
             null = coordinates.vector(base)
             moved = null + size * (coordinates.vector({**base, **secant}) - null)
             low, high = coordinates.bounds()
-            value = coordinates.values(np.clip(moved, low, high), base)[name]
+            if np.any((moved < low) | (moved > high)):
+                value = float("nan")
+            else:
+                value = coordinates.values(moved, base)[name]
         out.append(Detectable(effect.id, name, float(value), parameter.unit))
     return tuple(sorted(out, key=lambda d: d.effect))

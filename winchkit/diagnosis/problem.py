@@ -102,6 +102,11 @@ class Problem:
         }
         return np.array([(1e-8 * size[output]) ** 2 or 1e-300 for output, _, _ in self.bands])
 
+    def samples(self, output: str) -> int:
+        """How many samples of an output are compared; the others are zero in every residual."""
+        there = [r.valid[output] for r in self.dataset.recordings if output in r.valid]
+        return max(1, sum(int(np.count_nonzero(valid)) for valid in there))
+
     def change(self, hypothesis: Hypothesis) -> Array:
         """What the terms add to the nominal prediction, rows."""
         if not hypothesis.terms:

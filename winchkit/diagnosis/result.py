@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from winchkit.effects.empirical import empirical_id
+
 __all__ = [
     "Candidate",
     "Comparison",
@@ -130,6 +132,7 @@ class Detectable:
     effect: str
     parameter: str
     smallest: float
+    """NaN where no size within the parameter's bounds would have been seen."""
     unit: str
 
 
@@ -171,6 +174,12 @@ class Diagnosis:
     next_runs: tuple[NextRun, ...]
     notes: tuple[str, ...] = ()
 
+    @property
+    def empirical(self) -> tuple[str, ...]:
+        """Empirical effects that would take up the rest where it lives, most of it first."""
+        seen = [empirical_id(w.output, w.variable) for w in self.where if w.frequency is None]
+        return tuple(dict.fromkeys(seen))
+
     def to_json(self) -> dict[str, Any]:
         """As ``winchkit diagnose --json`` prints it."""
         return {
@@ -183,6 +192,7 @@ class Diagnosis:
             "unexplained": {
                 "share": self.unexplained_share,
                 "where": [where.to_json() for where in self.where],
+                "empirical": list(self.empirical),
             },
             "next_runs": [
                 {**vars(run), "separates": list(run.separates)} for run in self.next_runs

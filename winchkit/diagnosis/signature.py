@@ -124,7 +124,7 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
         coordinates = Coordinates(effect)
         added = partial(_column, problem, present, here, effect)
         for shape in coordinates.grid():
-            if not _turns_enough(problem, effect, shape):
+            if not _turns_enough(problem, shape):
                 continue
             own = [
                 (secant, added({**effect.null, **shape, **secant}))
@@ -141,9 +141,9 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
     return Signatures(tuple(atoms), stacked, _gram(problem, stacked))
 
 
-def _turns_enough(problem: Problem, effect: Effect, shape: dict[str, float]) -> bool:
+def _turns_enough(problem: Problem, shape: dict[str, float]) -> bool:
     """Whether the motor turns through two periods of an order in some run."""
-    orders = [shape[p.name] for p in effect.parameters if p.whole and p.name in shape]
+    orders = [shape["order"]] if "order" in shape else []
     stroke = max(float(np.ptp(r.signals.motor_angle)) for r in problem.dataset.recordings)
     return all(order * stroke >= _PERIODS * 2 * np.pi for order in orders)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Estimate
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
+from winchkit.effects.effect import Parameter
 
 __all__ = ["estimates", "unknown_std"]
 
@@ -45,10 +48,16 @@ def estimates(problem: Problem, fit: Fit, std: Array) -> list[tuple[Term, dict[s
             (
                 term,
                 {
-                    p.name: Estimate(term.values[p.name], deviation.get(p.name, 0.0), p.unit)
+                    p.name: Estimate(term.values[p.name], _believed(deviation, p), p.unit)
                     for p in term.effect.parameters
                     if p.name in deviation or p.whole
                 },
             )
         )
     return out
+
+
+def _believed(deviation: Mapping[str, float], parameter: Parameter) -> float:
+    """Standard deviation of a value; NaN where the data leave it anywhere within its bounds."""
+    std = deviation.get(parameter.name, 0.0)
+    return float("nan") if std >= parameter.high - parameter.low else std

@@ -16,6 +16,7 @@ from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import OutputFit, Verdict
 from winchkit.diagnosis.search import Found
+from winchkit.diagnosis.skirt import Skirt
 
 __all__ = ["Judgement", "judge", "output_fits"]
 
@@ -122,22 +123,29 @@ def output_fits(
     before, after = _rms(problem, begin[0]), _rms(problem, final[0])
     held_before = held_out_rms(problem, *begin, folds)
     held_after = held_out_rms(problem, *final, folds)
-    noise = final[1]
+    noise, skirt = final[1], Skirt(problem.dataset)
+    beyond = skirt.residual(begin[0].hypothesis), skirt.residual(final[0].hypothesis)
+    noise_beyond = skirt.noise(final[0].hypothesis)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         output: OutputFit(
             unit=OUTPUT_UNITS[output],
             band=next(s.band.cut_off for s in problem.segments if s.output == output),
             signal_rms=signal_rms(problem.dataset, output),
-            rms_before=before[output],
-            rms_after=after[output],
-            heldout_rms_before=held_before[output],
-            heldout_rms_after=held_after[output],
-            noise_rms=noise.rms[output],
+            rms_before=_with(before[output], beyond[0].get(output)),
+            rms_after=_with(after[output], beyond[1].get(output)),
+            heldout_rms_before=_with(held_before[output], beyond[0].get(output)),
+            heldout_rms_after=_with(held_after[output], beyond[1].get(output)),
+            noise_rms=_with(noise.rms[output], noise_beyond.get(output)),
             noise_source=source,
         )
         for output in problem.dataset.outputs
     }
+
+
+def _with(rms: float, beyond: float | None) -> float:
+    """An rms with the mean square above the low-pass's cut-off."""
+    return float(np.hypot(rms, np.sqrt(beyond or 0.0)))
 
 
 def _rms(problem: Problem, fitted: Fit) -> dict[str, float]:
@@ -145,5 +153,5 @@ def _rms(problem: Problem, fitted: Fit) -> dict[str, float]:
     for output in problem.dataset.outputs:
         own = [s for s in problem.segments if s.output == output]
         total = sum(float(np.sum(fitted.residual[s.rows] ** 2)) for s in own)
-        out[output] = float(np.sqrt(total / sum(s.band.count for s in own)))
+        out[output] = float(np.sqrt(total / problem.samples(output)))
     return out

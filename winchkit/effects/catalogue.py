@@ -10,6 +10,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 from winchkit.effects.effect import Effect
+from winchkit.effects.empirical import EMPIRICAL
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.units import dimension_of, suggest
 
@@ -19,7 +20,10 @@ _ROOMS = ("on_length", "on_tension", "on_torque")
 
 
 class Catalogue:
-    """Effects by id, in a fixed order: simple ones first."""
+    """Effects by id, in a fixed order: simple ones first.
+
+    Empirical ones are known by name and stand in no list: a curve explains anything.
+    """
 
     def __init__(self, effects: Iterable[Effect]) -> None:
         self._by_id = {effect.id: effect for effect in effects}
@@ -31,16 +35,16 @@ class Catalogue:
         return len(self._by_id)
 
     def __contains__(self, effect_id: object) -> bool:
-        return effect_id in self._by_id
+        return effect_id in self._by_id or effect_id in EMPIRICAL
 
     def __getitem__(self, effect_id: str) -> Effect:
-        try:
-            return self._by_id[effect_id]
-        except KeyError:
+        found = self._by_id.get(effect_id) or EMPIRICAL.get(effect_id)
+        if found is None:
             raise UsageError(
-                f"no effect '{effect_id}'{suggest(effect_id, list(self._by_id))}"
+                f"no effect '{effect_id}'{suggest(effect_id, [*self._by_id, *EMPIRICAL])}"
                 " ('winchkit effects' lists them)"
-            ) from None
+            )
+        return found
 
 
 def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:

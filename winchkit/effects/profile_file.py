@@ -1,7 +1,7 @@
 """Writes fitted effects into a copy of a profile file, with where their values came from.
 
-The user's file keeps its comments, its order and its shorthands: only values that were refitted
-change, and one ``[[effect]]`` table comes at the end.
+Only values that were refitted change, a new effect comes at the end of the effects, and the
+ledger gets a line.
 """
 
 from __future__ import annotations
@@ -9,23 +9,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
+from math import isinf, isnan
 from pathlib import Path
 from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT, InlineTable
+from tomlkit.items import InlineTable
 
 from winchkit.effects.bind import Term
+from winchkit.effects.profile_document import (
+    effect_tables,
+    read_document,
+    shorthands,
+    write_document,
+    written,
+)
+from winchkit.effects.profile_ledger import Judged, note
 from winchkit.errors import Fault, FileError
-from winchkit.units import format_quantity
+from winchkit.schema.winch import SHORTHANDS
 
-__all__ = ["Fitted", "write_fitted"]
-
-_SHORTHANDS = {
-    "cable-elongation-linear": ("cable", "axial_stiffness"),
-    "cable-weight": ("cable", "mass_per_length"),
-    "gear-efficiency": ("gearbox", "efficiency"),
-}
+__all__ = ["Fitted", "write_fitted", "write_without"]
 
 
 @dataclass(frozen=True)
@@ -38,20 +41,43 @@ class Fitted:
     date: date
 
 
-def write_fitted(source: Path, fitted: Sequence[Fitted], out: Path) -> None:
-    """Copy the profile ``source`` to ``out`` with fitted effects; those it has are updated.
+def write_fitted(source: Path, fitted: Sequence[Fitted], out: Path, judged: Judged) -> None:
+    """Copy the profile ``source`` to ``out`` with fitted effects, the last one new.
 
     Raises FileError where a file cannot be read or written.
     """
-    try:
-        document = tomlkit.parse(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FileError(Fault(f"cannot be read: {error.strerror}", str(source))) from error
-    tables = document.get("effect")
-    if not isinstance(tables, AoT):
-        tables = tomlkit.aot()
-        document["effect"] = tables
-    unused = list(tables)
+    document = read_document(source)
+    note(document, "add", fitted[-1].term.effect.id, judged)
+    _put(document, fitted)
+    write_document(document, out)
+
+
+def write_without(
+    source: Path, effect_id: str, fitted: Sequence[Fitted], out: Path, judged: Judged
+) -> None:
+    """Copy the profile ``source`` to ``out`` without an effect, the others as fitted.
+
+    Raises FileError where the profile has no such effect or a file cannot be read or written.
+    """
+    document = read_document(source)
+    there = [table["id"] for table in effect_tables(document)]
+    short = {SHORTHANDS[key]: key for key in shorthands(document)}
+    if effect_id not in there and effect_id not in short:
+        has = ", ".join([*there, *short]) or "none"
+        raise FileError(Fault(f"has no effect '{effect_id}'; it has {has}", str(source)))
+    note(document, "remove", effect_id, judged)
+    if effect_id in short:
+        part, _, name = short[effect_id].partition(".")
+        del document[part][name]
+    else:
+        del effect_tables(document)[len(there) - 1 - there[::-1].index(effect_id)]
+    _put(document, fitted)
+    write_document(document, out)
+
+
+def _put(document: Any, fitted: Sequence[Fitted]) -> None:
+    """Update the effects that are there and append the others."""
+    unused = list(effect_tables(document))
     for item in fitted:
         if _update_shorthand(document, item):
             continue
@@ -59,26 +85,27 @@ def write_fitted(source: Path, fitted: Sequence[Fitted], out: Path) -> None:
         if table is None:
             table = tomlkit.table()
             table["id"] = item.term.effect.id
-            tables.append(table)
-            table = tables[-1]
+            effect_tables(document).append(table)
+            table = effect_tables(document)[-1]
         else:
             unused.remove(table)
         _fill(table, item)
-    if not len(tables):
-        del document["effect"]
-    try:
-        out.write_text(tomlkit.dumps(document), encoding="utf-8")
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(out))) from error
 
 
 def _update_shorthand(document: Any, item: Fitted) -> bool:
-    """Put a refitted value where the profile has it as a shorthand; False where it has none."""
-    table, key = _SHORTHANDS.get(item.term.effect.id, ("", ""))
-    if key not in document.get(table, {}):
+    """Put a refitted value where the profile has it as a shorthand; False where it has none.
+
+    A value refitted to infinity (a rope that does not stretch) is a key left out.
+    """
+    effect = item.term.effect
+    key = next((key for key in shorthands(document) if SHORTHANDS[key] == effect.id), None)
+    if key is None:
         return False
-    unit = item.term.effect.parameter(key).unit
-    document[table][key] = _written(item.term.values[key], unit)
+    part, _, name = key.partition(".")
+    if isinf(item.term.values[name]):
+        del document[part][name]
+    else:
+        document[part][name] = written(item.term.values[name], effect.parameter(name).unit)
     return True
 
 
@@ -86,23 +113,21 @@ def _fill(table: Any, item: Fitted) -> None:
     effect = item.term.effect
     for parameter in effect.parameters:
         value = item.term.values[parameter.name]
-        if parameter.name in item.std or value != parameter.null:
-            table[parameter.name] = _written(value, parameter.unit)
+        if isinf(value):
+            table.pop(parameter.name, None)
+        elif parameter.name in item.std or value != parameter.null:
+            table[parameter.name] = written(value, parameter.unit)
     table["fitted"] = _provenance(item)
 
 
 def _provenance(item: Fitted) -> InlineTable:
     std = tomlkit.inline_table()
     for name, value in item.std.items():
-        std[name] = _written(value, item.term.effect.parameter(name).unit)
+        if isnan(value):
+            continue
+        std[name] = written(value, item.term.effect.parameter(name).unit)
     fitted = tomlkit.inline_table()
     fitted["runs"] = list(item.runs)
     fitted["date"] = item.date
     fitted["std"] = std
     return fitted
-
-
-def _written(value: float, unit: str) -> str | float:
-    """A quantity as files have it; a bare number only where there is no unit."""
-    text = format_quantity(value, unit, digits=8)
-    return float(text) if unit == "1" else text

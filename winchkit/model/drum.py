@@ -80,7 +80,9 @@ class Archimedean:
 
     def wound(self, angle: Array) -> Array:
         """R Φ + g Φ²/4π; on the first radius below zero."""
-        return self.winding_radius * angle + self.growth * np.maximum(angle, 0) ** 2 / (2 * _TURN)
+        # Multiplied out, since numpy's power rounds arrays and single numbers differently.
+        wound = np.maximum(angle, 0.0)
+        return self.winding_radius * angle + self.growth * wound * wound / (2 * _TURN)
 
     def arm(self, angle: Array) -> Array:
         """R + g Φ/2π."""

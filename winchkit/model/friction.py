@@ -1,13 +1,31 @@
-"""Friction of a rope on a pulley: Coulomb, capstan and Dahl (Cable-winding device, Eq. 19–26)."""
+"""Friction of a rope on a pulley: dry, viscous, Stribeck, capstan, Dahl (Cable-winding device,
+Eq. 19–26, corrected as docs/papers.md tells).
+
+``before`` and ``after`` are the tensions on the two sides of a pulley, seen along the way that
+one walks over it; ``friction`` and ``drag`` are positive where the rope runs the same way. Walked
+the other way both signs turn, so that every law is its own inverse.
+"""
 
 from __future__ import annotations
 
+from itertools import pairwise
+from math import copysign, exp
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from winchkit.model.recurrence import linear
 
-__all__ = ["coulomb_ratio", "dahl", "dahl_step", "normal_force"]
+__all__ = [
+    "capstan_ratio",
+    "coulomb_ratio",
+    "dahl",
+    "dahl_constant",
+    "dahl_step",
+    "normal_force",
+    "stribeck",
+    "tension_after",
+]
 
 Array = NDArray[np.float64]
 
@@ -17,16 +35,38 @@ def normal_force(before: Array, after: Array, wrap: float) -> Array:
     return np.asarray(np.sqrt(before**2 - 2 * before * after * np.cos(wrap) + after**2))
 
 
-def coulomb_ratio(friction: Array, wrap: float) -> Array:
-    """T1/T0 over a pulley with T1 − T0 = μ N(T0, T1) (Eq. 20–23), solved in closed form.
+def tension_after(
+    before: ArrayLike, wrap: float, friction: ArrayLike, drag: ArrayLike = 0.0
+) -> Array:
+    """T1 with T1 − T0 = μ N(T0, T1) + d (Eq. 20–23), solved in closed form, N.
 
-    ``friction`` is signed: positive where the rope runs towards T1, |μ| < 1. Squaring gives a
-    quadratic in the ratio whose root continues through μ = 0 without a kink.
+    ``before`` T0 in N, ``wrap`` in rad, ``friction`` μ signed and |μ| < 1, ``drag`` d signed, N
+    (viscous: F_v v); shapes broadcast. Squaring gives a quadratic in T1 whose root continues
+    through μ = 0 without a kink.
     """
-    cosine = np.cos(wrap)
-    square = friction**2
-    root = friction * np.sqrt((1 - cosine) * (2 - square * (1 + cosine)))
-    return np.asarray((1 - square * cosine + root) / (1 - square))
+    first, m = np.asarray(before, dtype=float), np.asarray(friction, dtype=float)
+    pulled, square, cosine = first + np.asarray(drag, dtype=float), m**2, np.cos(wrap)
+    inside = (pulled - first) ** 2 + first * (1 - cosine) * (
+        2 * pulled - square * first * (1 + cosine)
+    )
+    root = m * np.sqrt(inside)
+    return np.asarray((pulled - square * cosine * first + root) / (1 - square))
+
+
+def coulomb_ratio(friction: Array, wrap: float) -> Array:
+    """T1/T0 over a pulley with dry friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1."""
+    return tension_after(1.0, wrap, friction)
+
+
+def capstan_ratio(friction: Array, wrap: float) -> Array:
+    """T1/T0 of a rope that slides around ``wrap`` rad: e^(μ α), μ signed (Eq. 19)."""
+    return np.asarray(np.exp(friction * wrap))
+
+
+def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float) -> Array:
+    """Coefficient μc + (μs − μc) e^(−(v/vs)²), unsigned; speeds in m/s."""
+    fallen = np.exp(-((speed / stribeck_speed) ** 2))
+    return np.asarray(coulomb * (1 - fallen) + static * fallen)
 
 
 def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape: float) -> float:
@@ -34,19 +74,19 @@ def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape:
 
     ``force`` and ``limit`` in N, ``moved`` in m (signed), ``stiffness`` σ in N/m.
     """
+    # Plain floats and branches only: winchkit.estimation compiles this very function.
     if limit <= 0.0:
         return 0.0
-    if moved == 0.0:
-        return force
-    sign = 1.0 if moved > 0 else -1.0
+    sign = 1.0 if moved > 0.0 else -1.0
     u = 1.0 - sign * force / limit
+    if moved == 0.0 or u == 0.0:
+        return force
     q = stiffness * abs(moved) / limit
     if shape == 1.0:
-        left = u * np.exp(-q)
-    else:
-        base = abs(u) ** (1.0 - shape) + (shape - 1.0) * q if u else np.inf
-        left = np.copysign(max(base, 0.0) ** (1.0 / (1.0 - shape)), u) if u else 0.0
-    return float(sign * limit * (1.0 - left))
+        return sign * limit * (1.0 - u * exp(-q))
+    base = abs(u) ** (1.0 - shape) + (shape - 1.0) * q
+    left = copysign(base ** (1.0 / (1.0 - shape)), u) if base > 0.0 else 0.0
+    return sign * limit * (1.0 - left)
 
 
 def dahl(
@@ -69,3 +109,47 @@ def dahl(
         force = dahl_step(force, step, most, stiffness, shape)
         out[k] = force
     return out
+
+
+def dahl_constant(
+    position: Array, limit: float, stiffness: float, shape: float = 1.0, start: float = 0.0
+) -> Array:
+    """Dahl friction along ``position`` (m) at a constant limit F_c (N); shape (n,).
+
+    The exact step holds over any monotone piece, so only the reversals are stepped through and
+    all samples between two of them follow at once. ``start`` as in :func:`dahl`.
+    """
+    out = np.zeros(len(position))
+    if limit <= 0.0 or not len(position):
+        return out
+    rises = np.diff(position) > 0
+    turns = np.flatnonzero(rises[1:] != rises[:-1]) + 1
+    ends = [0, *turns.tolist(), len(position) - 1]
+    force = out[0] = start * limit
+    for first, last in pairwise(ends):
+        piece = out[first + 1 : last + 1]
+        np.subtract(position[first + 1 : last + 1], position[first], out=piece)
+        _along(piece, float(force), limit, stiffness, shape)
+        force = out[last]
+    return out
+
+
+def _along(gone: Array, force: float, limit: float, stiffness: float, shape: float) -> None:
+    """Turn ``gone``, the way along a monotone piece (m), into the force there, in place."""
+    sign = 1.0 if len(gone) and gone[-1] > 0 else -1.0
+    u = 1.0 - sign * force / limit
+    if u == 0.0 or not len(gone) or gone[-1] == 0.0:
+        gone[:] = force
+        return
+    gone *= sign * stiffness / limit
+    if shape == 1.0:
+        np.negative(gone, out=gone)
+        np.exp(gone, out=gone)
+        gone *= -sign * limit * u
+    else:
+        gone *= shape - 1.0
+        gone += abs(u) ** (1.0 - shape)
+        np.maximum(gone, 0.0, out=gone)
+        np.power(gone, 1.0 / (1.0 - shape), out=gone)
+        gone *= copysign(limit, -sign * u)
+    gone += sign * limit

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from winchkit.model.derivatives import (
     is_calmer,
     second_derivative,
+    sharp_gradient,
     smooth_sign,
     span_of,
     wide_gradient,
@@ -133,7 +134,7 @@ class Line:
         shown = self._through(Stage.LENGTH_INSTRUMENT, length, at)
         out = {"cable_length": shown}
         if motion.load is not None:
-            drum_side = self._drum_side(self._load(motion, free), at)
+            drum_side = self._drum_side(self._load(motion, free, path.slope), at)
             out["tension"] = self._through(Stage.CELL, drum_side, at)
         elif motion.drum_tension is not None:
             drum_side = motion.drum_tension
@@ -155,17 +156,23 @@ class Line:
         length = self._through(Stage.FRAME, length, at)
         return free, length, Path(path.value, path.slope * turned.slope)
 
-    def _load(self, motion: Motion, free: Array) -> Array:
+    def _load(self, motion: Motion, free: Array, arm: Array) -> Array:
         """A known weight follows the rope as it is really paid out, kinematic effects included.
 
-        What its strain adds is left out: a fourth derivative of the angle would be mostly noise.
+        How fast that is follows from the arm (m/rad) and the motor's rate, so that a ripple of
+        the arm is differentiated once only; what the arm does not know, such as a slip, is taken
+        from the length. What its strain adds is left out: a fourth derivative of the angle would
+        be mostly noise.
         """
         load = motion.load
         assert load is not None
         if motion.load_mass is None or not self.modifiers:
             return load
-        added = free - motion.at.free_length
-        return load - motion.load_mass * second_derivative(added, motion.at.time)
+        at = motion.at
+        paid_out = (self._pace(at.motor_angle) - arm) * at.motor_rate
+        rest = sharp_gradient(free - at.free_length, at.time) - paid_out
+        added = sharp_gradient(paid_out, at.time) + wide_gradient(rest, at.time)
+        return load - motion.load_mass * added
 
     def _drum_side(self, load: Array, at: At) -> Array:
         """Tension at the drum: from the load up the rope and back over the pulleys."""

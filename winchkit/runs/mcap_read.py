@@ -1,108 +1,156 @@
-"""Reads a run from MCAP; of a file that was cut off, every whole record."""
+"""Reads a run or a log from MCAP; of a file that was cut off, every whole record."""
 
 from __future__ import annotations
 
 import json
-import struct
-from dataclasses import dataclass, field
-from io import BytesIO
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Channel, Footer, Message, Metadata
-from mcap.stream_reader import StreamReader
 from numpy.typing import NDArray
-from zstandard import ZstdError
 
 from winchkit.errors import Fault, RunError
 from winchkit.runs.assemble import Recording, assemble, refuse
-from winchkit.runs.mcap_layout import COLUMNS, METADATA, TOPIC
+from winchkit.runs.layout import read_layout
+from winchkit.runs.log import Log, Note, aligned, log_of_run
+from winchkit.runs.mcap_content import McapContent, read_content, samples_of
+from winchkit.runs.mcap_layout import COLUMNS, COUNTERS, END, EVENTS, LOG, MARK, METADATA, TOPIC
+from winchkit.runs.mcap_records import Damage
 from winchkit.runs.run import Run
 from winchkit.runs.text import read_bytes
 
-__all__ = ["read_mcap"]
+__all__ = ["read_mcap", "read_mcap_log"]
 
 Array = NDArray[np.float64]
-_MARK = b"\x89MCAP0\r\n"
-# What the library raises where bytes are no records: its own errors, failed checksums and text
-# (ValueError), lz4 (RuntimeError), zstandard, and lengths that cannot be.
-_DAMAGE = (McapError, ValueError, RuntimeError, ArithmeticError, ZstdError)
-
-
-@dataclass
-class _Content:
-    """What was found in a file, as far as it could be read."""
-
-    columns: dict[str, str] = field(default_factory=dict)
-    metadata: dict[str, str] = field(default_factory=dict)
-    topics: dict[int, str] = field(default_factory=dict)
-    rows: list[bytes] = field(default_factory=list)
-    complete: bool = False
 
 
 def read_mcap(path: str | Path) -> Run:
     """Read a run; raises RunError where the file is none. A file cut off gives what is whole."""
+    name, content = str(path), _content(path)
+    return aligned(_log(name, content)) if LOG in content.metadata else _run(name, content)
+
+
+def read_mcap_log(path: str | Path) -> Log:
+    """Read a log by channels; a run of rows is a log of one source. Raises RunError."""
+    name, content = str(path), _content(path)
+    if LOG in content.metadata:
+        return _log(name, content)
+    return log_of_run(_run(name, content), content.complete)
+
+
+def _content(path: str | Path) -> McapContent:
     name, data = str(path), read_bytes(Path(path))
-    if not data.startswith(_MARK):
+    if not data.startswith(MARK):
         raise RunError(Fault("is no MCAP file: it does not begin with MCAP's mark", name))
-    content = _collect(data, name)
-    if not content.columns:
-        topics = ", ".join(sorted(set(content.topics.values()))) or "none"
-        message = f"holds no run: there is no metadata record '{COLUMNS}'; its topics are {topics}"
-        raise RunError(Fault(message, name))
-    notes = []
-    if not content.complete:
-        notes.append(f"the file is cut off; its {len(content.rows)} whole rows were recovered")
-    values = _values(name, content)
-    header = list(content.columns.items())
-    return assemble(Recording(name, header, list(values), _no_line, content.metadata, notes=notes))
-
-
-def _no_line(row: int) -> None:
-    """A binary file has no lines."""
-
-
-def _collect(data: bytes, path: str) -> _Content:
-    content = _Content()
-    try:
-        for record in StreamReader(BytesIO(data), validate_crcs=True).records:
-            if isinstance(record, Message) and content.topics.get(record.channel_id) == TOPIC:
-                content.rows.append(record.data)
-            elif isinstance(record, Channel):
-                content.topics[record.id] = record.topic
-            elif isinstance(record, Metadata) and record.name == COLUMNS:
-                content.columns = dict(record.metadata)
-            elif isinstance(record, Metadata) and record.name == METADATA:
-                content.metadata = dict(record.metadata)
-            elif isinstance(record, Footer):
-                content.complete = True
-    except (EndOfFile, struct.error):
-        content.complete = False
-    except _DAMAGE as error:
-        message = f"is damaged after {len(content.rows)} rows: {error or type(error).__name__}"
-        raise RunError(Fault(message, path)) from None
+    content = read_content(data)
+    if content.damage:
+        rows = content.count(TOPIC)
+        message = f"is damaged after {rows} rows: {content.damage}"
+        if LOG in content.metadata:
+            message = f"is damaged: {content.damage}"
+        advice = "; `winchkit log recover` saves what is whole"
+        raise RunError(Fault(message + advice, name))
     return content
 
 
-def _values(path: str, content: _Content) -> Array:
+def _run(name: str, content: McapContent) -> Run:
+    """A run that was written row by row."""
+    columns = content.metadata.get(COLUMNS, {})
+    if not columns:
+        topics = ", ".join(sorted(set(content.topics.values()))) or "none"
+        message = f"holds no run: there is no metadata record '{COLUMNS}'; its topics are {topics}"
+        raise RunError(Fault(message, name))
+    rows = [bytes(row) for batch in content.messages.get(TOPIC, ()) for row in batch.data]
+    notes = []
+    if not content.complete:
+        notes.append(f"the file is cut off; its {len(rows)} whole rows were recovered")
+    values = _values(name, list(columns), rows)
+    metadata = content.metadata.get(METADATA, {})
+    header = list(columns.items())
+    return assemble(Recording(name, header, list(values), lambda _: None, metadata, notes=notes))
+
+
+def _values(path: str, names: list[str], rows: list[bytes]) -> Array:
     """Columns by rows, NaN for null and for absent keys."""
-    names = list(content.columns)
-    values = np.full((len(names), len(content.rows)), np.nan)
+    values = np.full((len(names), len(rows)), np.nan)
     faults: list[Fault] = []
-    for index, message in enumerate(content.rows):
-        try:
-            row = json.loads(message)
-            values[:, index] = [_number(row.get(name)) for name in names]
-        except (ValueError, AttributeError, TypeError):
+    for index, message in enumerate(rows):
+        row = _object(message)
+        cells = [None] if row is None else [_number(row.get(name)) for name in names]
+        if None in cells:
             faults.append(Fault(f"row {index + 1} is no JSON object of numbers", path))
+        else:
+            values[:, index] = cells
     refuse(faults)
     return values
 
 
-def _number(value: object) -> float:
+def _object(message: bytes) -> dict[str, Any] | None:
+    """A JSON object; None where it is none."""
+    try:
+        found = json.loads(message)
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _number(value: object) -> float | None:
+    """A cell's value, NaN for null; None where it is no number."""
     if value is None:
         return float("nan")
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(value)
-    return float(value)
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return None
+
+
+def _log(name: str, content: McapContent) -> Log:
+    layout = read_layout(content.metadata[LOG].get("layout", ""), name)
+    try:
+        samples = {item.topic: samples_of(content, item, layout) for item in layout.sources}
+    except Damage as error:
+        raise RunError(Fault(f"is damaged: {error}", name)) from None
+    notes = []
+    if not content.complete:
+        count = sum(map(len, samples.values()))
+        notes.append(f"the file is cut off; its {count} whole samples were recovered")
+    return Log(
+        name,
+        layout,
+        samples,
+        content.metadata.get(METADATA, {}),
+        _notes(content, EVENTS, layout.clock_offset, _event),
+        _notes(content, COUNTERS, layout.clock_offset, _tables),
+        content.metadata.get(END, {}),
+        content.complete,
+        tuple(notes),
+    )
+
+
+def _notes(
+    content: McapContent, topic: str, offset: int, known: Callable[[dict[str, Any]], dict[str, Any]]
+) -> tuple[Note, ...]:
+    """JSON messages, of each what is ``known`` to have the right form."""
+    found: list[Note] = []
+    for batch in content.messages.get(topic, ()):
+        for stamp, data in zip(batch.log_times.tolist(), batch.data, strict=True):
+            value = _object(bytes(data))
+            if value is not None:
+                found.append(Note((stamp - offset) / 1e9, known(value)))
+    return tuple(found)
+
+
+def _event(value: dict[str, Any]) -> dict[str, Any]:
+    winches, trips, overruns = (value.get(key) for key in ("winch", "tripped", "overruns"))
+    return {
+        "winch": _tables(winches) if isinstance(winches, dict) else {},
+        "tripped": [str(text) for text in trips] if isinstance(trips, list) else [],
+        "overruns": overruns if isinstance(overruns, int) else 0,
+    }
+
+
+def _tables(value: dict[str, Any]) -> dict[str, Any]:
+    return {name: item for name, item in value.items() if isinstance(item, dict)}

@@ -1,26 +1,85 @@
-"""Reads a run from whichever format its name says."""
+"""Reads a run or a log from whichever format its name says, in one file or in parts."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from winchkit.errors import Fault, RunError
 from winchkit.runs.csv_read import read_csv
+from winchkit.runs.log import Log, aligned, joined, log_of_run
+from winchkit.runs.rotation import parts_beside
 from winchkit.runs.run import Run
+from winchkit.runs.text import read_bytes
 
-__all__ = ["SUFFIXES", "read_run"]
+__all__ = ["SUFFIXES", "read_log", "read_run"]
 
 SUFFIXES = (".csv", ".mcap")
+_BARE = 2
+"""Lines of a CSV file that are not yet a run: its header and one row."""
 
 
 def read_run(path: str | Path) -> Run:
-    """Read a run from CSV or MCAP; raises RunError with every fault of the file."""
-    suffix = Path(path).suffix.lower()
-    if suffix == ".csv":
-        return read_csv(path)
-    if suffix == ".mcap":
-        from winchkit.runs.mcap_read import read_mcap
+    """Read a run from CSV or MCAP; raises RunError with every fault of the file.
 
-        return read_mcap(path)
-    message = f"'{suffix}' is no format of a run; use one of {', '.join(SUFFIXES)}"
-    raise RunError(Fault(message, str(path)))
+    Of a log in parts, ``lift.mcap`` is all of ``lift.001.mcap``, ``lift.002.mcap`` … together.
+    """
+    _format_of(path)
+    files = _files(path)
+    return _read_run(files[0]) if len(files) == 1 else aligned(read_log(files))
+
+
+def read_log(paths: str | Path | Sequence[str | Path]) -> Log:
+    """Read a log with every source's own time stamps, of one file or of its parts together.
+
+    A run of rows is a log of one source. Raises RunError.
+    """
+    given = [paths] if isinstance(paths, str | Path) else paths
+    files = [file for path in given for file in _files(path)]
+    if len(files) > 1 and not _has_begun(files[-1]):
+        files.pop()
+    return joined([_read_log(file) for file in files])
+
+
+def _files(path: str | Path) -> list[Path]:
+    file = Path(path)
+    return [file] if file.exists() else parts_beside(file) or [file]
+
+
+def _has_begun(path: Path) -> bool:
+    """Whether a part holds anything: a recorder killed in between leaves its last one bare."""
+    data = read_bytes(path, may_be_empty=True)
+    if _format_of(path) == ".csv":
+        lines = data.split(b"\n")[:-1]
+        return sum(1 for line in lines if line.strip() and not line.startswith(b"#")) > _BARE
+    from winchkit.runs.mcap_content import read_content
+    from winchkit.runs.mcap_layout import COLUMNS, LOG, MARK
+
+    if MARK.startswith(data):
+        return False
+    content = read_content(data)
+    return not content.metadata.keys().isdisjoint((LOG, COLUMNS)) or bool(content.damage)
+
+
+def _format_of(path: str | Path) -> str:
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        message = f"'{suffix}' is no format of a run; use one of {', '.join(SUFFIXES)}"
+        raise RunError(Fault(message, str(path)))
+    return suffix
+
+
+def _read_run(path: Path) -> Run:
+    if _format_of(path) == ".csv":
+        return read_csv(path)
+    from winchkit.runs.mcap_read import read_mcap
+
+    return read_mcap(path)
+
+
+def _read_log(path: Path) -> Log:
+    if _format_of(path) == ".csv":
+        return log_of_run(read_csv(path), closed=None)
+    from winchkit.runs.mcap_read import read_mcap_log
+
+    return read_mcap_log(path)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import UsageError
+from winchkit.runs.whole_file import abandoned, open_new
 from winchkit.units import suggest
 
 __all__ = ["Clock", "Columns", "RunWriter"]
@@ -35,10 +36,21 @@ class RunWriter(ABC):
         self._flushed = clock()
         if "time" not in self._names:
             raise UsageError(f"{path}: a run needs a column 'time'")
+        self._whole = 0
+        self._stream = open_new(path)
         with self._writing():
-            self._stream = path.open("wb", buffering=1 << 20)
             self._begin({key: " ".join(value.split()) for key, value in metadata.items()})
         self.flush()
+
+    @property
+    def descriptor(self) -> int:
+        """Of the open file, for fsync."""
+        return self._stream.fileno()
+
+    @property
+    def size(self) -> int:
+        """Bytes handed over so far."""
+        return self._stream.tell()
 
     def append(self, row: Mapping[str, float]) -> None:
         """Add a row; a column that it lacks has no value there. UsageError for an unknown one."""
@@ -64,6 +76,7 @@ class RunWriter(ABC):
             if not self._stream.closed:
                 self._hand_over()
                 self._stream.flush()
+                self._whole = self._stream.tell()
         self._flushed = self._clock()
 
     def close(self) -> None:
@@ -80,11 +93,7 @@ class RunWriter(ABC):
         try:
             yield
         except OSError as error:
-            message = f"cannot be written: {error.strerror}"
-            if "_stream" in vars(self):
-                with suppress(OSError):
-                    self._stream.close()
-            raise FileError(Fault(message, str(self.path))) from None
+            raise abandoned(self._stream, self.path, self._whole, error) from None
 
     def __enter__(self) -> Self:
         return self

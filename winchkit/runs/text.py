@@ -10,7 +10,7 @@ from winchkit.errors import Fault, RunError
 __all__ = ["read_bytes", "read_lines"]
 
 
-def read_bytes(path: Path) -> bytes:
+def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
     """Content of a file; raises RunError where there is none to read."""
     try:
         data = path.read_bytes()
@@ -22,7 +22,7 @@ def read_bytes(path: Path) -> bytes:
         raise RunError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
     except ValueError as error:
         raise RunError(Fault(f"is no usable file name: {error}", repr(str(path)))) from None
-    if not data:
+    if not data and not may_be_empty:
         raise RunError(Fault("the file is empty", str(path)))
     return data
 

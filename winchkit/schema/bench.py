@@ -6,13 +6,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from winchkit.schema.device_servo import OptionSpec
 from winchkit.schema.quantity import (
     Flag,
     Force,
+    Frequency,
     Length,
     PositiveAcceleration,
     PositiveDuration,
     PositiveForce,
+    PositiveLength,
     PositiveMass,
     PositiveSpeed,
     Quantity,
@@ -50,6 +53,8 @@ class BusSpec(Table):
     baudrate: WholeNumber = 115_200
     parity: Literal["N", "E", "O"] = "N"
     stopbits: Literal[1, 2] = 1
+    bytesize: Literal[7, 8] = 8
+    """Data bits of a character on a serial bus."""
     # modbus-tcp
     host: str | None = None
     timeout: PositiveDuration = 0.2
@@ -71,6 +76,10 @@ class DeviceRef(Table):
     bus: str
     node: Annotated[int, Whole(1, 127)] | None = None
     unit: Annotated[int, Whole(0, 255)] | None = None
+    calibration: str | None = None
+    """A file of kind ``calibration`` beside the bench, applied by the host."""
+    rate: Frequency | None = None
+    """Readings a second, where the usual 100 are too few or too many, Hz."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +92,17 @@ class LimitSpec(Table):
     tension_high: PositiveForce | None = None
     tension_slack: Force | None = None
     tension_rate: Annotated[float, Quantity("force per time", 0.0, above=True)] | None = None
+    in_drive: Flag = False
+    """Whether the drive is to keep ``length`` as well (607Dh), a little further out."""
+    following_error: PositiveLength | None = None
+    """Of rope, at which the drive itself gives up (6065h)."""
+    torque: Annotated[float, Quantity("torque", 0.0, above=True)] | None = None
+    """Greatest of the motor, kept by the drive (6072h)."""
 
     def rules(self) -> Iterator[Rule]:
         """Lower limits lie below upper ones."""
+        if self.in_drive and self.length is None:
+            yield "in_drive", "there is no `length` for the drive to keep"
         if self.length is not None and self.length[0] >= self.length[1]:
             low, high = self.length
             yield "length", f"the lower limit {low:g} m is not below the upper limit {high:g} m"
@@ -107,6 +124,8 @@ class WinchWiring(Table):
     length: DeviceRef | None = None
     temperature: DeviceRef | None = None
     brake: Flag = False
+    options: OptionSpec = field(default_factory=OptionSpec)
+    """Option codes of the drive, before those of its device file; written and read back."""
 
     def rules(self) -> Iterator[Rule]:
         """The tension at the platform end is either measured or known."""
@@ -122,6 +141,8 @@ class BenchSpec(Table):
     winch: Mapping[str, WinchWiring]
     bus: Mapping[str, BusSpec]
     cycle: PositiveDuration = 0.004
+    stop_together: Flag = True
+    """Whether a stop of one winch stops all. Trips stop all in any case."""
     description: str = ""
     path: str = field(default="", compare=False)
     """The file it was read from; profiles by path are found beside it."""

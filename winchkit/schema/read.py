@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from winchkit.errors import Fault, FileError
 from winchkit.schema import read_bench as benches
 from winchkit.schema.bench import BenchSpec
+from winchkit.schema.calibration import CellCalibration, TareBook
 from winchkit.schema.device import DeviceSpec
 from winchkit.schema.programme import Programme
 from winchkit.schema.read_lines import Key
@@ -23,6 +24,7 @@ from winchkit.schema.read_parts import Reading
 from winchkit.schema.read_source import open_source
 from winchkit.schema.robot import RobotProfile
 from winchkit.schema.simbench import SimBench
+from winchkit.schema.size import SizeSpec
 from winchkit.schema.winch import WinchProfile
 
 __all__ = [
@@ -31,14 +33,27 @@ __all__ = [
     "load",
     "read_any",
     "read_bench",
+    "read_calibration",
     "read_device",
     "read_programme",
     "read_robot",
     "read_simbench",
+    "read_size",
+    "read_tares",
     "read_winch",
 ]
 
-Declared = WinchProfile | RobotProfile | BenchSpec | Programme | SimBench | DeviceSpec
+Declared = (
+    WinchProfile
+    | RobotProfile
+    | BenchSpec
+    | Programme
+    | SimBench
+    | DeviceSpec
+    | SizeSpec
+    | CellCalibration
+    | TareBook
+)
 T = TypeVar("T")
 PathLike = str | Path
 
@@ -48,7 +63,7 @@ class Declaration:
     """A file of any kind as read, with what is doubtful in it but no fault."""
 
     kind: str
-    """One of ``winch``, ``robot``, ``bench``, ``programme``, ``sim-bench``, ``device``."""
+    """As the file's key ``kind`` has it, e.g. ``winch`` or ``bench``."""
     value: Declared
     warnings: tuple[Fault, ...] = ()
 
@@ -81,6 +96,21 @@ def read_simbench(path: PathLike) -> SimBench:
 def read_device(path: PathLike) -> DeviceSpec:
     """Read a device file."""
     return _read(path, "device", DeviceSpec)
+
+
+def read_size(path: PathLike) -> SizeSpec:
+    """Read what a winch is to be sized for."""
+    return _read(path, "size", SizeSpec)
+
+
+def read_calibration(path: PathLike) -> CellCalibration:
+    """Read the calibration of a load cell."""
+    return _read(path, "calibration", CellCalibration)
+
+
+def read_tares(path: PathLike) -> TareBook:
+    """Read the host's tares of a bench."""
+    return _read(path, "tares", TareBook)
 
 
 def read_any(path: PathLike) -> Declared:
@@ -163,14 +193,36 @@ def _programme(reading: Reading, tree: dict[str, Any]) -> Programme | None:
     return reading.table(Programme, {"name": reading.stem, **tree})
 
 
+def _size(reading: Reading, tree: dict[str, Any]) -> SizeSpec | None:
+    return reading.table(SizeSpec, {"name": reading.stem, **tree})
+
+
+def _calibration(reading: Reading, tree: dict[str, Any]) -> CellCalibration | None:
+    return reading.table(CellCalibration, _named(reading, tree))
+
+
+def _tares(reading: Reading, tree: dict[str, Any]) -> TareBook | None:
+    return reading.table(TareBook, _named(reading, tree))
+
+
+def _named(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
+    """With the file's name, where it gives itself none, and its path."""
+    if "path" in tree:
+        reading.fault(("path",), "unknown key")
+    return {"name": reading.stem, **tree, "path": reading.source.path}
+
+
 def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
     if "path" in tree:
         reading.fault(("path",), "unknown key")
     device = reading.table(DeviceSpec, {**tree, "path": reading.source.path})
-    if device is not None and device.servo is not None:
-        eds = Path(reading.source.path).parent / device.servo.eds
+    for table in ("servo", "process"):
+        part = getattr(device, table, None)
+        if part is None:
+            continue
+        eds = Path(reading.source.path).parent / part.eds
         if not eds.is_file():
-            reading.fault(("servo", "eds"), f"there is no file {eds}")
+            reading.fault((table, "eds"), f"there is no file {eds}")
     return device
 
 
@@ -181,6 +233,9 @@ _READERS: dict[str, Callable[[Reading, dict[str, Any]], Declared | None]] = {
     "programme": _programme,
     "sim-bench": _simbench,
     "device": _device,
+    "size": _size,
+    "calibration": _calibration,
+    "tares": _tares,
 }
 
 

@@ -21,6 +21,13 @@ __all__ = ["bench", "sim_bench"]
 
 ROLES = ("servo", "cell", "load", "length", "temperature")
 DeviceReader = Callable[[str | Path], DeviceSpec]
+_FITTING = {
+    "servo": ("can",),
+    "modbus": ("modbus-rtu", "modbus-tcp"),
+    "stream": ("serial",),
+    "process": ("can",),
+}
+"""Kinds of buses by the kind of a device."""
 
 
 def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> BenchSpec | None:
@@ -162,14 +169,19 @@ def _check_device(
         what = "a servo drive" if servo else "an instrument"
         reading.fault((*at, "device"), f"'{device.name}' is {what}, which does not fit here")
         return
-    address, other = ("node", "unit") if servo else ("unit", "node")
-    if address not in raw:
+    fitting = _FITTING[device.kind]
+    address, other = ("node", "unit") if fitting == ("can",) else ("unit", "node")
+    if address not in raw and _is_addressed(device):
         reading.fault((*at, address), f"missing; '{device.name}' is reached by its {address}")
     if other in raw:
         reading.fault((*at, other), f"'{device.name}' has no {other}; it is reached by {address}")
     wired = buses.get(str(bus))
     kind = wired.get("kind") if isinstance(wired, dict) else None
-    fitting = ("can",) if servo else ("modbus-rtu", "modbus-tcp")
     if kind is not None and kind not in fitting:
         message = f"[bus.{bus}] is of kind {kind}; '{device.name}' needs {' or '.join(fitting)}"
         reading.fault((*at, "bus"), message)
+
+
+def _is_addressed(device: DeviceSpec) -> bool:
+    """Whether a device must be given its address; one alone on a serial line need not."""
+    return device.stream is None or "{address" in device.stream.poll

@@ -14,7 +14,17 @@ from winchkit.units import suggest
 
 __all__ = ["KINDS", "Source", "open_source", "spelled"]
 
-KINDS = ("winch", "robot", "bench", "programme", "sim-bench", "device")
+KINDS = (
+    "winch",
+    "robot",
+    "bench",
+    "programme",
+    "sim-bench",
+    "device",
+    "size",
+    "calibration",
+    "tares",
+)
 SCHEMA = 1
 _LARGEST = 4_000_000
 

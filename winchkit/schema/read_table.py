@@ -62,9 +62,7 @@ def _faults(kind: type, details: ErrorDetails) -> list[tuple[Key, str]]:
     place: Key = tuple(details["loc"])
     error = details.get("ctx", {}).get("error")
     if isinstance(error, BrokenRules):
-        return [
-            ((*place, *(key.split(".") if key else ())), message) for key, message in error.rules
-        ]
+        return [((*place, *_parts(key)), message) for key, message in error.rules]
     if details["type"] == "value_error":
         return [(place, str(error))]
     if place and place[-1] == "[key]":
@@ -73,6 +71,12 @@ def _faults(kind: type, details: ErrorDetails) -> list[tuple[Key, str]]:
     if place and _is_branch(kind, place):
         place = place[:-1]
     return [(place, _message(kind, details["type"], place, details))]
+
+
+def _parts(key: str) -> Key:
+    """The parts of a rule's dotted key; a number is a position within an array."""
+    parts = key.split(".") if key else []
+    return tuple(int(part) if part.isdigit() else part for part in parts)
 
 
 def _is_branch(kind: type, place: Key) -> bool:

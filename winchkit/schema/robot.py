@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from winchkit.schema.quantity import Angle, Length, Mass, Number, PositiveLength, Quantity
+from winchkit.schema.quantity import (
+    Angle,
+    Length,
+    Mass,
+    Number,
+    PositiveLength,
+    Quantity,
+    WholeNumber,
+)
 from winchkit.schema.table import Rule, Table
 from winchkit.schema.winch import EffectTable, WinchProfile
 
-__all__ = ["HomeSpec", "LineSpec", "PlatformSpec", "PriorSpec", "RobotProfile"]
+__all__ = ["FittedSpec", "HomeSpec", "LineSpec", "PlatformSpec", "PriorSpec", "RobotProfile"]
 
 Point = tuple[Length, Length, Length]
 
@@ -66,6 +75,21 @@ class LineSpec(Table):
 
 
 @dataclass(frozen=True)
+class FittedSpec(Table):
+    """Where the numbers of a calibrated robot came from; written by ``winchkit calibrate``."""
+
+    date: datetime.date
+    runs: tuple[str, ...] = ()
+    poses: WholeNumber = 0
+    position_rms: Length | None = None
+    """Of the poses fitted, m."""
+    held_out_rms: Length | None = None
+    """Of poses that were not fitted, m."""
+    std: Mapping[str, str] = field(default_factory=dict)
+    """Posterior standard deviation by parameter, with its unit."""
+
+
+@dataclass(frozen=True)
 class RobotProfile(Table):
     """A cable robot as declared; frozen, SI."""
 
@@ -75,12 +99,19 @@ class RobotProfile(Table):
     platform: PlatformSpec = field(default_factory=PlatformSpec)
     prior: Mapping[PriorName, PriorSpec] = field(default_factory=dict)
     effect: tuple[EffectTable, ...] = ()
+    fitted: FittedSpec | None = None
     description: str = ""
 
     def rules(self) -> Iterator[Rule]:
-        """A robot has lines, each by its own name."""
+        """A robot has lines, each by its own name and from its own exit point."""
         if not self.line:
             yield "line", "a robot needs at least one [[line]]"
         names = [line.name for line in self.line]
         for name in sorted({name for name in names if names.count(name) > 1}):
             yield "line", f"{names.count(name)} lines are named '{name}'"
+        seen: dict[Point, str] = {}
+        for n, line in enumerate(self.line):
+            other = seen.setdefault(line.exit_point, line.name)
+            if other != line.name:
+                message = f"is that of line {other}; two lines leave the frame in two points"
+                yield f"line.{n}.exit_point", message

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 __all__ = ["BrokenRules", "Rule", "Table"]
 
 Rule = tuple[str, str]
-"""A key of the table (empty for the table itself) and what is wrong with it."""
+"""A key of the table (dotted, positions in arrays from 0; empty for the table itself) and what is
+wrong with it."""
 
 
 class BrokenRules(ValueError):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import Annotated, Any, Literal
 
+from winchkit.schema.ledger import LedgerEntry
 from winchkit.schema.quantity import (
     Angle,
     Count,
@@ -57,6 +58,10 @@ class DrumSpec(Table):
     """Radius gained per turn (spiral, archimedean), m; default is the rope's diameter."""
     build_up: Annotated[float, Quantity("length", 0.0)] | None = None
     """k of r² = r0² + k L (squared): an area per length, m."""
+    width: PositiveLength | None = None
+    """Between the flanges, m; with ``groove_pitch`` it says how many turns the drum takes."""
+    flange_radius: PositiveLength | None = None
+    """Axis to the flange's rim, m; says how many layers the drum takes."""
 
     def rules(self) -> Iterator[Rule]:
         """A grooved drum needs its pitch, a squared one its build-up."""
@@ -69,6 +74,11 @@ class DrumSpec(Table):
             yield (
                 "layer_growth",
                 f"belongs to a layered drum, not to a {self.kind} one",
+            )
+        if self.flange_radius is not None and self.flange_radius <= self.winding_radius:
+            yield (
+                "flange_radius",
+                f"{self.flange_radius:g} m must be above winding_radius {self.winding_radius:g} m",
             )
 
 
@@ -158,6 +168,7 @@ class WinchProfile(Table):
     guide: GuideSpec | None = None
     pulley: tuple[PulleySpec, ...] = ()
     effect: tuple[EffectTable, ...] = ()
+    ledger: tuple[LedgerEntry, ...] = ()
     description: str = ""
 
     def rules(self) -> Iterator[Rule]:

@@ -12,6 +12,7 @@ import can
 
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
+from winchkit.sim.wire import Wire
 
 __all__ = ["CanPort", "Interface", "wired"]
 
@@ -39,9 +40,13 @@ def wired(spec: BusSpec, name: str, interface: Interface) -> BusSpec:
 
 
 class CanPort:
-    """An open CAN bus that hands frames over and takes them; raises ConnectionLost."""
+    """An open CAN bus that hands frames over and takes them; raises ConnectionLost.
 
-    def __init__(self, spec: BusSpec) -> None:
+    ``wire`` stands between the simulated drives and the bus.
+    """
+
+    def __init__(self, spec: BusSpec, wire: Wire) -> None:
+        self.wire = wire
         self._name = f"{spec.interface} channel '{spec.channel}'"
         options: dict[str, Any] = {"interface": spec.interface, "channel": spec.channel}
         if spec.interface == "udp_multicast":
@@ -68,6 +73,10 @@ class CanPort:
 
     def send(self, identifier: int, data: bytes) -> None:
         """Send a frame with an 11-bit identifier; raises ConnectionLost."""
+        if self.wire.carry(identifier, data, from_drive=True):
+            self._put(identifier, data)
+
+    def _put(self, identifier: int, data: bytes) -> None:
         message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
         try:
             self._bus.send(message)
@@ -76,13 +85,19 @@ class CanPort:
 
     def receive(self, timeout: float) -> tuple[int, bytes] | None:
         """Take the next frame, waiting at most ``timeout`` s; raises ConnectionLost."""
+        while (late := self.wire.due(from_drive=True)) is not None:
+            self._put(*late)
+        arrived = self.wire.due(from_drive=False)
+        if arrived is not None:
+            return arrived
         try:
             message = self._bus.recv(timeout)
         except (can.CanError, OSError) as error:
             raise ConnectionLost(f"{self._name}: cannot receive: {error}") from error
         if message is None or message.is_error_frame or message.is_extended_id:
             return None
-        return message.arbitration_id, bytes(message.data)
+        frame = message.arbitration_id, bytes(message.data)
+        return frame if self.wire.carry(*frame, from_drive=False) else None
 
     def close(self) -> None:
         """Let the bus go."""

@@ -3,34 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
-from winchkit.schema.device import ServoSpec
+from winchkit.schema.device_quirks import QuirkSpec
+from winchkit.schema.device_servo import ServoSpec
+from winchkit.sim.drive_actions import Actions
 from winchkit.sim.drive_axis import Axis
-from winchkit.sim.drive_faults import ERROR_CODES, known
-from winchkit.sim.drive_guards import guard_options
-from winchkit.sim.drive_motion import SIMULATED_MODES, Mode, Motion
+from winchkit.sim.drive_brake import HoldingBrake
+from winchkit.sim.drive_faults import FAULTS, FaultKind, known
+from winchkit.sim.drive_homing import Switches
+from winchkit.sim.drive_line import Line
+from winchkit.sim.drive_mode import Mode, check_objects, modes_of, supported
+from winchkit.sim.drive_motion import Motion
 from winchkit.sim.drive_network import Heartbeats, NmtState, emergency_frame
 from winchkit.sim.drive_pdo import Pdos
 from winchkit.sim.drive_power import PowerStage
 from winchkit.sim.drive_sdo import SdoServer
+from winchkit.sim.drive_settings import Settings
 from winchkit.sim.drive_shaft import Shaft
-from winchkit.sim.drive_state import HALT, State
-from winchkit.sim.drive_status import SetPointHandshake
-from winchkit.sim.drive_units import units_of
-from winchkit.sim.object_dictionary import Abort, ObjectDictionary
+from winchkit.sim.drive_state import State
+from winchkit.sim.drive_status import StatusBits
+from winchkit.sim.object_dictionary import ObjectDictionary
 
 __all__ = ["SimDrive"]
 
 _BOOT_SHARE = 0.8
 """Of the boot time that a device file declares as the longest."""
-_HEARTBEAT_LOST = 0x8130
+_HEARTBEAT_LOST = FaultKind(0x8130)
 _PDO_TOO_SHORT = 0x8210
 _NMT_COMMANDS = {
     0x01: NmtState.OPERATIONAL,
     0x02: NmtState.STOPPED,
     0x80: NmtState.PRE_OPERATIONAL,
 }
-_FOLLOWING_ERROR = ERROR_CODES["following error"]
 _COMMUNICATION = range(0x1000, 0x2000)
 
 
@@ -40,7 +45,8 @@ class SimDrive:
     ``objects`` is its object dictionary, which it takes over. ``send`` takes an identifier and
     data. Frames come in through :meth:`receive`, time through
     :meth:`tick`; both take the time in s of one steady clock and are called from one thread.
-    ``smoothing`` is the length of its set-point filter in CSV, s.
+    ``smoothing`` is the length of its set-point filter in CSV, CSP and IP, s. Raises FileError
+    where the objects do not suffice for the modes that the device file declares.
     """
 
     def __init__(
@@ -55,28 +61,34 @@ class SimDrive:
         smoothing: float = 0.0,
         now: float = 0.0,
     ) -> None:
+        check_objects(objects, modes_of(servo.modes), node)
         self.node = node
         self.objects = objects
         self.nmt = NmtState.BOOTING
-        self._send_frame, self._servo, self._shaft = send, servo, shaft
+        self._servo, self._shaft, self._quirks = servo, shaft, servo.quirks
         self._booted_at = now
         self._error = 0
-        self._silent = False
-        self._sdo = SdoServer(self.objects)
-        self._pdos = Pdos(
-            self.objects, self._send, self._sample, lambda: self._emergency(_PDO_TOO_SHORT)
+        self._sdo_refuses = False
+        self._line = Line(send, self._emergency)
+        self._sdo = SdoServer(objects)
+        short = partial(self._emergency, _PDO_TOO_SHORT)
+        self._pdos = Pdos(objects, self._line.send, self._sample, short)
+        lost, back = self._host_lost, self._host_back
+        self._heartbeats = Heartbeats(objects, self._send_heartbeat, lost, back)
+        self._heartbeats.needs_both = self._quirks.needs_both_heartbeats
+        self._power = PowerStage(objects, self._state_changed)
+        self._power.may_enable = self._may_enable
+        self._motion = Motion(
+            Settings(objects, servo),
+            {Mode.NONE, *modes_of(servo.modes)},
+            _brake_of(self._quirks, fitted=brake),
+            smoothing=smoothing,
         )
-        self._heartbeats = Heartbeats(
-            self.objects, self._send_heartbeat, self._host_lost, self._host_back
-        )
-        self._power = PowerStage(self.objects, self._state_changed)
-        units = units_of(self.objects, servo)
-        self._motion = Motion(self.objects, units, brake=brake, smoothing=smoothing)
-        self._handshake = SetPointHandshake(self.objects, self._motion)
-        self._axis = Axis(self.objects, shaft, self._power, self._motion, now=now)
-        self._axis.following_failed = lambda: self._fault(_FOLLOWING_ERROR)
-        self._guard_objects()
-        self.objects.put(0x6502, 0, SIMULATED_MODES)
+        self._status = StatusBits(objects, self._motion, toggling=self._quirks.toggles_bit_10)
+        self._axis = Axis(objects, shaft, self._power, self._motion, self._status, now=now)
+        self._axis.following_failed = lambda: self._fault(FAULTS["following error"])
+        Actions(objects, shaft, self._power, self._motion, self._axis, quirks=self._quirks)
+        self._show_modes()
 
     # What it is doing.
 
@@ -90,6 +102,11 @@ class SimDrive:
         """603Fh; 0 while there is no fault."""
         return self._error
 
+    @property
+    def switches(self) -> Switches:
+        """Limit and home switches of the axis, which may be moved."""
+        return self._motion.switches
+
     # What happens to it.
 
     def power_on(self, now: float, *, boot_time: float | None = None) -> None:
@@ -99,10 +116,11 @@ class SimDrive:
         self._booted_at = now + wait
         self._power.reset()
         self.objects.reset()
-        self.objects.put(0x6502, 0, SIMULATED_MODES)
+        self._show_modes()
         self._motion.set_mode(Mode.NONE, self._shaft.motor_angle)
         self._motion.halted = False
-        self._motion.units = units_of(self.objects, self._servo)
+        self._motion.settings.zero = 0.0
+        self._motion.settings.read_units()
         self._error = 0
         self._sdo.reset()
         self._pdos.rebuild()
@@ -111,7 +129,7 @@ class SimDrive:
 
     def receive(self, identifier: int, data: bytes, now: float) -> None:
         """Take a frame from the bus."""
-        if self._silent or self.nmt is NmtState.BOOTING:
+        if self._line.cut or self.nmt is NmtState.BOOTING:
             return
         if identifier == 0x000:
             self._manage(data, now)
@@ -121,7 +139,8 @@ class SimDrive:
             self._heartbeats.heard(identifier - 0x700, now)
         elif self.nmt is NmtState.OPERATIONAL:
             self.advance(now)
-            if identifier == self.objects.number(0x1005) & 0x7FF:
+            if identifier == self.objects.number(0x1005, 0, 0x80) & 0x7FF:
+                self._status.syncs += 1
                 self._pdos.latch()
                 self._pdos.on_sync(now)
             else:
@@ -135,27 +154,46 @@ class SimDrive:
                 self._boot_up(now)
             return
         self._heartbeats.tick(now)
+        self._line.tick(now)
         if self.nmt is NmtState.OPERATIONAL:
             self._pdos.poll(now)
 
     def inject(self, kind: str) -> None:
         """Make something go wrong now; raises UsageError for an unknown kind."""
         known(kind)
-        if kind in ERROR_CODES:
-            self._fault(ERROR_CODES[kind])
-        elif kind == "reboot":
+        if kind in FAULTS:
+            self._fault(FAULTS[kind])
+        else:
+            self._disturb(kind)
+
+    def _disturb(self, kind: str) -> None:
+        if kind == "reboot":
             self.power_on(self._axis.now)
+        elif kind == "map lost":
+            self._pdos.forget()
+        elif kind == "host lost":
+            self._heartbeats.lose()
         elif kind == "heartbeat stop":
             self._heartbeats.producing = False
+        elif kind == "tpdo stop":
+            self._pdos.mute = True
+        elif kind == "slow sdo":
+            self._line.slow_sdo = True
+        elif kind == "sdo abort":
+            self._sdo_refuses = True
+        elif kind == "emergency storm":
+            self._line.storm = True
         elif kind == "silence":
-            self._silent = True
+            self._line.cut = True
         else:
-            self._silent, self._heartbeats.producing = False, True
+            self._line.recover()
+            self._heartbeats.producing = True
+            self._pdos.mute = self._sdo_refuses = False
 
     # Network.
 
     def _boot_up(self, now: float) -> None:
-        self._send(0x700 + self.node, b"\0")
+        self._line.send(0x700 + self.node, b"\0")
         self.nmt = NmtState.PRE_OPERATIONAL
         self._heartbeats.start(now)
         if self.state is State.NOT_READY:
@@ -165,15 +203,22 @@ class SimDrive:
         if len(data) != 2 or data[1] not in (0, self.node):
             return
         self.advance(now)
-        command, before = data[0], self.nmt
+        command = data[0]
         if command == 0x81:
             self.power_on(now)
         elif command == 0x82:
             self._reset_communication(now)
         elif command in _NMT_COMMANDS:
-            self.nmt = _NMT_COMMANDS[command]
-            if self.nmt is NmtState.STOPPED and before is not self.nmt:
-                self._abort_connection()
+            self._enter_nmt(_NMT_COMMANDS[command])
+
+    def _enter_nmt(self, state: NmtState) -> None:
+        before, self.nmt = self.nmt, state
+        if state is before:
+            return
+        if state is NmtState.STOPPED:
+            self._abort_connection()
+        elif before is NmtState.OPERATIONAL and self._quirks.stops_outside_operational:
+            self._power.shut_down()
 
     def _reset_communication(self, now: float) -> None:
         self._abort_connection()
@@ -187,19 +232,19 @@ class SimDrive:
             return
         self.advance(now)
         self._sample()
-        reply = self._sdo.answer(data)
+        reply = self._sdo.refuse(data) if self._sdo_refuses else self._sdo.answer(data)
         if reply is not None:
-            self._send(0x580 + self.node, reply)
+            self._line.answer(0x580 + self.node, reply, now)
 
     def _host_lost(self, _node: int) -> None:
         if not self._power.faults_on_abort:
-            self._emergency(_HEARTBEAT_LOST)
+            self._emergency(_HEARTBEAT_LOST.code)
         self._abort_connection()
-        behaviour = self.objects.number(0x1029, 1) if (0x1029, 1) in self.objects else 0
+        behaviour = self.objects.number(0x1029, 1, 0)
         if behaviour == 2:
-            self.nmt = NmtState.STOPPED
+            self._enter_nmt(NmtState.STOPPED)
         elif behaviour == 0 and self.nmt is NmtState.OPERATIONAL:
-            self.nmt = NmtState.PRE_OPERATIONAL
+            self._enter_nmt(NmtState.PRE_OPERATIONAL)
 
     def _host_back(self) -> None:
         if not self._error:
@@ -212,28 +257,23 @@ class SimDrive:
             self._power.abort_connection()
 
     def _emergency(self, code: int) -> None:
-        if self._booted:
-            self._send(0x80 + self.node, emergency_frame(self.objects, code))
-
-    @property
-    def _booted(self) -> bool:
-        return self.nmt is not NmtState.BOOTING
+        if self.nmt is not NmtState.BOOTING:
+            self._line.send(0x80 + self.node, emergency_frame(self.objects, code))
 
     def _send_heartbeat(self) -> None:
-        self._send(0x700 + self.node, bytes((self.nmt,)))
-
-    def _send(self, identifier: int, data: bytes) -> None:
-        if not self._silent:
-            self._send_frame(identifier, data)
+        self._line.send(0x700 + self.node, bytes((self.nmt,)))
 
     # Power and motion.
 
-    def _fault(self, code: int) -> None:
+    def _may_enable(self) -> bool:
+        return not self._quirks.needs_mode or self._motion.mode is not Mode.NONE
+
+    def _fault(self, kind: FaultKind) -> None:
         if self.state in (State.FAULT, State.FAULT_REACTION, State.NOT_READY):
             return
-        self._error = code
-        self._emergency(code)
-        self._power.fault()
+        self._error = kind.code
+        self._emergency(kind.code)
+        self._power.fault(cut=kind.cuts)
 
     def _state_changed(self, state: State) -> None:
         if state is State.SWITCH_ON_DISABLED and self._error:
@@ -245,39 +285,11 @@ class SimDrive:
         self._axis.advance(now)
 
     def _sample(self) -> None:
-        acknowledged = self._handshake.acknowledged
-        self._axis.sample(self._error, acknowledged=acknowledged)
+        self._axis.sample(self._error)
 
-    # Objects that do something when they are written.
+    def _show_modes(self) -> None:
+        self.objects.put(0x6502, 0, supported(self._motion.modes))
 
-    def _guard_objects(self) -> None:
-        guard_options(self.objects)
-        guards, watchers = self.objects.guards, self.objects.watchers
-        for index in (0x608F, 0x6091, 0x6076):
-            guards[index] = self._check_scale
-            watchers[index] = self._scale_again
-        watchers[0x6040] = self._control
-        watchers[0x6060] = lambda _sub, value: self._motion.set_mode(
-            Mode(value), self._shaft.motor_angle
-        )
-        for index in (0x607A, 0x60FF, 0x60B0, 0x60B1):
-            watchers[index] = lambda _sub, _value: self._aim()
 
-    def _control(self, _sub: int, word: int) -> None:
-        self._motion.halted = bool(word & HALT)
-        self._power.control(word)
-        enabled = self.state is State.OPERATION_ENABLED
-        self._handshake.take(word, self._shaft.motor_angle, enabled=enabled)
-
-    def _aim(self) -> None:
-        if self._motion.mode in (Mode.CSP, Mode.CSV):
-            self._motion.aim()
-
-    def _check_scale(self, _sub: int, value: int) -> Abort | None:
-        if self.state in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION):
-            return Abort.STATE
-        return Abort.RANGE if value == 0 else None
-
-    def _scale_again(self, _sub: int, _value: int) -> None:
-        self._motion.units = units_of(self.objects, self._servo)
-        self._axis.forget_sample()
+def _brake_of(quirks: QuirkSpec, *, fitted: bool) -> HoldingBrake:
+    return HoldingBrake(fitted=fitted, release=quirks.brake_release, apply=quirks.brake_apply)

@@ -16,8 +16,6 @@ __all__ = ["Axis"]
 
 _MAX_SLICE = 1e-3
 _MIN_SLICE = 2e-5
-_UNWATCHED = 0xFFFFFFFF
-_MS = 1e-3
 
 
 class Axis:
@@ -33,12 +31,12 @@ class Axis:
         shaft: Shaft,
         power: PowerStage,
         motion: Motion,
+        status: StatusBits,
         *,
         now: float,
     ) -> None:
         self._objects, self._shaft = objects, shaft
-        self._power, self._motion = power, motion
-        self._status = StatusBits(objects, motion)
+        self._power, self._motion, self._status = power, motion, status
         self.following_failed: Callable[[], None] = lambda: None
         self.now = now
         self._sampled_at = -inf
@@ -62,39 +60,47 @@ class Axis:
             self._status.advance(shaft.motor_angle, shaft.motor_velocity, dt)
         self.now = now
 
-    def sample(self, error_code: int, *, acknowledged: bool) -> None:
+    def sample(self, error_code: int) -> None:
         """Bring the actual values in the object dictionary up to now."""
         put, motion = self._objects.put, self._motion
-        put(0x6041, 0, self._status.word(self._power.state, acknowledged=acknowledged))
+        put(0x6041, 0, self._status.word(self._power.state))
         put(0x603F, 0, error_code)
         put(0x6061, 0, motion.mode)
         if self._sampled_at == self.now:
             return
         self._sampled_at = self.now
-        reading, units = self._shaft.measure(), motion.units
-        put(0x6064, 0, wrapped(reading.motor_angle / units.angle, 32))
+        reading, settings, demand = self._shaft.measure(), motion.settings, motion.demand
+        units = settings.units
+        put(0x6064, 0, wrapped(settings.counts(reading.motor_angle), 32))
         put(0x606C, 0, wrapped(reading.motor_velocity / units.speed, 32))
-        torque = round(reading.motor_torque / units.torque)
-        put(0x6077, 0, max(-32768, min(32767, torque)))
-        put(0x6062, 0, wrapped(motion.angle / units.angle, 32))
-        put(0x606B, 0, wrapped(motion.speed / units.speed, 32))
-        error = motion.angle - reading.motor_angle if motion.controls_position else 0.0
+        torque = _permille(reading.motor_torque / units.torque)
+        put(0x6077, 0, torque)
+        put(0x6078, 0, torque)
+        demanded = demand.torque if motion.set_points.torque else reading.motor_torque
+        put(0x6074, 0, _permille(demanded / units.torque))
+        put(0x6062, 0, wrapped(settings.counts(demand.angle), 32))
+        put(0x606B, 0, wrapped(demand.speed / units.speed, 32))
+        error = demand.angle - reading.motor_angle if motion.controls_position else 0.0
         put(0x60F4, 0, wrapped(error / units.angle, 32))
+        put(0x60FD, 0, motion.switches.inputs(self._shaft.motor_angle))
 
     def forget_sample(self) -> None:
         """Sample anew next time, in units that may have changed."""
         self._sampled_at = -inf
 
     def _watch_following(self) -> None:
-        window = self._objects.number(0x6065)
-        error = abs(self._motion.angle - self._shaft.motor_angle)
-        watched = self._motion.controls_position and window != _UNWATCHED
-        beyond = watched and error > window * self._motion.units.angle
+        motion = self._motion
+        error = abs(motion.demand.angle - self._shaft.motor_angle)
+        beyond = motion.controls_position and error > motion.settings.following_window()
         self._status.following_error = beyond
         if not beyond:
             self._following_since = None
             return
         if self._following_since is None:
             self._following_since = self.now
-        if self.now - self._following_since >= self._objects.number(0x6066) * _MS:
+        if self.now - self._following_since >= motion.settings.following_time():
             self.following_failed()
+
+
+def _permille(value: float) -> int:
+    return max(-32768, min(32767, round(value)))

@@ -2,29 +2,52 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from winchkit.errors import UsageError
 from winchkit.units import suggest
 
-__all__ = ["CONDITIONS", "ERROR_CODES", "known"]
+__all__ = ["CONDITIONS", "FAULTS", "FaultKind", "known"]
 
-ERROR_CODES: dict[str, int] = {
-    "over-current": 0x2310,
-    "over-voltage": 0x3210,
-    "under-voltage": 0x3220,
-    "over-temperature": 0x4310,
-    "torque off": 0x5441,
-    "encoder": 0x7305,
-    "following error": 0x8611,
+
+@dataclass(frozen=True)
+class FaultKind:
+    """A fault that the drive detects: its error code, and whether it can still make a ramp."""
+
+    code: int
+    cuts: bool = False
+    """The power goes at once, whatever 605Eh says."""
+
+
+FAULTS: dict[str, FaultKind] = {
+    "over-current": FaultKind(0x2310, cuts=True),
+    "over-voltage": FaultKind(0x3210),
+    "under-voltage": FaultKind(0x3220),
+    "over-temperature": FaultKind(0x4310),
+    "torque off": FaultKind(0x5441, cuts=True),
+    "encoder": FaultKind(0x7305, cuts=True),
+    "following error": FaultKind(0x8611),
 }
 """Fault kinds that the drive reports by an error code of CiA 402."""
 
-CONDITIONS = ("reboot", "heartbeat stop", "silence", "recover")
-"""Fault kinds that need no code; ``recover`` ends the lasting ones."""
+CONDITIONS = {
+    "reboot": "restarts as after power-on",
+    "map lost": "forgets its PDO mapping without a restart",
+    "host lost": "no longer hears the host's heartbeat, until the next one",
+    "heartbeat stop": "sends no heartbeat",
+    "tpdo stop": "sends no PDO",
+    "slow sdo": "answers every SDO late",
+    "sdo abort": "answers every SDO with an abort",
+    "emergency storm": "sends an emergency message with every tick",
+    "silence": "neither hears nor sends anything, as with a cut cable",
+    "recover": "ends the lasting ones",
+}
+"""Fault kinds that need no code."""
 
 
 def known(kind: str) -> str:
     """Check the name of a fault kind; raises UsageError naming those there are."""
-    names = [*ERROR_CODES, *CONDITIONS]
+    names = [*FAULTS, *CONDITIONS]
     if kind not in names:
         raise UsageError(
             f"a simulated drive has no fault '{kind}'; use one of {', '.join(names)}"

@@ -41,6 +41,8 @@ class Heartbeats:
         back: Callable[[], None],
     ) -> None:
         self._objects = objects
+        self.needs_both = False
+        """Whether nothing is watched while nothing is produced."""
         self._send, self._lost, self._back = send, lost, back
         self._due = inf
         self._deadlines: dict[int, float] = {}
@@ -82,13 +84,21 @@ class Heartbeats:
                 self._send()
             self._due = max(self._due + self._period, now)
         for node in [node for node, limit in self._deadlines.items() if now > limit]:
-            del self._deadlines[node]
-            self._failed.add(node)
-            self._lost(node)
+            self._fail(node)
+
+    def lose(self) -> None:
+        """Hear nobody any more, as if every time had run out."""
+        for node in list(self._limits()):
+            self._fail(node)
+
+    def _fail(self, node: int) -> None:
+        self._deadlines.pop(node, None)
+        self._failed.add(node)
+        self._lost(node)
 
     @property
     def _period(self) -> float:
-        return self._objects.number(_PRODUCER) * _MS
+        return self._objects.number(_PRODUCER, 0, 0) * _MS
 
     def _produce_again(self, sub: int, value: int) -> None:
         self._changed = True
@@ -97,9 +107,11 @@ class Heartbeats:
         self._deadlines.clear()
 
     def _limits(self) -> dict[int, float]:
-        found = {}
-        for sub in range(1, self._objects.number(_CONSUMER, 0) + 1):
-            entry = self._objects.number(_CONSUMER, sub)
+        found: dict[int, float] = {}
+        if self.needs_both and not self._period:
+            return found
+        for sub in range(1, self._objects.number(_CONSUMER, 0, 0) + 1):
+            entry = self._objects.number(_CONSUMER, sub, 0)
             node, time = entry >> 16 & 0x7F, entry & 0xFFFF
             if node and time:
                 found[node] = time * _MS
@@ -111,8 +123,8 @@ class Heartbeats:
             return None
         if node > 127:
             return Abort.RANGE
-        subs = range(1, self._objects.number(_CONSUMER, 0) + 1)
-        others = (self._objects.number(_CONSUMER, other) for other in subs if other != sub)
+        subs = range(1, self._objects.number(_CONSUMER, 0, 0) + 1)
+        others = (self._objects.number(_CONSUMER, other, 0) for other in subs if other != sub)
         twice = any(entry >> 16 == node and entry & 0xFFFF for entry in others)
         return Abort.INCOMPATIBLE if twice else None
 
@@ -130,9 +142,9 @@ def emergency_frame(objects: ObjectDictionary, code: int) -> bytes:
     register = error_register(code)
     objects.put(0x1001, 0, register)
     if code:
-        depth = max(sub for index, sub in objects if index == _HISTORY)
+        depth = max((sub for index, sub in objects if index == _HISTORY), default=0)
         for sub in range(depth, 1, -1):
-            objects.put(_HISTORY, sub, objects.number(_HISTORY, sub - 1))
+            objects.put(_HISTORY, sub, objects.number(_HISTORY, sub - 1, 0))
         objects.put(_HISTORY, 1, code)
-        objects.put(_HISTORY, 0, min(depth, objects.number(_HISTORY, 0) + 1))
+        objects.put(_HISTORY, 0, min(depth, objects.number(_HISTORY, 0, 0) + 1))
     return struct.pack("<HB5x", code, register)

@@ -69,6 +69,8 @@ class Pdos:
         self._send, self._sample, self._short = send, sample, short
         self._receive: dict[int, _Pdo] = {}
         self._transmit: list[_Pdo] = []
+        self.mute = False
+        """Whether nothing is sent."""
         for index in {key[0] for key in objects}:
             for base, mapping in ((0x1400, False), (0x1600, True), (0x1800, False), (0x1A00, True)):
                 if index - base in _PDOS:
@@ -137,9 +139,19 @@ class Pdos:
             if timer or data != pdo.sent:
                 self._emit(pdo, data, now)
 
+    def forget(self) -> None:
+        """Lose every mapping; all PDOs are then invalid."""
+        put, number = self._objects.put, self._objects.number
+        for index, sub in self._objects:
+            if sub == 1 and (index - 0x1400 in _PDOS or index - 0x1800 in _PDOS):
+                put(index, 1, number(index, 1) | _INVALID)
+                put(index + 0x200, 0, 0)
+        self.rebuild()
+
     def _emit(self, pdo: _Pdo, data: bytes, now: float) -> None:
         pdo.sent, pdo.sent_at = data, now
-        self._send(pdo.identifier, data)
+        if not self.mute:
+            self._send(pdo.identifier, data)
 
     def _pack(self, pdo: _Pdo) -> bytes:
         parts = (self._objects.read(key) for key in pdo.keys)

@@ -19,6 +19,7 @@ class Order(Enum):
     """What the motion is told."""
 
     OFF = "no torque"
+    CUT = "no torque at once, whatever hangs on it"
     FOLLOW = "follow the set-points"
     SLOW_DOWN = "stop on 6084h"
     QUICK_STOP = "stop on 6085h"
@@ -27,6 +28,8 @@ class Order(Enum):
 
 RAMPS = {1: Order.SLOW_DOWN, 2: Order.QUICK_STOP, 3: Order.HARD_STOP, 4: Order.HARD_STOP}
 """Ramps of the option codes 605Ah (which adds 4 for staying), 605Dh and 605Eh."""
+_DEFAULTS = {0x605A: 2, 0x605B: 0, 0x605C: 1, 0x605E: 2, 0x6007: 1}
+"""What the standard asks of a drive that lacks an option code."""
 
 
 class PowerStage:
@@ -39,6 +42,7 @@ class PowerStage:
     def __init__(self, objects: ObjectDictionary, changed: Callable[[State], None]) -> None:
         self._objects = objects
         self._changed = changed
+        self.may_enable: Callable[[], bool] = lambda: True
         self.state = State.NOT_READY
         self.order = Order.OFF
         self._after: State | None = None
@@ -74,6 +78,11 @@ class PowerStage:
         while self._obey(Command.QUICK_STOP):
             pass
 
+    def shut_down(self) -> None:
+        """Go down to ready to switch on as if a control word had asked for it."""
+        while self._obey(Command.SHUTDOWN):
+            pass
+
     def disable_voltage(self) -> None:
         """Remove the power as if a control word had asked for it."""
         while self._obey(Command.DISABLE_VOLTAGE):
@@ -81,7 +90,7 @@ class PowerStage:
 
     def abort_connection(self) -> None:
         """React to a lost connection as 6007h says, short of the fault, which the drive raises."""
-        option = self._objects.number(0x6007)
+        option = self._option(0x6007)
         if option == _ABORT_DISABLE:
             self.disable_voltage()
         elif option == _ABORT_QUICK_STOP:
@@ -90,15 +99,16 @@ class PowerStage:
     @property
     def faults_on_abort(self) -> bool:
         """Whether 6007h makes a fault of a lost connection."""
-        return self._objects.number(0x6007) == _ABORT_FAULT
+        return self._option(0x6007) == _ABORT_FAULT
 
-    def fault(self) -> None:
-        """Transition 13, with the reaction of 605Eh, then 14."""
+    def fault(self, *, cut: bool = False) -> None:
+        """Transition 13, with the reaction of 605Eh or with a ``cut`` of the power, then 14."""
         if self.state in (State.FAULT, State.FAULT_REACTION, State.NOT_READY):
             return
-        ramp = RAMPS.get(self._objects.number(0x605E))
-        if ramp is None or self.order is Order.OFF:
+        ramp = RAMPS.get(self._option(0x605E))
+        if cut or ramp is None or self.order in (Order.OFF, Order.CUT):
             self._enter(State.FAULT)
+            self.order = Order.CUT if cut else Order.OFF
         else:
             self._ramp(ramp, State.FAULT_REACTION, State.FAULT)
 
@@ -116,13 +126,15 @@ class PowerStage:
         if row is None:
             return False
         if row.number == 11:
-            self._begin_quick_stop()
-        elif row.number == 16:
-            if self._objects.number(0x605A) < _STAYS:
+            return self._begin_quick_stop()
+        if row.number == 16:
+            if self._option(0x605A) < _STAYS:
                 return False
             self._enter(row.target)
+        elif row.number == 4 and not self.may_enable():
+            return False
         elif row.number in (5, 8):
-            option = self._objects.number(0x605C if row.number == 5 else 0x605B)
+            option = self._option(0x605C if row.number == 5 else 0x605B)
             if option == 1:
                 if self._after is not row.target:
                     self._ramp(Order.SLOW_DOWN, self.state, row.target)
@@ -132,14 +144,20 @@ class PowerStage:
             self._enter(row.target)
         return True
 
-    def _begin_quick_stop(self) -> None:
-        option = self._objects.number(0x605A)
+    def _option(self, index: int) -> int:
+        return self._objects.number(index, 0, _DEFAULTS[index])
+
+    def _begin_quick_stop(self) -> bool:
+        option = self._option(0x605A)
+        if option < 0:
+            return False
         if option == 0:
             self._enter(State.SWITCH_ON_DISABLED)
         elif option < _STAYS:
             self._ramp(RAMPS[option], State.QUICK_STOP_ACTIVE, State.SWITCH_ON_DISABLED)
         else:
             self._ramp(RAMPS[option - 4], State.QUICK_STOP_ACTIVE, None)
+        return True
 
     def _ramp(self, order: Order, state: State, after: State | None) -> None:
         self.order, self._after = order, after

@@ -49,6 +49,13 @@ class SdoServer:
         self._transfer = None
         return None if command == _ABORT else self._begin(command, request)
 
+    def refuse(self, request: bytes) -> bytes | None:
+        """Reply to any request with a general abort."""
+        if len(request) != 8 or request[0] >> 5 == _ABORT:
+            return None
+        index, sub = struct.unpack_from("<HB", request, 1)
+        return self._abort((index, sub), Abort.GENERAL)
+
     def _begin(self, command: int, request: bytes) -> bytes:
         index, sub = struct.unpack_from("<HB", request, 1)
         if command == _DOWNLOAD:

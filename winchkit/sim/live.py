@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,9 +18,9 @@ from winchkit.schema.simbench import FaultSpec, SimBench
 from winchkit.sim.bench import hiding, profiles_of
 from winchkit.sim.buses import CanPort, Interface, wired
 from winchkit.sim.live_file import write_bench
+from winchkit.sim.live_lines import Line, Placed, open_line
 from winchkit.sim.live_winch import LiveWinch
-from winchkit.sim.modbus import ModbusLine
-from winchkit.sim.modbus_instrument import ModbusInstrument
+from winchkit.sim.wire import Wire
 from winchkit.units import suggest
 
 __all__ = ["LiveBench"]
@@ -39,8 +39,8 @@ class LiveBench:
     ``bench_spec`` is the wiring that a user connects to: the declaration with channels and
     ports of this run. ``hidden`` replaces what the declaration hides, as in
     :func:`winchkit.sim.bench.hiding`. CAN is python-can's ``virtual`` (within this process) or
-    ``udp_multicast`` (between processes); instruments are reached over Modbus TCP on
-    127.0.0.1, whatever line the declaration names. Raises FileError for a declaration that
+    ``udp_multicast`` (between processes); Modbus instruments are reached over TCP on
+    127.0.0.1, serial ones at a pseudo-terminal. Raises FileError for a declaration that
     does not hold together, ConnectionLost where a bus cannot be opened.
     """
 
@@ -62,7 +62,9 @@ class LiveBench:
         self._pool: ThreadPoolExecutor | None = None
         self._loops: list[Future[None]] = []
         self._ports: dict[str, CanPort] = {}
-        self._lines: dict[str, ModbusLine] = {}
+        self._lines: dict[str, Line] = {}
+        self.wire: dict[str, Wire] = {}
+        """Cables of the CAN buses, by bus."""
         self.winches: dict[str, LiveWinch] = {}
         self.bench_spec: BenchSpec = self.sim_bench.bench
         self.overruns = 0
@@ -151,18 +153,17 @@ class LiveBench:
         for name, bus in declared.bus.items():
             if bus.kind == "can":
                 buses[name] = wired(bus, f"{declared.name}-{name}", self._interface)
-                self._ports[name] = CanPort(buses[name])
+                self.wire[name] = Wire(self._clock, seed=self.seed)
+                self._ports[name] = CanPort(buses[name], self.wire[name])
         self._make_winches()
         for fault in self._faults:
             winch, _, role = fault.target.partition(".")
             self._winch(winch).check_fault(role, fault.kind)
         for name in declared.bus:
             if name not in buses:
-                self._lines[name] = line = ModbusLine(self._units(name), self.up_to_date)
-                line.start()
-                host, port = line.address
-                timeout = declared.bus[name].timeout
-                buses[name] = BusSpec("modbus-tcp", host=host, port=port, timeout=timeout)
+                self._lines[name], buses[name] = open_line(
+                    declared.bus[name], self._placed(name), self.up_to_date, self._now
+                )
         self.bench_spec = replace(declared, bus=buses)
         self._started_at = self._now()
         self._pool = ThreadPoolExecutor(max(1, len(self._ports)), "sim-can")
@@ -189,21 +190,14 @@ class LiveBench:
                 now=now,
             )
 
-    def _units(self, bus: str) -> Mapping[int, ModbusInstrument]:
-        """Instruments on one line by unit id."""
-        found: dict[int, ModbusInstrument] = {}
+    def _placed(self, bus: str) -> Iterator[Placed]:
+        """Instruments on one bus."""
         for name, winch in self.winches.items():
             wiring = self.sim_bench.bench.winch[name]
             for role, instrument in winch.instruments.items():
                 ref = getattr(wiring, role)
-                if ref.bus != bus:
-                    continue
-                if ref.unit is None or ref.unit in found:
-                    raise UsageError(
-                        f"winch {name}: {role} needs a unit of its own on the bus '{bus}'"
-                    )
-                found[ref.unit] = instrument
-        return found
+                if ref.bus == bus:
+                    yield Placed(f"winch {name}: {role}", ref, instrument)
 
     def _close(self) -> None:
         self._stopping.set()
@@ -253,7 +247,7 @@ class LiveBench:
             now = self._now()
             for winch in winches:
                 winch.advance(now)
-                winch.drive.receive(identifier, data, now)
+                winch.receive(identifier, data, now)
 
     def _tick(self, winches: list[LiveWinch]) -> None:
         with self._lock:
@@ -262,7 +256,7 @@ class LiveBench:
                 self._go_wrong(self._faults.pop(0))
             for winch in winches:
                 winch.advance(now)
-                winch.drive.tick(now)
+                winch.tick(now)
 
     def _go_wrong(self, fault: FaultSpec) -> None:
         winch, _, role = fault.target.partition(".")

@@ -62,7 +62,9 @@ def _items(table: Any, beside: str) -> Iterator[tuple[str, Any, str | None]]:
 
 
 def _located(key: str, value: Any, beside: str) -> Any:
-    """Profiles and devices that stand beside the declaration, by a path that holds elsewhere."""
+    """What stands beside the declaration, by a path that holds elsewhere."""
+    if key == "calibration" and beside:
+        return str((Path(beside).parent / value).resolve())
     kinds: dict[str, Kind] = {"profile": "profiles", "device": "devices"}
     if key not in kinds or not beside:
         return value

@@ -6,17 +6,17 @@ from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
-from winchkit.catalog import find
 from winchkit.errors import FileError, NotPermitted, UsageError
 from winchkit.schema.bench import DeviceRef, WinchWiring
-from winchkit.schema.device import DeviceSpec, ModbusSpec, ServoSpec
+from winchkit.schema.device_servo import ServoSpec
 from winchkit.schema.simbench import NoiseSpec, WinchTruth
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.drive import SimDrive
 from winchkit.sim.drive_faults import known
-from winchkit.sim.modbus_instrument import ModbusInstrument, check_kind, in_unit_of
+from winchkit.sim.live_instruments import check_fault_of, device_of, instruments_of
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
 from winchkit.sim.plant import Measurement, WinchPlant
+from winchkit.sim.process import ProcessInstrument
 from winchkit.units import suggest
 
 __all__ = ["LiveWinch"]
@@ -68,12 +68,8 @@ class LiveWinch:
             now=now,
         )
         self.drive.power_on(now, boot_time=0.0)
-        self.instruments = {
-            role: ModbusInstrument(
-                spec, in_unit_of(spec, self._measuring(_QUANTITIES[role])), now=now
-            )
-            for role, spec in _instruments(wiring, beside)
-        }
+        measuring = {role: self._measuring(quantity) for role, quantity in _QUANTITIES.items()}
+        self.instruments = instruments_of(wiring, beside, measuring, send, now=now)
 
     def _measuring(self, quantity: Callable[[Measurement], float]) -> Callable[[], float]:
         return lambda: quantity(self.plant.measure())
@@ -92,6 +88,20 @@ class LiveWinch:
         self.drive.advance(now)
         for one in instruments:
             one.show(now)
+
+    def receive(self, identifier: int, data: bytes, now: float) -> None:
+        """Take a frame from the CAN bus."""
+        self.drive.receive(identifier, data, now)
+        for one in self.instruments.values():
+            if isinstance(one, ProcessInstrument):
+                one.receive(identifier, data, now)
+
+    def tick(self, now: float) -> None:
+        """Let the timers of what hangs on the CAN bus run."""
+        self.drive.tick(now)
+        for one in self.instruments.values():
+            if isinstance(one, ProcessInstrument):
+                one.tick(now)
 
     def hang(self, mass: float) -> None:
         """Hang another load (kg); NotPermitted while the winch moves."""
@@ -114,7 +124,7 @@ class LiveWinch:
                 f"winch {self.name} has no '{role}'; it has {', '.join(roles)}"
                 + suggest(role, roles)
             )
-        check_kind(kind)
+        check_fault_of(self.instruments[role], kind)
 
     def inject(self, role: str, kind: str) -> None:
         """Make a device of this winch go wrong; raises as :meth:`check_fault`."""
@@ -126,27 +136,7 @@ class LiveWinch:
 
 
 def _servo(ref: DeviceRef, beside: str) -> tuple[ServoSpec, Path]:
-    path, device = _device(ref, beside)
+    path, device = device_of(ref, beside)
     if device.servo is None:
         raise FileError(f"{path}: '{ref.device}' is no servo drive; it has no [servo] table")
     return device.servo, path.parent / device.servo.eds
-
-
-def _instruments(wiring: WinchWiring, beside: str) -> list[tuple[str, ModbusSpec]]:
-    found = []
-    for role in _QUANTITIES:
-        ref = getattr(wiring, role)
-        if ref is None:
-            continue
-        path, device = _device(ref, beside)
-        if device.modbus is None:
-            raise FileError(f"{path}: '{ref.device}' is no Modbus device; it has no [modbus] table")
-        found.append((role, device.modbus))
-    return found
-
-
-def _device(ref: DeviceRef, beside: str) -> tuple[Path, DeviceSpec]:
-    from winchkit.schema.read import read_device
-
-    path = find("devices", ref.device, beside=beside or None)
-    return path, read_device(path)

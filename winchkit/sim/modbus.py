@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
-from pymodbus.server import ModbusTcpServer
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from winchkit.errors import ConnectionLost
+from winchkit.sim.modbus_cable import PtyCable
 from winchkit.sim.modbus_instrument import ModbusInstrument
 
 __all__ = ["ModbusLine"]
 
-_READS = (3, 4)
-_WRITES = (6, 16)
+_WRITE_ONE, _WRITE_MANY = 6, 16
+_BAUDRATE = 115_200
 _START_TIMEOUT = 5.0
+
+# A client that is killed is no news for the simulation's terminal.
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
 class ModbusLine:
-    """One Modbus TCP server with several instruments by unit id.
+    """One Modbus server with several instruments by unit id: over TCP, or RTU where ``serial``.
 
     ``up_to_date`` is called, on this line's thread, before registers are read or written; it
     brings the simulation to now, and is a context in which nobody else touches it.
@@ -36,6 +41,7 @@ class ModbusLine:
         *,
         host: str = "127.0.0.1",
         port: int = 0,
+        serial: bool = False,
     ) -> None:
         self._instruments = dict(instruments)
         self._up_to_date = up_to_date
@@ -45,11 +51,18 @@ class ModbusLine:
         self._server: Any = None
         self._started = threading.Event()
         self._failure: OSError | None = None
+        self._serial = serial
+        self._cable: PtyCable | None = None
         self.address = self._wanted
-        """Host and port, once it serves."""
+        """Host and port over TCP, once it serves."""
+        self.port = ""
+        """Path of the port on a serial line, once it serves."""
 
     def start(self) -> None:
         """Begin to serve; raises ConnectionLost where the address is taken."""
+        if self._serial:
+            self._cable = PtyCable()
+            self.port = self._cable.far
         self._thread.start()
         self._started.wait(_START_TIMEOUT)
         host, port = self._wanted
@@ -65,6 +78,9 @@ class ModbusLine:
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join(_START_TIMEOUT)
+        if self._cable is not None:
+            self._cable.close()
+            self._cable = None
 
     def _run(self) -> None:
         try:
@@ -82,7 +98,14 @@ class ModbusLine:
         devices = [self._device(unit, one) for unit, one in self._instruments.items()]
         if 0 not in self._instruments:
             devices.append(_nobody())
-        server: Any = ModbusTcpServer(devices, address=self._wanted, ignore_missing_devices=True)
+        if self._cable is not None:
+            server: Any = ModbusSerialServer(
+                devices, port=self._cable.near, baudrate=_BAUDRATE, ignore_missing_devices=True
+            )
+            await server.serve_forever(background=True)
+            self._server = server
+            return
+        server = ModbusTcpServer(devices, address=self._wanted, ignore_missing_devices=True)
         try:
             await server.serve_forever(background=True)
         except RuntimeError as error:
@@ -118,21 +141,24 @@ class ModbusLine:
             return ExcCodes.DEVICE_FAILURE
         with self._up_to_date():
             if values is None:
-                return _read(instrument, function, (start, address, count), registers)
+                return _read(instrument, function, (start, count), registers)
             return _write(instrument, function, address, values)
 
 
 def _read(
     instrument: ModbusInstrument,
     function: int,
-    span: tuple[int, int, int],
+    span: tuple[int, int],
     registers: list[int],
 ) -> ExcCodes | None:
-    start, address, count = span
-    read = instrument.spec.read
-    if function in _READS and function != read.function:
+    start, count = span
+    spec = instrument.spec
+    # The server reads back what a function 6 has written.
+    if function not in (spec.read.function, _WRITE_ONE):
         return ExcCodes.ILLEGAL_FUNCTION
-    if read.fixed and (address, count) != (read.start, read.count):
+    if count > spec.max_registers:
+        return ExcCodes.ILLEGAL_VALUE
+    if spec.read.fixed and count != spec.read.count:
         return ExcCodes.ILLEGAL_ADDRESS
     for at, content in instrument.registers().items():
         registers[at - start] = content
@@ -142,10 +168,12 @@ def _read(
 def _write(
     instrument: ModbusInstrument, function: int, address: int, values: list[int] | list[bool]
 ) -> ExcCodes | None:
-    if function not in _WRITES:
+    commands = instrument.spec.command.values()
+    one_takes_six = not all(command.writes_many for command in commands)
+    if function != _WRITE_MANY and not (function == _WRITE_ONE and one_takes_six):
         return ExcCodes.ILLEGAL_FUNCTION
-    taken = [instrument.command(address + at, int(value)) for at, value in enumerate(values)]
-    return None if all(taken) else ExcCodes.ILLEGAL_VALUE
+    taken = instrument.command(address, *map(int, values))
+    return None if taken else ExcCodes.ILLEGAL_VALUE
 
 
 def _nobody() -> SimDevice:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from math import isfinite
 
 from winchkit.errors import UsageError
-from winchkit.schema.device import REGISTERS, FieldSpec, ModbusSpec, StatusMeaning
-from winchkit.sim.modbus_registers import counts_of, encode
+from winchkit.schema.device_modbus import ModbusSpec
+from winchkit.schema.modbus_parts import REGISTERS, CommandSpec, FieldSpec, StatusMeaning
+from winchkit.sim.modbus_registers import counts_of, decimals_of, encode, encode_number
 from winchkit.units import convert, dimension_of, factor, suggest
 
 __all__ = ["INSTRUMENT_FAULTS", "ModbusInstrument", "check_kind", "in_unit_of"]
@@ -26,6 +27,8 @@ INSTRUMENT_FAULTS = (
 """What can go wrong; ``recover`` ends all of it."""
 
 _STABLE_COUNTS = 100
+_IDENTITY = 4711
+"""Serial number and the like of every simulated instrument."""
 _FAST, _SLOW = 0.05, 0.5
 
 
@@ -57,6 +60,9 @@ class ModbusInstrument:
         self._shown = _Converted(now, 0.0)
         self._zero = self._tare = self._peak = 0.0
         self._net = False
+        self._unlocked: list[tuple[int, int]] = []
+        self.stored = 0
+        """How often its EEPROM was written."""
         self._fast: float | None = None
         self._slow: float | None = None
         self.faults: set[str] = set()
@@ -102,13 +108,17 @@ class ModbusInstrument:
         The register past the block lets a master ask for one more, unless the device answers
         one length only.
         """
-        read = self.spec.read
-        found = set(range(read.start, read.start + read.count + (not read.fixed)))
-        for field in self.spec.field:
-            found.update(range(field.register, field.register + REGISTERS[field.type]))
-        found.update(command.register for command in self.spec.command.values())
-        if self.spec.status_register is not None:
-            found.add(self.spec.status_register)
+        found: set[int] = set()
+        for block in (self.spec.read, self.spec.status_read):
+            if block is not None:
+                found.update(range(block.start, block.end + (not block.fixed)))
+        for item in (*self.spec.field, *self.spec.identity):
+            found.update(range(item.register, item.register + REGISTERS[item.type]))
+        for command in self.spec.command.values():
+            found.update(range(command.register, command.register + REGISTERS[command.type]))
+            found.update(step.register for step in command.unlock)
+        if (at := self.spec.status_register) is not None:
+            found.update(range(at, at + REGISTERS[self.spec.status_type]))
         return sorted(found)
 
     def registers(self) -> dict[int, int]:
@@ -122,15 +132,35 @@ class ModbusInstrument:
             if field.sign_bit is not None and counts < 0:
                 status |= 1 << field.sign_bit
             contents.update(enumerate(encode(field, counts), field.register))
+            if field.decimals is not None:
+                at = field.decimals.register
+                told = decimals_of(field) << field.decimals.bit
+                if at == self.spec.status_register:
+                    status |= told
+                else:
+                    contents[at] = told
+        for item in self.spec.identity:
+            contents.update(enumerate(encode(item, _IDENTITY), item.register))
         if self.spec.status_register is not None:
-            contents[self.spec.status_register] = status | self._status(clipped)
+            words = encode_number(
+                self.spec.status_type, self.spec.status_order, status | self._status(clipped)
+            )
+            contents.update(enumerate(words, self.spec.status_register))
         return contents
 
-    def command(self, register: int, value: int) -> bool:
-        """Obey a write; False where the register takes no such command."""
+    def command(self, register: int, *words: int) -> bool:
+        """Obey a write of registers; False where they take no such command."""
         for name, command in self.spec.command.items():
-            if (command.register, command.value) == (register, value):
-                self._obey(name)
+            steps = [(step.register, step.value) for step in command.unlock]
+            if (register, words[0]) in steps and len(words) == 1:
+                self._unlocked.append((register, words[0]))
+                return True
+            wanted = encode_number(command.type, command.order, command.value)
+            if (register, list(words)) == (command.register, wanted):
+                unlocked, self._unlocked = self._unlocked, []
+                if unlocked[-len(steps) :] != steps:
+                    return False
+                self._obey(name, command)
                 return True
         return False
 
@@ -142,8 +172,9 @@ class ModbusInstrument:
         else:
             self.faults.add(kind)
 
-    def _obey(self, name: str) -> None:
+    def _obey(self, name: str, command: CommandSpec) -> None:
         gross = self._shown.value - self._zero
+        self.stored += command.permanent
         if name == "zero":
             self._zero = self._shown.value
         elif name == "tare":
@@ -160,7 +191,8 @@ class ModbusInstrument:
         return gross if field.name == "gross" else gross - self._tare
 
     def _status(self, clipped: bool) -> int:
-        scale = next(field.scale for field in self.spec.field if field.name == self.spec.value)
+        shown = next(field for field in self.spec.field if field.name == self.spec.value)
+        scale = shown.scale / 10.0 ** decimals_of(shown)
         fast, slow = self._fast, self._slow
         moved = abs(fast - slow) if fast is not None and slow is not None else 0.0
         stable = moved < _STABLE_COUNTS * scale
@@ -171,6 +203,7 @@ class ModbusInstrument:
             "unstable": not stable,
             "net": self._net,
             "zero": abs(self._shown.value - self._zero) < scale / 4,
+            "valid": not self._shown.broken,
         }
         bits = 0
         for meaning, numbers in self.spec.status.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import configparser
+import io
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -9,7 +11,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
-from winchkit.errors import FileError
+from winchkit.errors import Fault, FileError
+from winchkit.schema.eds import read_eds_text
 
 __all__ = ["Abort", "Entry", "Guard", "Key", "ObjectDictionary", "Value", "read_eds"]
 
@@ -22,6 +25,8 @@ Watcher = Callable[[int, int], None]
 
 _FORMATS = {0x02: "b", 0x03: "h", 0x04: "i", 0x05: "B", 0x06: "H", 0x07: "I", 0x15: "q", 0x1B: "Q"}
 _BOOLEAN = 0x01
+_LIMITS = {0x6065, 0x6072, 0x6073, 0x607F, 0x6080, 0x60E0, 0x60E1}
+"""Limits that do not limit where the EDS states no default."""
 _FIRST_OBJECT = 0x1000
 """Below stand data types."""
 _SAVE = 0x65766173
@@ -42,6 +47,7 @@ class Abort(IntEnum):
     LENGTH = 0x06070010
     NO_SUB_INDEX = 0x06090011
     RANGE = 0x06090030
+    GENERAL = 0x08000000
     SIGNATURE = 0x08000020
     STATE = 0x08000022
 
@@ -123,9 +129,14 @@ class ObjectDictionary:
             if key[0] in indices:
                 self._values[key] = self._stored.get(key, entry.default)
 
-    def number(self, index: int, sub: int = 0) -> int:
-        """Present value of a numeric object; KeyError where the EDS does not declare it."""
-        value = self._values[index, sub]
+    def number(self, index: int, sub: int = 0, default: int | None = None) -> int:
+        """Present value of a numeric object, or the default where the EDS does not declare it.
+
+        KeyError where there is no default either.
+        """
+        value = self._values.get((index, sub), default)
+        if value is None:
+            raise KeyError((index, sub))
         return value if isinstance(value, int) else int.from_bytes(value, "little")
 
     def put(self, index: int, sub: int, value: int) -> None:
@@ -192,12 +203,14 @@ class ObjectDictionary:
 
 def read_eds(path: Path, node: int) -> dict[Key, Entry]:
     """Objects that an EDS or DCF file declares for a node id; FileError where it is none."""
-    import canopen
+    from canopen.objectdictionary import eds
 
+    library: Any = eds
+    text = read_eds_text(path).text
     try:
-        declared = canopen.import_od(str(path), node)
-    except (OSError, ValueError, KeyError) as error:
-        raise FileError(f"{path}: cannot be read as an EDS: {error}") from error
+        declared = library.import_eds(io.StringIO(text), node)
+    except (ValueError, KeyError, configparser.Error) as error:
+        raise FileError(Fault(f"cannot be read as an EDS: {error}", str(path))) from error
     entries: dict[Key, Entry] = {}
     for thing in declared.values():
         members = [thing] if not hasattr(thing, "subindices") else thing.subindices.values()
@@ -209,7 +222,8 @@ def _entry(variable: Any) -> Entry:
     letter = "B" if variable.data_type == _BOOLEAN else _FORMATS.get(variable.data_type, "")
     default = variable.default if variable.value is None else variable.value
     if letter:
-        default = int(default or 0)
+        unlimited = default is None and variable.index in _LIMITS
+        default = _most(letter) if unlimited else _fitting(int(default or 0), letter)
     elif not isinstance(default, bytes):
         default = str(default or "").encode()
     return Entry(
@@ -221,3 +235,14 @@ def _entry(variable: Any) -> Entry:
         variable.max if letter else None,
         bool(variable.pdo_mappable),
     )
+
+
+def _most(letter: str) -> int:
+    bits = 8 * struct.calcsize(letter)
+    return (1 << bits - letter.islower()) - 1
+
+
+def _fitting(value: int, letter: str) -> int:
+    """A signed number from one whose bits were written as unsigned, as EDS files do."""
+    bits = 8 * struct.calcsize(letter)
+    return value - (1 << bits) if letter.islower() and value >= 1 << (bits - 1) else value

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, inf
+from math import copysign, exp, inf
 
 from winchkit.errors import UsageError
 
 __all__ = ["DriveCommand", "Servo"]
 
-_FILTER_TIME = 0.004
-_LOOP_TIME = 0.004
+_LAG = 0.004
 _POSITION_GAIN = 25.0
 _BRAKE_DECELERATION = 2000.0
 
@@ -20,7 +19,8 @@ class DriveCommand:
     """What a drive's power stage is told, SI, in the motor's frame.
 
     With ``power`` the motor follows ``speed``, and ``angle`` where one is given (``speed`` is
-    then its feed-forward). Without it the motor is free, held only by the ``brake``.
+    then its feed-forward); with a ``torque`` it makes that torque instead, as long as it turns
+    no faster than ``top_speed``. Without power the motor is free, held only by the ``brake``.
     """
 
     power: bool = True
@@ -31,7 +31,19 @@ class DriveCommand:
     brake: bool = False
     """Whether the brake is closed; it wins over the motor."""
     torque_limit: float = inf
-    """N m, either sign."""
+    """N m, of positive torque, and of negative torque unless that has its own limit."""
+    negative_limit: float | None = None
+    """N m, of negative torque, as a positive number."""
+    torque: float | None = None
+    """N m."""
+    top_speed: float = inf
+    """rad/s, where a torque is given."""
+
+    @property
+    def torque_band(self) -> tuple[float, float]:
+        """Least and greatest torque that the motor may make, N m."""
+        below = self.torque_limit if self.negative_limit is None else self.negative_limit
+        return -below, self.torque_limit
 
     @classmethod
     def off(cls, *, brake: bool) -> DriveCommand:
@@ -40,7 +52,12 @@ class DriveCommand:
 
 
 class Servo:
-    """Speed loop and set-point filter, both first order of 4 ms, under a position loop."""
+    """Speed loop and set-point filter, both first order of 4 ms, under a position loop.
+
+    Both are stepped exactly for a held goal. A bench in real time is stepped whenever anything
+    happens on it; a force that depended on the length of the last step would be read by a load
+    cell that converts in step with those happenings, as if the load's mass were another.
+    """
 
     def __init__(self) -> None:
         self._filtered = 0.0
@@ -69,13 +86,31 @@ class Servo:
         if not command.power:
             self._filtered = speed
             return -idle_torque / inertia
-        goal = command.speed
-        if command.angle is not None:
-            goal += _POSITION_GAIN * (command.angle - angle)
-        self._filtered += (goal - self._filtered) * (1.0 - exp(-dt / _FILTER_TIME))
-        wanted = (self._filtered - speed) * (1.0 - exp(-dt / _LOOP_TIME)) / dt
-        limit = command.torque_limit
-        if limit == inf:
-            return wanted
-        torque = max(-limit, min(limit, idle_torque + inertia * wanted))
+        low, high = command.torque_band
+        if command.torque is None:
+            goal = command.speed
+            if command.angle is not None:
+                goal += _POSITION_GAIN * (command.angle - angle)
+            wanted = self._towards(goal, speed, dt)
+            if high == inf and low == -inf:
+                return wanted
+        else:
+            self._filtered = speed
+            made = max(low, min(high, command.torque))
+            wanted = _below(command.top_speed, speed, (made - idle_torque) / inertia, dt)
+        torque = max(low, min(high, idle_torque + inertia * wanted))
         return (torque - idle_torque) / inertia
+
+    def _towards(self, goal: float, speed: float, dt: float) -> float:
+        """Mean acceleration of two equal lags in a row while their goal is held."""
+        keep = exp(-dt / _LAG)
+        before = self._filtered - goal
+        self._filtered = goal + keep * before
+        reached = goal + keep * (speed - goal + before * dt / _LAG)
+        return (reached - speed) / dt
+
+
+def _below(top: float, speed: float, acceleration: float, dt: float) -> float:
+    """The acceleration that does not lead beyond a top speed."""
+    reached = speed + acceleration * dt
+    return acceleration if abs(reached) <= top else (copysign(top, reached) - speed) / dt

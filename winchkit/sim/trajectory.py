@@ -29,7 +29,7 @@ class SCurve:
 
     def at(self, time: float) -> tuple[float, float]:
         """Distance gone and speed at ``time``; the ends hold outside the move."""
-        if time <= 0.0:
+        if time < 0.0:
             return 0.0, 0.0
         if time >= self.duration:
             return self.distance, 0.0

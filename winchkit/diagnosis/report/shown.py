@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, isclose, isinf, isnan, log10
+from math import ceil, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.report.phrases import listed, parameter_name, parameter_unit
@@ -67,10 +67,7 @@ def unseen(answer: Answer) -> list[str]:
 def _row(item: Detectable, parameter: Parameter) -> Visible:
     name = parameter_name(item.parameter)
     unit = parameter_unit(item.parameter, item.unit)
-    at_end = any(
-        isclose(item.smallest, end, rel_tol=1e-6) for end in (parameter.low, parameter.high)
-    )
-    if at_end:
+    if isnan(item.smallest):
         return Visible(item.effect, name, "at no size within its bounds", float("nan"))
     shown = quantity(item.smallest, unit, _digits(item.smallest, parameter.null))
     if parameter.reciprocal or isinf(parameter.null):

@@ -22,6 +22,7 @@ from winchkit.diagnosis.result import Comparison, Diagnosis, OutputFit
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
     from winchkit.diagnosis.diagnose import Answer
+    from winchkit.diagnosis.remove import Removal
 
 __all__ = ["addition_text", "compare_text", "report_text"]
 
@@ -63,14 +64,14 @@ def compare_text(comparison: Comparison) -> str:
     return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
 
 
-def addition_text(addition: Addition) -> str:
-    """What was fitted, and what it bought out of sample."""
+def addition_text(addition: Addition | Removal) -> str:
+    """What was fitted, and what the step did to the error out of sample."""
     fitted = []
     for term, values in addition.terms:
         told = ", ".join(estimate_text(name, value) for name, value in values.items())
         fitted.append([term.label, told])
     blocks = [
-        ["fitted", *aligned(fitted, words=2)],
+        ["fitted", *aligned(fitted, words=2)] if fitted else [],
         _errors(addition.outputs, grown=True),
         _notes(addition.notes),
     ]
@@ -111,7 +112,10 @@ def _places(diagnosis: Diagnosis) -> list[str]:
         for where in telling(diagnosis.where)[:_FEW]
         for line in paragraph(where_text(where), "  ", "    ")
     ]
-    return ["where the rest lives", *lines] if lines else []
+    if not lines:
+        return []
+    try_it = f"try: winchkit add {diagnosis.empirical[0]} (a curve, marked as not understood)"
+    return ["where the rest lives", *lines, *([f"  {try_it}"] if diagnosis.empirical else [])]
 
 
 def _next(diagnosis: Diagnosis) -> list[str]:

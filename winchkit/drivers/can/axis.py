@@ -2,61 +2,45 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections import deque
-from dataclasses import dataclass
 from pathlib import Path
 
-from winchkit.drivers.can.bus import CanBus, Handler
-from winchkit.drivers.can.cia402 import State, Wish, control_word, state_of
-from winchkit.drivers.can.commission import MODES, Commissioned, WatchSpec, commission
+from winchkit.drivers.can.bus import CanBus
+from winchkit.drivers.can.cia402 import State, Wish, control_word
+from winchkit.drivers.can.command import Command, Commander
+from winchkit.drivers.can.commission import Commissioned, WatchSpec, await_booted, commission
 from winchkit.drivers.can.emergency import Emergency, error_text, parse_emergency
+from winchkit.drivers.can.feedback import AxisFeedback, FeedbackHealth, Gathering, check_feedback
 from winchkit.drivers.can.heartbeat import HeartbeatWatch, NmtState
+from winchkit.drivers.can.mode_change import change_mode
+from winchkit.drivers.can.modes import MODES, Homing, Target, homing_state, status_words
 from winchkit.drivers.can.node import SdoNode
-from winchkit.drivers.can.pdo import PdoCodec
 from winchkit.drivers.can.pdo_setup import cob_id
+from winchkit.drivers.can.profile import HomingSpec, set_homing, set_profile
+from winchkit.drivers.can.watchdog import Proof, prove_watchdog
 from winchkit.drivers.clock import Clock
-from winchkit.errors import Fault, FileError, NotPermitted
+from winchkit.errors import Fault, FileError, NotPermitted, WinchkitError
 from winchkit.schema.device import DeviceSpec
 
 __all__ = ["AxisFeedback", "Cia402Axis"]
 
-_CONTROL, _TARGET_POSITION, _TARGET_VELOCITY = (0x6040, 0), (0x607A, 0), (0x60FF, 0)
-_STATUS, _POSITION, _VELOCITY, _TORQUE = (0x6041, 0), (0x6064, 0), (0x606C, 0), (0x6077, 0)
-_MODE, _ERROR = (0x6061, 0), (0x603F, 0)
-_COMMANDS = {_CONTROL, _TARGET_POSITION, _TARGET_VELOCITY}
 _POLL = 0.005
 _REST = 0.05
 """Below this speed of the motor, rad/s, it counts as standing still."""
-
-
-@dataclass(frozen=True, slots=True)
-class AxisFeedback:
-    """What a drive said at one SYNC; SI at the motor shaft."""
-
-    time: float
-    """Estimate of the moment of sampling, on the bench's clock, s: the SYNC reaches the drive
-    between its sending and the arrival of the first answer."""
-    sync: int
-    """Number of that SYNC."""
-    state: State
-    status: int
-    angle: float
-    """rad."""
-    velocity: float
-    """rad/s; NaN where the drive does not send it."""
-    torque: float
-    """N m; NaN where the drive does not send it."""
-    mode: int | None = None
-    """As 6061h shows it; None where the drive does not send it."""
-    error_code: int = 0
+_STALE_SYNCS, _STALE_BEATS = 5, 2
+"""Feedback that is older than both of these tells nothing of the drive's state any more."""
+_POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 
 class Cia402Axis:
     """One drive on a CAN bus.
 
-    ``commission`` talks SDO and may take a second; ``send`` and ``feedback`` are for the control
-    loop. ``begin_cycle`` tells it the number and time of each SYNC.
+    ``commission``, ``switch_mode``, ``prepare_homing`` and ``set_profile`` talk SDO and may take
+    a second; ``send`` and ``feedback`` are for the control loop. ``begin_cycle`` tells it the
+    number and time of each SYNC. The axis outlives its bus: after ``CanBus.reopen`` it is
+    commissioned again.
     """
 
     def __init__(
@@ -69,36 +53,36 @@ class Cia402Axis:
         self.servo = device.servo
         self.heartbeat = HeartbeatWatch(watch.timeout)
         self.emergencies: deque[Emergency] = deque(maxlen=64)
-        self.feedback: AxisFeedback | None = None
-        self.short_frames = 0
+        self.drive: Commissioned | None = None
+        """What it agreed to; None before it is commissioned."""
+        self.mode: str = device.servo.motion_mode
         self._bus, self._clock, self._watch = bus, clock, watch
         self._node = SdoNode(bus, node, Path(device.path).parent / device.servo.eds)
-        self._drive: Commissioned | None = None
-        self._commands: tuple[tuple[int, PdoCodec], ...] = ()
-        self._cycle = self._answered = (0, -math.inf)
-        self._latest: dict[int, tuple[int, tuple[int, ...]]] = {}
+        self._gathering: Gathering | None = None
+        self._commander: Commander | None = None
+        self._cycle = (0, -math.inf)
+        self._boot_ups = self._beats = self._short_emergencies = 0
         self._previous = 0
         bus.on(0x700 + node, self.heartbeat.receive)
         bus.on(0x080 + node, self._on_emergency)
 
     def commission(self) -> Commissioned:
         """Set the drive up, checked and disabled; raises NoReply, DeviceRefused, NotPermitted."""
-        self.feedback = None
-        self._latest.clear()
+        self._gathering = self._commander = None
+        self._previous = 0
         self.heartbeat.last = self.heartbeat.state = None
+        await_booted(self._node, self.servo.boot_time, self._clock)
+        # Only a boot-up after this one takes away what is set up now.
+        self._boot_ups = self.heartbeat.boot_ups
+        self._beats = self._bus.beats[self._watch.host]
         drive = commission(self._node, self.servo, self._watch, self._clock)
-        self._check_mapping(drive)
-        target = _TARGET_POSITION if self.position_mode else _TARGET_VELOCITY
-        self._commands = tuple(
-            (cob_id("rpdo", codec.spec.number, self._node.node), codec)
-            for codec in drive.rpdo
-            if _CONTROL in codec.position or target in codec.position
-        )
-        self._drive = drive
-        for codec in drive.tpdo:
-            identifier = cob_id("tpdo", codec.spec.number, self._node.node)
-            self._bus.on(identifier, self._receiver(codec))
         self._await_operational()
+        if self._watch.prove:
+            drive = dataclasses.replace(drive, proof=self._prove())
+        commander = Commander(self.name, drive, self._node.node, drive.mode)
+        gathering = self._listen(drive)
+        self.drive, self.mode = drive, drive.mode
+        self._commander, self._gathering = commander, gathering
         return drive
 
     def disarm(self) -> None:
@@ -106,20 +90,67 @@ class Cia402Axis:
         self._node.write(0x1016, 1, 0)
 
     @property
+    def objects(self) -> SdoNode:
+        """Its object dictionary over SDO."""
+        return self._node
+
+    @property
+    def feedback(self) -> AxisFeedback | None:
+        """What its newest complete answer to a SYNC said."""
+        return None if self._gathering is None else self._gathering.feedback
+
+    @property
+    def health(self) -> FeedbackHealth:
+        """Counts of its TPDOs since it was commissioned."""
+        return FeedbackHealth() if self._gathering is None else self._gathering.health
+
+    @property
+    def short_frames(self) -> int:
+        """Frames with fewer bytes than they should have."""
+        return self.health.short + self._short_emergencies
+
+    @property
     def position_mode(self) -> bool:
-        """Whether it is moved by target positions (CSP) and not by speeds."""
-        return self.servo.motion_mode == "CSP"
+        """Whether it is moved by target positions (CSP, IP) and not by speeds."""
+        return MODES[self.mode].kind is Target.ANGLE
 
     @property
     def mode_kept(self) -> bool:
         """Whether the drive still shows the mode that it was given."""
         shown = self.feedback.mode if self.feedback else None
-        return shown is None or shown == MODES[self.servo.motion_mode][0]
+        return shown is None or shown == MODES[self.mode].number
 
     @property
     def operational(self) -> bool:
         """Whether its heartbeat says that its PDOs run."""
         return self.heartbeat.state in (None, NmtState.OPERATIONAL)
+
+    @property
+    def mapping_lost(self) -> bool:
+        """Whether it has booted since it was commissioned, and forgotten its PDOs."""
+        return self.heartbeat.boot_ups != self._boot_ups
+
+    @property
+    def state(self) -> State:
+        """Its power state as far as it is certain: UNKNOWN once what it said is stale."""
+        feedback = self.feedback
+        if feedback is None or self.mapping_lost:
+            return State.UNKNOWN
+        sync, now = self._cycle
+        old = sync - feedback.sync > _STALE_SYNCS
+        if old and now - feedback.time > _STALE_BEATS * self._watch.heartbeat:
+            return State.UNKNOWN
+        return feedback.state
+
+    @property
+    def homing(self) -> Homing:
+        """How far a homing is, by the newest feedback; for the mode HM, once it was started."""
+        return Homing.INTERRUPTED if self.feedback is None else homing_state(self.feedback.status)
+
+    @property
+    def status_words(self) -> tuple[str, ...]:
+        """The bits of its status word in words, as its mode gives them meaning."""
+        return () if self.feedback is None else status_words(self.mode, self.feedback.status)
 
     @property
     def fault_text(self) -> str:
@@ -137,35 +168,118 @@ class Cia402Axis:
     def begin_cycle(self, sync: int, now: float) -> None:
         """Note the SYNC that is about to be sent: TPDOs that follow were sampled at it."""
         self._cycle = (sync, now)
+        if self._gathering is not None:
+            self._gathering.begin(sync, now)
 
-    def send(self, wish: Wish, *, velocity: float = 0.0, angle: float | None = None) -> int:
-        """Send the next control word towards ``wish`` with a target (rad/s or rad).
+    def send(
+        self,
+        wish: Wish,
+        *,
+        velocity: float = 0.0,
+        angle: float | None = None,
+        torque: float = 0.0,
+        start: bool = False,
+    ) -> int:
+        """Send the next control word towards ``wish`` with targets (rad/s, rad, N m).
 
-        Returns the word. Without a target angle a position-controlled axis holds where it is;
-        a drive that is not enabled gets zero and its actual position, so that it starts from rest.
+        Returns the word. The mode says which target counts; beside it, velocity and torque are
+        fed forward where 60B1h and 60B2h are mapped. Without a target angle a
+        position-controlled axis holds where it is; a drive that is not enabled gets zero and its
+        actual position, so that it starts from rest. To run down is to halt where the drive makes
+        the motion itself (PP, HM), and to quick-stop under a torque. ``start`` starts a homing
+        (HM). Nothing is enabled before the host's heartbeat has begun. Raises NotPermitted for
+        targets beyond the drive's range, ConnectionLost.
         """
-        drive, feedback = self._drive, self.feedback
-        if drive is None or feedback is None:
+        commander, feedback = self._commander, self.feedback
+        if commander is None or feedback is None:
             return self._previous
+        if wish in (Wish.RUN_DOWN, Wish.HALT) and not MODES[self.mode].can_run_down:
+            wish = Wish.STOP
+        if wish is Wish.ENABLE and self._bus.beats[self._watch.host] == self._beats:
+            # The drive's watchdog arms on the first heartbeat that it hears.
+            wish = Wish.DISABLE
         word = control_word(
-            feedback.state,
+            self.state,
             wish,
             previous=self._previous,
             fresh=feedback.sync >= self._cycle[0] - 1,
             at_rest=self.at_rest,
         )
-        moves = feedback.state is State.OPERATION_ENABLED and wish in (Wish.ENABLE, Wish.RUN_DOWN)
-        values = {
-            _CONTROL: word,
-            _TARGET_VELOCITY: drive.scale.velocity_counts(velocity if moves else 0.0),
-            _TARGET_POSITION: drive.scale.angle_counts(
-                angle if moves and angle is not None else feedback.angle
-            ),
-        }
-        for identifier, codec in self._commands:
-            self._bus.send(identifier, codec.encode([values[key] for key in codec.position]))
+        command = Command(wish, velocity, angle, torque, start)
+        word, frames = commander.frames(word, command, feedback)
+        for identifier, data in frames:
+            self._bus.send(identifier, data)
         self._previous = word
         return word
+
+    def switch_mode(self, mode: str) -> None:
+        """Give the drive another mode, verified, while it is disabled.
+
+        Raises NotPermitted when it is not or when it lacks the mode, FileError when the device
+        file maps no target for it, NoReply, DeviceRefused; it then keeps the mode that it had.
+        """
+        drive = self._disabled_drive(f"change to {mode}")
+        if mode not in drive.modes:
+            raise NotPermitted(
+                f"{self.name}: the drive has no mode {mode}; it has {', '.join(drive.modes)}"
+            )
+        commander = Commander(self.name, drive, self._node.node, mode)
+        before = self._commander, self.mode
+        # From here on cyclic PDOs must carry the new mode, lest they set the old one again.
+        self._commander, self.mode = commander, mode
+        try:
+            change_mode(self._node, mode, self._clock)
+        except WinchkitError:
+            self._commander, self.mode = before
+            raise
+
+    def prepare_homing(self, homing: HomingSpec) -> None:
+        """Set a homing up and change to HM, disabled; ``send(Wish.ENABLE, start=True)`` runs it.
+
+        Afterwards ``switch_mode(servo.motion_mode)`` leads back. Raises NotPermitted, NoReply,
+        DeviceRefused.
+        """
+        drive = self._disabled_drive("prepare a homing")
+        set_homing(self._node, self.servo, drive.scale, homing)
+        self.switch_mode("HM")
+
+    def set_profile(self, *, speed: float | None = None, acceleration: float | None = None) -> None:
+        """Set speed (rad/s) and ramps (rad/s^2) of the profile modes; raises NotPermitted."""
+        drive = self._disabled_drive("set its profile")
+        set_profile(self._node, self.servo, drive.scale, speed=speed, acceleration=acceleration)
+
+    def _disabled_drive(self, what: str) -> Commissioned:
+        if self.drive is None:
+            raise NotPermitted(f"{self.name}: commission the drive before you {what}")
+        if self.state in _POWERED or not self.at_rest:
+            raise NotPermitted(
+                f"{self.name}: cannot {what} while the drive is {self.state} and "
+                f"{'at rest' if self.at_rest else 'moving'}; stop it first"
+            )
+        return self.drive
+
+    def _prove(self) -> Proof:
+        """Prove that the drive watches the host; leaves it operational, disabled, forgiven."""
+        proof = prove_watchdog(
+            self._node,
+            self.heartbeat,
+            self.emergencies,
+            self._clock,
+            host=self._watch.host,
+            timeout=self._watch.timeout,
+        )
+        self._await_operational()
+        self.emergencies.clear()
+        return proof
+
+    def _listen(self, drive: Commissioned) -> Gathering:
+        """Hear the drive's TPDOs, put together anew."""
+        check_feedback(self.name, drive.tpdo)
+        gathering = Gathering(drive.tpdo, drive.scale, self._watch.cycle)
+        for codec in drive.tpdo:
+            identifier = cob_id("tpdo", codec.spec.number, self._node.node)
+            self._bus.on(identifier, gathering.receiver(codec))
+        return gathering
 
     def _await_operational(self) -> None:
         """Wait for the heartbeat that confirms the start; also proves that it beats at all."""
@@ -178,62 +292,9 @@ class Cia402Axis:
                 )
             self._clock.sleep(_POLL)
 
-    def _check_mapping(self, drive: Commissioned) -> None:
-        """Refuse a device file whose PDOs lack what motion needs or map what nobody fills."""
-        mapped = {key for codec in drive.rpdo for key in codec.position}
-        seen = {key for codec in drive.tpdo for key in codec.position}
-        target = _TARGET_POSITION if self.position_mode else _TARGET_VELOCITY
-        lacking = {_CONTROL, target} - mapped | ({_STATUS, _POSITION, _VELOCITY} - seen)
-        for key, what in [(key, "lacks") for key in lacking] + [
-            (key, "cannot fill") for key in mapped - _COMMANDS
-        ]:
-            raise FileError(Fault(f"{self.name}: its PDO mapping {what} {key[0]:04X}h"))
-
     def _on_emergency(self, data: bytes, now: float) -> None:
         emergency = parse_emergency(data, now)
         if emergency is None:
-            self.short_frames += 1
+            self._short_emergencies += 1
         else:
             self.emergencies.append(emergency)
-
-    def _receiver(self, codec: PdoCodec) -> Handler:
-        number = codec.spec.number
-
-        def receive(data: bytes, now: float) -> None:
-            values = codec.decode(data)
-            if values is None:
-                self.short_frames += 1
-                return
-            sync, sent = self._cycle
-            if self._answered[0] != sync:
-                late = now - sent
-                self._answered = (sync, sent + late / 2 if late < self._watch.cycle else sent)
-            self._latest[number] = (sync, values)
-            self._publish()
-
-        return receive
-
-    def _publish(self) -> None:
-        """Make a snapshot once every TPDO of this SYNC is there, so that none is torn."""
-        drive = self._drive
-        sync, time = self._answered
-        if drive is None or len(self._latest) < len(drive.tpdo):
-            return
-        values: dict[tuple[int, int], int] = {}
-        for codec in drive.tpdo:
-            stamp, numbers = self._latest[codec.spec.number]
-            if stamp != sync:
-                return
-            values.update(zip(codec.position, numbers, strict=True))
-        scale = drive.scale
-        self.feedback = AxisFeedback(
-            time=time,
-            sync=sync,
-            state=state_of(values[_STATUS]),
-            status=values[_STATUS],
-            angle=values[_POSITION] * scale.angle,
-            velocity=values[_VELOCITY] * scale.velocity,
-            torque=values[_TORQUE] * scale.torque if _TORQUE in values else math.nan,
-            mode=values.get(_MODE),
-            error_code=values.get(_ERROR, 0),
-        )

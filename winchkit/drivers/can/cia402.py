@@ -125,12 +125,24 @@ _ENABLING = {
 _STAYING = {Wish.RUN_DOWN: ENABLE_OPERATION, Wish.HALT: ENABLE_OPERATION | HALT}
 
 
-def state_of(status: int) -> State:
-    """Power state that a status word 6041h says."""
+def _enables(word: int) -> bool:
+    return word & (FAULT_RESET | ENABLE_OPERATION) == ENABLE_OPERATION
+
+
+def _said(status: int) -> State:
     for mask, value, state in _STATUS:
         if status & mask == value:
             return state
     return State.UNKNOWN
+
+
+_STATE_BITS = 0x6F
+_STATES = tuple(_said(bits) for bits in range(_STATE_BITS + 1))
+
+
+def state_of(status: int) -> State:
+    """Power state that a status word 6041h says."""
+    return _STATES[status & _STATE_BITS]
 
 
 def control_word(
@@ -141,12 +153,14 @@ def control_word(
     Where nothing else is certain it is quick stop, which leads down from every state and, unlike
     disable voltage, never lets a moving drive coast.
 
-    ``previous`` is the word sent last (a fault reset is an edge of bit 7), ``fresh`` whether the
-    state comes from a status word of this SYNC, ``at_rest`` whether the motor stands still.
+    ``previous`` is the word sent last: a fault reset is an edge of bit 7, and a ramp is not taken
+    up again after a quick stop, which 0Fh would revoke in a drive that stays in quick stop active
+    (605Ah from 5) while an older status word still says enabled. ``fresh`` says whether the state
+    comes from a status word of this SYNC, ``at_rest`` whether the motor stands still.
     """
     if wish is Wish.ENABLE and state in _ENABLING:
         return _ENABLING[state]
-    if fresh and state is State.OPERATION_ENABLED and wish in _STAYING:
+    if fresh and state is State.OPERATION_ENABLED and wish in _STAYING and _enables(previous):
         return _STAYING[wish]
     if fresh and state is State.FAULT and wish is Wish.RESET and not previous & FAULT_RESET:
         return FAULT_RESET

@@ -2,42 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from winchkit.drivers.can.cia402 import QUICK_STOP, State, state_of
+from winchkit.drivers.can.cycle import set_cycle
+from winchkit.drivers.can.limits import DriveLimits, LimitsAtShaft, set_limits
+from winchkit.drivers.can.mode_change import change_mode, supported_modes
+from winchkit.drivers.can.modes import MODES
 from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.options import OptionCode, merged, set_options
 from winchkit.drivers.can.pdo import PdoCodec
 from winchkit.drivers.can.pdo_setup import codecs, set_up
+from winchkit.drivers.can.profile import set_profile
 from winchkit.drivers.can.scale import Scale, read_scale
+from winchkit.drivers.can.watchdog import Proof, set_error_behaviour, set_heartbeats
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NoReply, NotPermitted
-from winchkit.schema.device import ServoSpec
+from winchkit.schema.device_servo import OptionSpec, ServoSpec
 
-__all__ = ["MODES", "Commissioned", "WatchSpec", "commission"]
-
-MODES: dict[str, tuple[int, int]] = {
-    "PP": (1, 0),
-    "PV": (3, 2),
-    "PT": (4, 3),
-    "HM": (6, 5),
-    "IP": (7, 6),
-    "CSP": (8, 7),
-    "CSV": (9, 8),
-    "CST": (10, 9),
-}
-"""Value of 6060h and bit of 6502h by mode."""
+__all__ = ["Commissioned", "WatchSpec", "await_booted", "commission"]
 
 _START, _PRE_OPERATIONAL = 0x01, 0x80
-_MODE_TIME = 0.5
 _STOP_TIME = 3.0
 _POLL = 0.01
 _MISSED_BEATS = 4
-_MEANING = {0x605A: "quick stop", 0x605B: "shutdown", 0x605C: "disable operation", 0x605E: "fault"}
 
 
 @dataclass(frozen=True)
 class WatchSpec:
-    """Who watches whom, and how often."""
+    """Who watches whom, how often, and what the drive itself has to keep to."""
 
     host: int
     """Node id of the host."""
@@ -50,6 +44,12 @@ class WatchSpec:
 
     acceleration: float = 0.0
     """Of the motor, that a profile mode may use, rad/s^2; 0 leaves the drive's own."""
+    prove: bool = True
+    """Whether every commissioning proves that the drive notices a withheld heartbeat."""
+    limits: LimitsAtShaft = field(default_factory=LimitsAtShaft)
+    """Written to the drive and read back."""
+    options: OptionSpec = field(default_factory=OptionSpec)
+    """Option codes that count before those of the device file."""
 
     @property
     def timeout(self) -> float:
@@ -62,38 +62,52 @@ class Commissioned:
     """What the drive said and agreed to."""
 
     mode: str
+    modes: tuple[str, ...]
+    """All that it has."""
     scale: Scale
     tpdo: tuple[PdoCodec, ...]
     rpdo: tuple[PdoCodec, ...]
-    options: dict[int, int | None]
-    """605Ah to 605Eh and 6007h as read; None where the drive has no such object."""
+    options: Mapping[str, OptionCode]
+    """605Ah to 605Eh and 6007h as they are now, by the keys of a device file."""
+    limits: DriveLimits
+    """As read back."""
+    cycle: float | None
+    """60C2h, s; None where the drive has none."""
+    on_error: int | None
+    """1029h:1, what it does with its network state when the host is gone: 0 pre-operational,
+    1 nothing, 2 stopped; None where it has no such object."""
+    proof: Proof | None = None
+    """How it noticed a withheld heartbeat; None where that was not asked for."""
 
 
 def commission(node: SdoNode, servo: ServoSpec, watch: WatchSpec, clock: Clock) -> Commissioned:
-    """Set a drive up for cyclic motion and start it, disabled.
+    """Set a drive that has booted up for cyclic motion and start it, disabled.
 
     Raises NoReply, DeviceRefused, and NotPermitted where the drive could not be moved safely.
     """
-    _wait_for(node, servo.boot_time, clock)
     _bring_to_rest(node, clock)
     node.bus.nmt(_PRE_OPERATIONAL, node.node)
-    options = _check_options(node, watch.brake)
-    mode = _supported_mode(node, servo)
+    mode = servo.motion_mode
+    modes = supported_modes(node, servo, mode)
+    options = set_options(node, merged(servo.options, watch.options), watch.brake)
     scale = read_scale(node, servo)
     tpdo, rpdo = codecs(node, servo.tpdo), codecs(node, servo.rpdo)
     set_up(node, "tpdo", tpdo)
     set_up(node, "rpdo", rpdo)
-    _set_cycle(node, watch.cycle)
-    _set_heartbeats(node, watch)
-    _set_targets(node)
-    _set_profile(node, mode, round(watch.acceleration / scale.velocity))
-    _set_mode(node, mode, clock)
+    cycle = set_cycle(node, watch.cycle)
+    set_heartbeats(node, watch.host, watch.timeout, watch.heartbeat)
+    on_error = set_error_behaviour(node)
+    limits = set_limits(node, scale, watch.limits)
+    change_mode(node, mode, clock)
+    if watch.acceleration and not MODES[mode].cyclic:
+        # The drive's own ramps must not come in the way of those that the host makes.
+        set_profile(node, servo, scale, acceleration=watch.acceleration)
     node.bus.nmt(_START, node.node)
-    return Commissioned(mode, scale, tpdo, rpdo, options)
+    return Commissioned(mode, modes, scale, tpdo, rpdo, options, limits, cycle, on_error)
 
 
-def _wait_for(node: SdoNode, boot_time: float, clock: Clock) -> None:
-    """Ask for the device type until the drive has booted."""
+def await_booted(node: SdoNode, boot_time: float, clock: Clock) -> None:
+    """Ask for the device type until the drive has booted; raises NoReply."""
     deadline = clock.now() + boot_time
     while True:
         try:
@@ -120,94 +134,5 @@ def _bring_to_rest(node: SdoNode, clock: Clock) -> None:
             raise NotPermitted(
                 f"{node.place(0x6041)}: still {state} {_STOP_TIME:g} s after a quick stop; "
                 "use the emergency stop and look at the drive"
-            )
-        clock.sleep(_POLL)
-
-
-def _check_options(node: SdoNode, brake: bool) -> dict[int, int | None]:
-    """Read what the drive does when it stops; refuse what would drop the load."""
-    codes = (0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x6007)
-    options = {index: node.read_if_there(index) for index in codes}
-    lost = options[0x6007]
-    if not lost:
-        raise NotPermitted(
-            f"{node.place(0x6007)} is {lost}: the drive would go on moving when the host dies; "
-            "set it to 3 (quick stop) or 1 (fault)"
-        )
-    if brake:
-        return options
-    for index, meaning in _MEANING.items():
-        if options[index] == 0:
-            raise NotPermitted(
-                f"{node.place(index)} is 0: on {meaning} the motor coasts and a hanging load "
-                "falls; set a ramp, or declare `brake = true` where a brake holds the load"
-            )
-    if lost == 2:
-        raise NotPermitted(
-            f"{node.place(0x6007)} is 2: without the host the motor coasts and a hanging load "
-            "falls; set it to 3 (quick stop), or declare `brake = true` where a brake holds it"
-        )
-    return options
-
-
-def _supported_mode(node: SdoNode, servo: ServoSpec) -> str:
-    mode = servo.motion_mode
-    supported = node.read_if_there(0x6502)
-    there: tuple[str, ...] = servo.modes
-    if supported is not None:
-        there = tuple(name for name, (_, bit) in MODES.items() if supported & 1 << bit)
-    if mode not in there:
-        raise NotPermitted(
-            f"{node.place(0x6502)}: the drive has no mode {mode}; it has "
-            f"{', '.join(there) or 'none'}; set motion_mode in the device file"
-        )
-    return mode
-
-
-def _set_cycle(node: SdoNode, cycle: float) -> None:
-    """Make 60C2h equal to the SYNC period."""
-    if node.read_if_there(0x60C2, 1) is None:
-        return
-    for exponent in (-3, -4, -5):
-        value = cycle / 10**exponent
-        if 1 <= round(value) <= 255 and abs(value - round(value)) < 1e-6 * value:
-            node.write_verified(0x60C2, 2, exponent)
-            node.write_verified(0x60C2, 1, round(value))
-            return
-    raise NotPermitted(
-        f"{node.place(0x60C2, 1)} cannot hold a cycle of {cycle * 1e3:g} ms; "
-        "use a whole number of 0.1 ms up to 25.5 ms, or of ms up to 255 ms"
-    )
-
-
-def _set_heartbeats(node: SdoNode, watch: WatchSpec) -> None:
-    """Let the drive watch the host (1016h) and tell the host that it lives (1017h)."""
-    node.write_verified(0x1016, 1, watch.host << 16 | round(watch.timeout * 1e3))
-    node.write_verified(0x1017, 0, round(watch.heartbeat * 1e3))
-
-
-def _set_targets(node: SdoNode) -> None:
-    """Zero speed and the actual position, before any mode can act on them."""
-    node.write(0x60FF, 0, 0)
-    if node.read_if_there(0x607A) is not None:
-        node.write(0x607A, 0, node.read(0x6064))
-
-
-def _set_profile(node: SdoNode, mode: str, counts: int) -> None:
-    """Keep the drive's own ramps out of the way of those that the host makes."""
-    if mode == "PV" and counts:
-        for index in (0x6083, 0x6084):
-            node.write_verified(index, 0, counts)
-
-
-def _set_mode(node: SdoNode, mode: str, clock: Clock) -> None:
-    number = MODES[mode][0]
-    node.write(0x6060, 0, number)
-    deadline = clock.now() + _MODE_TIME
-    while (shown := node.read(0x6061)) != number:
-        if clock.now() > deadline:
-            raise NotPermitted(
-                f"{node.place(0x6061)} shows mode {shown} {_MODE_TIME:g} s after {mode} "
-                f"({number}) was asked for; the drive does not take this mode now"
             )
         clock.sleep(_POLL)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import configparser
 import threading
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,9 @@ import can
 import canopen
 
 from winchkit.drivers.can.bus import CanBus
+from winchkit.drivers.can.eds import read_eds
 from winchkit.drivers.can.pdo import MappedObject
-from winchkit.errors import DeviceRefused, Fault, FileError, NoReply
+from winchkit.errors import DeviceRefused, FileError, NoReply, NotPermitted
 
 __all__ = ["SdoNode", "read_dictionary"]
 
@@ -21,11 +21,8 @@ _TIMEOUT = 0.5
 
 
 def read_dictionary(path: Path, node: int) -> Any:
-    """Object dictionary of an EDS or DCF; raises FileError."""
-    try:
-        return canopen.import_od(str(path), node)
-    except (OSError, ValueError, KeyError, configparser.Error) as error:
-        raise FileError(Fault(f"cannot be read as an EDS: {error}", str(path))) from error
+    """Object dictionary of an EDS or DCF; raises FileError. Its warnings are for ``check``."""
+    return read_eds(path, node)[0]
 
 
 class SdoNode:
@@ -51,20 +48,27 @@ class SdoNode:
 
     def read(self, index: int, sub: int = 0) -> int:
         """Value of an integer object; raises NoReply, DeviceRefused."""
+        return self._number(index, sub, self.upload(index, sub))
+
+    def upload(self, index: int, sub: int = 0) -> bytes:
+        """Bytes of any object as the device sends them; raises NoReply, DeviceRefused."""
         with self._lock:
             try:
-                data = self._sdo.upload(index, sub)
+                return bytes(self._sdo.upload(index, sub))
             except canopen.SdoAbortedError as error:
                 raise self._refused("read", index, sub, error) from error
             except (canopen.SdoCommunicationError, can.CanError, OSError) as error:
                 raise self._silent(index, sub, error) from error
-        signed = self._variable(index, sub, len(data)).signed
-        return int.from_bytes(data, "little", signed=signed)
 
     def read_if_there(self, index: int, sub: int = 0) -> int | None:
         """Value of an object that the device may lack; None where it does."""
+        data = self.upload_if_there(index, sub)
+        return None if data is None else self._number(index, sub, data)
+
+    def upload_if_there(self, index: int, sub: int = 0) -> bytes | None:
+        """Bytes of an object that the device may lack; None where it does."""
         try:
-            return self.read(index, sub)
+            return self.upload(index, sub)
         except DeviceRefused as error:
             cause = error.__cause__
             if isinstance(cause, canopen.SdoAbortedError) and cause.code in _ABSENT:
@@ -72,13 +76,23 @@ class SdoNode:
             raise
 
     def write(self, index: int, sub: int, value: int) -> None:
-        """Write an integer object; raises NoReply, DeviceRefused."""
+        """Write an integer object; raises NoReply, DeviceRefused, NotPermitted for its range."""
         item = self._variable(index, sub, 4)
-        data = value.to_bytes(item.bits // 8, "little", signed=item.signed and value < 0)
+        try:
+            data = value.to_bytes(item.bits // 8, "little", signed=value < 0)
+        except OverflowError as error:
+            raise NotPermitted(
+                f"{self.place(index, sub)}: {value} does not fit into its {item.bits} bits"
+            ) from error
+        self.download(index, sub, data)
+
+    def download(self, index: int, sub: int, data: bytes) -> None:
+        """Write the bytes of any object; raises NoReply, DeviceRefused."""
         with self._lock:
             try:
                 self._sdo.download(index, sub, data)
             except canopen.SdoAbortedError as error:
+                value = int.from_bytes(data, "little")
                 raise self._refused(f"write {value} to", index, sub, error) from error
             except (canopen.SdoCommunicationError, can.CanError, OSError) as error:
                 raise self._silent(index, sub, error) from error
@@ -93,11 +107,20 @@ class SdoNode:
                 "the device does not take this value"
             )
 
+    def writes(self, index: int, sub: int) -> bool:
+        """Whether the EDS lets the object be written; True where it does not know it."""
+        variable = self.dictionary.get_variable(index, sub)
+        return variable is None or bool(variable.writable)
+
     def mapped(self, index: int, sub: int) -> MappedObject:
         """The object as a PDO carries it; raises FileError when the EDS does not know it."""
         if self.dictionary.get_variable(index, sub) is None:
             raise FileError(f"{self.place(index, sub)}: not in the EDS, so it cannot be mapped")
         return self._variable(index, sub, 4)
+
+    def _number(self, index: int, sub: int, data: bytes) -> int:
+        signed = self._variable(index, sub, len(data)).signed
+        return int.from_bytes(data, "little", signed=signed)
 
     def _variable(self, index: int, sub: int, size: int) -> MappedObject:
         variable = self.dictionary.get_variable(index, sub)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from winchkit.errors import Fault, FileError
-from winchkit.schema.device import PdoSpec
+from winchkit.schema.device_servo import PdoSpec
 
 __all__ = ["MappedObject", "PdoCodec", "parse_object"]
 
@@ -54,13 +54,15 @@ class PdoCodec:
         layout = "".join(_CHARACTER[item.bits, item.signed] for item in objects)
         self._struct = struct.Struct("<" + layout)
         self.size = self._struct.size
+        self.unpack = self._struct.unpack_from
+        """Values in a frame of at least ``size`` bytes."""
         self.position = {(item.index, item.sub): k for k, item in enumerate(objects)}
 
     def decode(self, data: bytes) -> tuple[int, ...] | None:
         """Values in the order of the objects; None when the frame is too short."""
         if len(data) < self.size:
             return None
-        return self._struct.unpack_from(data)
+        return self.unpack(data)
 
     def encode(self, values: Sequence[int]) -> bytes:
         """Frame data; raises ``struct.error`` for a value beyond its object's range."""

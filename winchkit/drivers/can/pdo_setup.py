@@ -7,7 +7,7 @@ from typing import Literal
 
 from winchkit.drivers.can.node import SdoNode
 from winchkit.drivers.can.pdo import PdoCodec, parse_object
-from winchkit.schema.device import PdoSpec
+from winchkit.schema.device_servo import PdoSpec
 
 __all__ = ["Direction", "cob_id", "codecs", "set_up"]
 
@@ -19,6 +19,7 @@ _COMMUNICATION = {"tpdo": 0x1800, "rpdo": 0x1400}
 _MAPPING = {"tpdo": 0x1A00, "rpdo": 0x1600}
 _FIRST_COB = {"tpdo": 0x180, "rpdo": 0x200}
 _PREDEFINED = range(1, 5)
+_INHIBIT_UNIT, _MS = 1e-4, 1e-3
 
 
 def cob_id(direction: Direction, number: int, node: int) -> int:
@@ -60,12 +61,22 @@ def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
         identifier |= _NO_RTR
     node.write(record, 1, identifier | _INVALID)
     node.write_verified(record, 2, codec.spec.transmission)
+    _set_timers(node, record, codec.spec)
     node.write(mapping, 0, 0)
     for position, item in enumerate(codec.objects, start=1):
         node.write_verified(mapping, position, item.entry)
     node.write_verified(mapping, 0, len(codec.objects))
     node.write(record, 1, identifier)
     _verify_identifier(node, record, identifier)
+
+
+def _set_timers(node: SdoNode, record: int, spec: PdoSpec) -> None:
+    """Inhibit time and event timer; a drive may lack those that are not asked for."""
+    if not spec.by_event:
+        return
+    for sub, time, unit in ((3, spec.inhibit_time, _INHIBIT_UNIT), (5, spec.event_timer, _MS)):
+        if time or node.read_if_there(record, sub) is not None:
+            node.write_verified(record, sub, round(time / unit))
 
 
 def _verify_identifier(node: SdoNode, record: int, identifier: int) -> None:

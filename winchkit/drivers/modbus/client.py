@@ -1,36 +1,49 @@
-"""The one module that knows pymodbus: a guarded client for one line.
+"""The one module that knows pymodbus: a client for one line that lets exact answers through only.
 
-Guards for what was measured: a reply that comes after its timeout must never answer the next
-request (silence after a timeout, alternating lengths, the number of registers checked), and one
-silent device must not close the line for the others.
+pymodbus takes whatever decodes as an answer. Its trace hook sees every byte first; the gate that
+stands there passes the one frame that answers the request and counts all else.
 """
 
 from __future__ import annotations
 
-import asyncio
 import logging
+import sys
+from collections import defaultdict, deque
+from collections.abc import Awaitable, Sequence
+from typing import Any
 
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ExceptionResponse
 
+from winchkit.drivers.modbus.frames import AnswerGate, Event
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device import ReadBlock
+from winchkit.schema.modbus_parts import ReadBlock
 
 __all__ = ["ModbusClient"]
 
 _NEVER = 1 << 30
+_KEPT = 256
+"""Events of a unit that nobody asks for, e.g. of another master's devices."""
+_ACKNOWLEDGE, _BUSY = 5, 6
 _EXCEPTIONS = {
     1: "illegal function",
     2: "illegal address",
     3: "illegal value",
     4: "device failure",
-    5: "acknowledge",
-    6: "device busy",
+    _ACKNOWLEDGE: "acknowledge",
+    _BUSY: "device busy",
     10: "gateway path unavailable",
     11: "gateway target silent",
 }
+
+_PORT_ERRORS: tuple[type[Exception], ...] = (ModbusException, OSError, ValueError)
+if sys.platform != "win32":
+    import termios
+
+    # A port that was pulled out raises this from its settings, and it is no OSError.
+    _PORT_ERRORS += (termios.error,)
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
@@ -43,6 +56,11 @@ class ModbusClient:
         self.name = name
         self._spec = spec
         self._client: AsyncModbusTcpClient | AsyncModbusSerialClient | None = None
+        self._gate = AnswerGate("tcp" if spec.kind == "modbus-tcp" else "rtu")
+        self._known = 0
+        self.refusal = 0
+        """Exception code of the newest refusal."""
+        self._events: defaultdict[int, deque[Event]] = defaultdict(lambda: deque(maxlen=_KEPT))
 
     @property
     def where(self) -> str:
@@ -58,53 +76,75 @@ class ModbusClient:
     async def connect(self) -> None:
         """Open the line anew, so that nothing of an old one remains; raises ConnectionLost."""
         self.close()
-        self._client = client = self._make()
-        client.set_max_no_responses(_NEVER)
         try:
+            self._client = client = self._make()
+            client.set_max_no_responses(_NEVER)
             open_now = await client.connect()
-        except (OSError, ModbusException) as error:
+        except _PORT_ERRORS as error:
             raise ConnectionLost(f"{self.where}: cannot be opened: {error}") from error
         if not open_now:
             raise ConnectionLost(f"{self.where}: cannot be opened; check address and power")
 
     def close(self) -> None:
         """Close the line."""
-        if self._client is not None:
-            self._client.close()
-            self._client = None
+        client, self._client = self._client, None
+        self._gate.expire()
+        if client is not None:
+            try:
+                client.close()
+            except _PORT_ERRORS as error:
+                logging.getLogger(__name__).debug("%s: closing: %s", self.where, error)
 
-    async def read(self, unit: int, block: ReadBlock, count: int, silence: float) -> list[int]:
-        """Exactly ``count`` registers; raises NoReply, DeviceRefused, ConnectionLost.
+    def events(self, unit: int) -> list[Event]:
+        """What came from a unit, beside good answers, since the last call."""
+        self._collect()
+        return list(self._events.pop(unit, ()))
 
-        After a timeout it keeps the line silent for ``silence`` seconds, until no late reply can
-        come any more.
-        """
+    async def read(self, unit: int, block: ReadBlock, count: int) -> list[int]:
+        """Exactly ``count`` registers; raises NoReply, DeviceRefused, ConnectionLost."""
         client = self._open()
         ask = client.read_holding_registers if block.function == 3 else client.read_input_registers
-        try:
-            reply = await ask(block.start, count=count, device_id=unit)
-        except (ModbusException, OSError) as error:
-            await asyncio.sleep(silence)
-            raise self._failed(unit, error) from error
-        self._refuse_exception(unit, reply)
-        registers = list(reply.registers)
-        if len(registers) != count:
-            await asyncio.sleep(silence)
-            raise NoReply(
-                f"{self.where} unit {unit}: {len(registers)} registers came for {count}: "
-                "the answer to another request, dropped"
-            )
-        return registers
+        reply = await self._exchange(unit, ask(block.start, count=count, device_id=unit))
+        return list(reply.registers)
 
-    async def write(self, unit: int, register: int, value: int, silence: float) -> None:
-        """Write one register; raises NoReply, DeviceRefused, ConnectionLost."""
+    async def write(self, unit: int, register: int, words: Sequence[int], *, many: bool) -> None:
+        """Write registers, with function 16 where ``many``; raises as :meth:`read`."""
         client = self._open()
+        if many:
+            await self._exchange(
+                unit, client.write_registers(register, list(words), device_id=unit)
+            )
+        else:
+            await self._exchange(unit, client.write_register(register, words[0], device_id=unit))
+
+    async def _exchange(self, unit: int, request: Awaitable[Any]) -> Any:
         try:
-            reply = await client.write_register(register, value, device_id=unit)
-        except (ModbusException, OSError) as error:
-            await asyncio.sleep(silence)
-            raise self._failed(unit, error) from error
-        self._refuse_exception(unit, reply)
+            reply = await request
+        except _PORT_ERRORS as error:
+            came = self._gate.expire()
+            raise self._failed(unit, error, came) from error
+        if isinstance(reply, ExceptionResponse):
+            self.refusal = code = reply.exception_code
+            raise DeviceRefused(
+                f"{self.where} unit {unit}: Modbus exception {code} "
+                f"({_EXCEPTIONS.get(code, 'unknown')})"
+            )
+        return reply
+
+    def _trace(self, sending: bool, data: bytes) -> bytes:
+        """Stand between pymodbus and the line; it hands over all that it has not used yet."""
+        if sending:
+            self._gate.sent(data)
+            self._known = 0
+            return data
+        fresh = data[self._known :] if len(data) >= self._known else data
+        answer = self._gate.received(fresh)
+        self._known = len(data) - len(answer)
+        return answer
+
+    def _collect(self) -> None:
+        for event in self._gate.events():
+            self._events[event.unit].append(event)
 
     def _make(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
         spec = self._spec
@@ -115,6 +155,7 @@ class ModbusClient:
                 timeout=spec.timeout,
                 retries=0,
                 reconnect_delay=0,
+                trace_packet=self._trace,
             )
         return AsyncModbusSerialClient(
             str(spec.port),
@@ -124,6 +165,7 @@ class ModbusClient:
             timeout=spec.timeout,
             retries=0,
             reconnect_delay=0,
+            trace_packet=self._trace,
         )
 
     def _open(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
@@ -131,18 +173,15 @@ class ModbusClient:
             raise ConnectionLost(f"{self.where}: the line is closed; it is opened again by itself")
         return self._client
 
-    def _failed(self, unit: int, error: Exception) -> ConnectionLost:
+    def _failed(self, unit: int, error: Exception, came: bool) -> ConnectionLost:
         if not self.connected:
             return ConnectionLost(f"{self.where}: connection lost: {error}")
-        return NoReply(
-            f"{self.where} unit {unit}: no valid answer within {self._spec.timeout:g} s; "
-            "check power, wiring, baud rate and unit number"
-        )
-
-    def _refuse_exception(self, unit: int, reply: object) -> None:
-        if isinstance(reply, ExceptionResponse):
-            code = reply.exception_code
-            raise DeviceRefused(
-                f"{self.where} unit {unit}: Modbus exception {code} "
-                f"({_EXCEPTIONS.get(code, 'unknown')})"
+        place, time = f"{self.where} unit {unit}", f"{self._spec.timeout:g} s"
+        if came:
+            return NoReply(
+                f"{place}: no valid answer within {time}, only what is damaged or answers "
+                "something else; check wiring, termination and that every unit number is unique"
             )
+        return NoReply(
+            f"{place}: no answer within {time}; check power, wiring, baud rate and unit number"
+        )

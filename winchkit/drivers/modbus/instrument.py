@@ -1,33 +1,32 @@
-"""One instrument on a line: polls it, turns answers into readings, counts what goes wrong."""
+"""One instrument on a Modbus line: polls it, makes readings, counts what goes wrong."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import asyncio
+from collections.abc import Callable, Sequence
+from math import inf
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.modbus.client import ModbusClient
-from winchkit.drivers.modbus.reading import Decoder, Quality, Reading
-from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
+from winchkit.drivers.modbus.consistency import Consistency
+from winchkit.drivers.modbus.decoder import Decoded, Decoder
+from winchkit.drivers.modbus.distrust import LISTENING, Distrust
+from winchkit.drivers.publisher import Publisher, Sampled
+from winchkit.drivers.reading import Counters, Quality, Reading
+from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.device import DeviceSpec
 
-__all__ = ["Counters", "Instrument"]
+__all__ = ["Instrument"]
 
-_RETRY = 0.5
 _QUICK_RETRIES = 2
+_RETRY = 0.5
 _STALE_TIMEOUTS = 2
 """One lost answer is no reason to stop a winch, two are."""
 _LATE = 0.02
-
-
-@dataclass(frozen=True, slots=True)
-class Counters:
-    """What happened since the start."""
-
-    readings: int = 0
-    duplicates: int = 0
-    timeouts: int = 0
-    exceptions: int = 0
+_FRESH = 0.06
+"""No overload comes and goes within it, s: a status so old still says what is before a value."""
+_TOO_LONG = (2, 3)
+"""Exceptions with which a device refuses a block longer than its own: address, value."""
 
 
 class Instrument:
@@ -50,21 +49,82 @@ class Instrument:
         self.name = name
         self.unit = unit
         self.decoder = Decoder(device)
-        self.period = 1.0 / min(rate, self.decoder.spec.rate)
-        self.latest: Reading | None = None
-        self.status = 0
-        self.counters = Counters()
+        self.device = device
+        self.wanted_rate = min(rate, self.decoder.spec.rate)
         self.problem: ConnectionLost | None = None
         """Why there is no new reading, while there is none."""
+        self.status = 0
         self.due = clock.now()
-        self.listeners: list[Callable[[Reading], None]] = []
-        self.max_age = max(_STALE_TIMEOUTS * timeout, 5 * self.period)
-        """A reading older than this is stale, s."""
+        self.may_store = False
+        """Whether commands that write the device's EEPROM are let through."""
+        self.publisher = Publisher(self.decoder.spec.rate)
         self._clock = clock
-        self._silence = max(0.0, self.decoder.spec.longest_reply - timeout)
+        self._timeout = timeout
+        self._wire = (0.0, 0.0)
         self._failures = 0
-        self._longer = False
+        self._longer = self._longer_works = False
         self._fixed = self.decoder.spec.read.fixed
+        self._distrust = Distrust(self.decoder.spec.longest_reply, timeout)
+        self._consistency = Consistency(floats=self.decoder.field.type == "f32")
+        self._status_before: Sequence[int] | None = None
+        self._status_at = -inf
+        self._tagged = False
+        self.on_line(1 / self.wanted_rate, (0.0, 0.0), tagged=False)
+
+    def on_line(self, period: float, wire: tuple[float, float], *, tagged: bool) -> None:
+        """Take the period that the line allows, and the times of request and answer on it, s.
+
+        On a ``tagged`` line (TCP) every answer names its request, so none can be mistaken.
+        """
+        self.period = period
+        self._tagged = tagged
+        self._wire = wire
+        self.max_age = max(_STALE_TIMEOUTS * self._timeout, 5 * period)
+        """A reading older than this is stale, s."""
+
+    @property
+    def latest(self) -> Reading | None:
+        """Newest reading."""
+        return self.publisher.latest
+
+    @property
+    def listeners(self) -> list[Callable[[Reading], None]]:
+        """Called with every reading."""
+        return self.publisher.listeners
+
+    @property
+    def counters(self) -> Counters:
+        """What happened since the start."""
+        return self.publisher.tally.counters(self._clock.now())
+
+    @property
+    def tared(self) -> bool | None:
+        """Whether the device says that it shows a net value; None where it does not say."""
+        if "net" not in self.decoder.spec.status:
+            return None
+        return self.decoder.has("net", self.status)
+
+    @property
+    def _all_alike(self) -> bool:
+        """Whether an old answer cannot be told from a new one by its length."""
+        one_length = self._fixed or self.decoder.spec.status_read is not None
+        return one_length and not self._tagged
+
+    @property
+    def dead(self) -> bool:
+        """Whether it has failed so often that it is to be asked less often."""
+        return self._failures > _QUICK_RETRIES
+
+    def reconnected(self, *, again: bool) -> None:
+        """Note that the line was opened: nothing of an old one can come any more."""
+        self.publisher.tally.reconnects += again
+        self._distrust.clear()
+        self._failures = 0
+        self.due = self._clock.now()
+
+    def lost(self, error: ConnectionLost) -> None:
+        """Note that the line is closed."""
+        self.problem = error
 
     async def poll(self, client: ModbusClient) -> None:
         """Take one reading; a failure is counted, kept as ``problem`` and retried.
@@ -72,71 +132,127 @@ class Instrument:
         One that fails again and again is asked less often, so that the others on its line keep
         their rates.
         """
-        spec = self.decoder.spec
-        self._longer = not self._longer and not self._fixed
-        count = spec.read.count + self._longer
         t_request = self._clock.now()
         self.due = max(self.due + self.period, t_request)
+        self._take_events(client)
+        if self._distrust.silent(t_request):
+            self.due = self._distrust.until
+            return
         try:
-            registers = await client.read(self.unit, spec.read, count, self._silence)
+            registers, t_receive = await self._ask_value(client)
+            status = await self._ask_status(client)
         except DeviceRefused as error:
-            self._refused(error)
+            self._refused(error, client.refusal)
         except NoReply as error:
-            self.counters = replace(self.counters, timeouts=self.counters.timeouts + 1)
-            self._failed(error)
+            self._unanswered(error, client)
         except ConnectionLost as error:
             self._failed(error)
         else:
-            self._publish(registers, t_request, self._clock.now())
+            self._take_events(client)
+            if self._distrust.discards(self._clock.now(), fixed=self._all_alike):
+                self.publisher.tally.drops += 1
+                self._status_before = None
+                self.due = self._distrust.until
+            else:
+                self._distrust.answered(self._clock.now(), fixed=self._all_alike)
+                self._publish(registers, status, (t_request, t_receive))
 
-    async def command(self, client: ModbusClient, name: str) -> None:
-        """Send a command of the device file, e.g. ``tare``."""
-        spec = self.decoder.spec
-        command = spec.command.get(name)
-        if command is None:
-            known = ", ".join(spec.command) or "none"
-            raise NotPermitted(f"{self.name} has no command '{name}'; its device file has {known}")
-        await client.write(self.unit, command.register, command.value, self._silence)
+    async def _ask_value(self, client: ModbusClient) -> tuple[list[int], float]:
+        """Registers of the value's block, and when they came."""
+        if self.decoder.spec.status_read is not None and not self._status_is_fresh:
+            self._status_before = await self._read_status(client)
+            await self._listen()
+        self._longer = not self._longer and not self._fixed
+        block = self.decoder.spec.read
+        registers = await client.read(self.unit, block, block.count + self._longer)
+        self._longer_works |= self._longer
+        return registers, self._clock.now()
 
-    def _refused(self, error: DeviceRefused) -> None:
-        if self._longer:
+    async def _ask_status(self, client: ModbusClient) -> Sequence[int]:
+        """Registers of the status block, where there is one of its own."""
+        if self.decoder.spec.status_read is None:
+            return ()
+        await self._listen()
+        return await self._read_status(client)
+
+    @property
+    def _status_is_fresh(self) -> bool:
+        """Whether what the last reading's status said can still be what it says before this one."""
+        age = self._clock.now() - self._status_at
+        return self._status_before is not None and age < _FRESH
+
+    async def _listen(self) -> None:
+        """Let a second copy of an answer come before the next query, which it would answer."""
+        if self._all_alike:
+            await asyncio.sleep(LISTENING)
+
+    async def _read_status(self, client: ModbusClient) -> Sequence[int]:
+        block = self.decoder.spec.status_read
+        assert block is not None, "asked for only where the device has a status block"
+        return await client.read(self.unit, block, block.count)
+
+    def _take_events(self, client: ModbusClient) -> bool:
+        """Count what came from this unit beside good answers; True where that spoilt an answer."""
+        spoilt = False
+        tally = self.publisher.tally
+        for event in client.events(self.unit):
+            setattr(tally, event.kind, getattr(tally, event.kind) + event.count)
+            spoilt |= event.kind in ("crc", "malformed")
+            if event.kind == "late" and not self._tagged:
+                self._distrust.late(self._clock.now())
+        return spoilt
+
+    def _refused(self, error: DeviceRefused, code: int) -> None:
+        if self._longer and not self._longer_works and code in _TOO_LONG:
             # A device that ends where its block ends: no alternating lengths for this one.
             self._fixed = True
             return
-        self.counters = replace(self.counters, exceptions=self.counters.exceptions + 1)
+        self.publisher.tally.exceptions += 1
+        self._failed(error)
+
+    def _unanswered(self, error: NoReply, client: ModbusClient) -> None:
+        self.publisher.tally.timeouts += not self._take_events(client)
+        if not self._tagged:
+            self._distrust.unanswered(self._clock.now())
         self._failed(error)
 
     def _failed(self, error: ConnectionLost) -> None:
         self.problem = error
         self._failures += 1
-        self.due = self._clock.now() + (_RETRY if self._failures > _QUICK_RETRIES else 0.0)
+        self.publisher.tally.drops += 1
+        self._status_before = None
+        pause = max(_RETRY, 4 * self._timeout) if self.dead else 0.0
+        self.due = max(self._clock.now() + pause, self._distrust.until)
 
-    def _publish(self, registers: list[int], t_request: float, t_receive: float) -> None:
-        spec = self.decoder.spec
-        decoded = self.decoder.decode(registers)
-        quality, self.status = decoded.quality, decoded.status
-        duplicate = self.latest is not None and decoded.counts == self.latest.raw
-        if duplicate:
-            quality |= Quality.DUPLICATE
-        if t_receive - t_request > _LATE:
+    def _publish(
+        self, registers: Sequence[int], status: Sequence[int], times: tuple[float, float]
+    ) -> None:
+        decoded = self.decoder.decode(registers, status)
+        quality = decoded.quality | self._before(registers, decoded)
+        self._status_before, self._status_at = status or None, times[1]
+        t_request, t_receive = times
+        spec, (there, back) = self.decoder.spec, self._wire
+        if t_receive - t_request > _LATE + there + back:
             quality |= Quality.LATE
-        conversion = 1.0 / spec.rate
-        reading = Reading(
-            value=decoded.value,
-            gross=decoded.gross,
-            raw=decoded.counts,
-            quality=quality,
-            t_request=t_request,
-            t_receive=t_receive,
-            t_sample=(t_request + t_receive - conversion) / 2 - spec.filter_delay,
-            t_uncertainty=(t_receive - t_request + conversion) / 2,
+        sampled = Sampled(
+            t_request,
+            t_receive,
+            min(t_request + there, t_receive) - spec.filter_delay - 1 / spec.rate,
+            max(t_receive - back, t_request) - spec.filter_delay,
         )
-        self.counters = replace(
-            self.counters,
-            readings=self.counters.readings + 1,
-            duplicates=self.counters.duplicates + duplicate,
-        )
-        self.problem, self._failures = None, 0
-        self.latest = reading
-        for listener in self.listeners:
-            listener(reading)
+        self.problem, self._failures, self.status = None, 0, decoded.status
+        believed = self._consistency.take(not quality & Quality.MISMATCH)
+        if believed is None:
+            return
+        if not believed:
+            quality |= Quality.MISMATCH
+        self.publisher.publish(decoded.value, decoded.gross, decoded.counts, quality, sampled)
+
+    def _before(self, registers: Sequence[int], decoded: Decoded) -> Quality:
+        """What the status that was read before the value says against it."""
+        if self._status_before is None or self.decoder.spec.status_read is None:
+            return Quality.GOOD
+        before = self.decoder.decode(registers, self._status_before)
+        if before.value != decoded.value and before.quality.usable and decoded.quality.usable:
+            return Quality.MISMATCH
+        return before.quality

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.friction import capstan_ratio
 from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
@@ -11,7 +12,7 @@ Array = NDArray[np.float64]
 
 def apply(tension: Array, at: At, values: Values) -> Array:
     """Tension after a wrap with Euler-Eytelwein friction."""
-    return tension * np.exp(at.direction * values["friction"] * at.wrap)
+    return tension * capstan_ratio(at.direction * values["friction"], at.wrap)
 
 
 EFFECT = Effect(

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.friction import coulomb_ratio
+from winchkit.model.friction import coulomb_ratio, stribeck
 from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
@@ -12,8 +12,7 @@ Array = NDArray[np.float64]
 
 def apply(tension: Array, at: At, values: Values) -> Array:
     """Tension after a pulley whose friction falls from μs to μc with the speed."""
-    static = np.exp(-((at.speed / values["stribeck_speed"]) ** 2))
-    friction = values["coulomb"] * (1 - static) + values["static"] * static
+    friction = stribeck(at.speed, values["coulomb"], values["static"], values["stribeck_speed"])
     return tension * coulomb_ratio(at.direction * friction, at.wrap)
 
 

@@ -7,6 +7,8 @@ from math import ceil
 __all__ = ["relax"]
 
 _SMALL = 0.2
+_ABRUPT = 0.01
+"""Below shape 1 the force arrives at the limit with a corner, which larger steps round off."""
 _LONG = 100.0
 """Travel over limit/slope after which the force has settled to a hundredth, for shapes to 2."""
 
@@ -27,7 +29,7 @@ def relax(force: float, travel: float, limit: float, slope: float, shape: float)
     if reach > _LONG:
         return sign * limit
     steepness = max(1.0, shape * abs(load) ** (shape - 1.0))
-    count = ceil(reach * steepness / _SMALL)
+    count = ceil(reach * steepness / (_SMALL if shape >= 1.0 else _ABRUPT))
     step = reach / count
     for _ in range(count):
         before = load

@@ -1,0 +1,1 @@
+"""Parts of ``canopen_cost.py``."""

@@ -1,0 +1,169 @@
+"""Eight winches on one bus: what is spoken on it shows that they start and stop in one SYNC."""
+
+from __future__ import annotations
+
+import struct
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+
+import can
+import pytest
+
+from winchkit import catalog, open_bench
+from winchkit.bench.bench import Bench
+from winchkit.bench.snapshot import Phase
+from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
+from winchkit.schema.bench import BusSpec
+from winchkit.schema.read import read_simbench
+from winchkit.schema.simbench import SimBench
+from winchkit.sim.live import LiveBench
+from winchkit.sim.pace import PacedClock
+
+pytestmark = pytest.mark.realtime
+
+NAMES = "ABCDEFGH"
+SYNC, RPDO = 0x080, 0x200
+
+
+def declared() -> SimBench:
+    """The shipped spiral bench eight times, without instruments, at 50 Hz."""
+    sim = read_simbench(catalog.find("sim", "spiral-bench"))
+    one = sim.bench.winch["A"]
+    winches = {
+        name: replace(
+            one,
+            servo=replace(one.servo, node=number),
+            cell=None,
+            length=None,
+            temperature=None,
+        )
+        for number, name in enumerate(NAMES, start=1)
+    }
+    bus = {"can": replace(sim.bench.bus["can"], heartbeat=0.2)}
+    bench = replace(sim.bench, winch=winches, bus=bus, cycle=0.02)
+    return replace(sim, bench=bench, truth=dict.fromkeys(winches, sim.truth["A"]))
+
+
+class Witness:
+    """Writes down what is spoken on a bus; a context manager."""
+
+    def __init__(self, bus: BusSpec) -> None:
+        self._bus = can.Bus(interface="virtual", channel=bus.channel)
+        self.frames: list[tuple[int, bytes]] = []
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+
+    def __enter__(self) -> Witness:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self._bus.shutdown()
+
+    def _listen(self) -> None:
+        while not self._stopping.is_set():
+            message = self._bus.recv(0.02)
+            if message is not None:
+                self.frames.append((message.arbitration_id, bytes(message.data)))
+
+    def commands(self) -> list[dict[int, tuple[int, int]]]:
+        """Control word and target velocity by node, between each two SYNCs."""
+        cycles: list[dict[int, tuple[int, int]]] = [{}]
+        for identifier, data in self.frames:
+            if identifier == SYNC:
+                cycles.append({})
+            elif RPDO < identifier <= RPDO + len(NAMES):
+                cycles[-1][identifier - RPDO] = struct.unpack("<Hi", data)
+        return cycles
+
+
+@pytest.fixture(scope="module")
+def clock() -> PacedClock:
+    return PacedClock(slack=0.03)
+
+
+@pytest.fixture(scope="module")
+def live(clock: PacedClock) -> Iterator[LiveBench]:
+    with LiveBench(declared(), seed=1, clock=clock.simulation) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def bench(live: LiveBench, clock: PacedClock) -> Iterator[Bench]:
+    with open_bench(live.bench_spec, clock) as opened:
+        opened.on_cycle(clock.control)
+        yield opened
+
+
+def nodes_at_first(cycles: list[dict[int, tuple[int, int]]], word: int) -> set[int]:
+    """Nodes that are first told this word, in the cycle in which the first of them is."""
+    for cycle in cycles:
+        told = {node for node, (control, _) in cycle.items() if control == word}
+        if told:
+            return told
+    return set()
+
+
+def test_they_are_enabled_start_and_stop_within_one_sync(live: LiveBench, bench: Bench) -> None:
+    everybody = set(range(1, len(NAMES) + 1))
+    targets = {name: 3.9 + 0.02 * n for n, name in enumerate(NAMES)}
+    with Witness(live.bench_spec.bus["can"]) as witness:
+        bench.move_together(targets, speed=0.2, wait=False, hold=True)
+        while any(bench.winch[name].moving for name in NAMES):
+            bench.raise_trouble()
+            bench.clock.sleep(0.02)
+        begun = len(witness.frames)
+        bench.stop_now()
+    bench.clock.sleep(0.6)  # until a stop no longer counts as somebody still pressing the key
+    cycles = witness.commands()
+    for word in (0x06, 0x07, 0x0F):
+        assert nodes_at_first(cycles, word) == everybody
+    moved = next(cycle for cycle in cycles if any(target for _, target in cycle.values()))
+    still = {node for node, (_, target) in moved.items() if target == 0}
+    assert still <= {6}, "only F, who is there already, may have nothing to do"
+    assert set(moved) == everybody
+    witness.frames = witness.frames[begun:]
+    assert nodes_at_first(witness.commands(), 0x02) == everybody
+    for name, target in targets.items():
+        assert bench.winch[name].cable_length == pytest.approx(target, abs=5e-3)
+
+
+def test_one_that_may_not_move_keeps_all_from_beginning(bench: Bench) -> None:
+    with pytest.raises(NotPermitted, match="beyond the limits"):
+        bench.move_together({"A": 3.0, "B": 99.0})
+    with pytest.raises(UsageError, match="no winch 'Z'"):
+        bench.move_together({"A": 3.0, "Z": 3.0})
+    with pytest.raises(UsageError, match="at least one winch"):
+        bench.move_together({})
+    assert {bench.winch[name].snapshot.phase for name in NAMES} == {Phase.DISABLED}
+
+
+def test_a_stop_of_one_stops_all(bench: Bench) -> None:
+    bench.move_together(dict.fromkeys(NAMES, 3.0), speed=0.1, wait=False)
+    until_moving(bench)
+    bench.winch["C"].stop()
+    assert bench.snapshot.at_rest
+    with pytest.raises(MotionError, match="somebody stopped it"):
+        bench.winch["A"].wait()
+
+
+def test_a_fault_of_one_is_told_to_whoever_waits(live: LiveBench, bench: Bench) -> None:
+    bench.move_together(dict.fromkeys(NAMES, 3.0), speed=0.1, wait=False)
+    until_moving(bench)
+    live.inject("D.servo", "over-current")
+    with pytest.raises(DriveFault, match="winch D"):
+        bench.winch["A"].wait()
+    bench.wait_at_rest(NAMES)
+    bench.reset()
+
+
+def until_moving(bench: Bench) -> None:
+    for _ in range(300):
+        if all(abs(bench.winch[name].snapshot.speed) > 0.01 for name in NAMES):
+            return
+        bench.raise_trouble()
+        bench.clock.sleep(0.02)
+    pytest.fail("they did not move")

@@ -1,0 +1,51 @@
+"""An adapter that was unplugged: everything stops, and a reset opens its bus again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from winchkit import catalog, open_bench
+from winchkit.bench.snapshot import Phase
+from winchkit.errors import ConnectionLost, LimitTripped
+from winchkit.schema.read import read_simbench
+from winchkit.sim.live import LiveBench
+from winchkit.sim.pace import PacedClock
+
+pytestmark = pytest.mark.realtime
+
+
+def test_a_reset_opens_a_bus_that_went_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim = read_simbench(catalog.find("sim", "spiral-bench"))
+    winch = replace(sim.bench.winch["A"], cell=None, length=None, temperature=None)
+    buses = {"can": sim.bench.bus["can"]}
+    sim = replace(sim, bench=replace(sim.bench, winch={"A": winch}, bus=buses))
+    clock = PacedClock()
+    with (
+        LiveBench(sim, seed=1, clock=clock.simulation) as live,
+        open_bench(live.bench_spec, clock) as bench,
+    ):
+        bench.on_cycle(clock.control)
+        bus = bench._wired.buses["can"]
+        bench.winch["A"].move_to(3.0, 0.1, wait=False)
+        while abs(bench.winch["A"].snapshot.speed) < 0.05:
+            bench.raise_trouble()
+            clock.sleep(0.02)
+
+        def unplugged(_identifier: int, _data: bytes) -> None:
+            raise OSError(19, "No such device")
+
+        monkeypatch.setattr(bus._port, "send", unplugged)
+        with pytest.raises(LimitTripped, match="No such device"):
+            bench.winch["A"].wait()
+        # The drive, which no longer hears the host, stops by itself.
+        while abs(live.winches["A"].plant.motor_velocity) > 0.1:
+            clock.sleep(0.05)
+        with pytest.raises((LimitTripped, ConnectionLost)):
+            bench.winch["A"].move_to(3.2)
+        assert bus.reopened == 0
+        bench.reset()
+        assert bus.reopened == 1
+        assert bench.winch["A"].snapshot.phase is Phase.DISABLED
+        bench.winch["A"].move_by(0.05)

@@ -1,0 +1,105 @@
+"""Calibrations, tares and points as files: what is written is read back, faults with their line."""
+
+from __future__ import annotations
+
+from datetime import UTC, date, datetime
+from pathlib import Path
+
+import pytest
+
+from winchkit.calibration.cell_file import calibration_toml, read_points, tares_toml, write_text
+from winchkit.errors import FileError
+from winchkit.schema.calibration import (
+    CalibrationPoint,
+    CellCalibration,
+    HostTare,
+    TareBook,
+    tare_book_path,
+)
+from winchkit.schema.read import read_calibration, read_tares
+
+CALIBRATION = CellCalibration(
+    name="cell-A",
+    date=date(2026, 11, 21),
+    coefficients=(0.123456789, 1.00263264, 8.26e-6),
+    device="laumas-tlb",
+    serial_number="4711",
+    temperature=21.5,
+    direction="compression",
+    low=0.0,
+    high=196.133,
+    residual_std=0.0515,
+    nonlinearity=0.000372,
+    hysteresis=0.0005,
+    repeatability=0.00005,
+    point=(CalibrationPoint(0.0, 0.12, 0.01), CalibrationPoint(98.0665, 97.95, 0.01, "down", 2)),
+)
+
+
+def test_a_calibration_is_read_back_as_it_was_written(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "cell-A.toml", calibration_toml(CALIBRATION))
+    assert read_calibration(path) == CALIBRATION
+
+
+def test_tares_are_read_back_as_they_were_written(tmp_path: Path) -> None:
+    taken = datetime(2026, 11, 21, 10, 51, 7, tzinfo=UTC)
+    book = TareBook("bench", {"A.cell": HostTare(97.8798, 0.0925, taken)})
+    assert read_tares(write_text(tmp_path / "bench.tares.toml", tares_toml(book))) == book
+
+
+def test_tares_stand_beside_the_wiring_file() -> None:
+    assert tare_book_path("lab/bench.toml") == "lab/bench.tares.toml"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ("coefficients = [1.0]", "1 given; two"),
+        ("coefficients = [0.0, -1.0]", "c1 = -1 is not positive"),
+        ('coefficient = "x"', "did you mean 'coefficients'"),
+    ],
+)
+def test_a_calibration_that_cannot_be_right(tmp_path: Path, wrong: str, words: str) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text(f'schema = 1\nkind = "calibration"\ndate = 2026-11-21\n{wrong}\n')
+    with pytest.raises(FileError, match=words):
+        read_calibration(path)
+
+
+def test_points_in_kilograms_go_up_and_down_by_themselves(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("# hung by hand\nload [kg],indicated [N]\n0,0.1\n5,49.0\n10,98.0\n5,49.2\n")
+    points = read_points(path)
+    assert [point.load for point in points] == pytest.approx([0, 49.03325, 98.0665, 49.03325])
+    assert [point.going for point in points] == ["up", "up", "up", "down"]
+    assert [point.series for point in points] == [1, 1, 1, 1]
+
+
+def test_points_say_their_own_direction_series_and_unit(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("load [kN],indicated [N],going,series,std [mN]\n0.1,99,down,3,20\n")
+    assert read_points(path) == (CalibrationPoint(100.0, 99.0, 0.02, "down", 3),)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("load [kg]\n1\n", "lacks the column indicated"),
+        ("load [kg],weight\n1,2\n", "unknown column 'weight'"),
+        ("load [m],indicated [N]\n1,2\n", "unknown force unit 'm'.*or kg"),
+        ("# x\nload [kg],indicated [N]\n1,2\n2,two\n", r"points.csv:4: cannot be read"),
+        ("load [kg],indicated [N],going\n1,2,left\n", "neither up nor down"),
+    ],
+)
+def test_points_that_cannot_be_read(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text(text)
+    with pytest.raises(FileError, match=words):
+        read_points(path)
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="cannot be written"):
+        write_text(tmp_path / "nowhere" / "c.toml", "x")
+    assert list(tmp_path.iterdir()) == []

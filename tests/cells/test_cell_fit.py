@@ -1,0 +1,131 @@
+"""The fit of a calibration against numpy's own, and figures of merit against numbers by hand."""
+
+from __future__ import annotations
+
+import math
+from random import Random
+
+import numpy as np
+import pytest
+
+from winchkit.calibration.cell_fit import fit_cell
+from winchkit.calibration.cell_plan import plan
+from winchkit.errors import RunError, UsageError
+from winchkit.schema.calibration import CalibrationPoint
+
+LOADS = (0.0, 20.0, 50.0, 100.0, 150.0, 200.0)
+
+
+def points(
+    bow: float = 0.0, lag: float = 0.0, noise: float = 0.0, series: int = 3
+) -> list[CalibrationPoint]:
+    """True force over 1.02 and 0.5 N of zero; a bow and a lag on the way down, N."""
+    random, out = Random(5), []
+    for number in range(1, series + 1):
+        for going, loads in (("up", LOADS), ("down", LOADS[::-1][1:])):
+            for load in loads:
+                shape = 4 * bow * load / 200 * (1 - load / 200)
+                back = lag * math.sin(math.pi * load / 200) if going == "down" else 0.0
+                shown = (load + shape + back) / 1.02 - 0.5 + random.gauss(0, noise)
+                out.append(CalibrationPoint(load, shown, 0.01, going, number))  # type: ignore[arg-type]
+    return out
+
+
+@pytest.mark.parametrize(("order", "degree"), [("linear", 1), ("quadratic", 2)])
+def test_coefficients_and_uncertainties_agree_with_numpy(order: str, degree: int) -> None:
+    measured = points(bow=0.3, noise=0.05)
+    fit = fit_cell(measured, order)  # type: ignore[arg-type]
+    x = np.array([p.indicated for p in measured])
+    y = np.array([p.load for p in measured])
+    wanted, covariance = np.polyfit(x, y, degree, cov=True)
+    assert fit.coefficients == pytest.approx(wanted[::-1])
+    assert fit.std == pytest.approx(np.sqrt(np.diag(covariance))[::-1])
+    assert fit.residual_std == pytest.approx(
+        math.sqrt(np.sum((y - np.polyval(wanted, x)) ** 2) / (len(x) - degree - 1))
+    )
+
+
+def test_the_truth_is_found_within_its_uncertainty() -> None:
+    fit = fit_cell(points(noise=0.05))
+    assert fit.coefficients[1] == pytest.approx(1.02, abs=4 * fit.std[1])
+    assert fit.coefficients[0] == pytest.approx(0.51, abs=4 * fit.std[0])
+
+
+def test_hysteresis_by_hand() -> None:
+    """Going down it lags by 1 N at mid span: 0.5 % of 200 N."""
+    fit = fit_cell(points(lag=1.0))
+    assert fit.hysteresis.value == pytest.approx(1.0 / 200, rel=0.03)
+    assert fit.repeatability.value == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_bow_is_non_linearity_and_a_parabola_takes_it_away() -> None:
+    line, parabola = fit_cell(points(bow=1.0)), fit_cell(points(bow=1.0), "quadratic")
+    assert 0.4 / 200 < line.nonlinearity.value < 1.0 / 200
+    assert parabola.residual_std < 0.05 * line.residual_std
+    assert parabola.nonlinearity.value == line.nonlinearity.value
+
+
+def test_repeatability_is_the_spread_between_series() -> None:
+    fit = fit_cell(points(noise=0.2, series=20))
+    assert fit.repeatability.value == pytest.approx(0.2 * 1.02 / 200, rel=0.15)
+    assert fit.repeatability.std == pytest.approx(
+        fit.repeatability.value / math.sqrt(2 * 209), 0.05
+    )
+
+
+def test_what_is_not_known_is_not_invented_but_told() -> None:
+    once = [CalibrationPoint(load, load) for load in LOADS[:4]]
+    once[1] = CalibrationPoint(20.0, 20.1)
+    fit = fit_cell(once)
+    assert math.isnan(fit.hysteresis.value)
+    assert math.isnan(fit.repeatability.value)
+    assert {"one way only", "one series only", "only 4 loads"} <= {
+        word for word in ("one way only", "one series only", "only 4 loads")
+        if any(word in warning for warning in fit.warnings)
+    }  # fmt: skip
+
+
+def test_a_wrong_weight_is_pointed_at() -> None:
+    measured = points(noise=0.01)
+    measured[4] = CalibrationPoint(150.0, measured[4].indicated + 5.0, 0.01, "up", 1)
+    assert any("150 N" in warning and "off" in warning for warning in fit_cell(measured).warnings)
+
+
+def test_a_cell_that_is_wired_the_wrong_way_round_is_told() -> None:
+    turned = [CalibrationPoint(p.load, -p.indicated, 0.0, p.going, p.series) for p in points()]
+    with pytest.raises(RunError, match="turn it round"):
+        fit_cell(turned)
+
+
+def test_a_cell_that_does_not_carry_the_weights_is_told() -> None:
+    random = Random(8)
+    elsewhere = [CalibrationPoint(p.load, 98 + random.gauss(0, 0.2)) for p in points()]
+    with pytest.raises(RunError, match="does not follow the loads"):
+        fit_cell(elsewhere)
+
+
+@pytest.mark.parametrize(
+    ("measured", "words"),
+    [
+        ([CalibrationPoint(0, 0), CalibrationPoint(10, 10)], "2 different loads"),
+        ([CalibrationPoint(load, 5.0) for load in LOADS], "the same at every load"),
+        ([CalibrationPoint(load, math.nan) for load in LOADS], "no number"),
+    ],
+)
+def test_points_that_carry_no_calibration(measured: list[CalibrationPoint], words: str) -> None:
+    with pytest.raises(RunError, match=words):
+        fit_cell(measured)
+
+
+def test_the_weights_go_up_and_down_without_repeating_the_top() -> None:
+    steps = plan("0 2 5 kg", 2)
+    kilograms = [round(step.load / 9.80665, 6) for step in steps]
+    assert kilograms == [0, 2, 5, 2, 0, 2, 5, 2, 0]
+    assert [step.going for step in steps] == ["up"] * 3 + ["down"] * 2 + ["up"] * 2 + ["down"] * 2
+    assert [step.series for step in steps] == [1] * 5 + [2] * 4
+
+
+@pytest.mark.parametrize("weights", ["", "5", "0 5 2 kg", "0 x kg", "0 1 2 m", "0 0 1 kg"])
+def test_weights_that_cannot_be_meant(weights: str) -> None:
+    with pytest.raises(UsageError):
+        plan(weights, 1)

@@ -1,0 +1,62 @@
+"""What a line has room for: bytes on the wire by the standard, and a fair share of the rest."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from winchkit import catalog
+from winchkit.drivers.modbus.timing import exchange, fair_rates, wire_times
+from winchkit.schema.bench import BusSpec
+from winchkit.schema.device_modbus import ModbusSpec
+from winchkit.schema.read import read_device
+
+WISHES = st.lists(st.tuples(st.floats(1, 1000), st.floats(1e-4, 0.1)), min_size=1, max_size=8)
+
+
+def spec(name: str) -> ModbusSpec:
+    found = read_device(catalog.find("devices", name)).modbus
+    assert found is not None
+    return found
+
+
+def test_bytes_and_times_of_an_exchange_by_hand() -> None:
+    """TLB: 8 bytes there, 5 + 2 x 7 + 1 register more every other time back; 10 bits a byte."""
+    cost = exchange(spec("laumas-tlb"), BusSpec("modbus-rtu", port="x", baudrate=9600))
+    assert cost.bytes == 8 + 5 + 14 + 1
+    assert cost.wire == pytest.approx(28 * 10 / 9600)
+    assert cost.silence == pytest.approx(2 * 3.5 * 10 / 9600)
+    there, back = wire_times(spec("laumas-tlb"), BusSpec("modbus-rtu", port="x", baudrate=9600))
+    assert there == pytest.approx(8 * 10 / 9600)
+    assert back == pytest.approx(19 * 10 / 9600)
+
+
+def test_parity_and_a_second_stop_bit_are_counted() -> None:
+    bus = BusSpec("modbus-rtu", port="x", baudrate=9600, parity="E", stopbits=2)
+    assert exchange(spec("laumas-tlb"), bus).wire == pytest.approx(28 * 12 / 9600)
+
+
+def test_a_device_with_its_status_elsewhere_costs_two_queries() -> None:
+    cost = exchange(spec("mantracourt-dsc"), BusSpec("modbus-rtu", port="x", baudrate=115_200))
+    assert cost.queries == 2
+    assert cost.bytes == 2 * (8 + 5 + 4)
+
+
+def test_above_19200_baud_the_silence_is_fixed() -> None:
+    cost = exchange(spec("laumas-tlb"), BusSpec("modbus-rtu", port="x", baudrate=115_200))
+    assert cost.silence == pytest.approx(2 * 1.75e-3)
+
+
+@given(WISHES)
+def test_the_share_is_fair_and_fills_the_line(wishes: list[tuple[float, float]]) -> None:
+    wanted, times = [w for w, _ in wishes], [t for _, t in wishes]
+    rates = fair_rates(wanted, times)
+    load = sum(rate * time for rate, time in zip(rates, times, strict=True))
+    assert load <= 0.95 + 1e-9
+    short = [rate for rate, wish in zip(rates, wanted, strict=True) if rate < wish - 1e-9]
+    assert all(rate <= wish + 1e-9 for rate, wish in zip(rates, wanted, strict=True))
+    if short:
+        assert load == pytest.approx(0.95)
+        assert max(short) == pytest.approx(min(short))
+        assert all(rate <= max(short) + 1e-9 for rate in rates)

@@ -1,0 +1,231 @@
+"""``move``, ``home``, ``reset``, ``stop`` and dry runs against simulated drives in real time."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from can_commands import Served, invoke, served
+
+from winchkit import open_bench
+from winchkit.bench.bench import Bench
+from winchkit.bench.client import RemoteStation, attach
+from winchkit.bench.server import StationServer
+from winchkit.bench.snapshot import Phase
+from winchkit.errors import UsageError
+
+pytestmark = pytest.mark.realtime
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with served(tmp_path_factory.mktemp("moving"), "AB") as running:
+        yield running
+
+
+def length(bench: Served, winch: str = "A") -> float:
+    """True cable length, m."""
+    with bench.live.up_to_date():
+        return bench.live.winches[winch].plant.cable_length
+
+
+def test_move_to_and_by(bench: Served) -> None:
+    before = length(bench, "B")
+    done = invoke("move", "A", "--to", "3.8 m", "--speed", "0.4 m/s", "-b", bench.file, "--json")
+    assert done.exit_code == 0, done.output
+    assert length(bench) == pytest.approx(3.8, abs=5e-3)
+    status = json.loads(done.stdout)
+    assert status["winch"]["A"]["phase"] == "disabled"
+    assert invoke("move", "A", "--by", "0.1 m", "-b", bench.file).exit_code == 0
+    assert length(bench) == pytest.approx(3.9, abs=5e-3)
+    assert length(bench, "B") == pytest.approx(before, abs=1e-3)
+
+
+def test_move_all(bench: Served) -> None:
+    done = invoke("move", "all", "--to", "3.7 m", "-b", bench.file)
+    assert done.exit_code == 0, done.output
+    for winch in "AB":
+        assert length(bench, winch) == pytest.approx(3.7, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("A",), 2, "give either --to LENGTH or --by LENGTH"),
+        (("A", "--to", "1m", "--by", "1m"), 2, "give either"),
+        (("A", "--to", "1"), 2, "has no unit"),
+        (("--to", "1 m"), 2, "which winch?"),
+        (("C", "--to", "1 m"), 2, "no winch 'C'"),
+        (("A", "--to", "20 m"), 5, "is beyond the limits 0.5 m to 4.7 m"),
+        (("A", "--to", "3 m", "--speed", "2 m/s"), 5, "speed 2 m/s is not within"),
+        (("A", "--to", "3 m", "--speed", "-1 m/s"), 5, "speed -1 m/s is not within"),
+    ],
+)
+def test_moves_that_cannot_be_meant(
+    bench: Served, arguments: tuple[str, ...], code: int, words: str
+) -> None:
+    result = invoke("move", *arguments, "-b", bench.file)
+    assert result.exit_code == code, result.output
+    assert words in result.stderr
+
+
+def test_home_here_defines_the_length_and_moves_nothing(bench: Served) -> None:
+    before = length(bench, "B")
+    done = invoke("home", "B", "--here", "2.5 m", "-b", bench.file, "--json")
+    assert done.exit_code == 0, done.output
+    shown = json.loads(done.stdout)["winch"]["B"]["cable_length"]
+    assert shown == pytest.approx(2.5, abs=2e-3)
+    assert length(bench, "B") == pytest.approx(before, abs=1e-3)
+    # The drive keeps it: the bench, opened anew, still sees it, and so does a move.
+    assert invoke("move", "B", "--by", "-0.1 m", "-b", bench.file).exit_code == 0
+    assert length(bench, "B") == pytest.approx(before - 0.1, abs=0.01)
+
+
+def test_home_by_the_index_finds_a_zero(bench: Served) -> None:
+    done = invoke("home", "B", "--method", "34", "--at", "3 m", "-b", bench.file, "--json")
+    assert done.exit_code == 0, done.output
+    status = json.loads(done.stdout)["winch"]["B"]
+    assert status["phase"] == "disabled"
+    assert status["cable_length"] == pytest.approx(3.0, abs=0.02)
+    assert bench.live.winches["B"].drive.objects.number(0x6061) == 9, "back in its mode, CSV"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        ((), 2, "give either --here LENGTH or --method NUMBER"),
+        (("--here", "1 m", "--at", "1 m"), 2, "--at belongs to --method"),
+        (("--method", "99"), 4, "refused to write 99"),
+        (("--method", "999"), 2, "999 is not in the range"),
+        (("--method", "34", "--speed", "3 m/s"), 5, "is not within its limit"),
+    ],
+)
+def test_homings_that_cannot_be(
+    bench: Served, arguments: tuple[str, ...], code: int, words: str
+) -> None:
+    result = invoke("home", "A", *arguments, "-b", bench.file)
+    assert result.exit_code == code, result.output
+    assert words in result.stderr
+
+
+def test_a_homing_that_fails_leaves_the_drive_disabled_in_its_mode(bench: Served) -> None:
+    """There is no limit switch on this winch to search for."""
+    result = invoke("home", "A", "--method", "17", "-b", bench.file)
+    assert result.exit_code == 5
+    assert "homing failed" in result.stderr
+    objects = bench.live.winches["A"].drive.objects
+    assert objects.number(0x6041) & 0x6F != 0x27
+    assert objects.number(0x6061) == 9
+
+
+def test_reset_clears_a_fault_and_enables_nothing(bench: Served) -> None:
+    bench.live.inject("A.servo", "over-current")
+    tripped = invoke("move", "A", "--by", "0.1 m", "-b", bench.file)
+    assert tripped.exit_code == 5, tripped.output
+    done = invoke("reset", "-b", bench.file)
+    assert done.exit_code == 0, done.output
+    assert done.stdout == "reset: nothing is tripped\n"
+    assert bench.live.winches["A"].drive.objects.number(0x6041) & 0x4F == 0x40
+    assert invoke("move", "A", "--by", "0.05 m", "-b", bench.file).exit_code == 0
+
+
+def test_a_rehearsed_move_touches_no_drive(bench: Served) -> None:
+    before = length(bench)
+    done = invoke("move", "A", "--by", "0.1 m", "-b", bench.file, "--dry-run", "--json")
+    assert done.exit_code == 0, done.output
+    frames = json.loads(done.stdout)["frames"]
+    words = [f["values"]["6040h"] for f in frames if f["kind"] == "RPDO" and f["node"] == 1]
+    order = [word for word, last in zip(words, [None, *words], strict=False) if word != last]
+    assert [word for word in order if word in (0x06, 0x07, 0x0F)] == [0x06, 0x07, 0x0F]
+    assert order[-1] in (0x00, 0x02)
+    others = {f["values"]["6040h"] for f in frames if f["kind"] == "RPDO" and f["node"] == 2}
+    assert others <= {0x00, 0x02}, "B is never enabled"
+    assert length(bench) == pytest.approx(before, abs=1e-4)
+    assert bench.number(0x1016, 1) == 0
+
+
+def test_a_rehearsal_in_words(bench: Served) -> None:
+    shown = invoke("jog", "A", "--for", "0.2s", "-b", bench.file, "--dry-run")
+    assert shown.exit_code == 0, shown.output
+    assert "winch A: 6040h Controlword 0Fh enable operation" in shown.stdout
+    assert "dry run: nothing was sent" in shown.stderr
+    stop = invoke("stop", "-b", bench.file, "--dry-run")
+    assert stop.stdout.count("= 02h quick stop") == 2
+
+
+def test_a_programme_is_rehearsed_move_by_move(bench: Served, tmp_path: Path) -> None:
+    programme = tmp_path / "p.toml"
+    programme.write_text(
+        'schema = 1\nkind = "programme"\n[[step]]\nwinch = "all"\nby = "0.05 m"\n'
+        'speed = "0.3 m/s"\n[[step]]\nhold = "30 s"\n'
+    )
+    shown = invoke("run", programme, "-b", bench.file, "-o", tmp_path / "runs", "--dry-run")
+    assert shown.exit_code == 0, shown.output
+    assert "0Fh enable operation" in shown.stdout
+    assert not (tmp_path / "runs").exists()
+
+
+def test_who_attaches_does_the_same_through_the_owner(bench: Served) -> None:
+    with open_bench(bench.file) as opened, owned(opened) as station:
+        with pytest.raises(UsageError, match="either to a cable length or by a change"):
+            station.move("A", None, None)
+        station.move("all", None, 0.05, 0.3)
+        while station.moving("all"):
+            time.sleep(0.02)
+        assert [item.winch for item in station.scan()] == ["A", "B"]
+        assert {item.heartbeat for item in station.scan()} == {"operational"}
+        told = station.upload("A", 0x6007, 0)
+        assert told is not None
+        assert told[0] == bench.number(0x6007)
+        assert station.upload("A", 0x5FFF, 0) is None
+        # The other commands of this process go through the owner as well.
+        assert "mode CSV" in invoke("info", "A", "-b", bench.file).stdout
+        refused = invoke("config", "store", "A", "-b", bench.file, "--yes")
+        assert refused.exit_code == 5
+        assert "is owned by another process" in refused.stderr
+        lss = invoke("lss", "list", "-b", bench.file)
+        assert lss.exit_code == 5
+
+
+def test_whoever_goes_away_during_a_homing_stops_it(bench: Served) -> None:
+    with open_bench(bench.file) as opened, owned(opened) as station:
+        begun = length(bench, "B")
+        station.home("B", 33, None, 0.05)
+        while abs(length(bench, "B") - begun) < 5e-3:
+            assert station.homing()
+            time.sleep(0.01)
+        station.close()
+        deadline = time.monotonic() + 10
+        while opened.axes["B"].mode != "CSV":
+            assert time.monotonic() < deadline, "it is still in HM"
+            time.sleep(0.02)
+        assert opened.winch["B"].snapshot.phase is Phase.DISABLED
+        assert length(bench, "B") == pytest.approx(begun, abs=0.2)
+
+
+@contextmanager
+def owned(bench: Bench) -> Iterator[RemoteStation]:
+    """A station as another process would have it."""
+    server = StationServer(bench)
+    station = attach(bench.spec)
+    assert station is not None
+    try:
+        yield station
+    finally:
+        station.close()
+        server.close()
+
+
+def test_stop_says_in_json_who_has_confirmed(bench: Served) -> None:
+    alone = invoke("stop", "-b", bench.file, "--json")
+    assert alone.exit_code == 0, alone.output
+    told = {item["winch"]: item for item in json.loads(alone.stdout)["stopped"]}
+    assert set(told) == {"A", "B"}
+    assert all(item["confirmed"] for item in told.values())
+    with open_bench(bench.file) as opened, owned(opened):
+        through = invoke("stop", "-b", bench.file)
+        assert through.stdout.count("the bench's owner confirms it at rest") == 2

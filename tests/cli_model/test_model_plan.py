@@ -1,0 +1,76 @@
+"""Plan, run, diagnose again: the loop closes without leaving the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from model_files import answer, invoke, record_files
+
+from winchkit.catalog import find
+from winchkit.runs import write_csv
+from winchkit.schema.programme import Programme
+from winchkit.schema.read import read_programme, read_simbench
+from winchkit.sim.bench import profiles_of
+from winchkit.sim.record import record
+
+BENCH = read_simbench(find("sim", "demo-fat-drum"))
+
+
+def recorded(programme: Programme, folder: Path, seed: int) -> list[Path]:
+    out = []
+    for run in record(BENCH, profiles_of(BENCH), programme, seed=seed):
+        out.append(folder / f"{seed}-{run.name}.csv")
+        write_csv(run, out[-1])
+    return out
+
+
+@pytest.fixture(scope="module")
+def fat(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("fat")
+    names = ("programme-demo-fast", "programme-demo-slow")
+    return [path for n in names for path in recorded(read_programme(find("sim", n)), folder, 0)]
+
+
+def test_the_plan_is_a_programme_that_tells_them_apart(fat: list[Path], tmp_path: Path) -> None:
+    before = answer("diagnose", *fat, "-p", "bench-spiral")
+    (step,) = before["steps"]
+    assert "drum-radius" in step["effects"]
+    assert len(step["effects"]) == 2
+    next_file = tmp_path / "next.toml"
+    told = answer("plan", *fat, "-p", "bench-spiral", "-o", next_file)
+    best = told["offers"][0]
+    assert [set(p["effects"]) for p in best["separates"]] == [set(step["effects"])]
+    assert best["separates"][0]["power"] > 0.9
+    assert best["minutes"] == min(
+        o["minutes"] for o in told["offers"] if o["separates"][0]["power"] > 0.9
+    )
+    programme = read_programme(next_file)
+    assert programme.repeat == 2
+    reached = [step.to for step in programme.step if step.to is not None]
+    assert min(reached) == pytest.approx(1.5, abs=0.01)
+    assert max(reached) == pytest.approx(2.8, abs=0.01)
+    assert invoke("check", next_file).exit_code == 0
+
+    more = [path for seed in range(4) for path in recorded(programme, tmp_path, seed)]
+    after = answer("diagnose", *fat, *more, "-p", "bench-spiral")
+    assert after["verdict"] == "explained"
+    assert [s["effects"] for s in after["steps"]] == [["drum-radius"]]
+
+
+def test_where_nothing_is_to_be_told_apart_it_shows_something_new(tmp_path: Path) -> None:
+    runs = record_files(tmp_path)
+    told = answer("plan", *runs, "-p", "bench-spiral")
+    assert told["programme"] is None
+    best = told["offers"][0]
+    assert best["separates"] == []
+    assert "cable-thermal" in best["shows"]
+    text = invoke("plan", *runs, "-p", "bench-spiral").stdout
+    assert text.startswith("what to run next (nothing to tell apart")
+    assert len(text.splitlines()) == 2 + len(told["offers"])
+
+
+def test_a_place_that_cannot_be_written_is_a_bad_file(fat: list[Path]) -> None:
+    done = invoke("plan", *fat, "-p", "bench-spiral", "-o", "/no/such/folder/next.toml")
+    assert done.exit_code == 3
+    assert "cannot be written" in done.stderr

@@ -1,0 +1,201 @@
+"""In what the simulated drives of the families differ, seen through each one's own files."""
+
+from __future__ import annotations
+
+from math import pi
+from pathlib import Path
+
+import pytest
+
+from winchkit import catalog
+from winchkit.drivers.can.eds import read_eds
+from winchkit.schema.device import DeviceSpec
+from winchkit.schema.device_servo import ServoSpec
+from winchkit.schema.read import read_device
+from winchkit.sim.drive import SimDrive
+from winchkit.sim.object_dictionary import Abort, Entry, ObjectDictionary
+from winchkit.sim.object_dictionary import read_eds as read_for_simulation
+from winchkit.sim.servo import DriveCommand
+
+VENDORS = {
+    "generic-cia402": 0x0,
+    "nanotec-pd4c": 0x26C,
+    "maxon-epos4": 0xFB,
+    "elmo-gold": 0x9A,
+    "delta-asda-a2": 0x1DD,
+    "delta-asda-a3": 0x1DD,
+    "beckhoff-ax8000": 0x2,
+    "ingenia-pluto": 0x29C,
+}
+BITS = {"PP": 0, "PV": 2, "PT": 3, "HM": 5, "IP": 6, "CSP": 7, "CSV": 8, "CST": 9}
+
+
+class Wheel:
+    """Turns as it is told."""
+
+    motor_angle = motor_velocity = motor_torque = 0.0
+
+    def advance(self, duration: float, command: DriveCommand) -> None:
+        self.motor_velocity = command.speed if command.power else 0.0
+        self.motor_angle += self.motor_velocity * duration
+
+    def measure(self) -> Wheel:
+        return self
+
+
+class Bench:
+    """A simulated drive of a device file, written to as an SDO client does."""
+
+    def __init__(self, name: str) -> None:
+        self.wheel = Wheel()
+        self.frames: list[tuple[int, bytes]] = []
+        self.objects = ObjectDictionary(read_for_simulation(eds_of(name), 1))
+        self.drive = SimDrive(
+            lambda identifier, data: self.frames.append((identifier, data)),
+            1,
+            servo_of(name),
+            self.objects,
+            self.wheel,
+            brake=True,
+        )
+        self.drive.power_on(0.0, boot_time=0.0)
+        self.now = 0.001
+        self.drive.tick(self.now)
+
+    def write(self, index: int, sub: int, value: int) -> Abort | None:
+        entry = self.objects.entry((index, sub))
+        assert isinstance(entry, Entry)
+        return self.objects.write((index, sub), entry.pack(value))
+
+    def run(self, duration: float) -> None:
+        for _ in range(round(duration / 1e-3)):
+            self.now += 1e-3
+            self.drive.tick(self.now)
+
+    def enable(self, mode: int) -> str:
+        assert self.write(0x6060, 0, mode) is None
+        for word in (0x06, 0x07, 0x0F):
+            self.write(0x6040, 0, word)
+        return self.drive.state.name
+
+
+def device(name: str) -> DeviceSpec:
+    return read_device(catalog.find("devices", name))
+
+
+def servo_of(name: str) -> ServoSpec:
+    servo = device(name).servo
+    assert servo is not None
+    return servo
+
+
+def eds_of(name: str) -> Path:
+    return catalog.find("devices", name).parent / servo_of(name).eds
+
+
+@pytest.mark.parametrize("name", list(VENDORS))
+def test_identity_and_modes_of_the_eds(name: str) -> None:
+    dictionary, _ = read_eds(eds_of(name), 1)
+    assert dictionary[0x1018][1].default == VENDORS[name]
+    assert dictionary.device_information.vendor_number == VENDORS[name]
+    assert dictionary.device_information.product_number == dictionary[0x1018][2].default
+    assert dictionary[0x6502].default == sum(1 << BITS[mode] for mode in servo_of(name).modes)
+
+
+@pytest.mark.parametrize("name", list(VENDORS))
+def test_every_file_says_where_its_numbers_come_from(name: str) -> None:
+    found = device(name)
+    assert len(found.source) > 40
+    assert found.trust == "generic"
+    assert servo_of(name).motion_mode in servo_of(name).modes
+
+
+@pytest.mark.parametrize("name", list(VENDORS))
+def test_the_eds_has_what_a_winch_needs_watched(name: str) -> None:
+    """Watchdog, option codes, limits: what winchkit checks or sets before it moves anything."""
+    dictionary, _ = read_eds(eds_of(name), 1)
+    for index in (0x1016, 0x1017, 0x6007, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E):
+        assert index in dictionary, hex(index)
+    for index in (0x6065, 0x6066, 0x6072, 0x607D, 0x6085, 0x60C2):
+        assert index in dictionary, hex(index)
+    assert dictionary[0x6007].default != 0
+    for index in (0x605A, 0x605E):
+        assert dictionary[index].default != 0
+
+
+def test_nanotec_is_not_enabled_without_a_mode() -> None:
+    assert Bench("nanotec-pd4c").enable(0) == "SWITCHED_ON"
+    assert Bench("nanotec-pd4c").enable(9) == "OPERATION_ENABLED"
+    assert Bench("elmo-gold").enable(0) == "OPERATION_ENABLED"
+
+
+def test_delta_a2_takes_its_cycles_only_and_has_no_cyclic_modes() -> None:
+    bench = Bench("delta-asda-a2")
+    taken = [period for period in range(256) if bench.write(0x60C2, 1, period) is None]
+    assert taken == list(range(1, 21))
+    assert bench.write(0x60C2, 2, -3) is None
+    assert bench.write(0x60C2, 2, -4) is Abort.RANGE
+    for mode in (8, 9, 10):
+        assert bench.write(0x6060, 0, mode) is Abort.RANGE
+
+
+def test_delta_ramps_are_times_and_speeds_tenths_of_rpm() -> None:
+    bench = Bench("delta-asda-a2")
+    bench.write(0x6083, 0, 1000)
+    bench.enable(3)
+    bench.write(0x60FF, 0, 15_000)
+    bench.run(0.25)
+    assert bench.wheel.motor_velocity == pytest.approx(0.25 * 3000 * pi / 30, rel=0.01)
+    bench.run(0.5)
+    assert bench.wheel.motor_velocity == pytest.approx(1500 * pi / 30)
+
+
+def test_delta_a3_watches_the_host_only_while_it_beats_itself() -> None:
+    for own, watched in ((0, False), (100, True)):
+        bench = Bench("delta-asda-a3")
+        bench.write(0x1016, 1, 127 << 16 | 50)
+        bench.write(0x1017, 0, own)
+        bench.drive.receive(0x77F, b"\x05", bench.now)
+        bench.run(0.2)
+        lost = [data for identifier, data in bench.frames if identifier == 0x81]
+        assert bool(lost) == watched
+
+
+def test_beckhoff_takes_its_option_codes_only() -> None:
+    bench = Bench("beckhoff-ax8000")
+    for index, codes in ((0x605A, {-1, 2, 6}), (0x605E, {-2, -1, 0, 2})):
+        taken = {code for code in range(-3, 9) if bench.write(index, 0, code) is None}
+        assert taken == codes
+
+
+@pytest.mark.parametrize(
+    ("name", "per_turn"),
+    [
+        ("generic-cia402", 65536),
+        ("nanotec-pd4c", 3600),
+        ("maxon-epos4", 2000),
+        ("elmo-gold", 65536),
+        ("delta-asda-a2", 1_280_000),
+        ("delta-asda-a3", 100_000),
+        ("beckhoff-ax8000", 1 << 20),
+        ("ingenia-pluto", 8192),
+    ],
+)
+def test_a_turn_has_the_declared_positions(name: str, per_turn: int) -> None:
+    bench = Bench(name)
+    bench.wheel.motor_angle = 2 * pi
+    bench.drive.receive(0x601, bytes((0x40, 0x64, 0x60, 0, 0, 0, 0, 0)), bench.now)
+    answer = next(data for identifier, data in bench.frames if identifier == 0x581)
+    assert int.from_bytes(answer[4:], "little") == per_turn
+
+
+@pytest.mark.parametrize("name", list(VENDORS))
+def test_a_slow_boot_is_as_slow_as_declared(name: str) -> None:
+    bench = Bench(name)
+    bench.frames.clear()
+    bench.drive.inject("reboot")
+    declared = servo_of(name).boot_time
+    bench.run(0.7 * declared)
+    assert not bench.frames
+    bench.run(0.3 * declared)
+    assert bench.frames[0] == (0x701, b"\0")

@@ -1,0 +1,133 @@
+"""Gearboxes and the rope guide."""
+
+from __future__ import annotations
+
+from math import atan, cos, isnan, pi, sin, tan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from winchkit.catalog import find
+from winchkit.errors import UsageError
+from winchkit.model.gearbox import Gearbox, GearStage, worm_stage
+from winchkit.model.guide import FLEET_LIMIT, Guide, guide_of
+from winchkit.schema.read import read_winch
+
+efficiencies = st.floats(0.3, 1.0)
+stages = st.lists(st.tuples(st.floats(1, 60), efficiencies), min_size=1, max_size=4)
+
+
+@given(stages, st.floats(0.1, 1e3), st.floats(0.1, 100))
+def test_power_in_is_power_out_and_losses(
+    parts: list[tuple[float, float]], torque: float, speed: float
+) -> None:
+    """Stage after stage, power by power."""
+    box = Gearbox(tuple(GearStage(ratio, efficiency) for ratio, efficiency in parts))
+    power, turning = torque * speed, speed
+    for ratio, efficiency in reversed(parts):
+        power, turning = power / efficiency, turning * ratio
+    assert box.motor_torque(torque) * turning == pytest.approx(power)
+    assert box.ratio == pytest.approx(turning / speed)
+
+
+@given(efficiencies)
+def test_a_stage_loses_the_same_torque_both_ways(efficiency: float) -> None:
+    stage = GearStage(10.0, efficiency)
+    lift = Gearbox((stage,)).motor_torque(100.0)
+    lower = Gearbox((stage,)).motor_torque(100.0, lowering=True)
+    if efficiency <= 0.5:
+        assert stage.self_locking
+        assert isnan(lower)
+    else:
+        assert lift - 10.0 == pytest.approx(10.0 - lower)
+
+
+@given(st.floats(0.01, 0.8), st.floats(0.0, 0.3))
+def test_a_worm_is_a_wedge_with_friction(lead: float, friction: float) -> None:
+    """Forces on the flank: drive t for an axial load of one, N normal to the flank."""
+    stage = worm_stage(2, 60, lead, friction)
+    assert stage.ratio == 30
+    # Lifting: N (cos γ − μ sin γ) = 1, drive N (sin γ + μ cos γ); work in over one turn.
+    normal = 1 / (cos(lead) - friction * sin(lead))
+    drive = normal * (sin(lead) + friction * cos(lead))
+    assert stage.efficiency == pytest.approx(tan(lead) / drive, rel=1e-9)
+    # Lowering: friction turned round; it locks when the load's own drive is gone.
+    normal = 1 / (cos(lead) + friction * sin(lead))
+    own = normal * (sin(lead) - friction * cos(lead))
+    assert stage.backward == pytest.approx(max(0.0, own / tan(lead)), rel=1e-9, abs=1e-12)
+    assert stage.self_locking == (own <= 0)
+
+
+def test_a_worm_locks_below_its_angle_of_friction() -> None:
+    assert worm_stage(1, 30, 0.05, 0.06).self_locking
+    assert not worm_stage(1, 30, 0.07, 0.06).self_locking
+    # Steeper flanks press harder: ρ = atan(μ / cos α_n).
+    assert worm_stage(1, 30, atan(0.061), 0.06, pressure_angle=np.deg2rad(20)).self_locking
+    box = Gearbox((GearStage(3.0, 0.97), worm_stage(1, 30, 0.05, 0.06)))
+    assert (box.ratio, box.self_locking, box.back_efficiency) == (90.0, True, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("starts", "teeth", "lead", "friction"),
+    [(0, 30, 0.1, 0.1), (1, 0, 0.1, 0.1), (1, 30, 0.0, 0.1), (1, 30, 1.5, 0.1), (1, 30, 0.1, -1)],
+)
+def test_worms_that_cannot_be_are_refused(
+    starts: int, teeth: int, lead: float, friction: float
+) -> None:
+    with pytest.raises(UsageError, match="cannot be"):
+        worm_stage(starts, teeth, lead, friction)
+
+
+def test_a_guide_that_fits_its_groove_stays_over_the_rope() -> None:
+    guide = Guide(0.005, 1.0, 0.4, pitch=0.005)
+    angle = np.linspace(0, 100, 7)
+    assert guide.mismatch == 0.0
+    assert np.array_equal(guide.fleet_angle(angle), np.zeros(7))
+    assert guide.turns_within(0.01) == float("inf")
+    assert np.allclose(guide.position(angle), 0.005 * angle / (2 * pi))
+
+
+@given(
+    st.floats(1e-3, 2e-2),
+    st.floats(0.2, 3),
+    st.floats(0.1, 2),
+    st.floats(1e-3, 2e-2),
+    st.floats(-0.002, 0.002),
+)
+def test_the_fleet_angle_is_reached_where_it_is_told(
+    lead: float, ratio: float, distance: float, pitch: float, offset: float
+) -> None:
+    guide = Guide(lead, ratio, distance, pitch)
+    limit = float(FLEET_LIMIT["grooved"])
+    turns = guide.turns_within(limit, offset)
+    if np.isfinite(turns) and turns > 0 and turns < 1e6:
+        there = float(guide.fleet_angle(2 * pi * turns, offset))
+        assert abs(there) == pytest.approx(limit, rel=1e-6)
+        before = float(guide.fleet_angle(2 * pi * turns * 0.99, offset))
+        assert abs(before) <= limit * (1 + 1e-9)
+
+
+def test_a_guide_that_starts_beyond_the_limit_allows_no_turn() -> None:
+    assert Guide(0.005, 1.0, 0.4, 0.006).turns_within(0.01, offset=0.05) == 0.0
+
+
+def test_travel_limits() -> None:
+    guide = Guide(0.004, 1.25, 0.4, 0.005)
+    assert guide.turns_in(0.3) == pytest.approx(60.0)
+    guide.check(2 * pi * 59.9, 0.3)
+    with pytest.raises(UsageError, match=r"302\.5 mm of its 0 to 300\.0 mm"):
+        guide.check(2 * pi * 60.5, 0.3)
+    with pytest.raises(UsageError, match=r"-2\.5 mm"):
+        guide.check(-pi, 0.3)
+
+
+def test_the_guide_of_a_profile() -> None:
+    guide = guide_of(read_winch(find("profiles", "bench-grooved")))
+    assert guide == Guide(0.005, 1.0, 0.4, 0.005)
+    from dataclasses import replace
+
+    bare = replace(read_winch(find("profiles", "bench-grooved")), guide=None)
+    with pytest.raises(UsageError, match="has no"):
+        guide_of(bare)

@@ -1,0 +1,30 @@
+"""A small share of benchmarks/recorder_kill.py: SIGKILL costs at most 0.3 s."""
+
+from __future__ import annotations
+
+import random
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from recording.kill import kill_once
+
+MOMENTS = random.Random(7)
+
+
+@pytest.mark.realtime
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+@pytest.mark.parametrize(
+    ("moment", "rotate"),
+    [(MOMENTS.uniform(0, 1.5), rotate) for rotate in (None, "1s", None, "10kB", None)],
+)
+def test_a_killed_recording_loses_little_and_is_recovered(
+    tmp_path: Path, moment: float, rotate: str | None
+) -> None:
+    killed = kill_once(tmp_path, moment, rotate)
+    assert killed.lost <= 0.3
+    assert killed.gaps == 0
+    assert killed.recovered

@@ -1,0 +1,76 @@
+"""Logs that tests write: one winch, its drive at 250 Hz, its load cell at 50 Hz."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+from winchkit.runs.log_writer import open_log
+from winchkit.runs.rotation import Rotation
+
+OFFSET = 1_700_000_000_123_456_789
+OPENED = 1000.0
+DRIVE, CELL = "/A/drive", "/A/cell"
+LAYOUT = Layout(
+    (
+        Source(
+            DRIVE,
+            (
+                Signal("motor_angle", "rad", "motor_angle"),
+                Signal("motor_torque", "N m", "motor_torque"),
+            ),
+            0.1,
+        ),
+        Source(
+            CELL,
+            (Signal("tension", "N", "tension"), Signal("raw", "1"), Signal("quality", "1")),
+            0.1,
+        ),
+    ),
+    RowRule(CELL, OPENED),
+    OFFSET,
+)
+METADATA = {"load_mass": "15 kg", "note": "two\nlines"}
+
+
+def samples_until(end: float) -> dict[str, Samples]:
+    """What comes from ``OPENED`` on until a moment."""
+    drive, cell = (
+        np.arange(OPENED + delay, end, step) for delay, step in ((0, 4e-3), (7e-3, 0.02))
+    )
+    quality = np.where(np.arange(len(cell)) % 7 == 3, 2.0, 0.0)
+    torque = np.where(drive < OPENED + 0.3, np.nan, np.cos(drive))
+    return {
+        DRIVE: Samples(drive, drive, np.column_stack([np.sin(drive), torque])),
+        CELL: Samples(
+            cell,
+            cell + 5e-3,
+            np.column_stack([100 + np.cos(cell), np.arange(float(len(cell))), quality]),
+        ),
+    }
+
+
+def between(pieces: dict[str, Samples], begin: float, end: float) -> dict[str, Samples]:
+    """What arrives in a stretch of time."""
+    found = {}
+    for topic, item in pieces.items():
+        part = (item.received >= begin) & (item.received < end)
+        found[topic] = Samples(item.times[part], item.received[part], item.values[part])
+    return found
+
+
+def written(
+    path: Path, duration: float = 2.0, rotation: Rotation | None = None, piece: float = 0.1
+) -> list[Path]:
+    """Record a log piece by piece, with counters and a trip; returns its files."""
+    log = open_log(path, LAYOUT, METADATA, rotation)
+    pieces = samples_until(OPENED + duration)
+    log.tell(OPENED, {"tripped": []})
+    for begin in np.arange(OPENED, OPENED + duration, piece):
+        log.count(begin, {"A.cell": {"readings": 3, "rate": float("nan")}})
+        log.write(between(pieces, begin, begin + piece), begin + piece)
+    log.tell(OPENED + duration, {"tripped": ["winch A: tension above 800 N"]})
+    log.close({"clock_offset": "1 s"})
+    return log.parts

@@ -1,0 +1,82 @@
+"""A simulated bench whose cell hangs on a serial line, used through the public interface."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from winchkit import open_bench
+from winchkit.catalog import find
+from winchkit.errors import UsageError
+from winchkit.schema.bench import DeviceRef
+from winchkit.schema.read import read_simbench
+from winchkit.schema.simbench import NoiseSpec
+from winchkit.sim.live import LiveBench
+
+pytestmark = [
+    pytest.mark.realtime,
+    pytest.mark.skipif(sys.platform == "win32", reason="needs pseudo-terminals"),
+]
+PATIENCE = 20.0
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[LiveBench]:
+    with LiveBench(read_simbench(find("sim", "serial-bench")), seed=1) as running:
+        yield running
+
+
+def comes(condition: Callable[[], bool]) -> bool:
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_a_serial_cell_measures_fails_and_comes_back(live: LiveBench, tmp_path: Path) -> None:
+    with open_bench(live.write_bench_file(tmp_path / "bench.toml")) as bench:
+        winch = bench.winch["A"]
+        assert comes(lambda: abs(winch.tension - 10 * 9.80665) < 5.0)
+        winch.move_by(-0.1)
+        assert comes(lambda: abs(winch.tension - 10 * 9.80665) < 5.0)
+        live.inject("A.cell", "overload")
+        assert comes(lambda: math.isnan(winch.tension))
+        live.inject("A.cell", "recover")
+        assert comes(lambda: math.isfinite(winch.tension))
+        live.inject("A.cell", "unplug")
+        assert comes(lambda: math.isnan(winch.tension))
+        live.inject("A.cell", "replug")
+        assert comes(lambda: math.isfinite(winch.tension))
+
+
+def test_two_cells_share_a_line_by_their_addresses(tmp_path: Path) -> None:
+    declared = read_simbench(find("sim", "serial-bench"))
+    wired = declared.bench.winch["A"]
+    cell = DeviceRef("mantracourt-dsc-ascii", "cell", unit=1)
+    both = replace(wired, cell=cell, load=replace(cell, unit=2), load_mass=None)
+    bench_spec = replace(declared.bench, winch={"A": both})
+    with LiveBench(replace(declared, bench=bench_spec, noise=NoiseSpec()), seed=2) as running:
+        path = running.write_bench_file(tmp_path / "bench.toml")
+        with open_bench(path) as bench:
+            winch = bench.winch["A"]
+            assert comes(lambda: abs(winch.tension - 10 * 9.80665) < 0.5)
+            load = winch.sensors["load"]
+            assert load.latest is not None
+            assert load.latest.value == pytest.approx(10 * 9.80665, abs=0.5)
+            running.inject("A.cell", "silence")
+            assert comes(lambda: math.isnan(winch.tension))
+            before = load.counters.readings
+            assert comes(lambda: load.counters.readings > before)
+
+
+def test_its_faults_are_its_own(live: LiveBench) -> None:
+    with pytest.raises(UsageError, match="a simulated serial instrument has no fault"):
+        live.inject("A.cell", "exception")

@@ -1,0 +1,88 @@
+"""Tares and zeros of instruments: on the host, in a file beside the bench, or by the device."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+from winchkit.bench.cell_desk import CellDesk, steady
+from winchkit.bench.instruments import tares_of
+from winchkit.calibration.cell_file import tares_toml, write_text
+from winchkit.errors import NotPermitted, UsageError
+from winchkit.schema.calibration import HostTare, TareBook, tare_book_path
+
+__all__ = ["clear_tare", "device_tare", "device_zero", "host_tare"]
+
+_CHECK = 0.3
+
+
+def host_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Add the mean of the present value to the host's tare; raises NotPermitted, NoReply."""
+    _refuse_temperature(name)
+    seen = steady(desk.readings(name, duration))
+    book = tares_of(desk.spec)
+    old = book.tare.get(name)
+    value = seen.mean + (old.value if old else 0.0)
+    taken = datetime.now(UTC).replace(microsecond=0)
+    _keep(desk, book, {**book.tare, name: HostTare(value, seen.std, taken)})
+    _apply(desk, name, value)
+    after = steady(desk.readings(name, max(duration, _CHECK)))
+    return {
+        "before": seen.mean,
+        "std": seen.std,
+        "readings": seen.readings,
+        "tare": value,
+        "after": after.mean,
+        "file": tare_book_path(desk.spec.path),
+    }
+
+
+def clear_tare(desk: CellDesk, name: str) -> dict[str, Any]:
+    """Take the host's tare of an instrument away; raises UsageError where it has none."""
+    book = tares_of(desk.spec)
+    if name not in book.tare:
+        raise UsageError(f"{name} has no tare of the host; nothing to clear")
+    kept = {other: tare for other, tare in book.tare.items() if other != name}
+    _keep(desk, book, kept)
+    _apply(desk, name, 0.0)
+    return {"removed": book.tare[name].value, "file": tare_book_path(desk.spec.path)}
+
+
+def device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Send the device its own tare; raises NotPermitted, NoReply, DeviceRefused."""
+    return _by_device(desk, name, "tare", duration)
+
+
+def device_zero(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Send the device its own zero; raises NotPermitted, NoReply, DeviceRefused."""
+    return _by_device(desk, name, "zero", duration)
+
+
+def _by_device(desk: CellDesk, name: str, command: str, duration: float) -> dict[str, Any]:
+    before = steady(desk.readings(name, duration))
+    desk.command(name, command)
+    desk.clock.sleep(_CHECK)
+    after = steady(desk.readings(name, duration))
+    return {
+        "before": before.mean,
+        "std": before.std,
+        "readings": before.readings,
+        "after": after.mean,
+    }
+
+
+def _keep(desk: CellDesk, book: TareBook, tares: dict[str, HostTare]) -> None:
+    if not desk.spec.path:
+        raise NotPermitted("a bench without a wiring file has no place for tares; save it first")
+    write_text(tare_book_path(desk.spec.path), tares_toml(TareBook(book.name, tares)))
+
+
+def _apply(desk: CellDesk, name: str, value: float) -> None:
+    publisher = desk.publisher(name)
+    publisher.scale = replace(publisher.scale, tare=value)
+
+
+def _refuse_temperature(name: str) -> None:
+    if name.endswith(".temperature"):
+        raise UsageError(f"{name} is a thermometer; taring it makes no sense")

@@ -1,0 +1,1 @@
+"""Parameters with uncertainties from measurements made for them: load cells, robot geometry."""

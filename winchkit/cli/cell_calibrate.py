@@ -1,0 +1,194 @@
+"""``winchkit cell calibrate``: known weights up and down, a fit, a report, accept or abort."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from winchkit.cli.bench_option import bench_option
+from winchkit.cli.completing import complete_winch
+from winchkit.cli.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.bench.cell_desk import CellDesk
+    from winchkit.calibration.cell_fit import CellFit
+    from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
+
+__all__ = ["command"]
+
+_AT_REST = 4.0
+"""The spread of a mean over what white noise would make of it; more is a load that moves."""
+
+
+@click.command()
+@click.argument("cell", required=False, shell_complete=complete_winch)
+@bench_option
+@click.option("--weights", help='Weights in rising order, e.g. "0 2 5 10 15 20 kg"; or N.')
+@click.option("--series", default=3, show_default=True, help="Times up and down.")
+@click.option("--points", metavar="CSV", help="Fit these points instead of measuring.")
+@click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
+@click.option("--for", "duration", default="3 s", show_default=True, help="Averaged per weight.")
+@click.option("--settle", default="2 s", show_default=True, help="Waited after a weight is hung.")
+@click.option("--temperature", help='At the cell, e.g. "21 degC".')
+@click.option(
+    "--direction",
+    type=click.Choice(["tension", "compression"]),
+    default="tension",
+    show_default=True,
+)
+@click.option(
+    "-o", "--output", metavar="FILE", help="The calibration's file; CELL.toml by default."
+)
+@click.option("--html", metavar="FILE", help="Also write the report as one page.")
+@click.option("--yes", is_flag=True, help="Accept the fit without asking.")
+@click.option("--json", "as_json", is_flag=True, help="Print the fit as JSON.")
+def command(
+    cell: str | None,
+    bench: str,
+    points: str | None,
+    order: Literal["linear", "quadratic"],
+    temperature: str | None,
+    direction: LoadDirection,
+    output: str | None,
+    html: str | None,
+    *,
+    yes: bool,
+    as_json: bool,
+    **guided: Any,
+) -> None:
+    """Calibrate the load cell CELL with known weights, and write the calibration beside the bench.
+
+    The device is not changed. Name the file in the wiring: cell = { …, calibration = "FILE" }.
+    """
+    from winchkit.calibration.cell_file import calibration_toml, write_text
+    from winchkit.calibration.cell_fit import fit_cell
+    from winchkit.cli.cell_report import report_lines
+    from winchkit.cli.duration import optional
+
+    degrees = optional(temperature, "temperature")
+    found = _from_file(cell, bench, points) if points else _measure(cell, bench, **guided)
+    fit = fit_cell(found.points, order)
+    target = Path(output or Path(bench).parent / f"{found.name.replace('.', '-')}.toml")
+    calibration = _calibration(target.stem, fit, found, degrees, direction)
+    for line in report_lines(fit, found.points):
+        click.echo(line, err=as_json)
+    if html is not None:
+        _write_page(html, calibration, fit)
+    if not yes:
+        click.confirm(f"Accept, and write {target}?", abort=True, err=True)
+    write_text(target, calibration_toml(calibration))
+    click.echo(f"written: {target}", err=True)
+    if as_json:
+        echo_json({"schema": 1, "file": str(target), "fit": fit, "points": found.points})
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Points, and the cell that they are of."""
+
+    name: str
+    device: str
+    serial: str
+    points: tuple[CalibrationPoint, ...]
+
+
+def _write_page(path: str, calibration: CellCalibration, fit: CellFit) -> None:
+    from winchkit.cli.cell_page import report_page
+    from winchkit.cli.html_option import write_page
+
+    write_page(path, report_page(calibration, fit))
+
+
+def _calibration(
+    name: str,
+    fit: CellFit,
+    found: _Measured,
+    temperature: float | None,
+    direction: LoadDirection,
+) -> CellCalibration:
+    from winchkit.schema.calibration import CellCalibration
+
+    loads = [point.load for point in found.points]
+    return CellCalibration(
+        name=name,
+        date=date.today(),
+        coefficients=fit.coefficients,
+        device=found.device,
+        serial_number=found.serial,
+        temperature=temperature,
+        direction=direction,
+        low=min(loads),
+        high=max(loads),
+        residual_std=fit.residual_std,
+        nonlinearity=fit.nonlinearity.value,
+        hysteresis=fit.hysteresis.value,
+        repeatability=fit.repeatability.value,
+        point=found.points,
+    )
+
+
+def _from_file(cell: str | None, bench: str, points: str) -> _Measured:
+    """Points of a CSV file for a cell of the wiring file; nothing is opened."""
+    from winchkit.bench.cell_desk import full_name
+    from winchkit.bench.instruments import device_of, refs_of
+    from winchkit.calibration.cell_file import read_points
+    from winchkit.schema.read import read_bench
+
+    spec = read_bench(bench)
+    name = full_name(spec, cell)
+    winch, _, role = name.rpartition(".")
+    device = device_of(spec, refs_of(spec)[winch, role]).name
+    return _Measured(name, device, "", read_points(points))
+
+
+def _measure(
+    cell: str | None, bench: str, *, weights: str | None, series: int, duration: str, settle: str
+) -> _Measured:
+    """Lead through the weights."""
+    from winchkit.bench.cell_desk import cell_desk
+    from winchkit.calibration.cell_plan import plan
+    from winchkit.cli.duration import quantity
+
+    steps = plan(weights or click.prompt("Weights, rising (0 2 5 10 kg)", err=True), series)
+    average, wait = quantity(duration, "time"), quantity(settle, "time")
+    with cell_desk(bench) as desk:
+        name = desk.named(cell)
+        identity = desk.identify(name)
+        serial = f"{identity['serial number']:.0f}" if "serial number" in identity else ""
+        points = tuple(
+            _hang(desk, name, f"{number}/{len(steps)}", step, average, wait)
+            for number, step in enumerate(steps, start=1)
+        )
+        return _Measured(name, desk.device(name).name, serial, points)
+
+
+def _hang(
+    desk: CellDesk, name: str, number: str, step: CalibrationPoint, average: float, wait: float
+) -> CalibrationPoint:
+    """Ask for one weight and measure it, again where the operator wants."""
+    from winchkit.bench.cell_desk import indicated
+    from winchkit.calibration.cell_plan import spoken
+
+    while True:
+        click.prompt(
+            f"[{number}] hang {spoken(step)}, let it come to rest, press Enter",
+            default="",
+            show_default=False,
+            err=True,
+        )
+        desk.clock.sleep(wait)
+        seen = indicated(desk.readings(name, average), desk.publisher(name).scale)
+        click.echo(
+            f"    indicated {seen.mean:.4f} ± {seen.std:.4f} N (noise {seen.noise:.3g} N, "
+            f"{seen.readings} readings)",
+            err=True,
+        )
+        at_rest = seen.std <= _AT_REST * seen.noise / seen.readings**0.5
+        if at_rest or click.confirm(
+            "    it is not at rest; take it all the same?", default=False, err=True
+        ):
+            return replace(step, indicated=seen.mean, std=seen.std)

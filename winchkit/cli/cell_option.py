@@ -1,0 +1,51 @@
+"""What the commands of ``winchkit cell`` have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import isnan
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.bench_option import bench_option
+from winchkit.cli.completing import complete_winch
+
+if TYPE_CHECKING:
+    from winchkit.bench.cell_desk import CellDesk
+
+__all__ = ["cell_options", "desk", "shown", "unit_of"]
+
+_UNITS = {"cell": "N", "load": "N", "length": "m", "temperature": "degC"}
+
+
+def cell_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the argument CELL, --bench and --json."""
+    options: list[Callable[..., Any]] = [
+        click.argument("cell", required=False, shell_complete=complete_winch),
+        bench_option,
+        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+    ]
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+@contextmanager
+def desk(bench: str, cell: str | None) -> Iterator[tuple[CellDesk, str]]:
+    """The instruments of a bench, and the full name of the one that is meant."""
+    from winchkit.bench.cell_desk import cell_desk
+
+    with cell_desk(bench) as found:
+        yield found, found.named(cell)
+
+
+def unit_of(name: str) -> str:
+    """SI unit of an instrument by its role."""
+    return _UNITS[name.rpartition(".")[2]]
+
+
+def shown(value: float, unit: str, digits: int = 5) -> str:
+    """A value for people; ``unknown`` for NaN."""
+    return "unknown" if isnan(value) else f"{value:.{digits}g} {unit}".rstrip()

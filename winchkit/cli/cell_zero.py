@@ -1,0 +1,34 @@
+"""``winchkit cell zero``: the device's own zero."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.cell_option import cell_options, desk, shown, unit_of
+from winchkit.cli.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@cell_options
+@click.option("--for", "duration", default="1 s", show_default=True, help="Averaged over this.")
+def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
+    """Send the device of CELL its zero command: what hangs on it now becomes its gross zero.
+
+    Only a volatile zero is sent; a device that keeps it in its EEPROM needs `cell store zero`.
+    """
+    from winchkit.bench.cell_tares import device_zero
+    from winchkit.cli.duration import quantity
+
+    seconds = quantity(duration, "time")
+    with desk(bench, cell) as (found, name):
+        result = device_zero(found, name, seconds)
+    unit = unit_of(name)
+    if as_json:
+        echo_json({"schema": 1, "cell": name, "unit": unit, **result})
+        return
+    click.echo(
+        f"{name}: the device zeroed itself at {shown(result['before'], unit)}; "
+        f"it reads {shown(result['after'], unit)}"
+    )

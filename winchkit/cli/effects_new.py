@@ -1,0 +1,98 @@
+"""``winchkit effects new``: a Python file for an effect of one's own, begun from runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.runs_option import ManyValues, catalogue_of, read_runs
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.result import Diagnosis
+    from winchkit.effects.catalogue import Catalogue
+    from winchkit.runs.run import Run
+    from winchkit.schema.winch import WinchProfile
+
+__all__ = ["command"]
+
+
+@click.command(cls=ManyValues)
+@click.argument("file", metavar="FILE.py")
+@click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file.")
+@click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs.")
+@click.option("--curve", metavar="ID", help="Empirical effect to begin from; else the strongest.")
+@click.option("--id", "effect_id", metavar="ID", help="Of the new effect; else the file's name.")
+@click.option("--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects.")
+@click.option("--winch", help="Which winch of runs with several.")
+def command(
+    file: str,
+    profile: str,
+    runs: Sequence[str],
+    curve: str | None,
+    effect_id: str | None,
+    effect_files: Sequence[str],
+    winch: str | None,
+) -> None:
+    """Write FILE.py with the variable and the curve that the runs show and no effect explains.
+
+    It is ready for --effects: diagnose with it, then put in the physics that you recognise.
+    """
+    from winchkit.catalog import find
+    from winchkit.effects.own_file import write_wave_on_drum
+    from winchkit.schema.read import read_winch
+
+    declared, catalogue = read_winch(find("profiles", profile)), catalogue_of(effect_files)
+    measured = read_runs(runs, winch)
+    name = effect_id or Path(file).stem.replace("_", "-")
+    if curve is None:
+        found = _unexplained(measured, declared, catalogue)
+        order = _order_of_drum(found)
+        if order is not None:
+            write_wave_on_drum(order, name, Path(file))
+            _tell(file, name, f"a wave of {order} periods per drum turn")
+            return
+        curve = found.empirical[0]
+    _write_curve(curve, name, Path(file), (measured, declared, catalogue))
+    _tell(file, name, curve)
+
+
+def _tell(file: str, name: str, start: str) -> None:
+    click.echo(f"written: {file}; it holds the effect '{name}', begun from {start}", err=True)
+
+
+def _write_curve(
+    curve: str, name: str, file: Path, data: tuple[Sequence[Run], WinchProfile, Catalogue]
+) -> None:
+    from winchkit.diagnosis.add import add
+    from winchkit.effects.empirical import EMPIRICAL
+    from winchkit.effects.own_file import write_own
+    from winchkit.errors import UsageError
+    from winchkit.units import suggest
+
+    if curve not in EMPIRICAL:
+        raise UsageError(f"'{curve}' is no empirical effect{suggest(curve, list(EMPIRICAL))}")
+    term, _ = add(curve, *data).added
+    write_own(term, name, file)
+
+
+def _unexplained(runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue) -> Diagnosis:
+    """A diagnosis that leaves something, and says where."""
+    from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.errors import UsageError
+
+    found = diagnose(runs, profile, catalogue).diagnosis
+    if not found.empirical:
+        raise UsageError(
+            f"the verdict is '{found.verdict}' and nothing unexplained was located; name the "
+            "curve to begin from with --curve, e.g. empirical-motor-torque-speed"
+        )
+    return found
+
+
+def _order_of_drum(found: Diagnosis) -> int | None:
+    """Order per drum turn that several outputs share: then the drum's own path has it."""
+    orders = [w.order for w in found.where if w.variable == "drum_angle" and w.order is not None]
+    return next((order for order in orders if orders.count(order) > 1), None)

@@ -1,0 +1,29 @@
+"""``winchkit ledger``: how a profile grew, as a ladder of held-out errors."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file.")
+@click.option("--json", "as_json", is_flag=True, help="Print the ledger as JSON.")
+def command(profile: str, as_json: bool) -> None:
+    """Show every effect that was added to or removed from a profile and what that did."""
+    from winchkit.catalog import find
+    from winchkit.diagnosis.ladder import ladder
+    from winchkit.schema.read import read_winch
+
+    declared = read_winch(find("profiles", profile))
+    rungs = ladder(declared)
+    if as_json:
+        steps = [rung.to_json() for rung in rungs]
+        echo_json({"schema": 1, "profile": declared.name, "steps": steps})
+        return
+    from winchkit.diagnosis.report.ladder_text import ladder_text
+
+    click.echo(ladder_text(declared.name, rungs))

@@ -1,0 +1,70 @@
+"""``winchkit move``: moves a winch, or all as one, to a cable length."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.bench_option import bench_option, dry_run_option, winch_argument
+from winchkit.cli.output import echo_json
+from winchkit.cli.status_line import status_line
+from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.bench.station import Station
+
+__all__ = ["command"]
+
+_POLL = 0.05
+
+
+@click.command()
+@winch_argument
+@bench_option
+@click.option("--to", metavar="LENGTH", help="Cable length to go to.")
+@click.option("--by", metavar="LENGTH", help="Change of cable length; positive pays out.")
+@click.option("--speed", metavar="SPEED", help="Of the rope.  [default: the winch's limit]")
+@click.option("--acceleration", metavar="ACCELERATION", help="[default: the winch's limit]")
+@dry_run_option
+@click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
+def command(
+    winch: str | None,
+    *,
+    bench: str,
+    to: str | None,
+    by: str | None,
+    speed: str | None,
+    acceleration: str | None,
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Move WINCH to a cable length on an S-curve, then disable it.
+
+    WINCH may be left out where there is one, and be "all": then all winches start in one control
+    cycle and arrive together. Ctrl-C stops. Attaches to the process that owns the bench where
+    there is one; then the motion ends with this command too.
+    """
+    from winchkit.cli.dry_run import station_for
+    from winchkit.cli.duration import optional
+
+    if (to is None) == (by is None):
+        raise UsageError("where to? give either --to LENGTH or --by LENGTH")
+    target, change = optional(to, "length"), optional(by, "length")
+    fastest, ramp = optional(speed, "speed"), optional(acceleration, "acceleration")
+    with station_for(bench, dry_run=dry_run, as_json=as_json) as station:
+        station.move(winch, target, change, fastest, ramp)
+        _wait(station, winch)
+        status = station.status()
+    if dry_run:
+        return
+    if as_json:
+        echo_json(status)
+    else:
+        click.echo(status_line(status))
+
+
+def _wait(station: Station, winch: str | None) -> None:
+    while station.moving(winch):
+        time.sleep(_POLL)

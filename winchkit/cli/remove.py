@@ -1,0 +1,71 @@
+"""``winchkit remove``: take an effect out of a copy of a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.output import echo_json
+from winchkit.cli.runs_option import ManyValues, catalogue_of, model_options, read_runs
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.remove import Removal
+
+__all__ = ["command"]
+
+
+@click.command(cls=ManyValues)
+@click.argument("effect")
+@click.option("--fit", "runs", multiple=True, metavar="RUN...", help="Runs to refit the others on.")
+@click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
+@model_options
+def command(
+    effect: str,
+    runs: Sequence[str],
+    output: str,
+    profile: str,
+    effect_files: Sequence[str],
+    winch: str | None,
+    band: float | None,
+    as_json: bool,
+) -> None:
+    """Write a profile without EFFECT; with --fit the effects that stay are refitted.
+
+    The ledger notes the step, and 'winchkit undo' takes it back.
+    """
+    from winchkit.catalog import find
+    from winchkit.diagnosis.remove import remove
+    from winchkit.schema.read import read_winch
+
+    source = find("profiles", profile)
+    declared, removal = read_winch(source), None
+    if runs:
+        catalogue = catalogue_of(effect_files)
+        removal = remove(effect, read_runs(runs, winch), declared, catalogue, band)
+    _write(source, effect, removal, runs, Path(output))
+    click.echo(f"written: {output}", err=True)
+    _tell(effect, removal, as_json)
+
+
+def _write(
+    source: Path, effect: str, removal: Removal | None, runs: Sequence[str], out: Path
+) -> None:
+    from winchkit.cli.provenance import provenance
+    from winchkit.effects.profile_file import write_without
+
+    terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
+    fitted, judged = provenance(terms, outputs, [Path(run).name for run in runs])
+    write_without(source, effect, fitted, out, judged)
+
+
+def _tell(effect: str, removal: Removal | None, as_json: bool) -> None:
+    if as_json:
+        nothing = {"schema": 1, "effect": effect, "outputs": {}, "parameters": {}, "notes": []}
+        echo_json(nothing if removal is None else removal.to_json())
+    elif removal is not None:
+        from winchkit.diagnosis.report.text import addition_text
+
+        click.echo(addition_text(removal))

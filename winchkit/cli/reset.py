@@ -1,0 +1,35 @@
+"""``winchkit reset``: clears trips and drive faults; nothing is enabled."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.bench_option import bench_option, dry_run_option
+from winchkit.cli.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@bench_option
+@dry_run_option
+@click.option("--json", "as_json", is_flag=True, help="Print the bench's state as JSON.")
+def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
+    """Clear latched trips and drive faults of a bench; every winch stays disabled.
+
+    Drives that restarted are set up again. Ends with 5, naming why, where something still
+    forbids motion. Attaches to the process that owns the bench where there is one.
+    """
+    from winchkit.cli.dry_run import station_for
+
+    with station_for(bench, dry_run=dry_run, as_json=as_json) as station:
+        station.reset()
+        status = station.status()
+    if dry_run:
+        return
+    if as_json:
+        echo_json(status)
+        return
+    click.echo("reset: nothing is tripped")
+    for trip in status["blocked"]:
+        click.echo(f"still forbidden: {trip}")

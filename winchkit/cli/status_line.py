@@ -1,0 +1,22 @@
+"""The winches of a bench in one line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["status_line"]
+
+
+def status_line(status: dict[str, Any]) -> str:
+    """Length, speed, tension and phase of each winch of a station's status."""
+    parts = []
+    for name, winch in status["winch"].items():
+        text = f"{name}: {_number(winch['cable_length'])} m {_number(winch['speed'])} m/s"
+        if winch["tension"] is not None:
+            text += f" {_number(winch['tension'], 1)} N"
+        parts.append(f"{text} {winch['phase']}")
+    return "  ".join(parts)
+
+
+def _number(value: float | None, digits: int = 3) -> str:
+    return "—" if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,107 @@
+"""What a CAN bus counts of its own troubles: error frames read, and the picture of all counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+__all__ = ["BusHealth", "BusState", "ErrorTally"]
+
+_CONTROLLER, _BUS_OFF, _RESTARTED = 0x004, 0x040, 0x100
+_OVERFLOW = 0x01
+_WARNING, _PASSIVE, _ACTIVE = 0x0C, 0x30, 0x40
+
+
+class BusState(Enum):
+    """State of the CAN controller, as its error counters make it."""
+
+    ACTIVE = "error active"
+    WARNING = "error warning"
+    PASSIVE = "error passive"
+    OFF = "bus off"
+    DOWN = "down"
+    """The interface cannot be read any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class BusHealth:
+    """What happened on a bus since it was opened; a snapshot."""
+
+    state: BusState = BusState.ACTIVE
+    received: int = 0
+    sent: int = 0
+    error_frames: int = 0
+    """And frames that could not be read."""
+    bus_off: int = 0
+    """Times that the controller left the bus."""
+    error_passive: int = 0
+    overruns: int = 0
+    """Frames that the controller or its driver lost because nobody took them in time."""
+    dropped: int = 0
+    """Frames that the socket's queue had no room for."""
+    unsent: int = 0
+    """Frames that could not be sent."""
+    reopened: int = 0
+    fault: str = ""
+    """Why it cannot be used; empty while it can."""
+
+    @property
+    def lossless(self) -> bool:
+        """Whether nothing is known to be lost."""
+        return not (self.overruns or self.dropped or self.unsent)
+
+    def __str__(self) -> str:
+        counts = {
+            "received": self.received,
+            "sent": self.sent,
+            "error frames": self.error_frames,
+            "bus off": self.bus_off,
+            "error passive": self.error_passive,
+            "overruns": self.overruns,
+            "dropped": self.dropped,
+            "not sent": self.unsent,
+            "reopened": self.reopened,
+        }
+        words = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+        return f"{self.state.value}: {words or 'nothing yet'}" + (
+            f"; {self.fault}" if self.fault else ""
+        )
+
+
+@dataclass
+class ErrorTally:
+    """Reads error frames in the layout of SocketCAN, which python-can hands on."""
+
+    state: BusState = BusState.ACTIVE
+    frames: int = 0
+    bus_off: int = 0
+    error_passive: int = 0
+    overruns: int = 0
+
+    def take(self, identifier: int, data: bytes) -> None:
+        """Count an error frame: its identifier holds classes, its second byte the controller's."""
+        self.frames += 1
+        if identifier & _CONTROLLER and len(data) > 1:
+            self._controller(data[1])
+        if identifier & _BUS_OFF:
+            self.enter(BusState.OFF)
+        elif identifier & _RESTARTED:
+            self.enter(BusState.ACTIVE)
+
+    def _controller(self, detail: int) -> None:
+        if detail & _OVERFLOW:
+            self.overruns += 1
+        if detail & _PASSIVE:
+            self.enter(BusState.PASSIVE)
+        elif detail & _WARNING:
+            self.enter(BusState.WARNING)
+        elif detail & _ACTIVE:
+            self.enter(BusState.ACTIVE)
+
+    def enter(self, state: BusState) -> None:
+        """Take a state of the controller, however it was told."""
+        if state is self.state:
+            return
+        self.state = state
+        self.bus_off += state is BusState.OFF
+        self.error_passive += state is BusState.PASSIVE

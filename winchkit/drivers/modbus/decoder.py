@@ -1,0 +1,143 @@
+"""Registers of one query turned into a value in SI or NaN, with flags."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from winchkit.drivers.modbus.words import number_of
+from winchkit.drivers.reading import Quality
+from winchkit.errors import Fault, FileError
+from winchkit.schema.device import DeviceSpec
+from winchkit.schema.device_modbus import FieldSpec, ModbusSpec, ReadBlock, StatusMeaning
+from winchkit.units import convert, dimension_of
+
+__all__ = ["Decoded", "Decoder"]
+
+_FLAGS: dict[StatusMeaning, Quality] = {
+    "overload": Quality.OVERLOAD,
+    "underload": Quality.UNDERLOAD,
+    "fault": Quality.FAULT,
+    "unstable": Quality.UNSTABLE,
+    "busy": Quality.STALE,
+}
+_TINIEST = 1e-30
+"""A float below it, but not zero, is no measurement: its bytes stand in another order."""
+_TINIEST_SHARE = 1e-12
+"""The same where the device's largest number is known; no converter resolves that."""
+_NEAR_ZERO = 1.0
+"""Counts; where the status says that the gross value is within a quarter of a count of zero."""
+
+
+class Decoded(NamedTuple):
+    """What one block of registers says."""
+
+    value: float
+    gross: float
+    counts: float
+    quality: Quality
+    status: int
+
+
+class Decoder:
+    """Reads the measurement of one kind of device out of its block of registers."""
+
+    def __init__(self, device: DeviceSpec) -> None:
+        """Raise FileError where the device file contradicts itself."""
+        if device.modbus is None:
+            raise FileError(Fault("is no Modbus instrument", device.path))
+        self.spec: ModbusSpec = device.modbus
+        broken = [Fault(message, device.path, key=key) for key, message in self.spec.rules()]
+        if broken:
+            raise FileError(broken)
+        by_name = {item.name: item for item in self.spec.field}
+        self.field = by_name[self.spec.value]
+        self._gross = by_name.get("gross", self.field)
+        self.dimension = dimension_of(self.field.unit) or ""
+        self._masks = {
+            meaning: sum(1 << bit for bit in bits) for meaning, bits in self.spec.status.items()
+        }
+
+    def decode(self, registers: Sequence[int], status_registers: Sequence[int] = ()) -> Decoded:
+        """Value and gross value (SI or NaN), signed counts, quality, status word.
+
+        ``registers`` are those of the block ``read``, ``status_registers`` those of
+        ``status_read`` where the device has one.
+        """
+        words = _placed(self.spec.read, registers) | _placed(
+            self.spec.status_read, status_registers
+        )
+        status = self._status(words)
+        counts = self._counts(self.field, words, status)
+        gross = self._counts(self._gross, words, status)
+        quality = self.quality(status) | self._doubt(counts, gross, status)
+        if not quality.usable:
+            return Decoded(math.nan, math.nan, counts, quality, status)
+        return Decoded(
+            self._si(self.field, counts, words),
+            self._si(self._gross, gross, words),
+            counts,
+            quality,
+            status,
+        )
+
+    def has(self, meaning: StatusMeaning, status: int) -> bool:
+        """Whether a status word says ``meaning``, e.g. that a tare is active."""
+        return bool(status & self._masks.get(meaning, 0))
+
+    def quality(self, status: int) -> Quality:
+        """What the status word alone says."""
+        quality = Quality.GOOD
+        for meaning, flag in _FLAGS.items():
+            if self.has(meaning, status):
+                quality |= flag
+        if "stable" in self.spec.status and not self.has("stable", status):
+            quality |= Quality.UNSTABLE
+        if "valid" in self.spec.status and not self.has("valid", status) and quality.usable:
+            quality |= Quality.FAULT
+        return quality
+
+    def _doubt(self, counts: float, gross: float, status: int) -> Quality:
+        """What the numbers say against themselves, or against a status that finds them good."""
+        if not (math.isfinite(counts) and math.isfinite(gross)):
+            return Quality.FAULT
+        if not self.quality(status).usable:
+            return Quality.GOOD
+        strange = any(
+            _strange(item, number) for item, number in ((self.field, counts), (self._gross, gross))
+        )
+        if self.has("zero", status) and self._gross.type != "f32":
+            strange |= abs(gross) > _NEAR_ZERO
+        return Quality.MISMATCH if strange else Quality.GOOD
+
+    def _status(self, words: Mapping[int, int]) -> int:
+        at = self.spec.status_register
+        if at is None:
+            return 0
+        number = number_of(self.spec.status_type, self.spec.status_order, words, at)
+        return int(number) if 0 <= number < 1 << 32 else -1
+
+    def _counts(self, item: FieldSpec, words: Mapping[int, int], status: int) -> float:
+        counts = number_of(item.type, item.order, words, item.register)
+        negative = item.sign_bit is not None and status >> item.sign_bit & 1
+        return -counts if negative else counts
+
+    def _si(self, item: FieldSpec, counts: float, words: Mapping[int, int]) -> float:
+        scale = item.scale
+        if (place := item.decimals) is not None:
+            scale /= 10.0 ** (words[place.register] >> place.bit & (1 << place.bits) - 1)
+        return convert(counts * scale, item.unit, self.dimension)
+
+
+def _placed(block: ReadBlock | None, registers: Sequence[int]) -> dict[int, int]:
+    """Registers by address."""
+    return {} if block is None else dict(enumerate(registers, block.start))
+
+
+def _strange(item: FieldSpec, counts: float) -> bool:
+    """Whether no device in good order shows this number."""
+    if item.limit is not None and abs(counts) > item.limit:
+        return True
+    tiniest = _TINIEST if item.limit is None else _TINIEST_SHARE * item.limit
+    return item.type == "f32" and 0 < abs(counts) < tiniest

@@ -1,0 +1,127 @@
+"""One Modbus line: polls its instruments in turn, the one that is due first."""
+
+from __future__ import annotations
+
+import asyncio
+from math import inf
+
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.modbus.client import ModbusClient
+from winchkit.drivers.modbus.commands import command_of, confirm, identity, send
+from winchkit.drivers.modbus.instrument import Instrument
+from winchkit.drivers.modbus.timing import exchange, fair_rates, wire_times
+from winchkit.drivers.reading import Sensor
+from winchkit.errors import ConnectionLost
+from winchkit.schema.bench import BusSpec
+
+__all__ = ["ModbusLine"]
+
+_RECONNECT = 0.3
+_OPENING, _POLL = 1.0, 0.01
+_PROBE_SHARE = 4
+"""A silent device costs the line a timeout: for each there are four times as long for the rest."""
+
+
+class ModbusLine:
+    """A line of :class:`~winchkit.drivers.slow.SlowDevices`."""
+
+    def __init__(
+        self, name: str, spec: BusSpec, instruments: tuple[Instrument, ...], clock: Clock
+    ) -> None:
+        """Remember what hangs on the line; ``serve`` opens it."""
+        self.name = name
+        self.sensors = instruments
+        self._spec = spec
+        self._clock = clock
+        self._client = ModbusClient(spec, name)
+        self._lock = asyncio.Lock()
+        self._closing = False
+        self._opened = False
+        self._next_probe = clock.now()
+        self._gap = max((item.decoder.spec.gap for item in instruments), default=0.0)
+        self._times = [exchange(item.decoder.spec, spec).time for item in instruments]
+        self._share_out()
+
+    async def serve(self) -> None:
+        """Poll until closed."""
+        # A cancellation that meets an answer is lost in asyncio.wait_for (Python 3.11).
+        while not self._closing:
+            if not self._client.connected and not await self._connect():
+                await asyncio.sleep(_RECONNECT)
+                continue
+            instrument = min(self.sensors, key=self._due)
+            await asyncio.sleep(max(0.0, self._due(instrument) - self._clock.now()))
+            async with self._lock:
+                await self._poll(instrument)
+
+    async def command(self, sensor: Sensor, name: str) -> None:
+        """Send a command to one of its instruments between two polls, and see it obeyed."""
+        instrument = self._own(sensor)
+        command = command_of(instrument, name)
+        await self._wait_until_open()
+        async with self._lock:
+            await send(self._client, instrument, command)
+            sent = self._clock.now()
+        await confirm(instrument, name, sent, self._clock)
+
+    async def identify(self, sensor: Sensor) -> dict[str, float]:
+        """Ask one of its instruments for its serial number and the like."""
+        await self._wait_until_open()
+        async with self._lock:
+            return await identity(self._client, self._own(sensor))
+
+    def room_for(self, sensor: Sensor) -> float:
+        """Readings a second that the line has room for, were this instrument's wish no limit."""
+        mine = self._own(sensor)
+        rates = fair_rates(
+            [inf if item is mine else item.wanted_rate for item in self.sensors], self._times
+        )
+        return rates[self.sensors.index(mine)]
+
+    def close(self) -> None:
+        """Close the line and poll no more."""
+        self._closing = True
+        self._client.close()
+
+    async def _wait_until_open(self) -> None:
+        """Give a line that is being opened its time; the client refuses where it stays shut."""
+        deadline = self._clock.now() + _OPENING
+        while not self._client.connected and self._clock.now() < deadline:
+            await asyncio.sleep(_POLL)
+
+    def _own(self, sensor: Sensor) -> Instrument:
+        return next(item for item in self.sensors if item is sensor)
+
+    def _due(self, instrument: Instrument) -> float:
+        """When to ask it next; silent ones wait for each other too."""
+        return max(instrument.due, self._next_probe) if instrument.dead else instrument.due
+
+    async def _poll(self, instrument: Instrument) -> None:
+        probe = instrument.dead
+        await instrument.poll(self._client)
+        if probe:
+            self._next_probe = self._clock.now() + _PROBE_SHARE * self._spec.timeout
+        if self._gap:
+            await asyncio.sleep(self._gap)
+
+    async def _connect(self) -> bool:
+        try:
+            await self._client.connect()
+        except ConnectionLost as error:
+            for instrument in self.sensors:
+                instrument.lost(error)
+            return False
+        for instrument in self.sensors:
+            instrument.reconnected(again=self._opened)
+        self._opened = True
+        return True
+
+    def _share_out(self) -> None:
+        """Give every instrument the rate that the line has room for."""
+        rates = fair_rates([item.wanted_rate for item in self.sensors], self._times)
+        for item, rate in zip(self.sensors, rates, strict=True):
+            item.on_line(
+                1 / rate,
+                wire_times(item.decoder.spec, self._spec),
+                tagged=self._spec.kind == "modbus-tcp",
+            )

@@ -1,0 +1,84 @@
+"""Turns what a device says into readings: calibrated, judged, counted and handed out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from winchkit.drivers.counters import Tally
+from winchkit.drivers.host_scale import HostScale
+from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.stillness import Stillness
+
+__all__ = ["Publisher", "Sampled"]
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """When a device was asked, when it answered, and within what interval it sampled, s."""
+
+    t_request: float
+    t_receive: float
+    earliest: float
+    latest: float
+
+
+def _never() -> bool:
+    return False
+
+
+class Publisher:
+    """The readings of one instrument; ``publish`` for one thread, everything else to be read."""
+
+    def __init__(self, rate: float) -> None:
+        """``rate`` is the device's, in conversions a second."""
+        self.tally = Tally()
+        self.scale = HostScale()
+        """What the host makes of the device's value; may be replaced at any time."""
+        self.moving: Callable[[], bool] = _never
+        """Whether the winch moves now, so that the counts should move as well."""
+        self.latest: Reading | None = None
+        self.listeners: list[Callable[[Reading], None]] = []
+        self._rate = rate
+        self._stillness = Stillness()
+
+    def publish(
+        self, value: float, gross: float, counts: float, quality: Quality, when: Sampled
+    ) -> Reading:
+        """Make a reading of what the device says (SI), judge it and tell the listeners.
+
+        Without a value (NaN) or with a flag that makes it unusable it is NaN.
+        """
+        before = self.latest
+        if before is not None and counts == before.raw:
+            quality |= Quality.DUPLICATE
+            self.tally.duplicates += 1
+        if self._frozen(counts, before, when):
+            quality |= Quality.FROZEN
+        if not math.isfinite(value):
+            quality |= Quality.FAULT if quality.usable else Quality.GOOD
+        net = total = math.nan
+        if quality.usable:
+            net, total = self.scale.apply(value, gross)
+        reading = Reading(
+            net,
+            total,
+            counts,
+            quality,
+            when.t_request,
+            when.t_receive,
+            t_sample=(when.earliest + when.latest) / 2,
+            t_uncertainty=(when.latest - when.earliest) / 2,
+        )
+        self.tally.reading(when.t_receive, when.t_receive - when.t_request)
+        self.latest = reading
+        for listener in self.listeners:
+            listener(reading)
+        return reading
+
+    def _frozen(self, counts: float, before: Reading | None, when: Sampled) -> bool:
+        if before is None or not math.isfinite(counts):
+            return False
+        conversions = (when.t_receive - before.t_receive) * self._rate
+        return self._stillness.frozen(counts, conversions, self.moving())

@@ -1,0 +1,100 @@
+"""What an instrument says: a reading with its flags, and how the bench sees any instrument."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Flag, auto
+from typing import Protocol
+
+from winchkit.drivers.counters import Counters
+from winchkit.errors import ConnectionLost
+
+__all__ = ["Counters", "Quality", "Reading", "Sensor"]
+
+
+class Quality(Flag):
+    """What is to be said against a reading; GOOD is nothing."""
+
+    GOOD = 0
+    OVERLOAD = auto()
+    UNDERLOAD = auto()
+    UNSTABLE = auto()
+    FAULT = auto()
+    DUPLICATE = auto()
+    """The same count as before: perhaps the same conversion, read twice."""
+    LATE = auto()
+    """The reply took so long that the moment of sampling is uncertain."""
+    STALE = auto()
+    """The device itself says that it has no new value."""
+    FROZEN = auto()
+    """The raw counts stand still while they should not."""
+    MISMATCH = auto()
+    """Status and value contradict each other, e.g. for a wrong word order in the device file."""
+
+    @property
+    def usable(self) -> bool:
+        """Whether the value is a measurement at all."""
+        return not self & _UNUSABLE
+
+    def __str__(self) -> str:
+        return ", ".join(flag.name.lower() for flag in self if flag.name) or "good"
+
+
+_UNUSABLE = (
+    Quality.OVERLOAD
+    | Quality.UNDERLOAD
+    | Quality.FAULT
+    | Quality.STALE
+    | Quality.FROZEN
+    | Quality.MISMATCH
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One answer of an instrument; times are on the bench's clock, s."""
+
+    value: float
+    """Net, calibrated, SI; NaN where the flags say that it is no measurement."""
+    gross: float
+    """Calibrated value before any tare, the device's or the host's."""
+    raw: float
+    """Counts as read, with their sign."""
+    quality: Quality
+    t_request: float
+    t_receive: float
+    t_sample: float
+    """Estimate of the moment that the value belongs to: wire, conversion and filter taken off."""
+    t_uncertainty: float
+    """Half the interval in which that moment lies, s."""
+
+
+class Sensor(Protocol):
+    """An instrument as the bench sees it, whatever line it is on."""
+
+    name: str
+    period: float
+    """Between two readings, s."""
+    max_age: float
+    """A reading older than this is stale, s."""
+
+    @property
+    def latest(self) -> Reading | None:
+        """Newest reading; other threads read it."""
+
+    @property
+    def problem(self) -> ConnectionLost | None:
+        """Why there is no new reading, while there is none."""
+
+    @property
+    def listeners(self) -> list[Callable[[Reading], None]]:
+        """Called with every reading, on the thread of the slow devices."""
+
+    @property
+    def counters(self) -> Counters:
+        """What happened since the start."""
+
+    @property
+    def tared(self) -> bool | None:
+        """Whether the device says that it shows a net value; None where it does not say."""

@@ -1,0 +1,104 @@
+"""All slow devices on one asyncio thread, each line served by a coroutine of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Coroutine, Sequence
+from concurrent.futures import TimeoutError as FutureTimeout
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+from winchkit.drivers.reading import Sensor
+from winchkit.errors import NoReply
+
+__all__ = ["Identifying", "SlowDevices", "SlowLine"]
+
+T = TypeVar("T")
+_COMMAND_TIME = 5.0
+
+
+class SlowLine(Protocol):
+    """One line with what hangs on it; its coroutines run on the thread of the slow devices."""
+
+    name: str
+
+    @property
+    def sensors(self) -> Sequence[Sensor]:
+        """What hangs on it."""
+
+    async def serve(self) -> None:
+        """Keep the readings of its sensors new until cancelled or closed."""
+
+    async def command(self, sensor: Sensor, name: str) -> None:
+        """Send a command of the device file, e.g. ``tare``, and wait for the device's answer."""
+
+    def close(self) -> None:
+        """Let the port go; ``serve`` returns soon."""
+
+
+@runtime_checkable
+class Identifying(Protocol):
+    """A line whose instruments can say who they are."""
+
+    async def identify(self, sensor: Sensor) -> dict[str, float]:
+        """Serial number and the like, by name."""
+
+
+class SlowDevices:
+    """Serves every line from one thread until closed."""
+
+    def __init__(self, lines: Sequence[SlowLine]) -> None:
+        """Start serving at once; devices that are silent are tried again."""
+        self._loop = asyncio.new_event_loop()
+        self._lines = tuple(lines)
+        self._line_of = {id(sensor): line for line in lines for sensor in line.sensors}
+        self._failure: Exception | None = None
+        self._thread = threading.Thread(target=self._run, name="slow-devices", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop and close the lines; raises what ended the serving before, if anything."""
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(timeout=3.0)
+        if self._failure is not None:
+            raise self._failure
+
+    def command(self, sensor: Sensor, name: str) -> None:
+        """Send a command to an instrument between two readings and wait for its answer.
+
+        Raises NoReply, DeviceRefused, ConnectionLost, NotPermitted.
+        """
+        self._wait(self._line_of[id(sensor)].command(sensor, name), sensor)
+
+    def identify(self, sensor: Sensor) -> dict[str, float]:
+        """What an instrument says of itself, e.g. its serial number; raises as ``command``."""
+        line = self._line_of[id(sensor)]
+        if not isinstance(line, Identifying):
+            return {}
+        return self._wait(line.identify(sensor), sensor)
+
+    def _wait(self, coroutine: Coroutine[Any, Any, T], sensor: Sensor) -> T:
+        future = asyncio.run_coroutine_threadsafe(coroutine, self._loop)
+        try:
+            return future.result(_COMMAND_TIME)
+        except FutureTimeout:
+            if future.done():
+                raise  # the device's own NoReply, which is a TimeoutError too
+            future.cancel()
+            raise NoReply(
+                f"{sensor.name}: no answer to a command within {_COMMAND_TIME:g} s; "
+                "look at the line's other devices"
+            ) from None
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        tasks = [self._loop.create_task(line.serve()) for line in self._lines]
+        self._loop.run_forever()
+        for line in self._lines:
+            line.close()
+        for task in tasks:
+            task.cancel()
+        ended = self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        self._failure = next((item for item in ended if isinstance(item, Exception)), None)
+        self._loop.run_until_complete(asyncio.sleep(0.01))
+        self._loop.close()

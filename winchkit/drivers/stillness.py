@@ -1,0 +1,87 @@
+"""Tells an instrument that hangs from one that is merely quiet, by its raw counts.
+
+Counts that stand still prove nothing by themselves: a good cell at rest shows the same number for
+minutes. They prove something where this very instrument, in this very state (at rest or moving),
+has never been so quiet before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+__all__ = ["Stillness"]
+
+_BLOCK = 40
+"""Trials in a block. With a noise of one count a block alike throughout has a chance of 4e-16."""
+_BLOCKS = 10
+_NOISE = 1.0
+"""Counts; below it a value in the middle of a step may stand for ever."""
+_MOVING, _UNKNOWN, _KNOWN = 200, 1000, 100
+"""Trials alike that are too many while the winch moves: for a cell whose counts were seen to move
+then for at least so many trials, and for one of which nothing is known, perhaps a coarse one."""
+_MARGIN = 2
+
+
+@dataclass(slots=True)
+class _State:
+    """What is known of the counts in one state, at rest or moving."""
+
+    noisy: int = 0
+    """Blocks seen, every one of them noisy."""
+    quiet: bool = False
+    """Whether a block was ever quiet and ended by itself."""
+    longest: float = 0.0
+    """Trials alike that ended by themselves."""
+    seen: float = 0.0
+    """Trials in all that ended in a change."""
+    squares: float = 0.0
+    trials: float = 0.0
+
+    def learn(self, change: float, run: float) -> None:
+        """Take in a change of the counts after a run of ``run`` trials alike."""
+        self.longest = max(self.longest, run)
+        self.seen += run
+        self.quiet |= run >= _BLOCK
+        self.squares += change * change / 2
+        self.trials += run
+        if self.trials < _BLOCK:
+            return
+        if self.squares < _NOISE**2 * self.trials:
+            self.quiet = True
+        else:
+            self.noisy += 1
+        self.squares = self.trials = 0.0
+
+    def too_long(self, run: float, moving: bool) -> bool:
+        """Whether so many trials alike cannot be."""
+        if not self.quiet and self.noisy >= _BLOCKS and run >= _BLOCK:
+            return True
+        known = self.seen >= _KNOWN
+        return moving and run >= max(_MOVING if known else _UNKNOWN, _MARGIN * self.longest)
+
+
+@dataclass(slots=True)
+class Stillness:
+    """Fed with every count; says whether they stand still while they should not."""
+
+    _states: dict[bool, _State] = field(default_factory=lambda: {True: _State(), False: _State()})
+    _last: float | None = None
+    _run: float = 0.0
+    _moving: bool = False
+
+    def frozen(self, counts: float, conversions: float, moving: bool) -> bool:
+        """Take in the next counts, ``conversions`` after the ones before them.
+
+        Several readings of one conversion count as one trial, conversions that nobody read not
+        at all.
+        """
+        trial = min(1.0, conversions)
+        if moving != self._moving:
+            self._moving, self._run = moving, 0.0
+        if self._last is None or counts != self._last:
+            if self._last is not None:
+                self._states[moving].learn(counts - self._last, self._run + trial)
+            self._last, self._run = counts, 0.0
+            return False
+        self._run += trial
+        return self._states[moving].too_long(self._run, moving)

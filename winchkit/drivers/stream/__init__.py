@@ -1,0 +1,1 @@
+"""Instruments on serial lines: bytes to readings, the port, and the line that is served."""

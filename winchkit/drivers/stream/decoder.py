@@ -1,0 +1,224 @@
+"""One frame turned into a value in SI or NaN, with flags; no number is ever guessed."""
+
+from __future__ import annotations
+
+import math
+import re
+from enum import Enum, auto
+from functools import reduce
+from operator import xor
+from typing import NamedTuple
+
+from winchkit.drivers.reading import Quality
+from winchkit.drivers.stream.matcher import Match, Matcher, fits
+from winchkit.errors import Fault, FileError
+from winchkit.schema.device_stream import ChecksumSpec, Says, StreamSpec
+from winchkit.schema.template import parts_of
+from winchkit.units import convert
+
+__all__ = ["Decoded", "Decoder", "Heard", "Meaning", "check_sum"]
+
+_NUMBER = re.compile(r" *[+-]? *(?:[0-9]+\.?[0-9]*|\.[0-9]+) *")
+_PADDING = " _"
+_FLAGS: dict[Says, Quality] = {
+    "overload": Quality.OVERLOAD,
+    "underload": Quality.UNDERLOAD,
+    "fault": Quality.FAULT,
+    "unstable": Quality.UNSTABLE,
+    "stale": Quality.STALE,
+}
+
+
+class Meaning(Enum):
+    """What a frame was."""
+
+    READING = auto()
+    STATUS = auto()
+    """Status bits without a value."""
+    ANSWER = auto()
+    """The answer to a command."""
+    BUSY = auto()
+    REFUSED = auto()
+    MALFORMED = auto()
+    BAD_CHECKSUM = auto()
+
+
+class Decoded(NamedTuple):
+    """What a frame says."""
+
+    value: float
+    gross: float
+    counts: float
+    quality: Quality
+    net: bool | None = None
+    """Whether it is a net value, None where the frame does not say."""
+
+
+class Heard(NamedTuple):
+    """A frame and what it was; ``before`` are the bytes of garbage in front of it."""
+
+    meaning: Meaning
+    text: str
+    decoded: Decoded | None = None
+    before: int = 0
+
+
+NOTHING = Decoded(math.nan, math.nan, math.nan, Quality.GOOD)
+
+
+class Decoder:
+    """Reads the frames of one kind of device."""
+
+    def __init__(
+        self, spec: StreamSpec, path: str, *, address: int | None = None, frames: tuple[str, ...]
+    ) -> None:
+        """``frames`` are the templates to expect; FileError where the file contradicts itself."""
+        self._spec = spec
+        self._address = address
+        self._matchers = [Matcher(parts_of(text)) for text in frames]
+        asked = (*spec.start, *spec.command.values(), *((spec.select,) if spec.select else ()))
+        self._answers = [pattern for one in asked for pattern in one.answer]
+        self._words = {text.strip(_PADDING): says for text, says in spec.words.items()}
+        dimension = spec.dimension()
+        if dimension is None:
+            raise FileError(Fault(f"unknown unit '{spec.unit}'", path, key="stream.unit"))
+        self.dimension = dimension
+        self._masks = {says: sum(1 << bit for bit in bits) for says, bits in spec.bits.items()}
+
+    def binary(self, data: bytes) -> Heard:
+        """A frame of bytes."""
+        layout = self._spec.binary
+        assert layout is not None, "the schema gives a binary frame its layout"
+        first, size = layout.value
+        counts = float(int.from_bytes(data[first : first + size], layout.order, signed=True))
+        said: list[Says] = [] if layout.bits is None else self._in_bits(data[layout.bits])
+        return Heard(Meaning.READING, data.hex(), self._measured(said, counts, counts, ""))
+
+    def line(self, data: bytes) -> Heard:
+        """A line of text."""
+        text = data.decode("latin-1")
+        bare = text.strip()
+        reply = fits(bare, self._spec.replies)
+        if reply is not None:
+            return self._reply(bare, self._spec.replies[reply])
+        if fits(bare, self._answers) is not None:
+            return Heard(Meaning.ANSWER, bare)
+        spoilt = Meaning.MALFORMED
+        for matcher in self._matchers:
+            match = matcher.match(text)
+            if match is None:
+                continue
+            if not self._is_whole(match):
+                spoilt = Meaning.BAD_CHECKSUM
+                continue
+            decoded = self._fields(match.fields)
+            if decoded is not None:
+                kind = Meaning.READING if "value" in match.fields else Meaning.STATUS
+                return Heard(kind, match.text, decoded, match.before)
+        return Heard(spoilt, text)
+
+    def _reply(self, text: str, says: Says) -> Heard:
+        if says == "busy":
+            return Heard(Meaning.BUSY, text)
+        if says == "refused":
+            return Heard(Meaning.REFUSED, text)
+        return Heard(Meaning.READING, text, NOTHING._replace(quality=self._quality([says])))
+
+    def _is_whole(self, match: Match) -> bool:
+        spec = self._spec.checksum
+        if spec is None or "checksum" not in match.fields:
+            return True
+        said = match.fields["checksum"].upper()
+        return said == f"{check_sum(spec, match.text, len(match.fields['checksum'])):02X}"
+
+    def _fields(self, fields: dict[str, str]) -> Decoded | None:
+        """What the fields say, None where one of them says nothing that is known."""
+        address = fields.get("address")
+        if address is not None and not self._is_mine(address):
+            return None
+        said: list[Says] = []
+        for name, letters in self._spec.letter.items():
+            if name in fields:
+                says = letters.get(fields[name].strip())
+                if says is None:
+                    return None
+                said.append(says)
+        if "bits" in fields:
+            bits = _number(fields["bits"])
+            if not bits.is_integer() or not 0 <= bits < 1 << 32:
+                return None
+            said += self._in_bits(int(bits))
+        if "value" not in fields:
+            return NOTHING._replace(quality=self._quality(said))
+        return self._numbers(fields, said)
+
+    def _numbers(self, fields: dict[str, str], said: list[Says]) -> Decoded | None:
+        words = [self._word(fields[name], fields) for name in ("value", "gross") if name in fields]
+        said += [word for word in words if word is not None]
+        counts = _number(fields["value"])
+        gross = _number(fields.get("gross", fields["value"]))
+        if self._quality(said).usable and not (math.isfinite(counts) and math.isfinite(gross)):
+            return None
+        unit = fields.get("unit", "").strip()
+        if self._spec.units and unit not in self._spec.units and self._quality(said).usable:
+            return None
+        return self._measured(said, counts, gross, unit)
+
+    def _word(self, digits: str, fields: dict[str, str]) -> Says | None:
+        """What a text in place of the digits says; one that a check sum vouches for is a fault."""
+        text = digits.strip(_PADDING)
+        if text in self._words:
+            return self._words[text]
+        known = math.isfinite(_number(digits))
+        return "fault" if "checksum" in fields and not known else None
+
+    def _is_mine(self, address: str) -> bool:
+        text = address.strip()
+        known = text.isascii() and text.isdecimal()
+        return known and self._address in (None, int(text))
+
+    def _in_bits(self, bits: int) -> list[Says]:
+        said = [says for says, mask in self._masks.items() if bits & mask]
+        if "stable" in self._masks and "stable" not in said:
+            said.append("unstable")
+        if "net" in self._masks and "net" not in said:
+            said.append("gross")
+        return said
+
+    def _measured(self, said: list[Says], counts: float, gross: float, unit: str) -> Decoded:
+        quality = self._quality(said)
+        capacity = self._spec.capacity
+        if capacity is not None and abs(counts) > capacity:
+            quality |= Quality.OVERLOAD
+        net = "net" in said if "net" in said or "gross" in said else None
+        if not quality.usable:
+            return Decoded(math.nan, math.nan, counts, quality, net)
+        return Decoded(self._si(counts, unit), self._si(gross, unit), counts, quality, net)
+
+    def _si(self, number: float, unit: str) -> float:
+        one = self._spec.units.get(unit, self._spec)
+        return convert(number * one.scale, one.unit, self.dimension)
+
+    def _quality(self, said: list[Says]) -> Quality:
+        return reduce(lambda all_, says: all_ | _FLAGS.get(says, Quality.GOOD), said, Quality.GOOD)
+
+
+def check_sum(spec: ChecksumSpec, text: str, digits: int) -> int:
+    """Check sum (one byte) of a line that ends with, or has between its marks, its digits.
+
+    Source: the manuals; Laumas XORs what stands between ``&`` and ``\\``, both excluded.
+    """
+    start = text.find(spec.after) + 1 if spec.after else 0
+    end = text.rfind(spec.before) if spec.before else len(text) - digits
+    data = text[start:end].encode("latin-1")
+    if spec.kind == "xor":
+        return reduce(xor, data, 0)
+    total = sum(data) & 0xFF
+    return total if spec.kind == "sum" else ~total & 0xFF
+
+
+def _number(text: str) -> float:
+    """A decimal number, NaN where the text is none."""
+    if _NUMBER.fullmatch(text) is None:
+        return math.nan
+    return float(text.replace(" ", ""))

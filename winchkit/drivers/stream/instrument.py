@@ -1,0 +1,189 @@
+"""One instrument on a serial line: what it says becomes readings, and is counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.publisher import Publisher, Sampled
+from winchkit.drivers.reading import Counters, Quality, Reading
+from winchkit.drivers.stream.decoder import Decoded
+from winchkit.drivers.stream.parser import (
+    Item,
+    StreamParser,
+    asking_whether_fresh,
+    stream_of,
+    talking,
+)
+from winchkit.errors import ConnectionLost
+from winchkit.schema.device import DeviceSpec
+
+__all__ = ["StreamInstrument", "Wire"]
+
+_STALE_TIMEOUTS = 2
+"""One lost answer is no reason to stop a winch, two are."""
+_RETRY = 0.5
+_QUICK_RETRIES = 2
+_LATE = 0.02
+_JITTER = 0.8
+"""Two frames come at least this share of a conversion apart."""
+
+
+class Wire(Protocol):
+    """What a line says about the times on it, s."""
+
+    @property
+    def byte_time(self) -> float:
+        """Of one character with its start, parity and stop bits."""
+
+    @property
+    def latency(self) -> float:
+        """How late the port hands bytes over."""
+
+
+class StreamInstrument:
+    """An instrument that sends frames. ``latest`` is what other threads read."""
+
+    def __init__(
+        self,
+        name: str,
+        device: DeviceSpec,
+        address: int | None,
+        clock: Clock,
+        *,
+        rate: float,
+        timeout: float,
+    ) -> None:
+        """Poll at ``rate`` readings a second, or at the device's own rate where that is lower.
+
+        ``timeout`` (s) is the line's for one answer. FileError where the file contradicts itself.
+        """
+        self.name = name
+        self.address = address
+        self.spec = spec = stream_of(device)
+        self.parser = StreamParser(device, address)
+        self.talk = StreamParser(talking(device), address)
+        """Reads the answers to commands."""
+        self.fresh = StreamParser(asking_whether_fresh(device), address) if spec.fresh else None
+        wanted = rate if spec.mode == "polled" else spec.rate
+        self.period = 1.0 / min(wanted, spec.rate)
+        self.max_age = max(_STALE_TIMEOUTS * timeout, 5 * self.period)
+        """A reading older than this is stale, s."""
+        self.publisher = Publisher(spec.rate)
+        self.problem: ConnectionLost | None = None
+        """Why there is no new reading, while there is none."""
+        self.due = clock.now()
+        self.started = False
+        """Whether it was told what to send."""
+        self._clock = clock
+        self._failures = 0
+        self._net: bool | None = None
+        self._flags = Quality.GOOD
+        self._chunk_at = clock.now()
+        self._least_step = _JITTER / spec.rate
+
+    @property
+    def latest(self) -> Reading | None:
+        """Newest reading."""
+        return self.publisher.latest
+
+    @property
+    def listeners(self) -> list[Callable[[Reading], None]]:
+        """Called with every reading, on the thread of the slow devices."""
+        return self.publisher.listeners
+
+    @property
+    def counters(self) -> Counters:
+        """What happened since the start."""
+        tally = self.publisher.tally
+        parsers = [self.parser, self.talk, *([self.fresh] if self.fresh else [])]
+        counts = [parser.counts for parser in parsers]
+        tally.crc = sum(one.bad_checksums for one in counts)
+        tally.malformed = sum(one.malformed for one in counts)
+        tally.resynchronised = sum(one.resynchronised for one in counts)
+        return tally.counters(self._clock.now())
+
+    @property
+    def tared(self) -> bool | None:
+        """Whether the device says that it shows a net value; None where it does not say."""
+        return self._net
+
+    def text(self, template: str) -> bytes:
+        """What to send, the address put in."""
+        return template.format(address=_Address(self.address or 0)).encode("latin-1")
+
+    def took(self, decoded: Decoded) -> None:
+        """Keep the status that a device gives beside its next value."""
+        self._flags = decoded.quality
+
+    def answered(self, item: Item, t_request: float, t_chunk: float, wire: Wire) -> None:
+        """Publish the answer to a request: what was converted last when it was sent."""
+        t_receive = max(t_request, t_chunk - item.behind * wire.byte_time)
+        earliest = t_request - 1.0 / self.spec.rate
+        latest = max(t_request, t_receive - item.size * wire.byte_time)
+        late = Quality.LATE if t_receive - t_request > _LATE else Quality.GOOD
+        self._publish(item, self._sampled(t_request, t_receive, earliest, latest), late)
+
+    def sent(self, items: list[Item], t_chunk: float, wire: Wire) -> None:
+        """Publish the frames of one chunk that the device sent by itself.
+
+        Several at once mean that host or adapter held them back: all that is known then is that
+        they came after the chunk before, one conversion after the other.
+        """
+        held_since, self._chunk_at = self._chunk_at, t_chunk
+        newest_first = []
+        for after, item in enumerate(reversed(items)):
+            t_receive = t_chunk - max(item.behind * wire.byte_time, after * self._least_step)
+            began = t_receive - item.size * wire.byte_time
+            earliest = began - wire.latency - wire.byte_time
+            if len(items) > 1:
+                earliest = min(earliest, held_since - wire.latency)
+            newest_first.append((item, self._sampled(began, t_receive, earliest, began)))
+        for item, when in reversed(newest_first):
+            self._publish(item, when, Quality.GOOD)
+
+    def _sampled(
+        self, t_request: float, t_receive: float, earliest: float, latest: float
+    ) -> Sampled:
+        """Wire and port are taken off already, the filter now."""
+        delay = self.spec.filter_delay
+        return Sampled(t_request, t_receive, earliest - delay, latest - delay)
+
+    def _publish(self, item: Item, when: Sampled, late: Quality) -> None:
+        decoded = item.heard.decoded
+        assert decoded is not None, "a frame that is a reading says something"
+        quality = decoded.quality | self._flags | late
+        self._flags = Quality.GOOD
+        if decoded.net is not None:
+            self._net = decoded.net
+        self.problem, self._failures = None, 0
+        self.publisher.publish(decoded.value, decoded.gross, decoded.counts, quality, when)
+
+    def failed(self, error: ConnectionLost, *, timeout: bool) -> None:
+        """Keep and count a failure; one that fails again and again is asked less often."""
+        tally = self.publisher.tally
+        tally.drops += 1
+        tally.timeouts += timeout
+        self.problem = error
+        self._failures += 1
+        often = self._failures > _QUICK_RETRIES
+        if often:
+            self.started = False
+        self.due = self._clock.now() + (_RETRY if often else 0.0)
+
+    def refused(self, error: ConnectionLost) -> None:
+        """Keep and count an answer that is a refusal."""
+        self.publisher.tally.exceptions += 1
+        self.problem = error
+        self.due = self._clock.now() + self.period
+
+
+class _Address:
+    """An address in a template: ``{address:3}`` is three digits."""
+
+    def __init__(self, value: int) -> None:
+        self._value = value
+
+    def __format__(self, width: str) -> str:
+        return f"{self._value:0{width}d}" if width else str(self._value)

@@ -1,0 +1,123 @@
+"""Bytes in, what they say out: incremental, and the same for any cutting into chunks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from winchkit.drivers.stream.decoder import Decoder, Heard, Meaning
+from winchkit.drivers.stream.framing import framing_of
+from winchkit.errors import Fault, FileError
+from winchkit.schema.device import DeviceSpec
+from winchkit.schema.device_stream import StreamSpec
+
+__all__ = [
+    "Item",
+    "ParserCounts",
+    "StreamParser",
+    "asking_whether_fresh",
+    "stream_of",
+    "talking",
+]
+
+
+@dataclass(slots=True)
+class ParserCounts:
+    """What came so far. Bytes fed = framed + spoilt + resynchronised + those still pending."""
+
+    framed: int = 0
+    """Bytes of frames that said something."""
+    spoilt: int = 0
+    """Bytes of frames with a wrong check sum or that were malformed."""
+    resynchronised: int = 0
+    """Bytes that belonged to no frame."""
+    bad_checksums: int = 0
+    malformed: int = 0
+    words: int = 0
+    """Frames that said why there is no value."""
+
+
+class Item(NamedTuple):
+    """A frame that said something."""
+
+    heard: Heard
+    behind: int
+    """Bytes of the same chunk that came after it."""
+    size: int
+    """Its bytes on the wire."""
+
+
+class StreamParser:
+    """Reads what one device sends. Never raises, whatever comes."""
+
+    def __init__(self, device: DeviceSpec, address: int | None = None) -> None:
+        """Raise FileError where the device file contradicts itself."""
+        self.spec = spec = stream_of(device)
+        self.counts = ParserCounts()
+        self.decoder = Decoder(spec, device.path, address=address, frames=spec.frame)
+        self._framing = framing_of(spec)
+        self._before = 0
+
+    @property
+    def pending(self) -> int:
+        """Bytes of a frame that is not whole yet."""
+        return self._framing.pending
+
+    def begin(self, *, sure: bool = True) -> None:
+        """Forget what is half; ``sure`` where a frame begins with the next byte.
+
+        After a request it does; a line that listens must first hear one end.
+        """
+        self._framing.begin(sure=sure)
+        self._count_skipped()
+
+    def feed(self, data: bytes) -> list[Item]:
+        """Frames that are whole now and say something, in order."""
+        found = []
+        for piece in self._framing.feed(data):
+            if piece.broken:
+                heard = Heard(Meaning.MALFORMED, piece.data.hex())
+            elif self.spec.binary is not None:
+                heard = self.decoder.binary(piece.data)
+            else:
+                heard = self.decoder.line(piece.data)
+            if self._count(heard, piece.size):
+                found.append(Item(heard, piece.behind, piece.size - heard.before))
+        self._count_skipped()
+        return found
+
+    def _count(self, heard: Heard, size: int) -> bool:
+        """Whether the frame says something."""
+        counts = self.counts
+        if heard.meaning in (Meaning.MALFORMED, Meaning.BAD_CHECKSUM):
+            counts.spoilt += size
+            counts.malformed += heard.meaning is Meaning.MALFORMED
+            counts.bad_checksums += heard.meaning is Meaning.BAD_CHECKSUM
+            return False
+        self._before += heard.before
+        counts.framed += size - heard.before
+        counts.words += heard.decoded is not None and not heard.decoded.quality.usable
+        return True
+
+    def _count_skipped(self) -> None:
+        self.counts.resynchronised = self._framing.resynchronised + self._before
+
+
+def stream_of(device: DeviceSpec) -> StreamSpec:
+    """The table [stream] of a device file; raises FileError where there is none."""
+    if device.stream is None:
+        raise FileError(Fault("is no instrument on a serial line", device.path))
+    return device.stream
+
+
+def asking_whether_fresh(device: DeviceSpec) -> DeviceSpec:
+    """The device as it answers the question whether there is a new value."""
+    spec = stream_of(device)
+    assert spec.fresh is not None, "asked of devices that have the question"
+    return replace(device, stream=replace(spec, frame=(spec.fresh.frame,), binary=None))
+
+
+def talking(device: DeviceSpec) -> DeviceSpec:
+    """The device as it answers commands: in lines, also where its frames are binary."""
+    spec = stream_of(device)
+    return device if spec.binary is None else replace(device, stream=replace(spec, binary=None))

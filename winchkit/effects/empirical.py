@@ -1,0 +1,132 @@
+"""Empirical effects: a curve over one variable, for what is there and is not understood.
+
+They are no candidates of a diagnosis, since a curve over something fits anything. A user adds one
+by name to see what it would buy, until the physics behind it is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.effects.effect import Effect, Need, Output, Parameter, Values
+from winchkit.model.stages import At, Stage
+from winchkit.model.variables import ANGLES, VARIABLE_UNITS, VARIABLES
+
+__all__ = ["EMPIRICAL", "KNOTS", "empirical_id", "knots", "placed", "variable_of"]
+
+Array = NDArray[np.float64]
+KNOTS = 9
+_ORDERS = tuple(float(order) for order in range(1, 41))
+_BOUND = 1e6
+_AT: Mapping[Output, tuple[Stage, str, float]] = {
+    "cable_length": (Stage.LENGTH_INSTRUMENT, "m", 1e-4),
+    "tension": (Stage.CELL, "N", 0.5),
+    "motor_torque": (Stage.TORQUE_SIGNAL, "N m", 5e-3),
+}
+"""Where a curve is added, its unit, and a usual size of it."""
+_NEEDS: Mapping[str, tuple[Need, ...]] = {
+    "load": ("rope_force",),
+    "tension": ("rope_force",),
+    "temperature": ("temperature",),
+}
+
+
+def empirical_id(output: str, variable: str) -> str:
+    """How the curve of an output over a variable is called."""
+    return f"empirical-{output}-{variable}".replace("_", "-")
+
+
+def variable_of(effect: Effect) -> str:
+    """The variable of an empirical effect."""
+    return next(v for o in _AT for v in VARIABLES if empirical_id(o, v) == effect.id)
+
+
+def knots(values: Values) -> Array:
+    """Where the curve's values stand, (KNOTS,)."""
+    return np.linspace(values["low"], values["high"], KNOTS)
+
+
+def placed(effect: Effect, low: float, high: float) -> Effect:
+    """A spline over the range that data cover; an effect over an angle as it is."""
+    ends = {"low": (low,), "high": (high,)}
+    parameters = tuple(replace(p, grid=ends.get(p.name, p.grid)) for p in effect.parameters)
+    return replace(effect, parameters=parameters)
+
+
+def _over_turns(output: Output, variable: str) -> Effect:
+    _, unit, typical = _AT[output]
+
+    def apply(value: Array, at: At, values: Values) -> Array:
+        turned = values["order"] * VARIABLES[variable](at) + values["phase"]
+        return value + values["amplitude"] * np.sin(turned)
+
+    plain = _plain(output, variable, "a sin(k x + p)")
+    return replace(
+        plain,
+        apply=apply,
+        parameters=(
+            Parameter("amplitude", unit, null=0.0, typical=typical, low=0.0, high=_BOUND),
+            Parameter("phase", "rad", null=0.0, typical=1.0),
+            Parameter(
+                "order", "1", null=1.0, typical=1.0, low=1.0, high=1000.0,
+                role="shape", grid=_ORDERS, whole=True,
+            ),
+        ),
+        polar=("amplitude", "phase"),
+    )  # fmt: skip
+
+
+def _spline(output: Output, variable: str) -> Effect:
+    _, unit, typical = _AT[output]
+    names = [f"value_{index}" for index in range(1, KNOTS + 1)]
+
+    def apply(value: Array, at: At, values: Values) -> Array:
+        curve = np.array([values[name] for name in names])
+        if not curve.any():
+            return value
+        added: Array = np.interp(VARIABLES[variable](at), knots(values), curve)
+        return value + added
+
+    own = VARIABLE_UNITS[variable]
+    ends = tuple(
+        Parameter(name, own, null=null, typical=1.0, role="shape", whole=True)
+        for name, null in (("low", 0.0), ("high", 1.0))
+    )
+    sizes = tuple(
+        Parameter(name, unit, null=0.0, typical=typical, low=-_BOUND, high=_BOUND) for name in names
+    )
+    plain = _plain(output, variable, f"straight lines between {KNOTS} values from low to high")
+    return replace(plain, apply=apply, parameters=(*ends, *sizes))
+
+
+def _plain(output: Output, variable: str, formula: str) -> Effect:
+    """Words of an empirical effect."""
+    over = variable.replace("_", " ")
+    return Effect(
+        id=empirical_id(output, variable),
+        stage=_AT[output][0],
+        parameters=(),
+        apply=lambda value, at, values: value,
+        outputs=(output,),
+        what=f"Not understood: a curve over the {over}, as the data have it.",
+        formula=f"x = {over}: {formula}",
+        source="the user's own data; no physics stands behind it",
+        looks_like=f"Whatever the {output.replace('_', ' ')} still shows over the {over}.",
+        told_apart="Find the physics: 'winchkit effects new' writes a file to begin with.",
+        needs=_NEEDS.get(variable, ()),
+        repeatable=True,
+        order=9,
+    )
+
+
+EMPIRICAL: Mapping[str, Effect] = {
+    effect.id: effect
+    for output in _AT
+    for variable in VARIABLES
+    for effect in [(_over_turns if variable in ANGLES else _spline)(output, variable)]
+}
+"""By id, e.g. ``empirical-motor-torque-drum-angle``."""

@@ -1,0 +1,73 @@
+"""Writes a Python file with an effect of a user's own, begun from what the data show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from winchkit.effects.bind import Term
+from winchkit.effects.effect import Effect
+from winchkit.effects.empirical import knots, variable_of
+from winchkit.effects.own_templates import CURVE, DRUM, FOOT, HEAD, WAVE
+from winchkit.errors import Fault, FileError
+from winchkit.model.variables import ANGLES, VARIABLE_UNITS
+
+__all__ = ["write_own", "write_wave_on_drum"]
+
+
+def write_own(term: Term, effect_id: str, path: Path) -> None:
+    """Write an empirical term as a file of a user's own effect.
+
+    Raises FileError where the file is there already or cannot be written.
+    """
+    effect = term.effect
+    facts: dict[str, object] = {
+        "id": effect_id,
+        "file": path.name,
+        "output": effect.outputs[0],
+        "output_words": effect.outputs[0].replace("_", " "),
+        "variable": variable_of(effect),
+        "words": variable_of(effect).replace("_", " "),
+        "stage": effect.stage.name,
+        "needs": repr(tuple(effect.needs)),
+        "own_unit": VARIABLE_UNITS[variable_of(effect)],
+    }
+    body = _wave(effect, term.values) if variable_of(effect) in ANGLES else _curve(term)
+    _write("\n".join((HEAD + body[0], FOOT)).format(**facts, **body[1]), path)
+
+
+def write_wave_on_drum(order: int, effect_id: str, path: Path) -> None:
+    """Write a wave of the wound length as a file of a user's own effect; raises as above."""
+    _write(DRUM.format(id=effect_id, order=order, file=path.name), path)
+
+
+def _write(text: str, path: Path) -> None:
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        message = "is there already; name another file, or remove it first"
+        raise FileError(Fault(message, str(path))) from error
+    except OSError as error:
+        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from error
+
+
+def _wave(effect: Effect, values: Mapping[str, float]) -> tuple[str, dict[str, object]]:
+    size = values["amplitude"]
+    facts: dict[str, object] = {
+        "order": values["order"],
+        "unit": effect.parameter("amplitude").unit,
+        "typical": size,
+        "high": 100 * size,
+    }
+    return WAVE, facts
+
+
+def _curve(term: Term) -> tuple[str, dict[str, object]]:
+    y = [value for name, value in term.values.items() if name.startswith("value_")]
+    facts: dict[str, object] = {
+        "x": [float(f"{x:.6g}") for x in knots(term.values)],
+        "y": [float(f"{v:.6g}") for v in y],
+        "unit": term.effect.parameter("value_1").unit,
+    }
+    return CURVE, facts

@@ -1,0 +1,188 @@
+"""Elongation of a cable robot's ropes, corrected beside kinematics that stay as they are.
+
+The scheme of the IPAnema paper's Fig. 1: from the pose the rope forces are estimated (Eq. 8, its
+sign put right), from these the strain (Eq. 4, 5 or 6), and the rope that is paid out is made
+shorter by what the rope is longer. All is relative to a reference pose, where motors and platform
+were brought together, so that the correction is zero there.
+
+    correction = ElongationCorrection.of(robot, middle_force=500.0)
+    stretch = correction.update(pose)                  # twelve floats, at 1 kHz
+    angles = cycle.motor_angles(pose, stretch.strain)  # φ_IK, less the elongation
+    found = cycle.pose_at([l + d for l, d in zip(drum_lengths, stretch.length)])    # φ_FK
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.errors import UsageError
+from winchkit.model.robot import (
+    PLAIN,
+    ElongationLaw,
+    Linear,
+    Pose,
+    Robot,
+    RobotKernels,
+    approximate_forces,
+    flat_pose,
+    ropes_of,
+)
+
+__all__ = ["ElongationCorrection", "Stretch"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """How much longer the ropes are than at the reference, and why."""
+
+    strain: Any
+    """(n,), of rope and dead length, relative to the reference."""
+    length: Any
+    """δl, (n,), m."""
+    forces: Any
+    """(n,), N, as Eq. 8 estimates them."""
+    good: bool
+    """False where the pose gave no forces or no strain: then all is that of the last good one."""
+    slack: bool
+    """Whether a force is below zero, which Eq. 8 does not exclude and a rope cannot bear."""
+
+
+class ElongationCorrection:
+    """Strain and elongation of every rope at a pose, from a pose and nothing else."""
+
+    __slots__ = (
+        "_array",
+        "_at_reference",
+        "_dead",
+        "_estimate",
+        "_forces",
+        "_initial",
+        "_last",
+        "_laws",
+        "_lines",
+        "_room",
+        "_wrench",
+    )
+
+    def __init__(
+        self,
+        robot: Robot,
+        laws: Sequence[ElongationLaw],
+        reference: Pose,
+        initial: Sequence[float] | Array,
+        *,
+        wrench: Sequence[float] | Array | None = None,
+        kernels: RobotKernels = PLAIN,
+    ) -> None:
+        """Take a law per line, and the forces ``initial`` (n,), N, at the reference pose.
+
+        ``wrench`` on the platform (6,) is constant; the platform's weight at the reference unless
+        told. Raises UsageError where a law has no strain for a force at the reference.
+        """
+        count = len(robot.names)
+        if count < 6:
+            raise UsageError(
+                f"{count} lines: Eq. 8 needs at least six; the forces of a hanging platform come "
+                "from winchkit.model.robot.forward"
+            )
+        for name, found in (("laws", len(laws)), ("initial forces", len(initial))):
+            if found != count:
+                raise UsageError(f"{found} {name} were given for a robot of {count} lines")
+        weight = robot.weight(reference)[0] if wrench is None else np.asarray(wrench, dtype=float)
+        self._laws = [law.strain for law in laws]
+        self._lines = kernels.lines(ropes_of(robot))
+        self._dead = robot.dead_length.tolist()
+        self._estimate, self._room = kernels.forces, kernels.work(count)
+        self._initial = kernels.array(np.asarray(initial, dtype=float).tolist())
+        self._wrench = kernels.array(weight.tolist())
+        self._forces = kernels.array([0.0] * count)
+        self._at_reference = self._strains(robot, reference, kernels)
+        self._array = kernels.array
+        there = self._stretch(kernels.array(flat_pose(reference)))
+        assert there is not None, "forces and strains were just found here"
+        self._last = there
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        *,
+        middle_force: float,
+        reference: Pose | None = None,
+        kernels: RobotKernels = PLAIN,
+    ) -> ElongationCorrection:
+        """Linear ropes from the winches' ``cable.axial_stiffness``, weight balanced at home.
+
+        The forces at the reference pose (home unless told) are those closest to ``middle_force``
+        (N) that balance the platform's weight. Raises UsageError where a stiffness is missing.
+        """
+        laws = []
+        for line, winch in zip(robot.profile.line, robot.winches, strict=True):
+            if winch.cable.axial_stiffness is None:
+                raise UsageError(
+                    f"{robot.profile.name}: line {line.name} has no cable.axial_stiffness; "
+                    "measure it, or hand in a law per line"
+                )
+            laws.append(Linear(winch.cable.axial_stiffness))
+        pose = reference or robot.home
+        middle = np.full(len(laws), middle_force)
+        initial = approximate_forces(robot.structure(pose), robot.weight(pose), middle)[0]
+        return cls(robot, laws, pose, initial, kernels=kernels)
+
+    def update(self, pose: Any) -> Stretch:
+        """Elongation at a pose of twelve floats (position, rotation by rows).
+
+        Where it cannot be found, the last good one stays, so that a command never jumps.
+        """
+        found = self._stretch(pose)
+        if found is None:
+            return replace(self._last, good=False)
+        self._last = found
+        return found
+
+    def _stretch(self, pose: Any) -> Stretch | None:
+        if not self._estimate(
+            self._lines, pose, self._initial, self._wrench, self._room, self._forces
+        ):
+            return None
+        forces = [float(force) for force in self._forces]
+        strains = [
+            law(force) - origin
+            for law, force, origin in zip(self._laws, forces, self._at_reference, strict=True)
+        ]
+        if not isfinite(sum(strains)):
+            return None
+        lengths = [
+            strain * (length + dead)
+            for strain, length, dead in zip(strains, self._room[0][::7], self._dead, strict=True)
+        ]
+        make = self._array
+        return Stretch(make(strains), make(lengths), make(forces), True, min(forces) < 0.0)
+
+    def _strains(self, robot: Robot, reference: Pose, kernels: RobotKernels) -> list[float]:
+        """Strains at the reference, which all others are counted from."""
+        pose = kernels.array(flat_pose(reference))
+        if not self._estimate(
+            self._lines, pose, self._initial, self._wrench, self._room, self._forces
+        ):
+            raise UsageError(
+                f"{robot.profile.name}: the structure matrix is singular at the reference pose, so "
+                "that no rope forces follow from the wrench; choose another pose"
+            )
+        strains = []
+        for name, law, force in zip(robot.names, self._laws, self._forces, strict=True):
+            strains.append(law(float(force)))
+            if not isfinite(strains[-1]):
+                raise UsageError(
+                    f"{robot.profile.name}: line {name}: its elongation law has no strain for "
+                    f"{float(force):.4g} N, its force at the reference pose"
+                )
+        return strains

@@ -1,0 +1,77 @@
+"""Pulley groups: pulleys of one make, which share their friction, and how well it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, isfinite
+
+from winchkit.errors import UsageError
+
+__all__ = [
+    "COVARIANCE_SLOTS",
+    "PULLEY_SLOTS",
+    "PulleyGroup",
+    "flat_covariances",
+    "flat_pulleys",
+]
+
+PULLEY_SLOTS = 5
+"""Of each pulley: cosine of the wrap, μ, σ, β, index of its group."""
+COVARIANCE_SLOTS = 6
+"""Of each group: variances of μ, σ, β, covariances μσ, μβ, σβ."""
+
+
+@dataclass(frozen=True)
+class PulleyGroup:
+    """Pulleys in order from the drum to the platform, with Dahl friction of one kind."""
+
+    wraps: tuple[float, ...]
+    """Wrap angles, rad."""
+    friction: float
+    """μ, 0 to 1."""
+    stiffness: float
+    """σ, N/m."""
+    shape: float = 1.0
+    """β."""
+    covariance: tuple[tuple[float, float, float], ...] = ((0.0,) * 3,) * 3
+    """Of μ, σ and β; zero where they are taken as known."""
+
+    @property
+    def std(self) -> tuple[float, float, float]:
+        """Standard deviations of μ, σ and β."""
+        first, second, third = (self.covariance[k][k] ** 0.5 for k in range(3))
+        return first, second, third
+
+    def check(self) -> None:
+        """Raise UsageError for numbers that no pulley has."""
+        for name, value, low, high in (
+            ("friction", self.friction, 0.0, 1.0),
+            ("stiffness", self.stiffness, 0.0, float("inf")),
+            ("shape", self.shape, 0.0, 10.0),
+        ):
+            if not (isfinite(value) and low <= value < high):
+                raise UsageError(
+                    f"{name} of a pulley group is {value:g}; it must be finite, at least {low:g} "
+                    f"and below {high:g}"
+                )
+        if not self.wraps or not all(isfinite(wrap) and wrap >= 0 for wrap in self.wraps):
+            raise UsageError(f"wraps of a pulley group are {self.wraps}; give at least one, in rad")
+
+
+def flat_pulleys(groups: Sequence[PulleyGroup]) -> list[float]:
+    """Constants of every pulley in a row, as the kernels read them."""
+    flat: list[float] = []
+    for index, group in enumerate(groups):
+        for wrap in group.wraps:
+            flat += [cos(wrap), group.friction, group.stiffness, group.shape, float(index)]
+    return flat
+
+
+def flat_covariances(groups: Sequence[PulleyGroup]) -> list[float]:
+    """Covariances of every group in a row, as the kernels read them."""
+    flat: list[float] = []
+    for group in groups:
+        c = group.covariance
+        flat += [c[0][0], c[1][1], c[2][2], c[0][1], c[0][2], c[1][2]]
+    return flat

@@ -1,0 +1,165 @@
+"""Tension over a chain of pulleys, in both directions, without and with memory.
+
+One walks over the pulleys from a known tension to an unknown one: from the cell at the drum to
+the platform, or from the platform to the cell, with the wraps in that order. ``towards`` is the
+rope's motion in the direction of the walk. Rope wound in runs towards the cell, so that from the
+platform ``towards`` is what is wound in, and from the cell its negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import cos, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from winchkit.errors import UsageError
+from winchkit.model.friction import (
+    capstan_ratio,
+    dahl_step,
+    stribeck,
+    tension_after,
+)
+
+__all__ = ["Bearings", "Eyelets", "Presliding", "eq27_tension", "over_pulleys", "presliding_step"]
+
+Array = NDArray[np.float64]
+Step = Callable[[float, float, float, float, float], float]
+PulleyStep = Callable[..., Any]
+_NEWTON_STEPS = 8
+
+
+@dataclass(frozen=True)
+class Eyelets:
+    """The rope slides around surfaces that do not turn (Euler-Eytelwein, Eq. 19)."""
+
+    friction: float
+
+    def after(self, tension: Array, wrap: float, towards: Array) -> Array:
+        """Tension behind one of them at rope speeds ``towards`` (m/s), N."""
+        return tension * capstan_ratio(np.sign(towards) * self.friction, wrap)
+
+
+@dataclass(frozen=True)
+class Bearings:
+    """Pulleys whose bearings rub dry and drag viscously (Eq. 20–23), more at creep (Stribeck)."""
+
+    friction: float = 0.0
+    """μ of Coulomb friction, below 1."""
+    viscosity: float = 0.0
+    """F_pv of each pulley, N s/m."""
+    static: float | None = None
+    """μ at standstill; None where it is that of motion."""
+    stribeck_speed: float = 0.02
+    """m/s."""
+
+    def after(self, tension: Array, wrap: float, towards: Array) -> Array:
+        """Tension behind one of them at rope speeds ``towards`` (m/s), N."""
+        static = self.friction if self.static is None else self.static
+        friction = stribeck(towards, self.friction, static, self.stribeck_speed)
+        return tension_after(tension, wrap, np.sign(towards) * friction, self.viscosity * towards)
+
+
+def over_pulleys(
+    tension: ArrayLike, wraps: Sequence[float], towards: ArrayLike, law: Eyelets | Bearings
+) -> Array:
+    """Tension behind all pulleys at rope speeds ``towards`` (m/s); arrays (n,), N."""
+    carried, speed = np.asarray(tension, dtype=float), np.asarray(towards, dtype=float)
+    for wrap in wraps:
+        carried = law.after(carried, wrap, speed)
+    return carried
+
+
+def presliding_step(step: Step) -> PulleyStep:
+    """Dahl friction of one pulley over one move, built on ``step`` (:func:`dahl_step`).
+
+    A factory, so that the same lines serve as plain Python and, over a compiled ``step``, can be
+    compiled themselves.
+    """
+
+    def pulley_step(  # noqa: PLR0917 - numba takes no keywords
+        force: float,
+        tension: float,
+        moved: float,
+        cosine: float,
+        friction: float,
+        stiffness: float,
+        shape: float,
+    ) -> tuple[float, float]:
+        """New friction force and the normal force that limits it, N.
+
+        The limit μ N(T, T + F) holds the friction itself: one correction of order μ solves it.
+        """
+        normal = 0.0
+        new = force
+        for _ in range(2):
+            after = tension + new
+            square = tension * tension - 2.0 * tension * after * cosine + after * after
+            normal = sqrt(max(square, 0.0))
+            new = step(force, moved, friction * normal, stiffness, shape)
+        return new, normal
+
+    return pulley_step
+
+
+@dataclass(frozen=True)
+class Presliding:
+    """Pulleys whose friction builds up with distance before it slides (Dahl, Eq. 25)."""
+
+    friction: float
+    stiffness: float
+    """σ, N/m."""
+    shape: float = 1.0
+    """β."""
+
+    def over(self, tension: ArrayLike, wraps: Sequence[float], towards: ArrayLike) -> Array:
+        """Tension behind all pulleys along rope positions ``towards`` (m); arrays (n,), N.
+
+        Starts without friction.
+        """
+        carried, position = np.broadcast_arrays(
+            np.asarray(tension, dtype=float), np.asarray(towards, dtype=float)
+        )
+        moved = np.diff(position, prepend=position[:1])
+        for wrap in wraps:
+            carried = carried + self._forces(carried, moved, cos(wrap))
+        return np.asarray(carried)
+
+    def _forces(self, tension: Array, moved: Array, cosine: float) -> Array:
+        step = presliding_step(dahl_step)
+        force, out = 0.0, []
+        for t, d in zip(tension.tolist(), moved.tolist(), strict=True):
+            force, _ = step(force, t, d, cosine, self.friction, self.stiffness, self.shape)
+            out.append(force)
+        return np.array(out)
+
+
+def eq27_tension(
+    platform: ArrayLike, towards: ArrayLike, loss: Sequence[float], stiffness: float
+) -> Array:
+    """The cell's tension T of Eq. 27, solved for; arrays (n,), N.
+
+    T + Σ s T λ_j (1 − e^(−σ|x|/(λ_j T))) = the tension at the ``platform``, N; ``towards`` x is
+    the rope's way to the platform since friction was zero, m, its sign s; ``loss`` λ_j > 0 with
+    Σ λ < 1. T is on both sides: Newton from the platform's own value, monotone since the left
+    side rises with T. Raises UsageError for losses that have no solution.
+    """
+    if not all(share > 0 for share in loss) or sum(loss) >= 1:
+        raise UsageError(
+            f"loss factors {list(loss)} of Eq. 27 must be above 0 and add up to less than 1"
+        )
+    wanted = np.asarray(platform, dtype=float)
+    way = np.asarray(towards, dtype=float)
+    sign, reach = np.sign(way), stiffness * np.abs(way)
+    tension = np.broadcast_to(wanted, np.broadcast_shapes(wanted.shape, way.shape)).copy()
+    for _ in range(_NEWTON_STEPS):
+        value, slope = tension.copy(), np.ones_like(tension)
+        for share in loss:
+            z = reach / (share * tension)
+            value += sign * share * tension * -np.expm1(-z)
+            slope += sign * share * (-np.expm1(-z) - z * np.exp(-z))
+        tension -= (value - wanted) / slope
+    return tension

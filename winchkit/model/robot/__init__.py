@@ -1,0 +1,77 @@
+"""Cable robots: kinematics with swivel pulleys, rope forces, poses and motor angles.
+
+robot = robot_of(read_robot(find("profiles", "cabtive")))
+angles = robot.motor_angles(Pose(position, rotation))
+found = robot.poses_at(angles)
+"""
+
+from winchkit.model.robot.cycle import RobotCycle, flat_pose
+from winchkit.model.robot.elastic import ElongationLaw, Exponential, Linear, Quartic
+from winchkit.model.robot.force_distribution import (
+    Feasibility,
+    ForceLimits,
+    Forces,
+    approximate_forces,
+    closed_form,
+    improved_closed_form,
+    quadratic,
+    wrench_feasibility,
+)
+from winchkit.model.robot.forward import Found, forward
+from winchkit.model.robot.kernels import PLAIN, RobotKernels, compiled, fastest
+from winchkit.model.robot.kinematics import (
+    Geometry,
+    Pose,
+    Sensitivities,
+    geometry_of,
+    home_of,
+    lengths,
+    sensitivities,
+    structure_matrix,
+    swivel_angle,
+    swivel_sensitivities,
+    wrap_angle,
+)
+from winchkit.model.robot.robot import Robot, robot_of, ropes_of
+from winchkit.model.robot.rotation import angles_of, rotation_of
+from winchkit.model.robot.wrench import gravity_wrench
+
+__all__ = [
+    "PLAIN",
+    "ElongationLaw",
+    "Exponential",
+    "Feasibility",
+    "ForceLimits",
+    "Forces",
+    "Found",
+    "Geometry",
+    "Linear",
+    "Pose",
+    "Quartic",
+    "Robot",
+    "RobotCycle",
+    "RobotKernels",
+    "Sensitivities",
+    "angles_of",
+    "approximate_forces",
+    "closed_form",
+    "compiled",
+    "fastest",
+    "flat_pose",
+    "forward",
+    "geometry_of",
+    "gravity_wrench",
+    "home_of",
+    "improved_closed_form",
+    "lengths",
+    "quadratic",
+    "robot_of",
+    "ropes_of",
+    "rotation_of",
+    "sensitivities",
+    "structure_matrix",
+    "swivel_angle",
+    "swivel_sensitivities",
+    "wrap_angle",
+    "wrench_feasibility",
+]

@@ -1,0 +1,90 @@
+"""A robot in a control cycle: one pose at a time, as fast as it goes.
+
+cycle = RobotCycle(robot, kernels=fastest())
+angles = cycle.motor_angles(pose)          # twelve floats: position, then rotation by rows
+there = cycle.pose_at(measured_lengths)    # warm-started from the last one
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from winchkit.errors import UsageError
+from winchkit.model.robot.kernels import PLAIN, RobotKernels
+from winchkit.model.robot.kinematics import Pose
+from winchkit.model.robot.robot import Robot, ropes_of
+
+__all__ = ["RobotCycle", "flat_pose"]
+
+Flat = Sequence[float]
+_TOLERANCE = 1e-5
+_STEPS = 20
+
+
+def flat_pose(pose: Pose) -> list[float]:
+    """The first pose of a batch as twelve floats: position, then the rotation by rows."""
+    return [*pose.position[0].tolist(), *pose.rotation[0].ravel().tolist()]
+
+
+class RobotCycle:
+    """Motor angles of a pose and the pose of rope lengths, without numpy's overhead.
+
+    Poses are twelve floats as of :func:`flat_pose`; with compiled kernels they and all other
+    sequences are float64 arrays, made by ``kernels.array``. What is returned is overwritten by the
+    next call.
+    """
+
+    __slots__ = (
+        "_angles",
+        "_find",
+        "_kernels",
+        "_lengths",
+        "_lines",
+        "_motors",
+        "_pose",
+        "_still",
+        "_work",
+    )
+
+    def __init__(self, robot: Robot, kernels: RobotKernels = PLAIN) -> None:
+        count = len(robot.names)
+        self._kernels = kernels
+        self._lines = kernels.lines(ropes_of(robot))
+        self._motors, self._find = kernels.motors, kernels.find
+        self._still = kernels.array([0.0] * count)
+        self._lengths = kernels.array([0.0] * count)
+        self._angles = kernels.array([0.0] * count)
+        self._work = kernels.work(count)
+        self._pose = kernels.array(flat_pose(robot.home))
+
+    def motor_angles(self, pose: Any, strains: Any = None) -> Any:
+        """Motor angles (n) at a pose, rad, ropes strained more than at home by ``strains`` (n).
+
+        NaN for a line whose anchor lies inside its swivel pulley.
+        """
+        held = self._still if strains is None else strains
+        self._motors(self._lines, pose, held, self._lengths, self._angles)
+        return self._angles
+
+    def pose_at(self, lengths: Any) -> Any | None:
+        """The pose (12) of rope lengths (n), found from the last one; None where there is none.
+
+        A search that fails leaves the last pose as it was. Raises UsageError below six lines.
+        """
+        if len(self._lines) < 6:
+            raise UsageError(
+                f"{len(self._lines)} lines leave the platform free; its pose comes from "
+                "winchkit.model.robot.forward"
+            )
+        pose = self._pose.copy()
+        if self._find(self._lines, lengths, pose, self._work, _TOLERANCE, _STEPS) < 0:
+            return None
+        self._pose = pose
+        return pose
+
+    def start_from(self, pose: Any) -> None:
+        """Take a pose (12) as the last one."""
+        self._pose = self._kernels.array(np.asarray(pose, dtype=float).tolist())

@@ -1,0 +1,107 @@
+"""Laws of a rope's elongation: strain from force (IPAnema paper, Eq. 4, 5 and 6).
+
+The paper writes F = k1 δl + k0 and so on with coefficients of its own test; here the laws are in
+strain and in newtons, and their offset k0 cancels wherever elongation is taken between two states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, log, nan
+
+from winchkit.errors import UsageError
+
+__all__ = ["ElongationLaw", "Exponential", "Linear", "Quartic"]
+
+_STEPS = 60
+_TOLERANCE = 1e-13
+
+
+@dataclass(frozen=True)
+class Linear:
+    """F = k1 ε + k0 (Eq. 4)."""
+
+    k1: float
+    """Axial stiffness EA, N."""
+    k0: float = 0.0
+
+    def __post_init__(self) -> None:
+        _positive("k1", self.k1)
+
+    def force(self, strain: float) -> float:
+        """N."""
+        return self.k1 * strain + self.k0
+
+    def strain(self, force: float) -> float:
+        """Inverse."""
+        return (force - self.k0) / self.k1
+
+
+@dataclass(frozen=True)
+class Quartic:
+    """F = k4 ε⁴ + k3 ε³ + k2 ε² + k1 ε + k0 (Eq. 5), from zero strain as far as it rises."""
+
+    k1: float
+    k2: float = 0.0
+    k3: float = 0.0
+    k4: float = 0.0
+    k0: float = 0.0
+
+    def __post_init__(self) -> None:
+        _positive("k1", self.k1)
+
+    def force(self, strain: float) -> float:
+        """N."""
+        bent = self.k1 + strain * (self.k2 + strain * (self.k3 + strain * self.k4))
+        return self.k0 + strain * bent
+
+    def slope(self, strain: float) -> float:
+        """dF/dε, N."""
+        bent = 2 * self.k2 + strain * (3 * self.k3 + strain * 4 * self.k4)
+        return self.k1 + strain * bent
+
+    def strain(self, force: float) -> float:
+        """Inverse by Newton's method on the rising branch; NaN for a force that is not on it."""
+        strain = (force - self.k0) / self.k1
+        for _ in range(_STEPS):
+            slope = self.slope(strain)
+            if slope <= 0.0:
+                return nan
+            step = (self.force(strain) - force) / slope
+            strain -= step
+            if abs(step) <= _TOLERANCE * (1.0 + abs(strain)):
+                return strain
+        return nan
+
+
+@dataclass(frozen=True)
+class Exponential:
+    """F = exp(k1 ε) + k0 in newtons (Eq. 6)."""
+
+    k1: float
+    k0: float = 0.0
+
+    def __post_init__(self) -> None:
+        _positive("k1", self.k1)
+
+    def force(self, strain: float) -> float:
+        """N; infinite beyond what a float holds."""
+        from math import exp
+
+        exponent = self.k1 * strain
+        return exp(exponent) + self.k0 if exponent < 700.0 else inf
+
+    def strain(self, force: float) -> float:
+        """Inverse; NaN at and below k0, which no strain reaches."""
+        above = force - self.k0
+        return log(above) / self.k1 if above > 0.0 else nan
+
+
+ElongationLaw = Linear | Quartic | Exponential
+Strain = Callable[[float], float]
+
+
+def _positive(name: str, value: float) -> None:
+    if not value > 0.0:
+        raise UsageError(f"{name} of an elongation law is {value:g}; it must be above 0")

@@ -1,0 +1,206 @@
+"""Which rope forces balance a wrench, within limits: three methods, and whether there are any.
+
+At rest Aᵀ f + w = 0 with the structure matrix Aᵀ (6, n) and the wrench w (6,) on the platform.
+Among all solutions each method looks for the one closest to the middle of the limits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.errors import UsageError
+
+__all__ = [
+    "Feasibility",
+    "ForceLimits",
+    "Forces",
+    "approximate_forces",
+    "closed_form",
+    "improved_closed_form",
+    "quadratic",
+    "wrench_feasibility",
+]
+
+Array = NDArray[np.float64]
+_RANK = 1e-9
+_BALANCE = 1e-9
+_WITHIN = 1e-9
+
+
+@dataclass(frozen=True)
+class ForceLimits:
+    """Least and greatest rope force, N: one for all lines or one each, (n,)."""
+
+    low: float | Array
+    high: float | Array
+
+    def spread(self, count: int) -> tuple[Array, Array]:
+        """Both limits per line; raises UsageError where low is not below high."""
+        low = np.broadcast_to(np.asarray(self.low, dtype=float), (count,))
+        high = np.broadcast_to(np.asarray(self.high, dtype=float), (count,))
+        if not np.all(low < high):
+            raise UsageError(f"force limits: low {self.low} N is not below high {self.high} N")
+        return low, high
+
+    def between(self, count: int) -> tuple[Array, Array]:
+        """The same for a method that aims at their middle: both finite, else UsageError."""
+        low, high = self.spread(count)
+        if not np.all(np.isfinite(low) & np.isfinite(high)):
+            raise UsageError("force limits must be finite: the forces aim at their middle")
+        return low, high
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Rope forces of one pose."""
+
+    value: Array
+    """(n,), N; what the method found even where it is not feasible, NaN where it found nothing."""
+    feasible: bool
+    """Whether they balance the wrench within the limits."""
+    residual: float
+    """Norm of Aᵀ f + w, N and N m."""
+
+
+@dataclass(frozen=True)
+class Feasibility:
+    """Whether some rope forces within the limits balance a wrench."""
+
+    feasible: bool
+    margin: float
+    """How far all forces can stay from their limits at once, N; negative: by how much the limits
+    would have to give; NaN where no forces at all balance the wrench."""
+
+
+def approximate_forces(structure: Array, wrench: Array, initial: Array) -> Array:
+    """Forces at a pose from those at another: f = f_i − A⁺ᵀ (w + Aᵀ f_i), (p, n), N.
+
+    IPAnema paper, Eq. 8 with its sign put right, so that its Eq. 7 holds. ``structure`` is
+    (p, 6, n), ``wrench`` (6,) or (p, 6), ``initial`` (n,) or (p, n).
+    """
+    missing = wrench + (structure @ np.asarray(initial)[..., None])[..., 0]
+    change = np.linalg.pinv(structure, rcond=_RANK) @ missing[..., None]
+    return np.asarray(initial - change[..., 0])
+
+
+def closed_form(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
+    """The solution closest to the middle of the limits, which may lie outside them.
+
+    A. Pott, T. Bruckmann, L. Mikelsons, *Closed-form force distribution for parallel wire robots*,
+    2009: f = f_m − A⁺ᵀ (w + Aᵀ f_m).
+    """
+    low, high = limits.between(structure.shape[1])
+    return _judge(_nearest(structure, wrench, (low + high) / 2), structure, wrench, low, high)
+
+
+def improved_closed_form(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
+    """Closed form that fixes the worst offender at its limit and solves for the rest again.
+
+    A. Pott, *An improved force distribution algorithm for over-constrained cable-driven parallel
+    robots*, 2014. Finds more than the closed form; not everything that :func:`quadratic` finds.
+    """
+    low, high = limits.between(structure.shape[1])
+    value = np.array((low + high) / 2)
+    free = np.ones(len(value), dtype=bool)
+    while True:
+        known = wrench + structure[:, ~free] @ value[~free]
+        value[free] = _nearest(structure[:, free], known, ((low + high) / 2)[free])
+        beyond = np.where(free, np.maximum(low - value, value - high), -np.inf)
+        worst = int(np.argmax(beyond))
+        if beyond[worst] <= _WITHIN * (high[worst] - low[worst]) or np.sum(free) <= 6:
+            return _judge(value, structure, wrench, low, high)
+        value[worst] = low[worst] if value[worst] < low[worst] else high[worst]
+        free[worst] = False
+
+
+def quadratic(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
+    """The solution within the limits closest to their middle: min ‖f − f_m‖², if there is any.
+
+    With an orthonormal null space N of Aᵀ, f = f_c + N λ from the closed form f_c, and the problem
+    is one of least distance, min ‖λ‖ within the limits, which non-negative least squares solves
+    exactly (C. Lawson, R. Hanson, *Solving Least Squares Problems*, ch. 23).
+    """
+    low, high = limits.between(structure.shape[1])
+    centre = _nearest(structure, wrench, (low + high) / 2)
+    null = _null_space(structure)
+    step = _least_distance(
+        np.concatenate([null, -null]), np.concatenate([low - centre, centre - high])
+    )
+    value = np.full(len(low), np.nan) if step is None else centre + null @ step
+    return _judge(value, structure, wrench, low, high)
+
+
+def wrench_feasibility(structure: Array, wrench: Array, limits: ForceLimits) -> Feasibility:
+    """Whether forces within the limits balance ``wrench``, with the largest margin to them.
+
+    A linear programme; a limit may be infinite, and its margin is then the other one's.
+    """
+    from scipy.optimize import linprog
+
+    count = structure.shape[1]
+    low, high = limits.spread(count)
+    scale = _scale(structure, wrench, low, high)
+    above, below = np.isfinite(low), np.isfinite(high)
+    eye, ones = np.eye(count), np.ones((count, 1))
+    found = linprog(
+        np.append(np.zeros(count), -1.0),
+        A_ub=np.concatenate(
+            [np.hstack([-eye, ones])[above], np.hstack([eye, ones])[below]], axis=0
+        ),
+        b_ub=np.concatenate([-low[above], high[below]]) / scale,
+        A_eq=np.hstack([structure, np.zeros((6, 1))]),
+        b_eq=-wrench / scale,
+        bounds=[(None, None)] * count + [(None, 1e3)],
+        method="highs",
+    )
+    best = found.x
+    margin = float("nan") if best is None else float(best[-1]) * scale
+    return Feasibility(bool(margin >= -_WITHIN * scale), margin)
+
+
+def _nearest(structure: Array, wrench: Array, middle: Array) -> Array:
+    """The solution of least squares closest to ``middle``."""
+    missing = wrench + structure @ middle
+    return np.asarray(middle - np.linalg.pinv(structure, rcond=_RANK) @ missing)
+
+
+def _null_space(structure: Array) -> Array:
+    """Orthonormal columns that Aᵀ maps to zero, (n, n − rank)."""
+    _, values, right = np.linalg.svd(structure)
+    rank = int(np.sum(values > _RANK * values[0]))
+    return np.asarray(right[rank:].T)
+
+
+def _least_distance(slope: Array, least: Array) -> Array | None:
+    """The shortest x with ``slope`` x ≥ ``least``, or None where there is none."""
+    from scipy.optimize import nnls
+
+    if np.all(least <= 0):
+        return np.zeros(slope.shape[1])
+    scale = float(np.max(np.abs(least)))
+    matrix = np.vstack([slope.T, least / scale])
+    target = np.zeros(len(matrix))
+    target[-1] = 1.0
+    dual, _ = nnls(matrix, target, maxiter=50 * matrix.shape[1])
+    rest = matrix @ dual - target
+    if np.linalg.norm(rest) < _WITHIN:
+        return None
+    return np.asarray(-rest[:-1] / rest[-1] * scale)
+
+
+def _scale(structure: Array, wrench: Array, low: Array, high: Array) -> float:
+    """A force typical of the problem, N, so that it may be solved with numbers about one."""
+    limits = np.abs(np.concatenate([low, high]))
+    sizes = np.append(limits[np.isfinite(limits)], np.linalg.norm(wrench[:3]))
+    return float(np.max(sizes, initial=0.0)) or 1.0
+
+
+def _judge(value: Array, structure: Array, wrench: Array, low: Array, high: Array) -> Forces:
+    residual = float(np.linalg.norm(structure @ value + wrench))
+    slack = _WITHIN * (high - low)
+    within = bool(np.all((value >= low - slack) & (value <= high + slack)))
+    size = float(np.linalg.norm(wrench) + np.linalg.norm(value)) if within else np.inf
+    return Forces(value, within and residual <= _BALANCE * max(size, 1.0), residual)

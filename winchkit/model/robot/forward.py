@@ -1,0 +1,235 @@
+"""Forward kinematics: the platform's pose from its rope lengths.
+
+    found = forward(geometry, lengths, start, platform=PlatformSpec(mass=3.0))
+    found.pose.position[found.converged]
+
+With six ropes or more that hold all six freedoms the pose follows from the lengths alone, by Gauss
+and Newton. With fewer, the platform hangs where its weight is lowest (Lagrange's multipliers are
+the rope forces), by sequential quadratic programming on the same step; a rope that would have to
+push is slack and may be longer than its way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.errors import UsageError
+from winchkit.model.line import GRAVITY
+from winchkit.model.robot.hessian import length_hessian
+from winchkit.model.robot.kinematics import Geometry, Pose, lengths, linearised
+from winchkit.model.robot.rotation import rotation_by
+from winchkit.model.robot.wrench import gravity_wrench, weight_hessian
+from winchkit.schema.robot import PlatformSpec
+
+__all__ = ["Found", "forward"]
+
+Array = NDArray[np.float64]
+_TOLERANCE = 1e-10
+_RANK = 1e-7
+_FLAT = 1e-9
+_LONGEST = (0.5, 0.2, 0.08, 0.03)
+_EARLY, _PATIENCE = 12, 9
+_RIDGE = 1e-14
+_LOOSE = 1e-11
+_PUSH, _SHORT = 1e-9, 1e-9
+
+
+@dataclass(frozen=True)
+class Found:
+    """Poses found for given rope lengths; NaN where the search did not end in one."""
+
+    pose: Pose
+    converged: Array
+    """(p,), true where the pose solves the problem to rounding."""
+    residual: Array
+    """Given minus geometric length, (p, n), m: what no pose explains."""
+    forces: Array
+    """Rope forces of a platform that hangs, (p, n), N, zero in a slack rope; NaN with six or
+    more ropes, which may be tight to any degree."""
+    steps: int
+
+
+def forward(
+    geometry: Geometry,
+    given: Array,
+    start: Pose,
+    platform: PlatformSpec | None = None,
+    steps: int = 100,
+) -> Found:
+    """Poses with rope lengths ``given`` (p, n), searched from ``start`` (one pose or p).
+
+    Raises UsageError for fewer than six ropes without a platform's mass.
+    """
+    count = len(geometry.exit_point)
+    given = np.atleast_2d(np.asarray(given, dtype=float))
+    if given.shape[1] != count:
+        raise UsageError(f"{given.shape[1]} lengths were given for a robot of {count} lines")
+    hanging = count < 6
+    if hanging and (platform is None or platform.mass <= 0):
+        raise UsageError(
+            f"{count} lines leave the platform {6 - count} freedoms, which only its weight settles;"
+            " give [platform] mass"
+        )
+    search = _Search(geometry, given, platform if hanging else None)
+    return search.run(start, steps)
+
+
+class _Ropes(NamedTuple):
+    """Which ropes of each pose are taken as taut, and which of them was tightened last."""
+
+    taut: NDArray[np.bool_]
+    tightened: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class _Search:
+    geometry: Geometry
+    given: Array
+    platform: PlatformSpec | None
+
+    def run(self, start: Pose, steps: int) -> Found:
+        """Step all poses until every one has converged or is lost."""
+        many = len(self.given)
+        position = np.broadcast_to(start.position, (many, 3)).copy()
+        rotation = np.broadcast_to(start.rotation, (many, 3, 3)).copy()
+        forces = np.full_like(self.given, np.nan)
+        ropes = _Ropes(np.ones_like(self.given, dtype=bool), np.full(many, -1))
+        converged = np.zeros(many, dtype=bool)
+        going = np.flatnonzero(np.all(np.isfinite(self.given), axis=1))
+        taken = 0
+        while len(going) and taken < steps:
+            taken += 1
+            at, late = Pose(position[going], rotation[going]), taken > _EARLY
+            step, forces[going] = self._step(at, self.given[going], ropes.taut[going], late)
+            step = _no_longer(step, _LONGEST[min(taken // _EARLY, len(_LONGEST) - 1)])
+            position[going] += step[:, :3]
+            rotation[going] = rotation_by(step[:, 3:]) @ rotation[going]
+            size = np.linalg.norm(step, axis=1)
+            still = size < _TOLERANCE
+            # Ropes that cannot all be taut have no rest to wait for.
+            asked = still | (taken % _PATIENCE == 0)
+            which = going[asked]
+            there = Pose(position[which], rotation[which])
+            still[asked] &= self._settle(there, forces[which], ropes, which)
+            converged[going[still]] = True
+            going = going[~still & np.isfinite(size)]
+        if self.platform is None:
+            there = Pose(position[converged], rotation[converged])
+            converged[converged] = _holds(self.geometry, there)
+        residual = self.given - lengths(self.geometry, position, rotation)
+        for found in (position, rotation, forces, residual):
+            found[~converged] = np.nan
+        return Found(Pose(position, rotation), converged, residual, forces, taken)
+
+    def _settle(
+        self, at: Pose, forces: Array, ropes: _Ropes, which: NDArray[np.intp]
+    ) -> NDArray[np.bool_]:
+        """Whether poses at rest may stay so; else slackens or tightens one rope of each."""
+        if self.platform is None:
+            return np.ones(len(which), dtype=bool)
+        taut, row = ropes.taut[which], np.arange(len(which))
+        excess = lengths(self.geometry, at.position, at.rotation) - self.given[which]
+        push = np.where(taut, -forces / (self.platform.mass * GRAVITY), -np.inf)
+        short = np.where(taut, -np.inf, excess)
+        # The rope tightened last goes last, or the same two states would take turns for ever.
+        other = np.where(np.arange(push.shape[1]) == ropes.tightened[which, None], -np.inf, push)
+        push = np.where(np.max(other, axis=1, keepdims=True) > _PUSH, other, push)
+        worst, missing = np.argmax(push, axis=1), np.argmax(short, axis=1)
+        slacken = push[row, worst] > _PUSH
+        tighten = ~slacken & (short[row, missing] > _SHORT)
+        ropes.taut[which[slacken], worst[slacken]] = False
+        ropes.taut[which[tighten], missing[tighten]] = True
+        ropes.tightened[which[tighten]] = missing[tighten]
+        return np.asarray(~slacken & ~tighten)
+
+    def _step(
+        self, at: Pose, given: Array, taut: NDArray[np.bool_], late: bool
+    ) -> tuple[Array, Array]:
+        """Next step of position and rotation vector, (p, 6), and the rope forces, (p, n)."""
+        length, by = linearised(self.geometry, at.position, at.rotation)
+        slope, missing = np.concatenate([by.position, by.rotation], axis=-1), given - length
+        good = np.all(np.isfinite(slope), axis=(1, 2)) & np.all(np.isfinite(missing), axis=1)
+        step, forces = np.full((len(given), 6), np.nan), np.full_like(given, np.nan)
+        there = Pose(at.position[good], at.rotation[good])
+        if self.platform is not None:
+            held = np.where(taut, missing, 0.0)[good]
+            slope = np.where(taut[..., None], slope, 0.0)[good]
+            step[good], found = self._hanging(self.platform, there, slope, held)
+            forces[good] = np.where(taut[good], found, 0.0)
+        else:
+            bend = self._bend(there, missing[good]) if late else 0.0
+            step[good] = _downhill(slope[good], missing[good], bend)
+        return step, forces
+
+    def _bend(self, at: Pose, missing: Array) -> Array:
+        """What Gauss and Newton leave out: Newton's own step is faster where lengths disagree."""
+        bend = length_hessian(self.geometry, at.position, at.rotation)
+        return -np.asarray(np.einsum("pn,pnij->pij", missing, bend))
+
+    def _hanging(
+        self, platform: PlatformSpec, at: Pose, slope: Array, missing: Array
+    ) -> tuple[Array, Array]:
+        """Meet the lengths, and go downhill where they leave the platform free."""
+        weight = gravity_wrench(platform, at.rotation)
+        left, values, right = np.linalg.svd(slope)
+        count = slope.shape[1]
+        keep = values > _RANK * values[:, :1]
+        inverse = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
+        # slope⁺ = V S⁺ Uᵀ; the rest of V spans the motions that keep every length.
+        range_ = np.swapaxes(right[:, :count], 1, 2) * inverse[:, None]
+        pseudo = range_ @ np.swapaxes(left, 1, 2)
+        forces = (np.swapaxes(pseudo, 1, 2) @ weight[..., None])[..., 0]
+        meet = (pseudo @ missing[..., None])[..., 0]
+        bend = weight_hessian(platform, at.rotation) + np.einsum(
+            "pn,pnij->pij", forces, length_hessian(self.geometry, at.position, at.rotation)
+        )
+        dead = np.concatenate([~keep, np.ones((len(keep), 6 - count), dtype=bool)], axis=1)
+        null = np.swapaxes(right, 1, 2) * dead[:, None]
+        down = weight - (bend @ meet[..., None])[..., 0]
+        reduced = np.swapaxes(null, 1, 2) @ bend @ null
+        stiff, axes = np.linalg.eigh(reduced)
+        # Turned uphill curvature leads to a rest that is stable; no curvature, no step.
+        size = np.abs(stiff)
+        flat = size < _FLAT * np.max(size, axis=1, keepdims=True)
+        pull = (np.swapaxes(axes, 1, 2) @ np.swapaxes(null, 1, 2) @ down[..., None])[..., 0]
+        slide = np.where(flat, 0.0, pull / np.where(flat, 1.0, size))
+        return meet + (null @ axes @ slide[..., None])[..., 0], forces
+
+
+def _no_longer(step: Array, longest: float) -> Array:
+    """Steps of at most this many metres and radians: a search that swings has gone too far."""
+    size = np.linalg.norm(step, axis=1, keepdims=True)
+    return np.asarray(step * (longest / np.maximum(size, longest)))
+
+
+def _downhill(slope: Array, missing: Array, bend: Array | float) -> Array:
+    """Step of least squares, (p, 6); with ``bend`` Newton's, turned downhill."""
+    turned = np.swapaxes(slope, 1, 2)
+    right = turned @ missing[..., None]
+    matrix, scale = _balanced(turned @ slope)
+    if isinstance(bend, float):
+        step = np.linalg.solve(matrix + _RIDGE * np.eye(6), right / scale[..., None])
+    else:
+        curved = matrix + bend / scale[:, :, None] / scale[:, None, :]
+        stiff, axes = np.linalg.eigh(curved)
+        pull = np.swapaxes(axes, 1, 2) @ (right / scale[..., None])
+        step = axes @ (pull / np.maximum(np.abs(stiff), _RIDGE)[..., None])
+    return np.asarray(step[..., 0] / scale)
+
+
+def _balanced(matrix: Array) -> tuple[Array, Array]:
+    """A normal matrix with ones on its diagonal, and what it was divided by."""
+    scale = np.sqrt(np.maximum(np.diagonal(matrix, axis1=1, axis2=2), np.finfo(float).tiny))
+    return matrix / scale[:, :, None] / scale[:, None, :], scale
+
+
+def _holds(geometry: Geometry, at: Pose) -> NDArray[np.bool_]:
+    """Where the ropes hold all six freedoms, (p,)."""
+    by = linearised(geometry, at.position, at.rotation)[1]
+    slope = np.concatenate([by.position, by.rotation], axis=-1)
+    stiff = np.linalg.eigvalsh(_balanced(np.swapaxes(slope, 1, 2) @ slope)[0])
+    return np.asarray(stiff[:, 0] > _LOOSE)

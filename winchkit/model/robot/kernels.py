@@ -1,0 +1,114 @@
+"""The loops of a robot's cycle, built in plain Python or, from the same lines, compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import astuple, dataclass, fields
+from typing import Any
+
+from winchkit.errors import UsageError
+from winchkit.model.robot.loops import RopeLine, motors_loop, ropes_loop, wound_angle
+from winchkit.model.robot.loops_pose import (
+    cholesky,
+    find_loop,
+    forces_loop,
+    normal,
+    straighten,
+    turn,
+)
+
+__all__ = ["PLAIN", "RobotKernels", "RopeLine", "compiled", "fastest"]
+
+Function = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class RobotKernels:
+    """The inner loops as they were built."""
+
+    name: str
+    """``plain`` or ``numba``."""
+    ropes: Function
+    """Lines, pose → fills rows of a length and its gradient (7 n)."""
+    motors: Function
+    """Lines, pose, strains → fills lengths (n) and motor angles (n)."""
+    find: Function
+    """Lines, lengths, pose, work, tolerance, most steps → moves the pose; steps taken, or −1."""
+    forces: Function
+    """Lines, pose, initial forces, wrench, work → fills forces (n); false where singular."""
+    array: Callable[[list[float]], Any]
+    """A flat sequence of the kind that these loops want."""
+    lines: Callable[[list[RopeLine]], Any]
+    """Lines of the kind that these loops want."""
+
+    def work(self, count: int) -> tuple[Any, Any]:
+        """Room for the rows of :attr:`ropes`, and for a 6 by 6 system with its right side."""
+        return self.array([0.0] * (7 * count)), self.array([0.0] * 42)
+
+
+def _build(
+    name: str,
+    jit: Function,
+    array: Callable[[list[float]], Any],
+    lines: Callable[[list[RopeLine]], Any],
+) -> RobotKernels:
+    """All loops, each through ``jit``."""
+    steep, squares, solve = jit(ropes_loop(True)), jit(normal), jit(cholesky)
+    return RobotKernels(
+        name,
+        steep,
+        jit(motors_loop(jit(ropes_loop(False)), jit(wound_angle))),
+        jit(find_loop(steep, squares, solve, jit(turn), jit(straighten))),
+        jit(forces_loop(steep, squares, solve)),
+        array,
+        lines,
+    )
+
+
+PLAIN = _build("plain", lambda function: function, list, list)
+"""Plain Python: always there."""
+
+
+def compiled() -> RobotKernels:
+    """Compile the loops with numba and run each once: seconds, to be spent before motion.
+
+    Raises UsageError where numba is not installed (``pip install 'winchkit[fast]'``).
+    """
+    try:
+        from numba import njit
+    except ImportError:
+        raise UsageError(
+            "numba is not installed, so nothing can be compiled; pip install 'winchkit[fast]', "
+            "or go on in plain Python with winchkit.model.robot.PLAIN"
+        ) from None
+    import numpy as np
+
+    record = np.dtype([(field.name, np.float64) for field in fields(RopeLine)])
+
+    def array(values: list[float]) -> Any:
+        return np.array(values, dtype=np.float64)
+
+    def lines(ropes: list[RopeLine]) -> Any:
+        return np.array([astuple(rope) for rope in ropes], dtype=record)
+
+    built = _build("numba", njit, array, lines)
+    _warm_up(built)
+    return built
+
+
+def _warm_up(kernels: RobotKernels) -> None:
+    """Run every loop once, on six ropes of any kind."""
+    rope = RopeLine(1, 0, 0, 0, 0, 0, 0, 0, 1, 0.01, 1, 1, 0.1, 0.001, 1, 1, 1, 0, 0)
+    lines, work = kernels.lines([rope] * 6), kernels.work(6)
+    pose = kernels.array([0.0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1])
+    some, out = kernels.array([0.0] * 6), kernels.array([0.0] * 6)
+    kernels.motors(lines, pose, some, kernels.array([0.0] * 6), out)
+    kernels.forces(lines, pose, some, some, work, out)
+    kernels.find(lines, out, pose, work, 1e-9, 1)
+
+
+def fastest() -> RobotKernels:
+    """Compiled loops where numba is installed, else the plain ones."""
+    from importlib.util import find_spec
+
+    return compiled() if find_spec("numba") else PLAIN

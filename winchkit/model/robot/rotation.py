@@ -1,0 +1,120 @@
+"""Rotations of the platform: angles, rotation vectors, quaternions and matrices, in batches.
+
+Matrices turn platform coordinates into base coordinates. A rotation vector is a small turn in the
+base frame: R' = exp([ω]×) R.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "angles_of",
+    "quaternion_of",
+    "rotation_by",
+    "rotation_from_quaternion",
+    "rotation_of",
+    "rotation_vector",
+    "skew",
+]
+
+Array = NDArray[np.float64]
+
+
+def rotation_of(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
+    """R = Rz(yaw) Ry(pitch) Rx(roll), angles of shape (...), rad; returns (..., 3, 3)."""
+    turns = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (roll, pitch, yaw)))
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in turns)
+    rows = (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def angles_of(rotation: ArrayLike) -> Array:
+    """Roll, pitch and yaw of rotations (..., 3, 3); returns (..., 3), rad.
+
+    At a pitch of a right angle only yaw ∓ roll is defined; roll is then zero.
+    """
+    r = np.asarray(rotation, dtype=float)
+    flat = np.hypot(r[..., 0, 0], r[..., 1, 0])
+    pitch = np.arctan2(-r[..., 2, 0], flat)
+    upright = flat < 1e-12
+    roll = np.where(upright, 0.0, np.arctan2(r[..., 2, 1], r[..., 2, 2]))
+    yaw = np.where(
+        upright,
+        np.arctan2(-r[..., 0, 1], r[..., 1, 1]),
+        np.arctan2(r[..., 1, 0], r[..., 0, 0]),
+    )
+    return np.stack([roll, pitch, yaw], axis=-1)
+
+
+def skew(vector: ArrayLike) -> Array:
+    """[v]× with [v]× w = v × w, of vectors (..., 3); returns (..., 3, 3)."""
+    v = np.asarray(vector, dtype=float)
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return out
+
+
+def rotation_by(vector: ArrayLike) -> Array:
+    """exp([ω]×) of rotation vectors (..., 3), rad (Rodrigues); returns (..., 3, 3)."""
+    v = np.asarray(vector, dtype=float)
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    cross = skew(v)
+    # sinc keeps both factors exact down to no rotation at all.
+    first = np.sinc(angle / np.pi)
+    second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+
+
+def rotation_vector(rotation: ArrayLike) -> Array:
+    """The rotation vector of rotations (..., 3, 3), at most π long; returns (..., 3), rad."""
+    q = quaternion_of(rotation)
+    sine = np.linalg.norm(q[..., 1:], axis=-1)
+    angle = 2 * np.arctan2(sine, q[..., 0])
+    tiny = sine < 1e-12
+    scale = np.where(tiny, 2.0, angle / np.where(tiny, 1.0, sine))
+    return np.asarray(q[..., 1:] * scale[..., None])
+
+
+def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Rotations of quaternions (..., 4) as w, x, y, z, of any length but zero; (..., 3, 3)."""
+    q = np.asarray(quaternion, dtype=float)
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    cross = skew(q[..., 1:])
+    return np.asarray(np.eye(3) + 2 * q[..., :1, None] * cross + 2 * (cross @ cross))
+
+
+def quaternion_of(rotation: ArrayLike) -> Array:
+    """Unit quaternions w, x, y, z with w ≥ 0 of rotations (..., 3, 3); returns (..., 4)."""
+    r = np.asarray(rotation, dtype=float)
+    xx, yy, zz = r[..., 0, 0], r[..., 1, 1], r[..., 2, 2]
+    a, b, c = (
+        r[..., 2, 1] - r[..., 1, 2],
+        r[..., 0, 2] - r[..., 2, 0],
+        r[..., 1, 0] - r[..., 0, 1],
+    )
+    d, e, f = (
+        r[..., 1, 0] + r[..., 0, 1],
+        r[..., 0, 2] + r[..., 2, 0],
+        r[..., 2, 1] + r[..., 1, 2],
+    )
+    # Four times q qᵀ: each row is the quaternion, scaled; the longest is the exact one.
+    rows = np.stack(
+        [
+            np.stack([1 + xx + yy + zz, a, b, c], axis=-1),
+            np.stack([a, 1 + xx - yy - zz, d, e], axis=-1),
+            np.stack([b, d, 1 - xx + yy - zz, f], axis=-1),
+            np.stack([c, e, f, 1 - xx - yy + zz], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.argmax(np.diagonal(rows, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :]
+    unit = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    return np.asarray(np.where(unit[..., :1] < 0, -unit, unit))

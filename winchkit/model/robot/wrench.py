@@ -1,0 +1,32 @@
+"""The wrench that ropes have to balance: the platform's weight, and what else acts on it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.model.line import GRAVITY
+from winchkit.schema.robot import PlatformSpec
+
+__all__ = ["gravity_wrench", "weight_hessian"]
+
+Array = NDArray[np.float64]
+_DOWN = np.array([0.0, 0.0, -GRAVITY])
+
+
+def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
+    """Weight of the platform on its origin, (p, 6), N and N m in base axes; gravity is −z."""
+    lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
+    force = np.broadcast_to(platform.mass * _DOWN, lever.shape)
+    return np.concatenate([force, np.cross(lever, force)], axis=-1)
+
+
+def weight_hessian(platform: PlatformSpec, rotation: Array) -> Array:
+    """Second derivatives of the potential m g z by position and rotation vector, (p, 6, 6)."""
+    lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
+    lift = -platform.mass * _DOWN
+    out = np.zeros((len(lever), 6, 6))
+    product = lever[:, :, None] * lift
+    inner = (lever @ lift)[:, None, None]
+    out[:, 3:, 3:] = (product + np.swapaxes(product, 1, 2)) / 2 - inner * np.eye(3)
+    return out

@@ -1,0 +1,63 @@
+"""The variables that an error may follow along a run, by the names that answers use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.model.recurrence import play
+from winchkit.model.stages import At
+
+__all__ = ["ANGLES", "VARIABLES", "VARIABLE_UNITS"]
+
+Array = NDArray[np.float64]
+_CREEP = 1e-4
+
+
+def _direction(at: At) -> Array:
+    return np.sign(np.where(np.abs(at.speed) > _CREEP, at.speed, 0.0))
+
+
+def _reversal_distance(at: At) -> Array:
+    """Logarithm (base 10) of the distance run since the last change of direction, m."""
+    length = at.free_length
+    # A play of twice the creep length keeps encoder noise at standstill from counting as turns.
+    moved = np.diff(play(length, 2 * _CREEP), prepend=length[:1])
+    index = np.arange(len(moved))
+    sign = np.sign(moved)
+    held = sign[np.maximum.accumulate(np.where(sign != 0, index, 0))]
+    turned = np.maximum.accumulate(np.where(np.diff(held, prepend=held[:1]) != 0, index, 0))
+    travelled = np.cumsum(np.abs(moved))
+    return np.asarray(np.log10(np.maximum(travelled - travelled[turned], 1e-5)))
+
+
+VARIABLES: Mapping[str, Callable[[At], Array]] = {
+    "drum_angle": lambda at: at.drum_angle,
+    "motor_angle": lambda at: at.motor_angle,
+    "speed": lambda at: at.speed,
+    "direction": _direction,
+    "cable_length": lambda at: at.free_length,
+    "time": lambda at: at.time,
+    "reversal_distance": _reversal_distance,
+    "load": lambda at: at.tension,
+    "tension": lambda at: at.tension,
+    "temperature": lambda at: at.temperature,
+}
+"""Arrays (n,) along a run; ``load`` and ``tension`` are the rope's force, whichever is known."""
+
+VARIABLE_UNITS: Mapping[str, str] = {
+    "drum_angle": "rad",
+    "motor_angle": "rad",
+    "speed": "m/s",
+    "direction": "1",
+    "cable_length": "m",
+    "time": "s",
+    "reversal_distance": "1",
+    "load": "N",
+    "tension": "N",
+    "temperature": "degC",
+}
+ANGLES = ("drum_angle", "motor_angle")
+"""What repeats every turn."""

@@ -1,0 +1,40 @@
+"""Writes what was read from one or several files in the format that the output's name says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from winchkit.errors import UsageError
+from winchkit.runs.log import aligned, log_of_run
+from winchkit.runs.read import read_log, read_run
+from winchkit.runs.run import Run
+from winchkit.runs.writer import write_run
+
+__all__ = ["FORMATS", "export"]
+
+FORMATS = (".csv", ".mcap", ".parquet", ".mf4")
+
+
+def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> Run:
+    """Write a run, or the parts of a log together, and return its rows.
+
+    ``winch`` takes only that winch, its columns without its name. An MF4 file keeps every
+    source's own time stamps, the others hold rows. Raises RunError, FileError, UsageError.
+    """
+    suffix = Path(output).suffix.lower()
+    if suffix not in FORMATS:
+        raise UsageError(f"{output}: '{suffix}' is no format of a run; use {', '.join(FORMATS)}")
+    log = None if len(paths) == 1 and suffix != ".mf4" else read_log(paths)
+    run = (read_run(paths[0]) if log is None else aligned(log)).of_winch(winch)
+    if log is not None and suffix == ".mf4":
+        from winchkit.runs.mf4_write import write_mf4
+
+        write_mf4(log_of_run(run) if winch else log, output)
+    elif suffix == ".parquet":
+        from winchkit.runs.parquet_write import write_parquet
+
+        write_parquet(run, output)
+    else:
+        write_run(run, output)
+    return run

@@ -1,0 +1,97 @@
+"""What a log holds: sources, rates, gaps, what was counted, and whether it was closed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from winchkit.runs.layout import Samples, Source
+from winchkit.runs.log import Log
+
+__all__ = ["LogInfo", "SourceInfo", "info_of"]
+
+_GAP = 1.5
+_QUALITY = "quality"
+
+
+@dataclass(frozen=True)
+class SourceInfo:
+    """One source of a log."""
+
+    topic: str
+    channels: tuple[str, ...]
+    samples: int
+    rate: float
+    """From the median interval, Hz; NaN with fewer than two samples."""
+    gaps: int
+    """How often the time jumps by more than 1.5 intervals."""
+    longest_gap: float
+    """Longest interval, s."""
+    missing: Mapping[str, int]
+    """Samples without a value, by channel."""
+    flagged: int
+    """Samples against which the instrument said something."""
+
+
+@dataclass(frozen=True)
+class LogInfo:
+    """A log as a whole."""
+
+    path: str
+    closed: bool | None
+    """Whether it has its end; None for CSV, which has none."""
+    begun: str | None
+    """UTC of the first sample, where the log knows the clock's offset."""
+    duration: float
+    """From the first sample of any source to the last, s."""
+    sources: tuple[SourceInfo, ...]
+    counters: Mapping[str, Any]
+    """What was counted at last, by instrument."""
+    events: tuple[str, ...]
+    """Trips that were latched, in order."""
+    metadata: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def info_of(log: Log) -> LogInfo:
+    """Sum up a log."""
+    first, last = log.span
+    offset = log.layout.clock_offset
+    begun = None
+    if offset and np.isfinite(first):
+        begun = datetime.fromtimestamp(first + offset / 1e9, UTC).isoformat(timespec="milliseconds")
+    trips = (text for note in log.events for text in note.value.get("tripped", ()))
+    return LogInfo(
+        log.path,
+        log.closed,
+        begun,
+        last - first,
+        tuple(_source_info(item, log.samples[item.topic]) for item in log.layout.sources),
+        log.counters[-1].value if log.counters else {},
+        tuple(dict.fromkeys(map(str, trips))),
+        log.metadata,
+        log.notes,
+    )
+
+
+def _source_info(source: Source, samples: Samples) -> SourceInfo:
+    steps = np.diff(samples.times)
+    steps = steps[steps > 0]
+    median = float(np.median(steps)) if len(steps) else float("nan")
+    names = [signal.column or signal.name for signal in source.signals]
+    lacks = np.isnan(samples.values).sum(axis=0).tolist()
+    flags = [n for n, signal in enumerate(source.signals) if signal.name == _QUALITY]
+    return SourceInfo(
+        source.topic,
+        tuple(names),
+        len(samples),
+        1 / median if len(steps) else float("nan"),
+        int(np.count_nonzero(steps > _GAP * median)),
+        float(steps.max()) if len(steps) else float("nan"),
+        {name: count for name, count in zip(names, lacks, strict=True) if count},
+        int(np.count_nonzero(samples.values[:, flags])),
+    )

@@ -1,0 +1,117 @@
+"""A log of a bench as it was read: every source with its own time stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from winchkit.errors import Fault, RunError
+from winchkit.runs.align import Aligner
+from winchkit.runs.assemble import Recording, assemble
+from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+from winchkit.runs.run import Run
+
+__all__ = ["Log", "Note", "aligned", "joined", "log_of_run"]
+
+_BRIDGED = 1.5
+
+
+@dataclass(frozen=True)
+class Note:
+    """An event, or what was counted until a moment."""
+
+    time: float
+    """On the bench's clock, s."""
+    value: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Log:
+    """Samples of every source of a layout."""
+
+    path: str
+    layout: Layout
+    samples: Mapping[str, Samples]
+    """By topic."""
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    events: tuple[Note, ...] = ()
+    counters: tuple[Note, ...] = ()
+    end: Mapping[str, str] = field(default_factory=dict)
+    """What the recorder said when it closed the log; empty of one that it did not close."""
+    closed: bool | None = True
+    """Whether the file has its end, or was cut off; None where its format has none."""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last moment of any source, s; NaN without samples."""
+        times = [item.times for item in self.samples.values() if len(item)]
+        if not times:
+            return float("nan"), float("nan")
+        return min(float(t.min()) for t in times), max(float(t.max()) for t in times)
+
+
+def aligned(log: Log) -> Run:
+    """The run of a log: rows at the samples of its slowest instrument; raises RunError."""
+    aligner = Aligner(log.layout)
+    for topic, samples in log.samples.items():
+        aligner.add(topic, samples.times, samples.values)
+    table = aligner.rows(log.span[1])
+    recording = Recording(
+        log.path,
+        log.layout.columns(),
+        list(table.T.copy()),
+        lambda _row: None,
+        log.metadata,
+        notes=log.notes,
+    )
+    return assemble(recording)
+
+
+def log_of_run(run: Run, closed: bool | None = True) -> Log:
+    """A run as a log of one source, whose rows are its samples."""
+    signals = tuple(
+        Signal(name.replace(".", "_"), item.unit, name) for name, item in run.channels.items()
+    )
+    gap = _BRIDGED * run.interval if len(run) > 1 else 0.0
+    source = Source("/run", signals, gap)
+    values = [item.values for item in run.channels.values()]
+    table = np.column_stack(values) if values else np.empty((len(run), 0))
+    rule = RowRule("/run", float("-inf"), start=0.0)
+    samples = {"/run": Samples(run.time, run.time, table)}
+    return Log(
+        run.path, Layout((source,), rule), samples, run.metadata, closed=closed, notes=run.notes
+    )
+
+
+def joined(logs: Sequence[Log]) -> Log:
+    """The parts of one log put together; raises RunError where they are not of one log."""
+    first = logs[0]
+    for other in logs[1:]:
+        if _identity(other) != _identity(first):
+            message = f"is no part of the same log as {first.path}"
+            raise RunError(Fault(message, other.path))
+    samples = {
+        source.topic: Samples.joined(
+            [log.samples[source.topic] for log in logs], len(source.signals)
+        )
+        for source in first.layout.sources
+    }
+    return replace(
+        first,
+        samples=samples,
+        events=tuple(note for log in logs for note in log.events),
+        counters=tuple(note for log in logs for note in log.counters),
+        end=logs[-1].end,
+        closed=None if first.closed is None else all(log.closed for log in logs),
+        notes=tuple(dict.fromkeys(note for log in logs for note in log.notes)),
+    )
+
+
+def _identity(log: Log) -> object:
+    """What parts of one log have in common."""
+    signals = [(source.topic, source.signals) for source in log.layout.sources]
+    return replace(log.layout.rule, start=None), log.layout.clock_offset, signals

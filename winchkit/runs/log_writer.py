@@ -1,0 +1,96 @@
+"""What logs of a bench have in common: samples in, one file or several parts."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from winchkit.runs.layout import Layout, Samples
+from winchkit.runs.rotation import Rotation, part_path
+
+__all__ = ["LogWriter", "Watch", "open_log"]
+
+Watch = Callable[[int], None]
+"""Is told the descriptor of every file that is written."""
+
+
+class LogWriter(ABC):
+    """Takes what came from every source since the last time. Raises FileError where it cannot."""
+
+    def __init__(
+        self,
+        path: Path,
+        layout: Layout,
+        metadata: Mapping[str, str],
+        rotation: Rotation | None,
+        watch: Watch,
+    ) -> None:
+        self.rows = 0
+        """Of the run so far."""
+        self.parts: list[Path] = []
+        """Files so far, the last one being written."""
+        self._path, self._layout, self._metadata = path, layout, metadata
+        self._rotation, self._watch = rotation, watch
+        self._began = layout.rule.opened
+        self._next_part()
+
+    def write(self, pieces: Mapping[str, Samples], now: float) -> None:
+        """Write samples by topic, and hand them to the operating system."""
+        if self._rotation and self._rotation.due(self._size(), now - self._began):
+            self._close_part({})
+            self._began = now
+            self._next_part()
+        self._put(pieces, now)
+
+    def tell(self, time: float, event: Mapping[str, Any]) -> None:
+        """Keep an event at a moment (s), where the format has a place for it."""
+        return
+
+    def count(self, time: float, counters: Mapping[str, Any]) -> None:
+        """Keep what was counted until a moment (s), where the format has a place for it."""
+        return
+
+    def close(self, end: Mapping[str, str]) -> None:
+        """Finish the file; ``end`` is what was counted."""
+        self._close_part(end)
+
+    def _next_part(self) -> None:
+        number = len(self.parts) + 1
+        path = part_path(self._path, number) if self._rotation else self._path
+        self.parts.append(path)
+        self._open_part(path, {"part": str(number)} if self._rotation else {})
+
+    @abstractmethod
+    def _open_part(self, path: Path, about: Mapping[str, str]) -> None: ...
+
+    @abstractmethod
+    def _put(self, pieces: Mapping[str, Samples], now: float) -> None: ...
+
+    @abstractmethod
+    def _close_part(self, end: Mapping[str, str]) -> None: ...
+
+    @abstractmethod
+    def _size(self) -> int:
+        """Bytes of the part so far."""
+
+
+def open_log(
+    path: Path,
+    layout: Layout,
+    metadata: Mapping[str, str],
+    rotation: Rotation | None = None,
+    watch: Watch = lambda _descriptor: None,
+) -> LogWriter:
+    """Start a log in the format of the file's name; a file that is there is replaced.
+
+    Raises FileError where it cannot be written, UsageError for a suffix that is no format.
+    """
+    if path.suffix.lower() == ".mcap":
+        from winchkit.runs.log_channels import ChannelLog
+
+        return ChannelLog(path, layout, metadata, rotation, watch)
+    from winchkit.runs.log_rows import RowLog
+
+    return RowLog(path, layout, metadata, rotation, watch)

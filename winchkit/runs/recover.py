@@ -1,0 +1,207 @@
+"""Saves what is whole of a file that was cut off or damaged."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from winchkit.errors import Fault, FileError, RunError, UsageError
+from winchkit.runs.mcap_file import McapFile
+from winchkit.runs.mcap_layout import MARK, PROFILE
+from winchkit.runs.mcap_records import (
+    Body,
+    Damage,
+    Messages,
+    Op,
+    Record,
+    chunk_content,
+    is_intact,
+    records,
+)
+from winchkit.runs.text import read_bytes
+
+__all__ = ["Recovered", "recover", "recovered_path"]
+
+_COPIED = (Op.SCHEMA, Op.CHANNEL, Op.METADATA)
+_ZSTD = b"\x04\0\0\0zstd"
+_ZSTD_AT = 37
+"""Where a chunk record has the name of its compression: what the search for the next one finds."""
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """What was saved, and what was not."""
+
+    output: str
+    kept: int
+    """Messages, or rows of a CSV file."""
+    dropped_pieces: int
+    """Chunks or rows that were damaged and left out."""
+    dropped_bytes: int
+    was_whole: bool
+    """Whether there was nothing to recover."""
+
+
+def recovered_path(path: Path) -> Path:
+    """``lift.mcap`` becomes ``lift.recovered.mcap``."""
+    return path.with_suffix(f".recovered{path.suffix}")
+
+
+def recover(path: str | Path, output: str | Path | None = None) -> Recovered:
+    """Write everything whole of a file to another, which reads like one that was closed.
+
+    Never fails on a file of ours that was cut off, wherever that was. Raises RunError for a file
+    that is neither MCAP nor CSV, FileError where the output cannot be written.
+    """
+    source = Path(path)
+    target = Path(output) if output else recovered_path(source)
+    suffix = source.suffix.lower()
+    if target.resolve() == source.resolve():
+        raise UsageError(f"{target}: would replace the file that is to be recovered; name another")
+    data = read_bytes(source, may_be_empty=True)
+    if suffix == ".mcap":
+        saved, found = _mcap(data, source, target)
+    elif suffix == ".csv":
+        saved, found = _csv(data, target)
+    else:
+        raise RunError(Fault(f"'{suffix}' is no format of a log; use .mcap or .csv", str(path)))
+    try:
+        target.write_bytes(saved)
+    except OSError as error:
+        raise FileError(Fault(f"cannot be written: {error.strerror}", str(target))) from None
+    return found
+
+
+def _mcap(data: bytes, source: Path, target: Path) -> tuple[bytes, Recovered]:
+    if not data.startswith(MARK) and not MARK.startswith(data):
+        raise RunError(Fault("is no MCAP file: it does not begin with MCAP's mark", str(source)))
+    stream = io.BytesIO()
+    file = McapFile(stream, PROFILE, "winchkit recover")
+    kept = damaged = end = 0
+    closed = intact = False
+    for item in _whole(data):
+        damaged += item.offset > max(end, len(MARK))
+        end = item.end
+        if isinstance(item, Messages):
+            file.put_messages(item, data[item.offset : item.end])
+            kept += len(item.log_times)
+        elif item.op in _COPIED:
+            readable = _is_readable(item)
+            damaged += not readable
+            if readable:
+                file.put(item.op, bytes(item.body))
+        elif item.op == Op.CHUNK:
+            content = _chunk(item)
+            if content is None:
+                damaged += 1
+            else:
+                file.put_chunk(content)
+                kept += sum(len(m.log_times) for m in records(content) if isinstance(m, Messages))
+        elif item.op == Op.DATA_END:
+            closed, intact = True, is_intact(item, data)
+            break
+    file.finish()
+    whole = intact and not damaged and data.endswith(MARK)
+    lost = 0 if closed else len(data) - max(end, min(len(data), len(MARK)))
+    return stream.getvalue(), Recovered(str(target), kept, damaged, lost, whole)
+
+
+def _whole(data: bytes) -> Iterator[Record | Messages]:
+    """Every whole record; after damage it goes on at the next chunk that is whole."""
+    at = len(MARK)
+    while at < len(data):
+        try:
+            for item in records(data, at):
+                yield item
+                at = item.end
+                if isinstance(item, Record) and item.op == Op.DATA_END:
+                    return
+        except Damage:
+            pass
+        at = _next_chunk(data, at + 1)
+
+
+def _next_chunk(data: bytes, start: int) -> int:
+    """Where the next whole chunk begins; the end of the data without any."""
+    found = data.find(_ZSTD, start)
+    while found >= 0:
+        at = found - _ZSTD_AT
+        if at >= start and data[at] == Op.CHUNK:
+            item = next(records(data, at), None)
+            if isinstance(item, Record) and _chunk(item) is not None:
+                return at
+        found = data.find(_ZSTD, found + 1)
+    return len(data)
+
+
+def _is_readable(item: Record) -> bool:
+    """Whether a declaration or metadata can be read."""
+    fields = Body(item.body)
+    try:
+        if item.op == Op.METADATA:
+            fields.text()
+            fields.texts()
+        else:
+            fields.take(2 if item.op == Op.SCHEMA else 4)
+            fields.text()
+            fields.text()
+            fields.take(fields.number(4))
+    except Damage:
+        return False
+    return True
+
+
+def _chunk(item: Record) -> bytes | None:
+    """What is in a chunk; None where it is damaged."""
+    try:
+        content = chunk_content(item.body)
+        ends = [inner.end for inner in records(content)]
+    except Damage:
+        return None
+    return content if ends and ends[-1] == len(content) else None
+
+
+def _csv(data: bytes, target: Path) -> tuple[bytes, Recovered]:
+    """Whole lines: remarks, the header, and rows of numbers with rising time."""
+    lines = data.split(b"\n")
+    # What follows the last line end was cut off: a number there may lack digits.
+    cut = lines.pop()
+    kept: list[bytes] = []
+    rows = dropped = 0
+    header: list[bytes] | None = None
+    time_at, last = 0, -math.inf
+    for line in lines:
+        text = line.strip()
+        if header is None:
+            if b"\0" in line:
+                dropped += 1
+                continue
+            if text and not text.startswith(b"#"):
+                header = text.split(b",")
+                time_at = next((n for n, c in enumerate(header) if c.startswith(b"time")), -1)
+            kept.append(line)
+            continue
+        numbers = _numbers(text, len(header))
+        time = numbers[time_at] if numbers and time_at >= 0 else math.inf
+        if numbers is None or (time_at >= 0 and not time > last):
+            dropped += bool(text)
+            continue
+        last = time if time_at >= 0 else last
+        rows += 1
+        kept.append(line)
+    saved = b"".join(line + b"\n" for line in kept)
+    return saved, Recovered(str(target), rows, dropped, len(cut), not cut and not dropped)
+
+
+def _numbers(line: bytes, width: int) -> list[float] | None:
+    """A row's numbers, NaN for an empty cell; None where it is no row."""
+    cells = line.split(b",")
+    if len(cells) != width:
+        return None
+    try:
+        return [float(cell) if cell.strip() else math.nan for cell in cells]
+    except ValueError:
+        return None

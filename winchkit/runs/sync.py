@@ -1,0 +1,65 @@
+"""Brings files to the disk from a thread of its own: neither the writer nor a loop waits for it."""
+
+from __future__ import annotations
+
+import errno
+import os
+import threading
+
+__all__ = ["SYNC_PERIOD", "Syncer"]
+
+SYNC_PERIOD = 0.8
+"""Between two fsyncs, s: what was written reaches the disk within a second of it."""
+_CANNOT = (errno.EINVAL, errno.ENOTSUP, errno.EROFS)
+"""A pipe or a device has nothing to sync."""
+
+
+class Syncer:
+    """Calls fsync for the file that is watched until closed."""
+
+    def __init__(self) -> None:
+        self.error: OSError | None = None
+        """What the disk refused; from then on nothing is synced."""
+        self._lock = threading.Lock()
+        self._watched: int | None = None
+        self._finished: list[int] = []
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="recorder sync", daemon=True)
+        self._thread.start()
+
+    def watch(self, descriptor: int) -> None:
+        """Sync this file from now on; the one before once more."""
+        with self._lock:
+            self._release()
+            self._watched = os.dup(descriptor)
+
+    def close(self) -> None:
+        """Sync a last time and end."""
+        with self._lock:
+            self._release()
+        self._stopping.set()
+        self._thread.join()
+
+    def _release(self) -> None:
+        if self._watched is not None:
+            self._finished.append(self._watched)
+            self._watched = None
+
+    def _run(self) -> None:
+        ending = False
+        while not ending:
+            ending = self._stopping.wait(SYNC_PERIOD)
+            with self._lock:
+                finished, self._finished = self._finished, []
+                current = [] if self._watched is None else [os.dup(self._watched)]
+            for descriptor in (*finished, *current):
+                self._sync(descriptor)
+
+    def _sync(self, descriptor: int) -> None:
+        try:
+            os.fsync(descriptor)
+        except OSError as error:
+            if error.errno not in _CANNOT:
+                self.error = error
+        finally:
+            os.close(descriptor)

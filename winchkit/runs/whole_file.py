@@ -1,0 +1,37 @@
+"""Files that keep what was whole of them when they can no longer be written."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from winchkit.errors import Fault, FileError
+
+__all__ = ["abandoned", "open_new"]
+
+_BUFFER = 1 << 20
+
+
+def open_new(path: Path) -> BinaryIO:
+    """A new file, or an empty one in place of the old; raises FileError."""
+    try:
+        return path.open("wb", buffering=_BUFFER)
+    except OSError as error:
+        raise _refused(path, error) from None
+
+
+def abandoned(stream: BinaryIO, path: Path, whole: int, error: OSError) -> FileError:
+    """Close a stream, cut its file back to ``whole`` bytes, and return the error to raise."""
+    if not stream.closed:
+        # Closing writes what still waits, which fails again; what it got out is cut off after it.
+        with suppress(OSError):
+            stream.close()
+        with suppress(OSError):
+            os.truncate(path, whole)
+    return _refused(path, error)
+
+
+def _refused(path: Path, error: OSError) -> FileError:
+    return FileError(Fault(f"cannot be written: {error.strerror}", str(path)))

@@ -1,0 +1,271 @@
+"""What a device file declares of an instrument on a serial line, polled or sending by itself.
+
+Bytes are written as text, one character a byte (Latin-1); ``\\u001b`` is ESC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from winchkit.errors import UsageError
+from winchkit.schema.quantity import (
+    Duration,
+    Number,
+    PositiveDuration,
+    PositiveNumber,
+    Whole,
+    WholeNumber,
+)
+from winchkit.schema.table import Rule, Table
+from winchkit.schema.template import Part, fields_of, length_of, parts_of
+from winchkit.units import dimension_of
+
+__all__ = [
+    "NUMBERS",
+    "AskSpec",
+    "BinarySpec",
+    "ChecksumSpec",
+    "FreshSpec",
+    "LinkSpec",
+    "Says",
+    "StreamSpec",
+    "UnitSpec",
+]
+
+Says = Literal[
+    "good",
+    "overload",
+    "underload",
+    "fault",
+    "stable",
+    "unstable",
+    "net",
+    "gross",
+    "zero",
+    "stale",
+    "busy",
+    "refused",
+]
+"""What a status letter, a status bit, a word or a reply says."""
+NUMBERS = ("value", "gross")
+"""Fields that hold a number in the device's unit."""
+_OWN = (*NUMBERS, "unit", "address", "checksum", "bits", "skip")
+
+
+@dataclass(frozen=True)
+class AskSpec(Table):
+    """What is sent, and the lines that may answer; ``{address:3}`` is the device's address."""
+
+    send: str
+    answer: tuple[str, ...] = ()
+    """A ``*`` in it stands for anything; without answers the device says nothing."""
+
+
+@dataclass(frozen=True)
+class FreshSpec(Table):
+    """How to ask whether there is a new value: bits that may say ``stale``."""
+
+    send: str
+    frame: str = "{bits}"
+
+
+@dataclass(frozen=True)
+class ChecksumSpec(Table):
+    """Two hexadecimal digits, the field ``checksum``, over the characters between two marks."""
+
+    kind: Literal["xor", "sum", "sum-complement"]
+    after: str = ""
+    """First character of the line that does not count; empty: the line counts from its start."""
+    before: str = ""
+    """Last character that does not count; empty: the line counts up to the check sum."""
+
+
+@dataclass(frozen=True)
+class BinarySpec(Table):
+    """A frame of ``length`` bytes, which may hold any byte; the terminator comes behind it."""
+
+    length: WholeNumber
+    value: tuple[Annotated[int, Whole(0)], WholeNumber]
+    """First byte of the value (from 0) and number of bytes, two's complement."""
+    bits: Annotated[int, Whole(0)] | None = None
+    """Byte that holds the status bits."""
+    order: Literal["big", "little"] = "big"
+
+    def rules(self) -> Iterator[Rule]:
+        """The fields lie within the frame."""
+        first, size = self.value
+        if first + size > self.length:
+            yield "value", f"bytes {first} to {first + size - 1} are not within {self.length} bytes"
+        if self.bits is not None and self.bits >= self.length:
+            yield "bits", f"byte {self.bits} is not within {self.length} bytes"
+
+
+@dataclass(frozen=True)
+class UnitSpec(Table):
+    """What one of a unit that stands in a frame is: ``kg = { scale = 9.80665, unit = "N" }``."""
+
+    scale: Number
+    unit: str
+
+
+@dataclass(frozen=True)
+class LinkSpec(Table):
+    """The maker's settings of the line, said when nothing answers."""
+
+    baudrate: WholeNumber
+    parity: Literal["N", "E", "O"] = "N"
+    stopbits: Literal[1, 2] = 1
+    bytesize: Literal[7, 8] = 8
+
+    def __str__(self) -> str:
+        return f"{self.baudrate} {self.bytesize}{self.parity}{self.stopbits}"
+
+
+@dataclass(frozen=True)
+class StreamSpec(Table):
+    """An instrument on a serial line, read in lines of text or in binary frames."""
+
+    mode: Literal["polled", "continuous"]
+    example: str
+    """A frame as the source prints it, without terminator; the simulated device looks like it."""
+    frame: tuple[str, ...] = ()
+    """Templates of a line with the field ``value``, the usual one first."""
+    binary: BinarySpec | None = None
+    terminator: str = "\r\n"
+    longest: WholeNumber = 64
+    """Characters of the longest line."""
+    checksum: ChecksumSpec | None = None
+    unit: str = "1"
+    scale: Number = 1.0
+    """Of one of what the field ``value`` counts, in ``unit``."""
+    units: Mapping[str, UnitSpec] = field(default_factory=dict)
+    """Units that stand in the frame, by their text there; then ``unit`` and ``scale`` are none."""
+    capacity: PositiveNumber | None = None
+    """A number in the frame beyond this, either way, is an overload."""
+    words: Mapping[str, Says] = field(default_factory=dict)
+    """Text in place of the digits."""
+    replies: Mapping[str, Says] = field(default_factory=dict)
+    """Lines in place of a frame; a ``*`` in it stands for anything."""
+    letter: Mapping[str, Mapping[str, Says]] = field(default_factory=dict)
+    """Text of a status field by the field's name; what is not listed spoils the frame."""
+    bits: Mapping[Says, tuple[Annotated[int, Whole(0, 31)], ...]] = field(default_factory=dict)
+    """Bits of the number in the field ``bits``, from 0."""
+    start: tuple[AskSpec, ...] = ()
+    """Sent when the device is first spoken to, and again when it was silent."""
+    stop: str = ""
+    """Ends the sending, before a command and at the end."""
+    poll: str = ""
+    fresh: FreshSpec | None = None
+    select: AskSpec | None = None
+    """Sent before another device of the same line is spoken to."""
+    command: Mapping[str, AskSpec] = field(default_factory=dict)
+    link: LinkSpec | None = None
+    rate: PositiveNumber = 100.0
+    """Conversions per second."""
+    filter_delay: Duration = 0.0
+    """By this much a value is older than the moment at which it was sent, s."""
+    longest_reply: PositiveDuration = 0.1
+    """After this long an answer cannot come any more, s."""
+
+    def rules(self) -> Iterator[Rule]:
+        """A device speaks in one way, and what its frames hold is declared."""
+        if (self.binary is None) == (not self.frame):
+            yield "", "give either 'frame', templates of lines, or the table 'binary'"
+        if self.binary is not None and self.mode == "continuous":
+            yield "mode", "nothing tells where a binary frame begins; it can only be polled"
+        if (self.mode == "polled") != bool(self.poll):
+            yield "poll", "a polled device has what to send here, one that is continuous has not"
+        if not self.terminator:
+            yield "terminator", "empty; give the characters that end a frame"
+        if self.binary is not None and (self.units or self.words):
+            yield "binary", "a binary frame holds neither units nor words"
+        if self.capacity is not None and self.units:
+            yield "capacity", "has no meaning where the unit stands in the frame"
+        yield from self._broken_units()
+        yield from self._broken_templates()
+        yield from self._broken_requests()
+        yield from self._broken_example()
+
+    def dimension(self) -> str | None:
+        """Of the value; None where a unit is unknown or there are several."""
+        units = [one.unit for one in self.units.values()] or [self.unit]
+        found = {dimension_of(unit) for unit in units}
+        return found.pop() if len(found) == 1 else None
+
+    def templates(self) -> tuple[tuple[Part, ...], ...]:
+        """Templates of its lines in pieces; raises UsageError."""
+        return tuple(parts_of(text) for text in self.frame)
+
+    def _broken_units(self) -> Iterator[Rule]:
+        if self.dimension() is None:
+            known = ", ".join(sorted({one.unit for one in self.units.values()} or {self.unit}))
+            yield "unit", f"{known}: unknown, or not of one dimension"
+        if any(one.scale == 0.0 for one in self.units.values()) or self.scale == 0.0:
+            yield "scale", "must not be zero"
+
+    def _broken_templates(self) -> Iterator[Rule]:
+        asked = [("fresh.frame", self.fresh.frame)] if self.fresh else []
+        for key, text in [("frame", text) for text in self.frame] + asked:
+            try:
+                parts = parts_of(text)
+            except UsageError as error:
+                yield key, str(error)
+                continue
+            for message in self._broken_fields(parts, {part.field for part in parts}):
+                yield key, f"'{text}': {message}"
+            if key == "frame" and not any(part.field == "value" for part in parts):
+                yield key, f"'{text}' has no field {{value}}"
+
+    def _broken_requests(self) -> Iterator[Rule]:
+        """Only the address can be put into what is sent, and all of it must be bytes."""
+        asked = [("start", ask) for ask in self.start]
+        asked += [(f"command.{name}", ask) for name, ask in self.command.items()]
+        asked += [("select", self.select)] if self.select else []
+        texts = [("poll", self.poll), ("stop", self.stop)]
+        texts += [("fresh.send", self.fresh.send)] if self.fresh else []
+        for key, text in texts + [(f"{key}.send", ask.send) for key, ask in asked]:
+            try:
+                strange = {part.field for part in parts_of(text)} - {"", "address"}
+            except UsageError as error:
+                yield key, str(error)
+                continue
+            for name in sorted(strange):
+                yield key, f"'{text}': {{{name}}} is unknown; use {{address}} or {{address:3}}"
+            if not _is_bytes(text):
+                yield key, f"'{text}' has characters that are no bytes"
+        if not _is_bytes(self.terminator):
+            yield "terminator", f"'{self.terminator}' has characters that are no bytes"
+
+    def _broken_example(self) -> Iterator[Rule]:
+        """The example is a frame."""
+        if self.binary is not None:
+            digits = 2 * self.binary.length
+            if len(self.example) != digits or set(self.example) - set("0123456789abcdef"):
+                yield "example", f"'{self.example}' is not {digits} digits out of 0 to f"
+            return
+        try:
+            templates = self.templates()
+        except UsageError:
+            return  # said already, at its own place
+        if templates and fields_of(templates[0], self.example) is None:
+            yield "example", f"'{self.example}' does not fit '{self.frame[0]}'"
+
+    def _broken_fields(self, parts: tuple[Part, ...], names: set[str]) -> Iterator[str]:
+        for name in sorted(names - {"", *_OWN, *self.letter}):
+            yield f"{{{name}}} is unknown; use {', '.join(_OWN)} or a table letter.{name}"
+        if ("checksum" in names) != (self.checksum is not None) and "value" in names:
+            yield "a field {checksum:2} and the table 'checksum' go together"
+        if "unit" in names and not self.units:
+            yield "{unit} needs the table 'units'"
+        if "value" in names and self.units and "unit" not in names:
+            yield "there is a table 'units' and no field {unit}"
+        length = length_of(parts)
+        if length is not None and length > self.longest:
+            yield f"its {length} characters are more than 'longest', {self.longest}"
+
+
+def _is_bytes(text: str) -> bool:
+    """Whether each character is one byte."""
+    return all(ord(letter) < 256 for letter in text)

@@ -1,0 +1,135 @@
+"""What a simulated serial instrument says: its frames, status and replies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from winchkit.schema.device_stream import Says, StreamSpec
+from winchkit.sim.stream_encode import example_fields, style_of, write_line
+
+__all__ = ["Speech", "State"]
+
+_STABLE_DIGITS = 100
+_ALARMS: tuple[Says, ...] = ("fault", "overload")
+_IN_BITS: tuple[Says, ...] = ("overload", "underload", "fault", "unstable", "stable", "net")
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What an instrument knows, in the unit that its frames count."""
+
+    net: float
+    """NaN where nothing could be measured."""
+    gross: float
+    motion: float
+    tared: bool
+    overload: bool
+    broken: bool
+    address: int | None
+    spoilt: bool = False
+    """The check sum is to be wrong."""
+
+
+class Speech:
+    """Writes what one kind of device says."""
+
+    def __init__(self, spec: StreamSpec) -> None:
+        """Raise FileError where the device file's example does not fit its frame."""
+        self._spec = spec
+        self._example = example_fields(spec) if spec.binary is None else {}
+
+    def line(self, text: str) -> bytes:
+        """A line of text."""
+        return (text + self._spec.terminator).encode("latin-1")
+
+    def reply(self, *wanted: Says) -> str | None:
+        """The reply that says one of these, None where the device has none."""
+        found = [text for text, says in self._spec.replies.items() if says in wanted]
+        return found[0].replace("*", " ").strip() if found else None
+
+    def status(self, state: State, *, old: bool) -> bytes:
+        """The answer to the question whether there is a new value."""
+        assert self._spec.fresh is not None, "asked where the device file has the question"
+        bits = self._bits(self._truths(state)) | self._bit("stale", old)
+        return self.line(self._spec.fresh.frame.replace("{bits}", str(bits)))
+
+    def frame(self, state: State) -> bytes:
+        """The frame that says the state."""
+        truths = self._truths(state)
+        if self._spec.binary is not None:
+            return self._binary(state, truths)
+        said: Says | None = next((one for one in _ALARMS if truths[one]), None)
+        if said is not None and (reply := self.reply(said)) is not None:
+            return self.line(reply)
+        fields = {**self._example, **self._fields(state, truths, said)}
+        line = write_line(self._spec.templates()[0], fields, self._spec.checksum)
+        if state.spoilt and "checksum" in self._example:
+            line = line[:-1] + ("0" if line[-1] != "0" else "1")
+        return self.line(line)
+
+    def _fields(self, state: State, truths: dict[Says, bool], said: Says | None) -> dict[str, str]:
+        fields = {}
+        for name, number in (("value", state.net), ("gross", state.gross)):
+            if name in self._example:
+                fields[name] = self._digits(name, number, said)
+        for name, letters in self._spec.letter.items():
+            fits = [text for text, says in letters.items() if truths.get(says, False)]
+            fields[name] = fits[0] if fits else self._example.get(name, "")
+        if "bits" in self._example:
+            fields["bits"] = f"{self._bits(truths):0{len(self._example['bits'])}d}"
+        if "address" in self._example and state.address is not None:
+            fields["address"] = f"{state.address:0{len(self._example['address'])}d}"
+        return fields
+
+    def _digits(self, name: str, number: float, said: Says | None) -> str:
+        width = next(part.width for part in self._spec.templates()[0] if part.field == name)
+        if said is not None and self._can_say(said):
+            word = next((text for text, says in self._spec.words.items() if says == said), "")
+            return word.center(width or 0)
+        text = style_of(self._example[name], width).write(number)
+        return text if text is not None else "-" * (width or 0)
+
+    def _binary(self, state: State, truths: dict[Says, bool]) -> bytes:
+        layout = self._spec.binary
+        assert layout is not None, "called for a binary frame"
+        first, size = layout.value
+        highest = (1 << (8 * size - 1)) - 1
+        counts = round(state.net) if isfinite(state.net) else 0
+        clipped = min(max(counts, -highest - 1), highest)
+        frame = bytearray(layout.length)
+        frame[first : first + size] = clipped.to_bytes(size, layout.order, signed=True)
+        if layout.bits is not None:
+            frame[layout.bits] = self._bits(truths) | self._bit("overload", clipped != counts)
+        return bytes(frame) + self._spec.terminator.encode("latin-1")
+
+    def _truths(self, state: State) -> dict[Says, bool]:
+        """What is true of the conversion that is shown."""
+        alarm = state.overload or state.broken
+        stable = state.motion < _STABLE_DIGITS * self._one_digit()
+        says_fault = self._can_say("fault")
+        return {
+            "overload": state.overload or (state.broken and not says_fault),
+            "fault": state.broken and says_fault,
+            "unstable": not stable and not alarm,
+            "stable": stable and not alarm,
+            "net": state.tared,
+            "gross": not state.tared,
+        }
+
+    def _one_digit(self) -> float:
+        if not self._example:
+            return 1.0
+        return float(10.0 ** -len(self._example["value"].strip().partition(".")[2]))
+
+    def _can_say(self, says: Says) -> bool:
+        spec = self._spec
+        said = [*spec.words.values(), *spec.replies.values(), *spec.bits]
+        return says in said or any(says in one.values() for one in spec.letter.values())
+
+    def _bits(self, truths: dict[Says, bool]) -> int:
+        return sum(self._bit(says, truths.get(says, False)) for says in _IN_BITS)
+
+    def _bit(self, says: Says, true: bool) -> int:
+        numbers = self._spec.bits.get(says, ())
+        return 1 << numbers[-1] if true and numbers else 0

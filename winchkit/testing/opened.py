@@ -1,0 +1,226 @@
+"""A simulated bench, opened for a test: the bench, its truth, faults, frames and assertions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Container, Mapping, Sequence
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Self
+
+from winchkit.bench.bench import Bench, open_bench
+from winchkit.drivers.can.cia402 import state_of
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.simbench import SimBench
+from winchkit.sim.live import LiveBench
+from winchkit.sim.pace import PacedClock
+from winchkit.testing.frames import Frame
+from winchkit.testing.recording import Recording
+
+__all__ = ["OpenedBench"]
+
+_POLL = 2e-3
+_WALL = 10.0
+"""How many times longer than on the bench's clock a wait may last on a machine that is busy."""
+_LEAST_WALL = 20.0
+
+
+class OpenedBench:
+    """A bench on simulated winches; a context manager.
+
+    ``bench`` is what ``open_bench`` gives, ``spec`` its wiring, ``live`` the simulation behind
+    it, ``clock`` the clock of both, which stands still while this machine is busy elsewhere.
+    Times are on that clock, s. Faults last until ``recover``.
+    """
+
+    def __init__(self, declared: SimBench, *, hidden: Sequence[str] = (), seed: int = 0) -> None:
+        """Open it at once; raises FileError, UsageError and what ``open_bench`` raises."""
+        self.clock = PacedClock()
+        self._disturbances: list[Callable[[], None]] = []
+        self._faulty: set[str] = set()
+        with ExitStack() as stack:
+            live = LiveBench(declared, seed=seed, hidden=hidden, clock=self.clock.simulation)
+            self.live = stack.enter_context(live)
+            self.spec: BenchSpec = live.bench_spec
+            self._recording = Recording(self.spec, live.wire)
+            self.bench: Bench = stack.enter_context(open_bench(self.spec, self.clock))
+            self.bench.on_cycle(self.clock.control)
+            self._start: dict[str, float] = {}
+            self.mark()
+            self._stack = stack.pop_all()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the faults, stop the winches and end the simulation. Twice does no harm.
+
+        Raises what a callback has raised.
+        """
+        self.recover()
+        stack, self._stack = self._stack, ExitStack()
+        stack.close()
+
+    # What goes wrong.
+
+    def drop(self, frames: str | int, *, share: float = 1.0) -> Callable[[], None]:
+        """Lose a share of some frames on their way, ``drop("A.tpdo1")``; see ``Frame.name``.
+
+        A winch's name stands for everything from and to its drive, ``host`` for all that the
+        host sends, a number for an identifier. Returns a function that ends it.
+        """
+        return self._disturb(self._recording.identifiers(frames), share, None)
+
+    def delay(
+        self, frames: str | int, duration: float, *, share: float = 1.0
+    ) -> Callable[[], None]:
+        """Let a share of some frames come ``duration`` s late; else as :meth:`drop`."""
+        return self._disturb(self._recording.identifiers(frames), share, duration)
+
+    def drive_fault(self, winch: str, kind: str = "over-current") -> None:
+        """Let a drive report a fault, e.g. ``following error``."""
+        self.fault(f"{winch}.servo", kind)
+
+    def lose_heartbeat(self, winch: str) -> None:
+        """Let a drive stop its heartbeat and go on otherwise."""
+        self.fault(f"{winch}.servo", "heartbeat stop")
+
+    def lose_host(self) -> None:
+        """Let nothing that the host sends reach the drives, as if its process were killed."""
+        self.drop("host")
+
+    def cut_wire(self) -> None:
+        """Let no frame through on any bus, either way."""
+        self._disturb(dict.fromkeys(self.live.wire, range(0x800)), 1.0, None)
+
+    def reboot(self, winch: str) -> None:
+        """Let a drive start again, as after a short loss of power."""
+        self.fault(f"{winch}.servo", "reboot")
+
+    def freeze_cell(self, winch: str, role: str = "cell") -> None:
+        """Let an instrument go on answering with its last conversion."""
+        self.fault(f"{winch}.{role}", "frozen")
+
+    def silence_cell(self, winch: str, role: str = "cell") -> None:
+        """Let an instrument answer no more."""
+        self.fault(f"{winch}.{role}", "silence")
+
+    def fault(self, target: str, kind: str) -> None:
+        """Let any device go wrong: ``fault("A.length", "late reply")``; raises UsageError."""
+        self.live.inject(target, kind)
+        self._faulty.add(target)
+
+    def recover(self) -> None:
+        """End every fault and disturbance that lasts; what is latched stays so."""
+        for end in self._disturbances:
+            end()
+        self._disturbances.clear()
+        for target in self._faulty:
+            self.live.inject(target, "recover")
+        self._faulty.clear()
+
+    def hang(self, winch: str, mass: float) -> None:
+        """Hang another load (kg); NotPermitted while the winch moves."""
+        self.live.hang(winch, mass)
+
+    # What is true.
+
+    def state(self, winch: str) -> str:
+        """State of a drive as itself has it, in the words of CiA 402."""
+        with self.live.up_to_date():
+            return str(state_of(int(self.live.winches[winch].drive.state)))
+
+    def length(self, winch: str) -> float:
+        """True cable length, m."""
+        with self.live.up_to_date():
+            return self.live.winches[winch].plant.cable_length
+
+    def tension(self, winch: str) -> float:
+        """True tension at the cell, N."""
+        with self.live.up_to_date():
+            return self.live.winches[winch].plant.tension
+
+    def mark(self) -> None:
+        """Count :meth:`assert_moved` from here."""
+        self._start = {winch: self.length(winch) for winch in self.live.winches}
+
+    @property
+    def frames(self) -> list[Frame]:
+        """Frames so far in their order, those of the opening included; the last 200 000."""
+        return self._recording.frames()
+
+    def frames_of(self, name: str | int, since: float = 0.0) -> list[Frame]:
+        """Frames by name, e.g. ``A.rpdo1``, from a time on; raises UsageError for none such."""
+        return self._recording.frames(name, since)
+
+    # What a test expects.
+
+    def wait_until(self, condition: Callable[[], bool], within: float = 5.0) -> bool:
+        """Whether it comes true within a time on the bench's clock, s."""
+        deadline = self.clock.now() + within
+        # Nobody's test may hang where the clock does.
+        wall = time.monotonic() + max(_LEAST_WALL, _WALL * within)
+        while not condition():
+            if self.clock.now() > deadline or time.monotonic() > wall:
+                return False
+            time.sleep(_POLL)
+        return True
+
+    def assert_state(self, winch: str, state: str, within: float = 2.0) -> None:
+        """The drive itself comes to a state, e.g. ``switch on disabled``, within a time, s."""
+        arrived = self.wait_until(lambda: self.state(winch) == state, within)
+        known = self.bench.snapshot.winch[winch]
+        assert arrived, (
+            f"winch {winch}: its drive is in '{self.state(winch)}', not in '{state}', after "
+            f"{within:g} s (the bench believes '{known.state}', {known.phase.value})"
+        )
+
+    def assert_moved(self, winch: str, by: float, tolerance: float = 5e-3) -> None:
+        """The true cable length changed by so much (m) since the opening or :meth:`mark`."""
+        moved = self.length(winch) - self._start[winch]
+        assert abs(moved - by) <= tolerance, (
+            f"winch {winch}: the rope moved by {moved:+.4f} m, expected {by:+.4f} m "
+            f"within {tolerance:g} m"
+        )
+
+    def assert_tension(
+        self,
+        winch: str,
+        tension: float,
+        tolerance: float = 5.0,
+        *,
+        within: float = 2.0,
+        lasting: float = 0.2,
+    ) -> None:
+        """The true tension comes to a value (N) and stays there for ``lasting`` s."""
+        since: list[float] = []
+
+        def stays() -> bool:
+            if abs(self.tension(winch) - tension) > tolerance:
+                since.clear()
+                return False
+            since.append(self.clock.now())
+            return since[-1] - since[0] >= lasting
+
+        assert self.wait_until(stays, within + lasting), (
+            f"winch {winch}: the tension is {self.tension(winch):.1f} N, expected {tension:g} N "
+            f"within {tolerance:g} N for {lasting:g} s, after {within:g} s"
+        )
+
+    def _disturb(
+        self, buses: Mapping[str, Container[int]], share: float, delay: float | None
+    ) -> Callable[[], None]:
+        """Disturb identifiers by bus; returns a function that ends it."""
+        ends = ExitStack()
+        for bus, identifiers in buses.items():
+            ends.callback(self.live.wire[bus].disturb(identifiers, share=share, delay=delay))
+        self._disturbances.append(ends.close)
+        return ends.close
