@@ -69,7 +69,7 @@ def test_unstable_is_still_a_number() -> None:
     value, _, _, quality, status = laumas().decode(registers(1 << 10, 0, 12345))
     assert value == pytest.approx(123.45)
     assert quality is Quality.UNSTABLE
-    assert laumas().has("net", status)
+    assert laumas().status.has("net", status)
     assert "unstable" in str(quality)
 
 

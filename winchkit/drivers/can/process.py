@@ -70,7 +70,7 @@ class ProcessInstrument:
     @property
     def tared(self) -> bool | None:
         """Whether the device says that it shows a net value; None where it does not say."""
-        return self._decoder.has("net", self.status) if "net" in self.spec.bits else None
+        return self._decoder.status.has("net", self.status) if "net" in self.spec.bits else None
 
     @property
     def sends(self) -> bool:
@@ -140,7 +140,7 @@ class ProcessInstrument:
         sent = self._clock.now()
         while self._clock.now() < sent + command.within:
             await asyncio.sleep(self.period / 2)
-            reading, has = self.latest, self._decoder.has
+            reading, has = self.latest, self._decoder.status.has
             came = command.comes is None or has(command.comes, self.status)
             gone = command.goes is None or not has(command.goes, self.status)
             if reading is not None and reading.t_request > sent and came and gone:

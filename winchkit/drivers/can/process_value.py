@@ -8,9 +8,9 @@ import struct
 from winchkit.drivers.can.node import SdoNode
 from winchkit.drivers.can.pdo import parse_object
 from winchkit.drivers.reading import Quality
+from winchkit.drivers.status_word import StatusWord
 from winchkit.errors import Fault, FileError
 from winchkit.schema.device import DeviceSpec
-from winchkit.schema.modbus_parts import StatusMeaning
 from winchkit.units import convert, dimension_of
 
 __all__ = ["ProcessDecoder"]
@@ -18,13 +18,6 @@ __all__ = ["ProcessDecoder"]
 _REAL32_BITS = 32
 _TINIEST = 1e-30
 """A float below it, but not zero, is no measurement: its bytes are of another type."""
-_FLAGS: dict[StatusMeaning, Quality] = {
-    "overload": Quality.OVERLOAD,
-    "underload": Quality.UNDERLOAD,
-    "fault": Quality.FAULT,
-    "unstable": Quality.UNSTABLE,
-    "busy": Quality.STALE,
-}
 
 
 class ProcessDecoder:
@@ -42,20 +35,14 @@ class ProcessDecoder:
                 Fault(f"{spec.value} is no REAL32 in the EDS", device.path, key="process.type")
             )
         self._dimension = dimension_of(spec.unit) or ""
-        self._masks = {
-            meaning: sum(1 << bit for bit in bits) for meaning, bits in spec.bits.items()
-        }
-
-    def has(self, meaning: StatusMeaning, status: int) -> bool:
-        """Whether a status says ``meaning``."""
-        return bool(status & self._masks.get(meaning, 0))
+        self.status = StatusWord(spec.bits)
 
     def decode(self, raw: int, status: int) -> tuple[float, float, Quality]:
         """Value (SI or NaN), counts, flags of a raw object and its status."""
         counts = float(raw)
         if self.spec.type == "f32":
             counts = float(struct.unpack("<f", struct.pack("<I", raw))[0])
-        quality = self._quality(status)
+        quality = self.status.quality(status)
         if not math.isfinite(counts):
             quality |= Quality.FAULT
         elif quality.usable and self._strange(counts):
@@ -63,17 +50,6 @@ class ProcessDecoder:
         if not quality.usable:
             return math.nan, counts, quality
         return convert(counts * self.spec.scale, self.spec.unit, self._dimension), counts, quality
-
-    def _quality(self, status: int) -> Quality:
-        quality = Quality.GOOD
-        for meaning, flag in _FLAGS.items():
-            if self.has(meaning, status):
-                quality |= flag
-        if "stable" in self.spec.bits and not self.has("stable", status):
-            quality |= Quality.UNSTABLE
-        if "valid" in self.spec.bits and not self.has("valid", status) and quality.usable:
-            quality |= Quality.FAULT
-        return quality
 
     def _strange(self, counts: float) -> bool:
         """Whether no device in good order shows this number."""

@@ -77,6 +77,6 @@ async def identity(client: ModbusClient, instrument: Instrument) -> dict[str, fl
 
 
 def _obeyed(instrument: Instrument, command: CommandSpec) -> bool:
-    has, status = instrument.decoder.has, instrument.status
+    has, status = instrument.decoder.status.has, instrument.status
     came = command.comes is None or has(command.comes, status)
     return came and not (command.goes is not None and has(command.goes, status))

@@ -8,20 +8,14 @@ from typing import NamedTuple
 
 from winchkit.drivers.modbus.words import number_of
 from winchkit.drivers.reading import Quality
+from winchkit.drivers.status_word import StatusWord
 from winchkit.errors import Fault, FileError
 from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_modbus import FieldSpec, ModbusSpec, ReadBlock, StatusMeaning
+from winchkit.schema.device_modbus import FieldSpec, ModbusSpec, ReadBlock
 from winchkit.units import convert, dimension_of
 
 __all__ = ["Decoded", "Decoder"]
 
-_FLAGS: dict[StatusMeaning, Quality] = {
-    "overload": Quality.OVERLOAD,
-    "underload": Quality.UNDERLOAD,
-    "fault": Quality.FAULT,
-    "unstable": Quality.UNSTABLE,
-    "busy": Quality.STALE,
-}
 _TINIEST = 1e-30
 """A float below it, but not zero, is no measurement: its bytes stand in another order."""
 _TINIEST_SHARE = 1e-12
@@ -55,9 +49,7 @@ class Decoder:
         self.field = by_name[self.spec.value]
         self._gross = by_name.get("gross", self.field)
         self.dimension = dimension_of(self.field.unit) or ""
-        self._masks = {
-            meaning: sum(1 << bit for bit in bits) for meaning, bits in self.spec.status.items()
-        }
+        self.status = StatusWord(self.spec.status)
 
     def decode(self, registers: Sequence[int], status_registers: Sequence[int] = ()) -> Decoded:
         """Value and gross value (SI or NaN), signed counts, quality, status word.
@@ -71,7 +63,7 @@ class Decoder:
         status = self._status(words)
         counts = self._counts(self.field, words, status)
         gross = self._counts(self._gross, words, status)
-        quality = self.quality(status) | self._doubt(counts, gross, status)
+        quality = self.status.quality(status) | self._doubt(counts, gross, status)
         if not quality.usable:
             return Decoded(math.nan, math.nan, counts, quality, status)
         return Decoded(
@@ -82,32 +74,16 @@ class Decoder:
             status,
         )
 
-    def has(self, meaning: StatusMeaning, status: int) -> bool:
-        """Whether a status word says ``meaning``, e.g. that a tare is active."""
-        return bool(status & self._masks.get(meaning, 0))
-
-    def quality(self, status: int) -> Quality:
-        """What the status word alone says."""
-        quality = Quality.GOOD
-        for meaning, flag in _FLAGS.items():
-            if self.has(meaning, status):
-                quality |= flag
-        if "stable" in self.spec.status and not self.has("stable", status):
-            quality |= Quality.UNSTABLE
-        if "valid" in self.spec.status and not self.has("valid", status) and quality.usable:
-            quality |= Quality.FAULT
-        return quality
-
     def _doubt(self, counts: float, gross: float, status: int) -> Quality:
         """What the numbers say against themselves, or against a status that finds them good."""
         if not (math.isfinite(counts) and math.isfinite(gross)):
             return Quality.FAULT
-        if not self.quality(status).usable:
+        if not self.status.quality(status).usable:
             return Quality.GOOD
         strange = any(
             _strange(item, number) for item, number in ((self.field, counts), (self._gross, gross))
         )
-        if self.has("zero", status) and self._gross.type != "f32":
+        if self.status.has("zero", status) and self._gross.type != "f32":
             strange |= abs(gross) > _NEAR_ZERO
         return Quality.MISMATCH if strange else Quality.GOOD
 

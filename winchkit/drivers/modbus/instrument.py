@@ -102,7 +102,7 @@ class Instrument:
         """Whether the device says that it shows a net value; None where it does not say."""
         if "net" not in self.decoder.spec.status:
             return None
-        return self.decoder.has("net", self.status)
+        return self.decoder.status.has("net", self.status)
 
     @property
     def _all_alike(self) -> bool:

@@ -5,7 +5,8 @@ The cuts depend on the bytes alone, never on the chunks in which they came.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 from winchkit.schema.device_stream import StreamSpec
 
@@ -24,45 +25,40 @@ class Piece(NamedTuple):
     """The terminator is not where it must be."""
 
 
-class Framing(Protocol):
-    """Cuts a sequence of bytes."""
+class Framing(ABC):
+    """Cuts a sequence of bytes; what its kinds have in common is what is not whole yet."""
 
-    resynchronised: int
-    """Bytes that belonged to no frame so far."""
+    def __init__(self, terminator: str) -> None:
+        self._end = terminator.encode("latin-1")
+        self._buffer = bytearray()
+        self._inside = False
+        """Whether a frame is known to begin where the buffer does."""
+        self.resynchronised = 0
+        """Bytes that belonged to no frame so far."""
 
     @property
     def pending(self) -> int:
         """Bytes of a frame that is not whole yet."""
-
-    def feed(self, data: bytes) -> list[Piece]:
-        """Frames that are whole now."""
+        return len(self._buffer)
 
     def begin(self, *, sure: bool = True) -> None:
         """Forget what is half; ``sure`` where a frame begins with the next byte."""
+        self.resynchronised += len(self._buffer)
+        self._buffer.clear()
+        self._inside = sure
+
+    @abstractmethod
+    def feed(self, data: bytes) -> list[Piece]:
+        """Frames that are whole now."""
 
 
-class TextFraming:
+class TextFraming(Framing):
     """Lines up to a terminator. What comes before the first one may be half a line: dropped."""
 
     def __init__(self, terminator: str, longest: int, *, empty: bool = False) -> None:
         """``longest`` is in characters, without terminator; ``empty`` lines may say something."""
-        self._empty = empty
-        self._end = terminator.encode("latin-1")
-        self._longest = longest
-        self._buffer = bytearray()
-        self._inside = False
-        self.resynchronised = 0
-
-    @property
-    def pending(self) -> int:
-        """Bytes of a line that is not whole yet."""
-        return len(self._buffer)
-
-    def begin(self, *, sure: bool = True) -> None:
-        """Forget what is half; ``sure`` where a line begins with the next byte."""
-        self.resynchronised += len(self._buffer)
-        self._buffer.clear()
-        self._inside = sure
+        super().__init__(terminator)
+        self._empty, self._longest = empty, longest
 
     def feed(self, data: bytes) -> list[Piece]:
         """Lines that are whole now."""
@@ -90,27 +86,13 @@ class TextFraming:
             self.resynchronised += dropped
 
 
-class BinaryFraming:
+class BinaryFraming(Framing):
     """One frame of a fixed number of bytes after each :meth:`begin`; all else is dropped."""
 
     def __init__(self, length: int, terminator: str) -> None:
         """``length`` is in bytes, without the terminator that must follow."""
+        super().__init__(terminator)
         self._length = length
-        self._end = terminator.encode("latin-1")
-        self._buffer = bytearray()
-        self._inside = False
-        self.resynchronised = 0
-
-    @property
-    def pending(self) -> int:
-        """Bytes of a frame that is not whole yet."""
-        return len(self._buffer)
-
-    def begin(self, *, sure: bool = True) -> None:
-        """Forget what is half; ``sure`` where a frame begins with the next byte."""
-        self.resynchronised += len(self._buffer)
-        self._buffer.clear()
-        self._inside = sure
 
     def feed(self, data: bytes) -> list[Piece]:
         """The frame, when it is whole now."""
