@@ -1,0 +1,1 @@
+"""What fuzz_parsers.py feeds, and with what."""
