@@ -24,7 +24,8 @@ HANG = 1.0
 STALLED = 20
 """So long may one take in libFuzzer, s: its clock runs also while the machine does other things."""
 INSTRUMENTED = """
-import runpy, sys, atheris
+import os, runpy, sys, atheris
+sys.path.insert(0, os.path.dirname(sys.argv[1]))
 with atheris.instrument_imports(include=["winchkit"]):
     sys.argv = sys.argv[1:]
     runpy.run_path(sys.argv[0], run_name="__main__")
