@@ -14,7 +14,7 @@ from winchkit.bench.owner import Ownership
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.host_scale import HostScale
 from winchkit.drivers.modbus.line import ModbusLine
-from winchkit.drivers.publisher import Publisher
+from winchkit.drivers.publisher import Publisher, Publishing
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import NoReply, NotPermitted, UsageError
@@ -38,13 +38,6 @@ _BATCHES = 10
 _FEWEST, _ENOUGH = 2, 20
 _PATIENCE = 5.0
 """So long it waits for enough readings of a slow instrument, s."""
-
-
-@runtime_checkable
-class Published(Protocol):
-    """An instrument whose readings the host calibrates and tares."""
-
-    publisher: Publisher
 
 
 @runtime_checkable
@@ -128,7 +121,7 @@ class CellDesk:
     def publisher(self, name: str) -> Publisher:
         """What turns the device's values into readings, with the host's calibration and tare."""
         sensor = self.sensors[name]
-        assert isinstance(sensor, Published), "every instrument of a bench publishes this way"
+        assert isinstance(sensor, Publishing), "every instrument of a bench publishes this way"
         return sensor.publisher
 
     def identify(self, name: str) -> dict[str, float]:

@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Tally
 from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import Counters, Quality, Reading
 from winchkit.drivers.stillness import Stillness
 
-__all__ = ["Publisher", "Sampled"]
+__all__ = ["Publisher", "Publishing", "Sampled"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,3 +83,25 @@ class Publisher:
             return False
         conversions = (when.t_receive - before.t_receive) * self._rate
         return self._stillness.frozen(counts, conversions, self.moving())
+
+
+class Publishing:
+    """An instrument's face to the rest: what its publisher has made. All may be read anywhere."""
+
+    publisher: Publisher
+    _clock: Clock
+
+    @property
+    def latest(self) -> Reading | None:
+        """Newest reading."""
+        return self.publisher.latest
+
+    @property
+    def listeners(self) -> list[Callable[[Reading], None]]:
+        """Called with every reading, on the thread that receives it."""
+        return self.publisher.listeners
+
+    @property
+    def counters(self) -> Counters:
+        """What happened since the start."""
+        return self.publisher.tally.counters(self._clock.now())

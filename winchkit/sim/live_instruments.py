@@ -9,12 +9,12 @@ from winchkit.catalog import find
 from winchkit.errors import FileError
 from winchkit.schema.bench import DeviceRef, WinchWiring
 from winchkit.schema.device import DeviceSpec
-from winchkit.sim.modbus_instrument import ModbusInstrument, check_kind, in_unit_of
-from winchkit.sim.process import ProcessInstrument, check_process_fault
-from winchkit.sim.stream_instrument import StreamInstrument, check_stream_fault, shown_by
+from winchkit.sim.modbus_instrument import ModbusInstrument, in_unit_of
+from winchkit.sim.process import ProcessInstrument
+from winchkit.sim.stream_instrument import StreamInstrument, shown_by
 from winchkit.units import dimension_of, factor
 
-__all__ = ["Instrument", "check_fault_of", "device_of", "instruments_of"]
+__all__ = ["Instrument", "device_of", "instruments_of"]
 
 Instrument = ModbusInstrument | StreamInstrument | ProcessInstrument
 Send = Callable[[int, bytes], None]
@@ -47,16 +47,6 @@ def device_of(ref: DeviceRef, beside: str) -> tuple[Path, DeviceSpec]:
 
     path = find("devices", ref.device, beside=beside or None)
     return path, read_device(path)
-
-
-def check_fault_of(instrument: Instrument, kind: str) -> None:
-    """Raise UsageError for a fault that an instrument cannot have."""
-    if isinstance(instrument, StreamInstrument):
-        check_stream_fault(kind)
-    elif isinstance(instrument, ProcessInstrument):
-        check_process_fault(kind)
-    else:
-        check_kind(kind)
 
 
 def _instrument(

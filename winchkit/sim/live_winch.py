@@ -13,7 +13,7 @@ from winchkit.schema.simbench import NoiseSpec, WinchTruth
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.drive import SimDrive
 from winchkit.sim.drive_faults import known
-from winchkit.sim.live_instruments import check_fault_of, device_of, instruments_of
+from winchkit.sim.live_instruments import device_of, instruments_of
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
 from winchkit.sim.plant import Measurement, WinchPlant
 from winchkit.sim.process import ProcessInstrument
@@ -124,7 +124,7 @@ class LiveWinch:
                 f"winch {self.name} has no '{role}'; it has {', '.join(roles)}"
                 + suggest(role, roles)
             )
-        check_fault_of(self.instruments[role], kind)
+        self.instruments[role].check_fault(kind)
 
     def inject(self, role: str, kind: str) -> None:
         """Make a device of this winch go wrong; raises as :meth:`check_fault`."""

@@ -2,102 +2,51 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import isfinite
+from math import isnan
 
 from winchkit.errors import UsageError
 from winchkit.schema.device_modbus import ModbusSpec
 from winchkit.schema.modbus_parts import REGISTERS, CommandSpec, FieldSpec, StatusMeaning
+from winchkit.sim.instrument import SimulatedInstrument, status_word
 from winchkit.sim.modbus_registers import counts_of, decimals_of, encode, encode_number
-from winchkit.units import convert, dimension_of, factor, suggest
+from winchkit.units import convert, dimension_of, factor
 
-__all__ = ["INSTRUMENT_FAULTS", "ModbusInstrument", "check_kind", "in_unit_of"]
-
-INSTRUMENT_FAULTS = (
-    "silence",
-    "late reply",
-    "exception",
-    "frozen",
-    "overload",
-    "sensor break",
-    "recover",
-)
-"""What can go wrong; ``recover`` ends all of it."""
+__all__ = ["ModbusInstrument", "in_unit_of"]
 
 _STABLE_COUNTS = 100
 _IDENTITY = 4711
 """Serial number and the like of every simulated instrument."""
-_FAST, _SLOW = 0.05, 0.5
 
 
-@dataclass(frozen=True)
-class _Converted:
-    """One conversion, in the unit of the device."""
+class ModbusInstrument(SimulatedInstrument):
+    """One device on a Modbus line; ``measure`` gives the quantity in the unit of the device.
 
-    due: float
-    """When it has passed the filter, s."""
-    value: float
-    overload: bool = False
-    broken: bool = False
-
-
-class ModbusInstrument:
-    """One device on a Modbus line.
-
-    ``measure`` gives the quantity now in the unit of the device. Nobody but :meth:`convert`
-    looks at it, at the instants of :attr:`next_conversion`. Registers show a
-    conversion when it is as old as the declared filter delay: the filter delays and does not
-    smooth, since a lag would be an effect of its own.
+    Registers show a conversion when it is as old as the declared filter delay.
     """
 
+    KIND = "a simulated Modbus instrument"
+    FAULTS = (
+        "silence",
+        "late reply",
+        "exception",
+        "frozen",
+        "overload",
+        "sensor break",
+        "recover",
+    )
+
     def __init__(self, spec: ModbusSpec, measure: Callable[[], float], *, now: float) -> None:
+        super().__init__(measure, spec.rate, spec.filter_delay, now=now)
         self.spec = spec
-        self._measure = measure
-        self.next_conversion = now
-        self._pipeline: deque[_Converted] = deque()
-        self._shown = _Converted(now, 0.0)
-        self._zero = self._tare = self._peak = 0.0
-        self._net = False
+        self._peak = 0.0
         self._unlocked: list[tuple[int, int]] = []
-        self.stored = 0
-        """How often its EEPROM was written."""
-        self._fast: float | None = None
-        self._slow: float | None = None
-        self.faults: set[str] = set()
         self.reply_delay = 2 * spec.longest_reply
         """How late a late reply is, s; twice what the device declares as its longest."""
 
-    # Time.
-
-    def convert(self) -> None:
-        """Sample at the instant ``next_conversion``, which then moves on by one period."""
-        now = self.next_conversion
-        self.next_conversion = now + 1.0 / self.spec.rate
-        if "frozen" in self.faults:
-            return
-        value = self._measure()
-        broken = "sensor break" in self.faults or not isfinite(value)
-        due = now + self.spec.filter_delay
-        self._pipeline.append(_Converted(due, value, "overload" in self.faults, broken))
-        if not broken:
-            self._average(value)
-
-    def _average(self, value: float) -> None:
-        if self._fast is None or self._slow is None:
-            self._fast = self._slow = value
-            return
-        step = 1.0 / self.spec.rate
-        self._fast += (value - self._fast) * min(1.0, step / _FAST)
-        self._slow += (value - self._slow) * min(1.0, step / _SLOW)
-
-    def show(self, now: float) -> None:
-        """Let the conversions that are through the filter by ``now`` reach the registers."""
-        while self._pipeline and self._pipeline[0].due <= now:
-            self._shown = self._pipeline.popleft()
-            if not self._shown.broken:
-                self._peak = max(self._peak, self._shown.value - self._zero)
+    def _showing(self) -> None:
+        if not self._shown.broken:
+            self._peak = max(self._peak, self.gross)
 
     # What a master does.
 
@@ -160,65 +109,36 @@ class ModbusInstrument:
                 unlocked, self._unlocked = self._unlocked, []
                 if unlocked[-len(steps) :] != steps:
                     return False
-                self._obey(name, command)
+                self._carry_out(name, command)
                 return True
         return False
 
-    def inject(self, kind: str) -> None:
-        """Make something go wrong; raises UsageError for an unknown kind."""
-        check_kind(kind)
-        if kind == "recover":
-            self.faults.clear()
-        else:
-            self.faults.add(kind)
-
-    def _obey(self, name: str, command: CommandSpec) -> None:
-        gross = self._shown.value - self._zero
+    def _carry_out(self, name: str, command: CommandSpec) -> None:
         self.stored += command.permanent
-        if name == "zero":
-            self._zero = self._shown.value
-        elif name == "tare":
-            self._tare, self._net = gross, True
-        elif name == "gross":
-            self._tare, self._net = 0.0, False
-        elif name == "peak":
-            self._peak = gross
+        if name == "peak":
+            self._peak = 0.0 if isnan(self.gross) else self.gross
+        else:
+            self._obey(name)
 
     def _value(self, field: FieldSpec) -> float:
-        gross = self._shown.value - self._zero
         if field.name == "peak":
             return self._peak
-        return gross if field.name == "gross" else gross - self._tare
+        return self.gross if field.name == "gross" else self.gross - self._tare
 
     def _status(self, clipped: bool) -> int:
         shown = next(field for field in self.spec.field if field.name == self.spec.value)
         scale = shown.scale / 10.0 ** decimals_of(shown)
-        fast, slow = self._fast, self._slow
-        moved = abs(fast - slow) if fast is not None and slow is not None else 0.0
-        stable = moved < _STABLE_COUNTS * scale
+        stable = self._converter.motion < _STABLE_COUNTS * scale
         says: dict[StatusMeaning, bool] = {
             "fault": self._shown.broken,
             "overload": clipped or self._shown.overload,
             "stable": stable,
             "unstable": not stable,
             "net": self._net,
-            "zero": abs(self._shown.value - self._zero) < scale / 4,
+            "zero": abs(self.gross) < scale / 4,
             "valid": not self._shown.broken,
         }
-        bits = 0
-        for meaning, numbers in self.spec.status.items():
-            if says.get(meaning, False):
-                bits |= 1 << numbers[0]
-        return bits
-
-
-def check_kind(kind: str) -> None:
-    """Raise UsageError for a fault that no simulated instrument has."""
-    if kind not in INSTRUMENT_FAULTS:
-        raise UsageError(
-            f"a simulated instrument has no fault '{kind}'; use one of "
-            f"{', '.join(INSTRUMENT_FAULTS)}" + suggest(kind, list(INSTRUMENT_FAULTS))
-        )
+        return status_word(self.spec.status, says)
 
 
 def in_unit_of(spec: ModbusSpec, measure: Callable[[], float]) -> Callable[[], float]:

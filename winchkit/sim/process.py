@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import struct
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from math import isfinite, nan
+from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 
-from winchkit.errors import UsageError
 from winchkit.schema.device_process import ProcessSpec
 from winchkit.schema.modbus_parts import StatusMeaning
 from winchkit.sim.drive_network import Heartbeats, NmtState
 from winchkit.sim.drive_pdo import Pdos
 from winchkit.sim.drive_sdo import SdoServer
+from winchkit.sim.instrument import SimulatedInstrument, status_word
 from winchkit.sim.object_dictionary import Abort, Entry, Key, ObjectDictionary, read_eds
-from winchkit.units import suggest
 
-__all__ = ["PROCESS_FAULTS", "ProcessInstrument", "check_process_fault"]
+__all__ = ["ProcessInstrument"]
 
-PROCESS_FAULTS = ("silence", "frozen", "overload", "sensor break", "reboot", "recover")
-"""What can go wrong; ``recover`` ends all of it but a reboot."""
 _NMT = {0x01: NmtState.OPERATIONAL, 0x02: NmtState.STOPPED, 0x80: NmtState.PRE_OPERATIONAL}
 _RESET = (0x81, 0x82)
 _SYNC = 0x1005
@@ -29,20 +25,14 @@ _NO_NUMBER = 0x7FC00000
 """A quiet NaN as REAL32."""
 
 
-@dataclass(frozen=True)
-class _Converted:
-    due: float
-    value: float
-    overload: bool
-    broken: bool
-
-
-class ProcessInstrument:
+class ProcessInstrument(SimulatedInstrument):
     """One node. ``measure`` gives the quantity now in the unit of the device file.
 
-    As a Modbus instrument does it converts at its own instants, :attr:`next_conversion`, and shows
-    a conversion when it has passed the filter. ``send`` takes an identifier and data.
+    ``send`` takes an identifier and data.
     """
+
+    KIND = "a simulated CANopen instrument"
+    FAULTS = ("silence", "frozen", "overload", "sensor break", "reboot", "recover")
 
     def __init__(
         self,
@@ -54,48 +44,28 @@ class ProcessInstrument:
         *,
         now: float,
     ) -> None:
+        super().__init__(measure, spec.rate, spec.filter_delay, now=now)
         self.spec, self.node = spec, node
-        self._measure = measure
         self._bus = send
         self._value, self._status = _key(spec.value), _key(spec.status) if spec.status else None
         self.objects = ObjectDictionary(_numeric(read_eds(eds, node)))
         self._commands = {_key(item.object)[0] for item in spec.command.values()}
         for index in self._commands:
             self.objects.guards[index] = self._check_command
-            self.objects.watchers[index] = self._obey
+            self.objects.watchers[index] = self._command
         self._sdo = SdoServer(self.objects)
         self._pdos = Pdos(self.objects, self._send, lambda: None, lambda: None)
         self._heartbeats = Heartbeats(
             self.objects, self._send_heartbeat, lambda _node: None, lambda: None
         )
-        self.next_conversion = now
-        self._pipeline: deque[_Converted] = deque()
-        self._shown = _Converted(now, 0.0, False, False)
-        self._tare = 0.0
-        self.stored = 0
-        """How often its EEPROM was written."""
-        self.faults: set[str] = set()
         self.nmt = NmtState.BOOTING
 
     # Time.
 
-    def convert(self) -> None:
-        """Sample at the instant ``next_conversion``, which then moves on by one period."""
-        now = self.next_conversion
-        self.next_conversion = now + 1.0 / self.spec.rate
-        if "frozen" in self.faults:
-            return
-        value = self._measure()
-        broken = "sensor break" in self.faults or not isfinite(value)
-        due = now + self.spec.filter_delay
-        self._pipeline.append(_Converted(due, value, "overload" in self.faults, broken))
-
     def show(self, now: float) -> None:
         """Let the conversions that are through the filter by ``now`` reach the objects."""
-        while self._pipeline and self._pipeline[0].due <= now:
-            self._shown = self._pipeline.popleft()
-        value = nan if self._shown.broken else self._shown.value - self._tare
-        self.objects.put(*self._value, self._raw(value / self.spec.scale))
+        super().show(now)
+        self.objects.put(*self._value, self._raw((self.gross - self._tare) / self.spec.scale))
         if self._status is not None:
             self.objects.put(*self._status, self._status_bits())
 
@@ -129,13 +99,10 @@ class ProcessInstrument:
 
     def inject(self, kind: str) -> None:
         """Make something go wrong; raises UsageError for an unknown kind."""
-        check_process_fault(kind)
-        if kind == "recover":
-            self.faults.clear()
-        elif kind == "reboot":
+        if kind == "reboot":
             self._reboot()
         else:
-            self.faults.add(kind)
+            super().inject(kind)
 
     def _manage(self, command: int) -> None:
         if command in _RESET:
@@ -144,7 +111,7 @@ class ProcessInstrument:
             self.nmt = _NMT.get(command, self.nmt)
 
     def _reboot(self) -> None:
-        self._tare = 0.0
+        self._zero, self._tare, self._net = 0.0, 0.0, False
         self.objects.reset()
         self._sdo.reset()
         self._pdos.rebuild()
@@ -163,13 +130,10 @@ class ProcessInstrument:
         known = {item.value for item in self.spec.command.values()}
         return None if value in known else Abort.RANGE
 
-    def _obey(self, _sub: int, value: int) -> None:
+    def _command(self, _sub: int, value: int) -> None:
         name = next(key for key, item in self.spec.command.items() if item.value == value)
         self.stored += self.spec.command[name].permanent
-        if name in ("tare", "zero"):
-            self._tare = self._shown.value
-        elif name == "gross":
-            self._tare = 0.0
+        self._obey(name)
 
     def _raw(self, counts: float) -> int:
         if self.spec.type != "f32":
@@ -184,22 +148,9 @@ class ProcessInstrument:
             "overload": self._shown.overload,
             "valid": not self._shown.broken,
             "stable": True,
-            "net": self._tare != 0.0,
+            "net": self._net,
         }
-        bits = 0
-        for meaning, numbers in self.spec.bits.items():
-            if says.get(meaning, False):
-                bits |= 1 << numbers[0]
-        return bits
-
-
-def check_process_fault(kind: str) -> None:
-    """Raise UsageError for a fault that no simulated CANopen instrument has."""
-    if kind not in PROCESS_FAULTS:
-        raise UsageError(
-            f"a simulated CANopen instrument has no fault '{kind}'; use one of "
-            f"{', '.join(PROCESS_FAULTS)}" + suggest(kind, list(PROCESS_FAULTS))
-        )
+        return status_word(self.spec.bits, says)
 
 
 def _key(text: str) -> Key:

@@ -7,36 +7,36 @@ from math import nan
 
 from winchkit.errors import UsageError
 from winchkit.schema.device_stream import AskSpec, StreamSpec, UnitSpec
-from winchkit.sim.converter import Converted, Converter
+from winchkit.sim.instrument import SimulatedInstrument
 from winchkit.sim.stream_encode import example_fields
 from winchkit.sim.stream_speech import Speech, State
-from winchkit.units import convert, dimension_of, factor, suggest
+from winchkit.units import convert, dimension_of, factor
 
-__all__ = ["STREAM_FAULTS", "StreamInstrument", "check_stream_fault", "shown_by"]
-
-STREAM_FAULTS = (
-    "silence",
-    "late reply",
-    "frozen",
-    "overload",
-    "sensor break",
-    "garbage",
-    "bad checksum",
-    "half line",
-    "refusal",
-    "unplug",
-    "replug",
-    "recover",
-)
-"""What can go wrong; ``unplug`` and ``replug`` are of the whole line, ``recover`` ends all."""
+__all__ = ["StreamInstrument", "shown_by"]
 
 
-class StreamInstrument:
+class StreamInstrument(SimulatedInstrument):
     """One device on a serial line; ``receive`` what the host sends, ``take_output`` what it gets.
 
-    ``measure`` gives the quantity now as the device counts it (see :func:`shown_by`). A conversion
-    is shown when it is as old as the declared filter delay.
+    ``measure`` gives the quantity now as the device counts it (see :func:`shown_by`).
     """
+
+    KIND = "a simulated serial instrument"
+    FAULTS = (
+        "silence",
+        "late reply",
+        "frozen",
+        "overload",
+        "sensor break",
+        "garbage",
+        "bad checksum",
+        "half line",
+        "refusal",
+        "unplug",
+        "replug",
+        "recover",
+    )
+    """``unplug`` and ``replug`` are of the whole line."""
 
     def __init__(
         self,
@@ -47,16 +47,12 @@ class StreamInstrument:
         address: int | None = None,
     ) -> None:
         """Raise FileError where the device file's example does not fit its frame."""
+        super().__init__(measure, spec.rate, spec.filter_delay, now=now)
         self.spec = spec
         self.address = address
-        self.faults: set[str] = set()
         self.reply_delay = 2 * spec.longest_reply
         """How late a late reply is, s."""
-        self._converter = Converter(measure, spec.rate, spec.filter_delay, now=now)
-        self._shown = Converted(now, 0.0)
         self._old = True
-        self._zero = self._tare = 0.0
-        self._net = False
         self._sending = spec.mode == "continuous" and not spec.start
         self._open = spec.select is None or address is None
         self._received = b""
@@ -64,23 +60,10 @@ class StreamInstrument:
         self._speech = Speech(spec)
         self._actions = self._known_requests()
 
-    # Time.
-
-    @property
-    def next_conversion(self) -> float:
-        """Instant of the next conversion, s."""
-        return self._converter.next_conversion
-
-    def convert(self) -> None:
-        """Sample at the instant ``next_conversion``, which then moves on by one period."""
-        self._converter.convert(self.faults)
-
-    def show(self, now: float) -> None:
-        """Let the conversions that are through the filter by ``now`` be seen, and sent."""
-        for shown in self._converter.take(now):
-            self._shown, self._old = shown, False
-            if self._sending:
-                self._send(self._speech.frame(self._state()), shown.due)
+    def _showing(self) -> None:
+        self._old = False
+        if self._sending:
+            self._send(self._speech.frame(self._state()), self._shown.due)
 
     # What the host does and gets.
 
@@ -105,11 +88,9 @@ class StreamInstrument:
 
     def inject(self, kind: str) -> None:
         """Make something go wrong; raises UsageError for an unknown kind."""
-        check_stream_fault(kind)
+        super().inject(kind)
         if kind == "recover":
-            self.faults = {"replug"}
-        else:
-            self.faults.add(kind)
+            self.faults.add("replug")
 
     def _known_requests(self) -> dict[bytes, Callable[[float], None]]:
         """What this device understands, longest first, and what it does then."""
@@ -142,6 +123,8 @@ class StreamInstrument:
             if no is not None:
                 self._answer(self._speech.line(no), now)
                 return
+            if name == "start":
+                self._sending = self.spec.mode == "continuous"
             self._obey(name)
             if ask.answer:
                 self._answer(self._speech.line(ask.answer[0].replace("*", "")), now)
@@ -155,17 +138,6 @@ class StreamInstrument:
                 self._answer(self._speech.line(ask.answer[0]), now)
 
         return do
-
-    def _obey(self, name: str) -> None:
-        gross = self._shown.value - self._zero
-        if name == "start":
-            self._sending = self.spec.mode == "continuous"
-        elif name == "zero":
-            self._zero = self._shown.value
-        elif name == "tare":
-            self._tare, self._net = gross, True
-        elif name == "gross":
-            self._tare, self._net = 0.0, False
 
     def _stop(self) -> None:
         self._sending = False
@@ -192,7 +164,7 @@ class StreamInstrument:
     def _state(self) -> State:
         """What it knows of the conversion that is shown."""
         shown = self._shown
-        gross = shown.value - self._zero
+        gross = self.gross
         capacity = self.spec.capacity
         over = shown.overload or (capacity is not None and abs(gross) > capacity)
         if over or shown.broken:
@@ -220,15 +192,6 @@ class _Digits:
 
     def __format__(self, width: str) -> str:
         return str(self._address).rjust(int(width or "0"), "0")
-
-
-def check_stream_fault(kind: str) -> None:
-    """Raise UsageError for a fault that no simulated serial instrument has."""
-    if kind not in STREAM_FAULTS:
-        raise UsageError(
-            f"a simulated serial instrument has no fault '{kind}'; use one of "
-            f"{', '.join(STREAM_FAULTS)}" + suggest(kind, list(STREAM_FAULTS))
-        )
 
 
 def shown_by(spec: StreamSpec, measure: Callable[[], float]) -> Callable[[], float]:

@@ -211,7 +211,11 @@ def _expedited(data: bytes) -> int | None:
     return int.from_bytes(data[4 : 4 + size], "little")
 
 
-def _number(index: int, value: int) -> str:
+def _content(index: int, data: bytes) -> str:
+    """What a transfer carries, or how much where that follows in segments."""
+    value = _expedited(data)
+    if value is None:
+        return f"{int.from_bytes(data[4:8], 'little')} bytes"
     return _value(index, value) if index in (0x6040, 0x6041) else f"{value} ({value:X}h)"
 
 
@@ -224,9 +228,7 @@ def _request(data: bytes, dictionary: Any) -> str:
         return f"read {name}"
     if command == 4:
         return f"abort {name}: {_abort(data)}"
-    value = _expedited(data)
-    size = int.from_bytes(data[4:8], "little")
-    return f"write {name} = " + (f"{size} bytes" if value is None else _number(index, value))
+    return f"write {name} = {_content(index, data)}"
 
 
 def _reply(data: bytes, dictionary: Any) -> str:
@@ -238,9 +240,7 @@ def _reply(data: bytes, dictionary: Any) -> str:
         return f"{name} refused: {_abort(data)}"
     if command == 3:
         return f"{name} written"
-    value = _expedited(data)
-    size = int.from_bytes(data[4:8], "little")
-    return f"{name} is " + (f"{size} bytes" if value is None else _number(index, value))
+    return f"{name} is {_content(index, data)}"
 
 
 def _abort(data: bytes) -> str:

@@ -12,8 +12,8 @@ from winchkit.drivers.can.pdo import PdoCodec, parse_object
 from winchkit.drivers.can.pdo_setup import cob_id, codecs, set_up
 from winchkit.drivers.can.process_value import ProcessDecoder
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.publisher import Publisher, Sampled
-from winchkit.drivers.reading import Counters, Reading, Sensor
+from winchkit.drivers.publisher import Publisher, Publishing, Sampled
+from winchkit.drivers.reading import Sensor
 from winchkit.errors import ConnectionLost, DeviceRefused, Fault, FileError, NoReply, NotPermitted
 from winchkit.schema.device import DeviceSpec
 
@@ -27,7 +27,7 @@ _FRAME = 135 / 1e6
 _SERIAL = (0x1018, 4)
 
 
-class ProcessInstrument:
+class ProcessInstrument(Publishing):
     """An instrument on an open CAN bus. ``latest`` is what other threads read."""
 
     def __init__(self, name: str, device: DeviceSpec, node: int, bus: CanBus, clock: Clock) -> None:
@@ -51,21 +51,6 @@ class ProcessInstrument:
         self._codecs = codecs(self._node, spec.tpdo)
         self._heard = clock.now()
         self._was_set_up = False
-
-    @property
-    def latest(self) -> Reading | None:
-        """Newest reading."""
-        return self.publisher.latest
-
-    @property
-    def listeners(self) -> list[Callable[[Reading], None]]:
-        """Called with every reading, on the receive thread of the bus."""
-        return self.publisher.listeners
-
-    @property
-    def counters(self) -> Counters:
-        """What happened since the start."""
-        return self.publisher.tally.counters(self._clock.now())
 
     @property
     def tared(self) -> bool | None:

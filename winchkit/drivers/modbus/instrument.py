@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import inf
 
 from winchkit.drivers.clock import Clock
@@ -11,8 +11,8 @@ from winchkit.drivers.modbus.client import ModbusClient
 from winchkit.drivers.modbus.consistency import Consistency
 from winchkit.drivers.modbus.decoder import Decoded, Decoder
 from winchkit.drivers.modbus.distrust import LISTENING, Distrust
-from winchkit.drivers.publisher import Publisher, Sampled
-from winchkit.drivers.reading import Counters, Quality, Reading
+from winchkit.drivers.publisher import Publisher, Publishing, Sampled
+from winchkit.drivers.reading import Quality
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.device import DeviceSpec
 
@@ -29,7 +29,7 @@ _TOO_LONG = (2, 3)
 """Exceptions with which a device refuses a block longer than its own: address, value."""
 
 
-class Instrument:
+class Instrument(Publishing):
     """A Modbus instrument. ``latest`` is what other threads read."""
 
     def __init__(
@@ -81,21 +81,6 @@ class Instrument:
         self._wire = wire
         self.max_age = max(_STALE_TIMEOUTS * self._timeout, 5 * period)
         """A reading older than this is stale, s."""
-
-    @property
-    def latest(self) -> Reading | None:
-        """Newest reading."""
-        return self.publisher.latest
-
-    @property
-    def listeners(self) -> list[Callable[[Reading], None]]:
-        """Called with every reading."""
-        return self.publisher.listeners
-
-    @property
-    def counters(self) -> Counters:
-        """What happened since the start."""
-        return self.publisher.tally.counters(self._clock.now())
 
     @property
     def tared(self) -> bool | None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.publisher import Publisher, Sampled
-from winchkit.drivers.reading import Counters, Quality, Reading
+from winchkit.drivers.publisher import Publisher, Publishing, Sampled
+from winchkit.drivers.reading import Counters, Quality
 from winchkit.drivers.stream.decoder import Decoded
 from winchkit.drivers.stream.parser import (
     Item,
@@ -42,7 +41,7 @@ class Wire(Protocol):
         """How late the port hands bytes over."""
 
 
-class StreamInstrument:
+class StreamInstrument(Publishing):
     """An instrument that sends frames. ``latest`` is what other threads read."""
 
     def __init__(
@@ -84,16 +83,6 @@ class StreamInstrument:
         self._least_step = _JITTER / spec.rate
 
     @property
-    def latest(self) -> Reading | None:
-        """Newest reading."""
-        return self.publisher.latest
-
-    @property
-    def listeners(self) -> list[Callable[[Reading], None]]:
-        """Called with every reading, on the thread of the slow devices."""
-        return self.publisher.listeners
-
-    @property
     def counters(self) -> Counters:
         """What happened since the start."""
         tally = self.publisher.tally
@@ -102,7 +91,7 @@ class StreamInstrument:
         tally.crc = sum(one.bad_checksums for one in counts)
         tally.malformed = sum(one.malformed for one in counts)
         tally.resynchronised = sum(one.resynchronised for one in counts)
-        return tally.counters(self._clock.now())
+        return super().counters
 
     @property
     def tared(self) -> bool | None:

@@ -1,0 +1,91 @@
+"""What simulated instruments of every kind share: conversions, zero, tare, faults, status."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
+
+from winchkit.errors import UsageError
+from winchkit.schema.modbus_parts import StatusMeaning
+from winchkit.sim.converter import Converted, Converter
+from winchkit.units import suggest
+
+__all__ = ["SimulatedInstrument", "status_word"]
+
+
+class SimulatedInstrument:
+    """Converts at its own instants, shows what has passed its filter, zeroes and tares itself."""
+
+    KIND: ClassVar[str]
+    """What it is called in messages."""
+    FAULTS: ClassVar[tuple[str, ...]]
+    """What can go wrong; ``recover`` ends it."""
+
+    def __init__(
+        self, measure: Callable[[], float], rate: float, filter_delay: float, *, now: float
+    ) -> None:
+        """``measure`` gives the quantity now in the unit of the device; nobody else looks at it."""
+        self.faults: set[str] = set()
+        self.stored = 0
+        """How often its EEPROM was written."""
+        self._converter = Converter(measure, rate, filter_delay, now=now)
+        self._shown = Converted(now, 0.0)
+        self._zero = self._tare = 0.0
+        self._net = False
+
+    @property
+    def next_conversion(self) -> float:
+        """Instant of the next conversion, s."""
+        return self._converter.next_conversion
+
+    @property
+    def gross(self) -> float:
+        """What it shows before any tare; NaN where it can measure nothing."""
+        return self._shown.value - self._zero
+
+    def convert(self) -> None:
+        """Sample at the instant ``next_conversion``, which then moves on by one period."""
+        self._converter.convert(self.faults)
+
+    def show(self, now: float) -> None:
+        """Let the conversions that are through the filter by ``now`` be seen."""
+        for shown in self._converter.take(now):
+            self._shown = shown
+            self._showing()
+
+    def _showing(self) -> None:
+        """A conversion is seen for the first time; nothing follows, unless a kind says so."""
+        return
+
+    def inject(self, kind: str) -> None:
+        """Make something go wrong; raises UsageError for an unknown kind."""
+        self.check_fault(kind)
+        if kind == "recover":
+            self.faults.clear()
+        else:
+            self.faults.add(kind)
+
+    @classmethod
+    def check_fault(cls, kind: str) -> None:
+        """Raise UsageError for a fault that it cannot have."""
+        if kind not in cls.FAULTS:
+            raise UsageError(
+                f"{cls.KIND} has no fault '{kind}'; use one of {', '.join(cls.FAULTS)}"
+                + suggest(kind, list(cls.FAULTS))
+            )
+
+    def _obey(self, name: str) -> None:
+        """Zero or tare itself; one that measures nothing does not."""
+        if name == "gross":
+            self._tare, self._net = 0.0, False
+        elif name == "zero" and not self._shown.broken:
+            self._zero = self._shown.value
+        elif name == "tare" and not self._shown.broken:
+            self._tare, self._net = self.gross, True
+
+
+def status_word(
+    bits: Mapping[StatusMeaning, Sequence[int]], says: Mapping[StatusMeaning, bool]
+) -> int:
+    """The status with the first declared bit of each meaning that holds."""
+    return sum(1 << numbers[0] for meaning, numbers in bits.items() if says.get(meaning, False))
