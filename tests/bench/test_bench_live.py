@@ -17,7 +17,6 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.client import attach
 from winchkit.bench.emergency_stop import stop_on_bus
 from winchkit.bench.programme import run_programme
-from winchkit.bench.server import StationServer
 from winchkit.bench.snapshot import Phase
 from winchkit.errors import (
     DriveFault,
@@ -178,7 +177,6 @@ def test_a_silent_cell_stops_the_winch(bench: Bench, live: LiveBench) -> None:
 
 
 def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None:
-    server = StationServer(bench)
     station, other = attach(bench.spec), attach(bench.spec)
     assert station is not None
     assert other is not None
@@ -199,22 +197,18 @@ def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None
     finally:
         station.close()
         other.close()
-        server.close()
+    bench.close()
     assert attach(bench.spec) is None
 
 
 def test_a_station_that_goes_away_lets_go(bench: Bench) -> None:
-    server = StationServer(bench)
-    try:
-        station = attach(bench.spec)
-        assert station is not None
-        station.step("A", 0.6, 0.1)
-        until(lambda: bench.winch["A"].snapshot.speed < -0.05)
-        station.close()
-        until(lambda: bench.snapshot.at_rest)
-        assert bench.winch["A"].cable_length < 4.5
-    finally:
-        server.close()
+    station = attach(bench.spec)
+    assert station is not None
+    station.step("A", 0.6, 0.1)
+    until(lambda: bench.winch["A"].snapshot.speed < -0.05)
+    station.close()
+    until(lambda: bench.snapshot.at_rest)
+    assert bench.winch["A"].cable_length < 4.5
 
 
 def test_stop_without_an_owner_acts_on_the_bus(live: LiveBench, clock: PacedClock) -> None:

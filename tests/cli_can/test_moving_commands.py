@@ -14,7 +14,6 @@ from can_commands import Served, invoke, served
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.client import RemoteStation, attach
-from winchkit.bench.server import StationServer
 from winchkit.bench.snapshot import Phase
 from winchkit.errors import UsageError
 
@@ -210,14 +209,12 @@ def test_whoever_goes_away_during_a_homing_stops_it(bench: Served) -> None:
 @contextmanager
 def owned(bench: Bench) -> Iterator[RemoteStation]:
     """A station as another process would have it."""
-    server = StationServer(bench)
     station = attach(bench.spec)
     assert station is not None
     try:
         yield station
     finally:
         station.close()
-        server.close()
 
 
 def test_stop_says_in_json_who_has_confirmed(bench: Served) -> None:

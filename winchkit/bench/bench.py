@@ -8,11 +8,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from winchkit.bench.cell_desk import CellDesk
 from winchkit.bench.loop import Callback, ControlLoop
 from winchkit.bench.origin import origin
 from winchkit.bench.owner import Ownership
 from winchkit.bench.recorder import Recorder
 from winchkit.bench.resetting import reset
+from winchkit.bench.server import StationServer
 from winchkit.bench.snapshot import BenchSnapshot, Direction
 from winchkit.bench.together import begin_together, wait_together
 from winchkit.bench.waiting import (
@@ -65,12 +67,18 @@ class Bench:
                 name: Winch(self, name, spec.winch[name], parts, dict(self._wired.sensors[name]))
                 for name, parts in self.loop.winches.items()
             }
+            wired = self._wired
+            self.cells = CellDesk(
+                spec, clock, wired.lines, wired.slow, wired.sensors, permit=self._require_rest
+            )
+            """Its instruments by name, for commands and whoever looks at them one by one."""
             self.loop.on_jog = self._jog_from_callback
             stack.callback(self.loop.close)
             self.loop.start()
             await_feedback(self.loop, self.axes, clock)
             every = (item for one in self.winch.values() for item in one.sensors.values())
             await_sensors(every, clock)
+            self._server = StationServer(self)
             self._stack = stack.pop_all()
 
     def __enter__(self) -> Self:
@@ -190,6 +198,7 @@ class Bench:
     def close(self) -> None:
         """Stop every winch in a controlled way and let the buses go. Twice does no harm."""
         with self._stack:
+            self._server.close()
             if self.loop.alive:
                 # A function that still asks for motion is no longer heard.
                 self.loop.on_jog = lambda _name, _speed: None
@@ -232,7 +241,7 @@ class Bench:
 
     def command(self, instrument: Sensor, name: str) -> None:
         """Send a command of its device file to an instrument."""
-        self._wired.command(instrument, name)
+        self._wired.slow.command(instrument, name)
 
     def named(self, name: str | None) -> Winch:
         """A winch by name, or the only one; raises UsageError."""
@@ -250,6 +259,10 @@ class Bench:
                 self.winch[name].run_down()
         if wait:
             self.wait_at_rest(names)
+
+    def _require_rest(self, instrument: str) -> None:
+        """Raise NotPermitted while the winch of an instrument (``A.cell``) is enabled."""
+        self.winch[instrument.rpartition(".")[0]].require_rest()
 
     def _jog_from_callback(self, name: str, speed: float) -> None:
         try:

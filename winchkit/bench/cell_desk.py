@@ -1,22 +1,19 @@
-"""The slow instruments of a bench by themselves: no drive is touched, none needs to be there."""
+"""The slow instruments of a bench by name, whoever has opened them: readings and commands."""
 
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from winchkit.bench.instruments import can_buses, device_of, instruments, refs_of
-from winchkit.bench.owner import Ownership
-from winchkit.drivers.clock import Clock, MonotonicClock
+from winchkit.bench.instruments import device_of, refs_of
+from winchkit.drivers.clock import Clock
 from winchkit.drivers.host_scale import HostScale
 from winchkit.drivers.modbus.line import ModbusLine
 from winchkit.drivers.publisher import Publisher, Publishing
 from winchkit.drivers.reading import Reading, Sensor
-from winchkit.drivers.slow import SlowDevices
+from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import NoReply, NotPermitted, UsageError
 from winchkit.schema.bench import BenchSpec, DeviceRef
 from winchkit.schema.device import DeviceSpec
@@ -25,10 +22,9 @@ from winchkit.units import suggest
 __all__ = [
     "CellDesk",
     "Steady",
-    "cell_desk",
+    "check_permanent",
     "full_name",
     "indicated",
-    "permanent_commands",
     "steady",
 ]
 
@@ -62,28 +58,27 @@ class Steady:
 class CellDesk:
     """Instruments by ``WINCH.ROLE``, e.g. ``A.cell``, and what can be done with them."""
 
-    def __init__(self, spec: BenchSpec, clock: Clock, stack: ExitStack) -> None:
-        """Use :func:`cell_desk`."""
-        self.spec = spec
-        self.clock = clock
-        buses = {}
-        for name in can_buses(spec):
-            from winchkit.drivers.can.bus import CanBus
+    def __init__(
+        self,
+        spec: BenchSpec,
+        clock: Clock,
+        lines: Sequence[SlowLine],
+        slow: SlowDevices,
+        sensors: Mapping[str, Mapping[str, Sensor]],
+        *,
+        permit: Callable[[str], None] = lambda _name: None,
+    ) -> None:
+        """Take open instruments, by winch and role.
 
-            buses[name] = CanBus(spec.bus[name], name, clock)
-            stack.callback(buses[name].close)
-        by_winch, self.lines = instruments(spec, clock, buses)
+        ``permit`` raises where an instrument's zero or tare may not be changed now.
+        """
+        self.spec, self.clock, self.lines, self.permit = spec, clock, lines, permit
         self.sensors: Mapping[str, Sensor] = {
             f"{winch}.{role}": sensor
-            for winch, roles in by_winch.items()
+            for winch, roles in sensors.items()
             for role, sensor in roles.items()
         }
-        self._slow = SlowDevices(self.lines)
-        stack.callback(self._slow.close)
-
-    def named(self, name: str | None) -> str:
-        """The full name of an instrument; a winch stands for its cell. Raises UsageError."""
-        return full_name(self.spec, name)
+        self._slow = slow
 
     def ref(self, name: str) -> DeviceRef:
         """How an instrument is wired."""
@@ -109,7 +104,7 @@ class CellDesk:
 
     def store(self, name: str, command: str) -> None:
         """Send a command that writes the device's EEPROM; raises as :meth:`command`."""
-        permanent_commands(self, name, command)
+        check_permanent(self.spec, name, command)
         sensor = self.sensors[name]
         if isinstance(sensor, Storing):
             sensor.may_store = True
@@ -177,11 +172,10 @@ def full_name(spec: BenchSpec, name: str | None) -> str:
     raise UsageError(f"{what}; the bench has {listed}{suggest(name or '', known)}")
 
 
-def permanent_commands(desk: CellDesk, name: str, wanted: str) -> None:
+def check_permanent(spec: BenchSpec, name: str, wanted: str) -> None:
     """Raise NotPermitted where a device has no such command that writes its EEPROM."""
-    device = desk.device(name)
-    commands = (device.modbus or device.process or device).__dict__.get("command", {})
-    lasting = [key for key, item in commands.items() if getattr(item, "permanent", False)]
+    device = device_of(spec, _refs(spec)[name])
+    lasting = [command for command, permanent in device.commands.items() if permanent]
     if wanted not in lasting:
         listed = ", ".join(lasting) or "none"
         raise NotPermitted(
@@ -217,20 +211,6 @@ def _mean(readings: Sequence[Reading], values: Sequence[float]) -> Steady:
         statistics.pstdev(values),
         len(values),
     )
-
-
-@contextmanager
-def cell_desk(bench_file: str | Path, clock: Clock | None = None) -> Iterator[CellDesk]:
-    """Own a bench for its slow instruments only.
-
-    Raises FileError, ConnectionLost, and NotPermitted where another process owns the bench.
-    """
-    from winchkit.schema.read import read_bench
-
-    spec = read_bench(bench_file)
-    with ExitStack() as stack:
-        stack.callback(Ownership(spec).close)
-        yield CellDesk(spec, clock or MonotonicClock(), stack)
 
 
 def _refs(spec: BenchSpec) -> dict[str, DeviceRef]:

@@ -19,6 +19,7 @@ _CHECK = 0.3
 
 def host_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
     """Add the mean of the present value to the host's tare; raises NotPermitted, NoReply."""
+    desk.permit(name)
     _refuse_temperature(name)
     seen = steady(desk.readings(name, duration))
     book = tares_of(desk.spec)
@@ -43,6 +44,7 @@ def clear_tare(desk: CellDesk, name: str) -> dict[str, Any]:
     book = tares_of(desk.spec)
     if name not in book.tare:
         raise UsageError(f"{name} has no tare of the host; nothing to clear")
+    desk.permit(name)
     kept = {other: tare for other, tare in book.tare.items() if other != name}
     _keep(desk, book, kept)
     _apply(desk, name, 0.0)
@@ -60,6 +62,7 @@ def device_zero(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
 
 
 def _by_device(desk: CellDesk, name: str, command: str, duration: float) -> dict[str, Any]:
+    desk.permit(name)
     before = steady(desk.readings(name, duration))
     desk.command(name, command)
     desk.clock.sleep(_CHECK)

@@ -14,9 +14,11 @@ from winchkit.drivers.can.scan import Found
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["RemoteStation", "attach"]
+__all__ = ["RemoteCells", "RemoteStation", "attach"]
 
 _ANSWER_TIME = 10.0
+_CELL_TIME = 20.0
+"""Longer than any command to an instrument with the readings before and after it, s."""
 
 
 def attach(spec: BenchSpec, patience: float = _ANSWER_TIME) -> RemoteStation | None:
@@ -34,6 +36,7 @@ class RemoteStation:
 
     def __init__(self, connection: socket.socket, patience: float) -> None:
         connection.settimeout(patience)
+        self._patience = patience
         self._connection = connection
         self._stream = connection.makefile("rwb")
         self._lock = threading.Lock()
@@ -119,6 +122,15 @@ class RemoteStation:
         """What was counted by instrument, and for the log."""
         return dict(self._call("counters"))
 
+    def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """Something with an instrument, e.g. "zero"; ``arguments`` are times (s), or words."""
+        watched = sum(item for item in arguments if isinstance(item, float))
+        self._connection.settimeout(_CELL_TIME + 3 * watched)
+        try:
+            return dict(self._call("cell", task, name, *arguments))
+        finally:
+            self._connection.settimeout(self._patience)
+
     def close(self) -> None:
         """Go away; the owner ends what was started here."""
         with self._lock:
@@ -140,6 +152,17 @@ class RemoteStation:
         if "error" in answer:
             raise _error(answer["error"], answer["message"])
         return answer["ok"]
+
+
+class RemoteCells:
+    """The instruments of a bench that another process owns."""
+
+    def __init__(self, spec: BenchSpec, station: RemoteStation) -> None:
+        self.spec, self._station = spec, station
+
+    def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """One of :data:`~winchkit.bench.cell_tasks.TASKS`, done by the owner."""
+        return self._station.cell(task, name, *arguments)
 
 
 def _error(name: str, message: str) -> WinchkitError:

@@ -78,12 +78,22 @@ class Ownership:
 
 
 def listen(spec: BenchSpec) -> tuple[socket.socket, Path]:
-    """A listening socket for the owner, and the file by which others find it."""
+    """A listening socket for the owner, and the file by which others find it.
+
+    Raises NotPermitted where there can be none.
+    """
     if hasattr(socket, "AF_UNIX"):
         path = _folder() / f"{_key(spec)}.sock"
         path.unlink(missing_ok=True)
         server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        server.bind(str(path))
+        try:
+            server.bind(str(path))
+        except OSError as error:
+            server.close()
+            raise NotPermitted(
+                f"{path}: cannot be opened for other commands: {error}; "
+                "set TMPDIR to a folder with a short name that can be written"
+            ) from error
     else:
         path = _folder() / f"{_key(spec)}.port"
         server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

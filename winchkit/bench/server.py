@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import socket
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from winchkit.bench.bench import Bench
 from winchkit.bench.owner import listen
 from winchkit.bench.station import LocalStation
 from winchkit.errors import UsageError, WinchkitError
+
+if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench
 
 __all__ = ["OPERATIONS", "StationServer"]
 
@@ -32,6 +34,7 @@ OPERATIONS = (
     "counters",
     "read_object",
     "scanned",
+    "cell",
 )
 """Methods of a station that may be called from outside."""
 

@@ -29,13 +29,10 @@ def at_station(bench_file: str | Path) -> Iterator[Station]:
             remote.close()
         return
     from winchkit.bench.bench import open_bench
-    from winchkit.bench.server import StationServer
 
     with open_bench(spec) as bench:
-        server = StationServer(bench)
         station = LocalStation(bench)
         try:
             yield station
         finally:
             station.close()
-            server.close()

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import asdict
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from winchkit.bench.bench import Bench
+from winchkit.bench.cell_tasks import do
 from winchkit.bench.homing import HomingRequest, homing
 from winchkit.bench.recorder import Recorder, counters_of
 from winchkit.bench.snapshot import to_dict
 from winchkit.bench.winch import Winch
 from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench
 
 __all__ = ["ALL", "LocalStation", "Station"]
 
@@ -75,6 +78,12 @@ class Station(Protocol):
 
     def counters(self) -> dict[str, dict[str, Any]]:
         """What was counted by instrument (``A.cell``), and for the log of this station."""
+
+    def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """Something with an instrument by name: one of the tasks of ``winchkit.bench.cell_tasks``.
+
+        Raises what that raises, and NotPermitted where it would change a moving winch's tension.
+        """
 
     def close(self) -> None:
         """Stop what was started here, finish the log."""
@@ -203,6 +212,10 @@ class LocalStation:
         if self._recorder is not None:
             return self._recorder.counters()
         return counters_of({name: winch.sensors for name, winch in self._bench.winch.items()})
+
+    def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """Something with an instrument by name."""
+        return do(self._bench.cells, task, name, *arguments)
 
     def close(self) -> None:
         """Ramp down what this station set in motion, finish its log."""

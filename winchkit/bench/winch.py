@@ -221,12 +221,16 @@ class Winch:
         cell = self.sensors.get("cell")
         if cell is None:
             raise NotPermitted(f"winch {self.name} has no load cell to tare; wire one as `cell`")
+        self.require_rest()
+        self._bench.command(cell, "tare")
+        return self._tared(cell)
+
+    def require_rest(self) -> None:
+        """Raise NotPermitted while the drive is enabled: no moment to change a cell's zero."""
         if self._controller.phase is not Phase.DISABLED:
             raise NotPermitted(
                 f"winch {self.name} is {self._controller.phase.value}; stop it first"
             )
-        self._bench.command(cell, "tare")
-        return self._tared(cell)
 
     def _tared(self, cell: Sensor) -> float:
         """Wait for readings after the tare and make sure that the device took it."""

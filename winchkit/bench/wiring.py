@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -22,7 +22,7 @@ from winchkit.drivers.can.commission import WatchSpec
 from winchkit.drivers.can.limits import LimitsAtShaft
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
-from winchkit.drivers.slow import SlowDevices
+from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import ConnectionLost, Fault, FileError
 from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
 from winchkit.schema.winch import WinchProfile
@@ -47,7 +47,8 @@ class Wired:
     axes: Mapping[str, Cia402Axis]
     buses: Mapping[str, CanBus]
     sensors: Mapping[str, Mapping[str, Sensor]]
-    command: Callable[[Sensor, str], None]
+    lines: Sequence[SlowLine]
+    slow: SlowDevices
     metadata: Mapping[str, str]
 
     def disarm(self) -> None:
@@ -93,7 +94,7 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
     loop = ControlLoop(
         hosts, winches, supervisor, clock, spec.cycle, stop_together=spec.stop_together
     )
-    return Wired(loop, axes, buses, sensors, slow.command, _metadata(spec, profiles))
+    return Wired(loop, axes, buses, sensors, lines, slow, _metadata(spec, profiles))
 
 
 def _moving(axis: Cia402Axis, rope: RopeMap) -> Callable[[], bool]:

@@ -14,7 +14,7 @@ from winchkit.cli.completing import complete_winch
 from winchkit.cli.output import echo_json
 
 if TYPE_CHECKING:
-    from winchkit.bench.cell_desk import CellDesk
+    from winchkit.bench.cell_tasks import Cells
     from winchkit.calibration.cell_fit import CellFit
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
 
@@ -149,28 +149,27 @@ def _measure(
     cell: str | None, bench: str, *, weights: str | None, series: int, duration: str, settle: str
 ) -> _Measured:
     """Lead through the weights."""
-    from winchkit.bench.cell_desk import cell_desk
     from winchkit.calibration.cell_plan import plan
+    from winchkit.cli.cell_option import cells
     from winchkit.cli.duration import quantity
 
     steps = plan(weights or click.prompt("Weights, rising (0 2 5 10 kg)", err=True), series)
     average, wait = quantity(duration, "time"), quantity(settle, "time")
-    with cell_desk(bench) as desk:
-        name = desk.named(cell)
-        identity = desk.identify(name)
+    with cells(bench, cell) as (found, name):
+        known = found.do("identify", name)
+        identity = known["identity"]
         serial = f"{identity['serial number']:.0f}" if "serial number" in identity else ""
         points = tuple(
-            _hang(desk, name, f"{number}/{len(steps)}", step, average, wait)
+            _hang(found, name, f"{number}/{len(steps)}", step, average, wait)
             for number, step in enumerate(steps, start=1)
         )
-        return _Measured(name, desk.device(name).name, serial, points)
+        return _Measured(name, known["device"], serial, points)
 
 
 def _hang(
-    desk: CellDesk, name: str, number: str, step: CalibrationPoint, average: float, wait: float
+    found: Cells, name: str, number: str, step: CalibrationPoint, average: float, wait: float
 ) -> CalibrationPoint:
     """Ask for one weight and measure it, again where the operator wants."""
-    from winchkit.bench.cell_desk import indicated
     from winchkit.calibration.cell_plan import spoken
 
     while True:
@@ -180,15 +179,14 @@ def _hang(
             show_default=False,
             err=True,
         )
-        desk.clock.sleep(wait)
-        seen = indicated(desk.readings(name, average), desk.publisher(name).scale)
+        seen = found.do("indicated", name, wait, average)
         click.echo(
-            f"    indicated {seen.mean:.4f} ± {seen.std:.4f} N (noise {seen.noise:.3g} N, "
-            f"{seen.readings} readings)",
+            f"    indicated {seen['mean']:.4f} ± {seen['std']:.4f} N (noise {seen['noise']:.3g} N, "
+            f"{seen['readings']} readings)",
             err=True,
         )
-        at_rest = seen.std <= _AT_REST * seen.noise / seen.readings**0.5
+        at_rest = seen["std"] <= _AT_REST * seen["noise"] / seen["readings"] ** 0.5
         if at_rest or click.confirm(
             "    it is not at rest; take it all the same?", default=False, err=True
         ):
-            return replace(step, indicated=seen.mean, std=seen.std)
+            return replace(step, indicated=seen["mean"], std=seen["std"])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from winchkit.cli.cell_option import cell_options, desk, shown, unit_of
+from winchkit.cli.cell_option import cell_options, cells, shown, unit_of
 from winchkit.cli.output import echo_json
 
 if TYPE_CHECKING:
@@ -38,16 +38,14 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
     Leave the load alone, or change it once: then creep is told as well. Exit 1 where something
     is wrong with the readings themselves.
     """
-    from winchkit.bench.cell_report import counters_told
+    from winchkit.bench.cell_tasks import readings_of
     from winchkit.calibration.cell_health import examine
     from winchkit.cli.duration import quantity
 
     seconds = quantity(duration, "time")
-    with desk(bench, cell) as (found, name):
-        before = counters_told(found.sensors[name].counters)
-        readings = found.readings(name, seconds)
-        after = counters_told(found.sensors[name].counters)
-    counters = {key: after[key] - before[key] for key in after}
+    with cells(bench, cell) as (found, name):
+        watched = found.do("watch", name, seconds)
+    readings, counters = readings_of(watched), watched["counters"]
     unit = unit_of(name)
     flags = _flags(readings)
     if sum(item.quality.usable for item in readings) < len(readings) / 2:

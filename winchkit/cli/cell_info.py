@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from winchkit.cli.cell_option import cell_options, desk, shown, unit_of
+from winchkit.cli.cell_option import cell_options, cells, shown, unit_of
 from winchkit.cli.output import echo_json
 
 __all__ = ["command"]
@@ -16,10 +16,8 @@ __all__ = ["command"]
 @cell_options
 def command(cell: str | None, bench: str, *, as_json: bool) -> None:
     """Print device file, serial number, calibration, tare, a reading with its times, counters."""
-    from winchkit.bench.cell_report import about
-
-    with desk(bench, cell) as (found, name):
-        facts = about(found, name)
+    with cells(bench, cell) as (found, name):
+        facts = found.do("about", name)
     if as_json:
         echo_json({"schema": 1, **facts})
         return

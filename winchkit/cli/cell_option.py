@@ -13,9 +13,9 @@ from winchkit.cli.bench_option import bench_option
 from winchkit.cli.completing import complete_winch
 
 if TYPE_CHECKING:
-    from winchkit.bench.cell_desk import CellDesk
+    from winchkit.bench.cell_tasks import Cells
 
-__all__ = ["cell_options", "desk", "shown", "unit_of"]
+__all__ = ["cell_options", "cells", "shown", "unit_of"]
 
 _UNITS = {"cell": "N", "load": "N", "length": "m", "temperature": "degC"}
 
@@ -33,12 +33,13 @@ def cell_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @contextmanager
-def desk(bench: str, cell: str | None) -> Iterator[tuple[CellDesk, str]]:
+def cells(bench: str, cell: str | None) -> Iterator[tuple[Cells, str]]:
     """The instruments of a bench, and the full name of the one that is meant."""
-    from winchkit.bench.cell_desk import cell_desk
+    from winchkit.bench.cell_desk import full_name
+    from winchkit.bench.cell_session import at_cells
 
-    with cell_desk(bench) as found:
-        yield found, found.named(cell)
+    with at_cells(bench) as found:
+        yield found, full_name(found.spec, cell)
 
 
 def unit_of(name: str) -> str:

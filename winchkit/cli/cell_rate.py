@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from winchkit.cli.cell_option import cell_options, desk
+from winchkit.cli.cell_option import cell_options, cells
 from winchkit.cli.output import echo_json
 
 __all__ = ["command"]
@@ -17,12 +17,11 @@ __all__ = ["command"]
 @click.option("--for", "duration", default="3 s", show_default=True, help="Measured for this.")
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Measure the rate of CELL and say what limits it: wire, turnaround, conversions, sharing."""
-    from winchkit.bench.cell_report import rate_report
     from winchkit.cli.duration import quantity
 
     seconds = quantity(duration, "time")
-    with desk(bench, cell) as (found, name):
-        report = rate_report(found, name, seconds)
+    with cells(bench, cell) as (found, name):
+        report = found.do("rate", name, seconds)
     if as_json:
         echo_json({"schema": 1, **report})
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.cell_option import cell_options, desk
+from winchkit.cli.cell_option import cell_options, cells
 from winchkit.cli.output import echo_json
 
 __all__ = ["command"]
@@ -19,13 +19,13 @@ def command(cell: str | None, bench: str, name: str, *, yes: bool, as_json: bool
 
     An EEPROM wears out (100,000 writes are usual). Nothing else in winchkit writes it.
     """
-    from winchkit.bench.cell_desk import permanent_commands
+    from winchkit.bench.cell_desk import check_permanent
 
-    with desk(bench, cell) as (found, full):
-        permanent_commands(found, full, name)
+    with cells(bench, cell) as (found, full):
+        check_permanent(found.spec, full, name)
         if not yes:
             click.confirm(f"Write the EEPROM of {full} with '{name}'?", abort=True, err=True)
-        found.store(full, name)
+        found.do("store", full, name)
     if as_json:
         echo_json({"schema": 1, "cell": full, "command": name})
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.cell_option import cell_options, desk, shown, unit_of
+from winchkit.cli.cell_option import cell_options, cells, shown, unit_of
 from winchkit.cli.output import echo_json
 
 __all__ = ["command"]
@@ -23,17 +23,14 @@ def command(
     The host subtracts the mean; the number stands in BENCH.tares.toml and holds for everything
     that opens the bench from now on. The device knows nothing of it.
     """
-    from winchkit.bench.cell_tares import clear_tare, device_tare, host_tare
     from winchkit.cli.duration import quantity
 
     seconds = quantity(duration, "time")
-    with desk(bench, cell) as (found, name):
-        if device:
-            result = device_tare(found, name, seconds)
-        elif clear:
-            result = clear_tare(found, name)
+    with cells(bench, cell) as (found, name):
+        if clear:
+            result = found.do("clear tare", name)
         else:
-            result = host_tare(found, name, seconds)
+            result = found.do("device tare" if device else "host tare", name, seconds)
     unit = unit_of(name)
     if as_json:
         echo_json({"schema": 1, "cell": name, "unit": unit, **result})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.cell_option import cell_options, desk, shown, unit_of
+from winchkit.cli.cell_option import cell_options, cells, shown, unit_of
 from winchkit.cli.output import echo_json
 
 __all__ = ["command"]
@@ -18,12 +18,11 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
 
     Only a volatile zero is sent; a device that keeps it in its EEPROM needs `cell store zero`.
     """
-    from winchkit.bench.cell_tares import device_zero
     from winchkit.cli.duration import quantity
 
     seconds = quantity(duration, "time")
-    with desk(bench, cell) as (found, name):
-        result = device_zero(found, name, seconds)
+    with cells(bench, cell) as (found, name):
+        result = found.do("zero", name, seconds)
     unit = unit_of(name)
     if as_json:
         echo_json({"schema": 1, "cell": name, "unit": unit, **result})

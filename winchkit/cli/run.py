@@ -79,18 +79,13 @@ def _execute(
     """Run it as the bench's owner; other commands may attach meanwhile."""
     from winchkit.bench.bench import open_bench
     from winchkit.bench.programme import run_programme
-    from winchkit.bench.server import StationServer
 
     def tell(repeat: int, number: int, step: Step) -> None:
         place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
         click.echo(f"{place}: {_words(step)}", err=True)
 
     with open_bench(bench) as opened:
-        server = StationServer(opened)
-        try:
-            return run_programme(opened, programme, out, ask, suffix=suffix, progress=tell)
-        finally:
-            server.close()
+        return run_programme(opened, programme, out, ask, suffix=suffix, progress=tell)
 
 
 def _rehearse(bench: str, programme: Programme, *, as_json: bool) -> None:

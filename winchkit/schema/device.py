@@ -41,6 +41,14 @@ class DeviceSpec(Table):
         """Name of the table that is given."""
         return next((table for table in TABLES if getattr(self, table) is not None), "nothing")
 
+    @property
+    def commands(self) -> dict[str, bool]:
+        """Commands of an instrument by name, and whether each writes its EEPROM."""
+        table = self.modbus or self.stream or self.process
+        if table is None:
+            return {}
+        return {name: getattr(item, "permanent", False) for name, item in table.command.items()}
+
     def rules(self) -> Iterator[Rule]:
         """A device is of one kind."""
         if sum(getattr(self, table) is not None for table in TABLES) != 1:
