@@ -51,13 +51,15 @@ def test_info_names_the_device_and_its_reading(cell: Served, tmp_path: Path) -> 
 
 def test_rate_says_what_limits_it(cell: Served, tmp_path: Path) -> None:
     report = told("rate", "-b", cell.bench(tmp_path), "--for", "0.5s")
-    assert report["limited_by"] == "winchkit's usual rate"
-    assert report["rate"] == pytest.approx(100.0, rel=0.3)
-    faster = cell.bench(tmp_path, ', rate = "300 Hz"')
-    assert told("rate", "-b", faster, "--for", "0.3s")["planned"] == pytest.approx(300.0)
-    text = run("rate", "-b", cell.bench(tmp_path), "--for", "0.3s").output
-    assert "the device's conversions" in text
-    assert 'rate = "300 Hz"' in text
+    assert report["limited_by"] == "the device's conversions"
+    assert report["planned"] == pytest.approx(300.0)
+    slower = cell.bench(tmp_path, ', rate = "40 Hz"')
+    report = told("rate", "-b", slower, "--for", "0.5s")
+    assert report["limited_by"] == "`rate` in the wiring"
+    assert report["rate"] == pytest.approx(40.0, rel=0.3)
+    text = run("rate", "-b", slower, "--for", "0.3s").output
+    assert "300.0 /s  the device's conversions" in text
+    assert "a reading keeps the line busy" in text
 
 
 def test_diagnose_reports_noise_and_ends_with_zero(cell: Served, tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit import catalog
-from winchkit.drivers.modbus.timing import exchange, fair_rates, wire_times
+from winchkit.drivers.modbus.timing import exchange, wire_times
+from winchkit.drivers.sharing import LineShare, fair_rates
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.device_modbus import ModbusSpec
 from winchkit.schema.read import read_device
@@ -60,3 +61,28 @@ def test_the_share_is_fair_and_fills_the_line(wishes: list[tuple[float, float]])
         assert load == pytest.approx(0.95)
         assert max(short) == pytest.approx(min(short))
         assert all(rate <= max(short) + 1e-9 for rate in rates)
+
+
+def test_a_line_is_shared_out_by_what_its_readings_take() -> None:
+    """Reckoned with 10 ms each, seen to take 2 ms and 4 ms: 0.95 / 6 ms for each."""
+    share = LineShare([300.0, 1000.0], [10e-3, 10e-3])
+    assert share.rates == pytest.approx((47.5, 47.5))
+    changes = [share.took(k % 2, (2e-3, 4e-3)[k % 2]) for k in range(64)]
+    assert sum(changes) == 2
+    assert share.rates == pytest.approx((0.95 / 6e-3, 0.95 / 6e-3))
+    assert share.time_of(1) == pytest.approx(4e-3)
+    assert share.room_for(0) == pytest.approx(0.95 / 6e-3)
+
+
+def test_a_machine_that_stood_still_does_not_slow_a_line_down() -> None:
+    share = LineShare([1000.0], [2e-3])
+    for number in range(64):
+        share.took(0, 0.3 if number % 16 == 7 else 2e-3)
+    assert share.rates == pytest.approx((475.0,))
+
+
+def test_over_tcp_a_thousand_readings_a_second_are_enough() -> None:
+    share = LineShare([4000.0], [1e-4], least=1e-3)
+    for _ in range(64):
+        share.took(0, 1e-4)
+    assert share.rates == pytest.approx((950.0,))

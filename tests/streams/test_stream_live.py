@@ -57,6 +57,21 @@ def test_a_serial_cell_measures_fails_and_comes_back(live: LiveBench, tmp_path: 
         assert comes(lambda: math.isfinite(winch.tension))
 
 
+def test_a_cell_without_a_tare_of_its_own_is_tared_by_the_host(
+    live: LiveBench, tmp_path: Path
+) -> None:
+    wiring = live.write_bench_file(tmp_path / "bench.toml")
+    with open_bench(wiring) as bench:
+        winch = bench.winch["A"]
+        assert abs(winch.tare()) < 5.0
+        reading = winch.sensors["cell"].latest
+        assert reading is not None
+        assert reading.gross == pytest.approx(10 * 9.80665, abs=10.0)
+    with open_bench(wiring) as bench:
+        assert comes(lambda: abs(bench.winch["A"].tension) < 5.0), "it lasts"
+        assert bench.cells.sensors["A.cell"].tared is not True
+
+
 def test_two_cells_share_a_line_by_their_addresses(tmp_path: Path) -> None:
     declared = read_simbench(find("sim", "serial-bench"))
     wired = declared.bench.winch["A"]

@@ -10,10 +10,10 @@ from typing import Protocol, runtime_checkable
 from winchkit.bench.instruments import device_of, refs_of
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.modbus.line import ModbusLine
 from winchkit.drivers.publisher import Publisher, Publishing
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
+from winchkit.drivers.stream.line import StreamLine
 from winchkit.errors import NoReply, NotPermitted, UsageError
 from winchkit.schema.bench import BenchSpec, DeviceRef
 from winchkit.schema.device import DeviceSpec
@@ -34,6 +34,17 @@ _BATCHES = 10
 _FEWEST, _ENOUGH = 2, 20
 _PATIENCE = 5.0
 """So long it waits for enough readings of a slow instrument, s."""
+
+
+@runtime_checkable
+class Shared(Protocol):
+    """A line that shares its time out among its instruments."""
+
+    def room_for(self, sensor: Sensor) -> float:
+        """Readings a second that there is room for."""
+
+    def time_of(self, sensor: Sensor) -> float:
+        """How long a reading keeps the line busy, s."""
 
 
 @runtime_checkable
@@ -92,11 +103,28 @@ class CellDesk:
         """The bus that an instrument hangs on."""
         return self.ref(name).bus
 
-    def line_rate(self, name: str) -> float:
-        """Readings a second that the line would allow an instrument, were nothing else a limit."""
+    def sharing(self, name: str) -> int:
+        """How many instruments share its line."""
+        return sum(self.line(other) == self.line(name) for other in self.sensors)
+
+    def line_rate(self, name: str) -> float | None:
+        """Readings a second that its line has room for; None on a line that is not polled."""
+        line = self._line_of(name)
+        return line.room_for(self.sensors[name]) if isinstance(line, Shared) else None
+
+    def line_time(self, name: str) -> float | None:
+        """How long one of its readings keeps the line busy, s, as it was measured."""
+        line = self._line_of(name)
+        return line.time_of(self.sensors[name]) if isinstance(line, Shared) else None
+
+    def line_note(self, name: str) -> str:
+        """What is to be said of its port, e.g. of an adapter that holds bytes back."""
+        line = self._line_of(name)
+        return line.note if isinstance(line, StreamLine) else ""
+
+    def _line_of(self, name: str) -> SlowLine:
         sensor = self.sensors[name]
-        line = next(item for item in self.lines if sensor in item.sensors)
-        return line.room_for(sensor) if isinstance(line, ModbusLine) else float("inf")
+        return next(item for item in self.lines if any(one is sensor for one in item.sensors))
 
     def command(self, name: str, command: str) -> None:
         """Send a command of the device file; raises NoReply, DeviceRefused, NotPermitted."""

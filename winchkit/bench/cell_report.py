@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from winchkit.bench.cell_desk import CellDesk
-from winchkit.bench.instruments import READ_RATE, calibration_of
+from winchkit.bench.instruments import calibration_of
 from winchkit.drivers.modbus.timing import exchange
 from winchkit.drivers.reading import Counters
 from winchkit.schema.device import DeviceSpec
@@ -26,6 +26,8 @@ def about(desk: CellDesk, name: str) -> dict[str, Any]:
     calibration = calibration_of(desk.spec, ref)
     sensor, scale = desk.sensors[name], desk.publisher(name).scale
     remarks = _link_remarks(desk, name, device)
+    if note := desk.line_note(name):
+        remarks.append(note)
     serial = str(int(identity[_SERIAL])) if _SERIAL in identity else ""
     if calibration and serial and calibration.serial_number not in ("", serial):
         remarks.append(
@@ -69,65 +71,65 @@ def counters_told(counters: Counters) -> dict[str, int]:
 
 def rate_report(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
     """The rate that an instrument is read at, measured for ``duration`` s, and what limits it."""
-    sensor, device, ref = desk.sensors[name], desk.device(name), desk.ref(name)
+    sensor = desk.sensors[name]
     readings = desk.readings(name, duration)
     measured = (len(readings) - 1) / (readings[-1].t_receive - readings[0].t_receive)
     duplicates = sum(a.raw == b.raw for a, b in pairwise(readings))
-    wanted = ref.rate or READ_RATE
-    limits = {"asked for in the wiring" if ref.rate else "winchkit's usual rate": wanted}
-    facts: dict[str, Any] = {}
-    if device.modbus is not None:
-        limits["the device's conversions"] = device.modbus.rate
-        facts = _exchange(desk, name, device)
-        limits[f"the line, shared by {facts['sharing']}"] = facts["line_rate"]
-    elif device.stream is not None:
-        if device.stream.mode == "continuous":
-            limits = {}
-        limits["the device's output"] = device.stream.rate
-    elif device.process is not None:
-        limits["the device's conversions"] = device.process.rate
+    limits, facts, by_itself = _limits(desk, name)
     limit = min(limits, key=lambda key: limits[key])
     counters = sensor.counters
     return {
         "cell": name,
         "rate": measured,
         "planned": 1 / sensor.period,
+        "by_itself": by_itself,
         "limited_by": limit,
         "limits": limits,
         "exchange": facts,
         "duplicates": duplicates / max(1, len(readings) - 1),
         "latency": dataclasses.asdict(counters.latency),
         "counters": counters_told(counters),
-        "advice": _advice(limit, limits, measured, 1 / sensor.period),
+        "advice": _advice(limit, measured, 1 / sensor.period, by_itself=by_itself),
     }
 
 
-def _exchange(desk: CellDesk, name: str, device: DeviceSpec) -> dict[str, Any]:
-    """What one reading costs on its line, and what the line has room for."""
+def _limits(desk: CellDesk, name: str) -> tuple[dict[str, float], dict[str, Any], bool]:
+    """Rates that bound an instrument's, what a reading costs, whether it sends by itself."""
+    device, cap = desk.device(name), desk.ref(name).rate
+    table = device.modbus or device.stream or device.process
+    assert table is not None, "every instrument has one of them"
+    stream, process = device.stream, device.process
+    if (stream and stream.mode == "continuous") or (process and process.tpdo):
+        return {"the device, which sends by itself": table.rate}, {}, True
+    limits = {"the device's conversions": table.rate}
+    if cap is not None:
+        limits["`rate` in the wiring"] = cap
+    line, sharing = desk.line_rate(name), desk.sharing(name)
+    facts: dict[str, Any] = {}
+    if line is not None:
+        limits["the line" + (f", shared by {sharing}" if sharing > 1 else "")] = line
+        facts = {"sharing": sharing, "line_rate": line, "time": desk.line_time(name)}
+    if device.modbus is not None:
+        cost = exchange(device.modbus, desk.spec.bus[desk.line(name)])
+        facts |= dataclasses.asdict(cost)
     bus = desk.spec.bus[desk.line(name)]
-    assert device.modbus is not None, "asked for a Modbus device only"
-    cost = exchange(device.modbus, bus)
-    sharing = [other for other in desk.sensors if desk.line(other) == desk.line(name)]
-    return {
-        "bytes": cost.bytes,
-        "queries": cost.queries,
-        "wire": cost.wire,
-        "silence": cost.silence,
-        "turnaround": cost.turnaround,
-        "baudrate": None if bus.kind == "modbus-tcp" else bus.baudrate,
-        "sharing": len(sharing),
-        "line_rate": desk.line_rate(name),
-    }
+    facts["baudrate"] = bus.baudrate if bus.kind in ("modbus-rtu", "serial") else None
+    return limits, facts, False
 
 
-def _advice(limit: str, limits: dict[str, float], measured: float, planned: float) -> str:
+def _advice(limit: str, measured: float, planned: float, *, by_itself: bool) -> str:
+    strays = not 1 / _WORTH_TELLING < measured / planned < _WORTH_TELLING
+    if by_itself:
+        return (
+            f"its device file says {planned:g} a second: correct `rate` there, or the device's own "
+            "setting; what is stale and when a value was sampled are reckoned from it"
+            if strays
+            else ""
+        )
     if planned > _WORTH_TELLING * measured:
         return "it is read more slowly than planned: look at timeouts, CRC errors and latency"
     if limit.startswith("the line"):
         return "raise the baud rate, read fewer registers, or give the cell a line of its own"
-    others = min((value for key, value in limits.items() if key != limit), default=0.0)
-    if limit.startswith("winchkit") and others > _WORTH_TELLING * limits[limit]:
-        return f'write rate = "{others:.3g} Hz" beside the cell in the wiring for all there is'
     return ""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from winchkit.bench.cell_desk import CellDesk, steady
 from winchkit.bench.instruments import tares_of
 from winchkit.calibration.cell_file import tares_toml, write_text
-from winchkit.errors import NotPermitted, UsageError
+from winchkit.errors import UsageError
 from winchkit.schema.calibration import HostTare, TareBook, tare_book_path
 
 __all__ = ["clear_tare", "device_tare", "device_zero", "host_tare"]
@@ -18,13 +18,15 @@ _CHECK = 0.3
 
 
 def host_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
-    """Add the mean of the present value to the host's tare; raises NotPermitted, NoReply."""
+    """Add the mean of the present value to the host's tare; raises NotPermitted, NoReply.
+
+    It is kept beside the wiring file; a bench without one keeps it until it is closed.
+    """
     desk.permit(name)
     _refuse_temperature(name)
     seen = steady(desk.readings(name, duration))
     book = tares_of(desk.spec)
-    old = book.tare.get(name)
-    value = seen.mean + (old.value if old else 0.0)
+    value = seen.mean + desk.publisher(name).scale.tare
     taken = datetime.now(UTC).replace(microsecond=0)
     _keep(desk, book, {**book.tare, name: HostTare(value, seen.std, taken)})
     _apply(desk, name, value)
@@ -35,20 +37,19 @@ def host_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
         "readings": seen.readings,
         "tare": value,
         "after": after.mean,
-        "file": tare_book_path(desk.spec.path),
+        "file": _book_path(desk),
     }
 
 
 def clear_tare(desk: CellDesk, name: str) -> dict[str, Any]:
     """Take the host's tare of an instrument away; raises UsageError where it has none."""
-    book = tares_of(desk.spec)
-    if name not in book.tare:
+    book, removed = tares_of(desk.spec), desk.publisher(name).scale.tare
+    if name not in book.tare and not removed:
         raise UsageError(f"{name} has no tare of the host; nothing to clear")
     desk.permit(name)
-    kept = {other: tare for other, tare in book.tare.items() if other != name}
-    _keep(desk, book, kept)
+    _keep(desk, book, {other: tare for other, tare in book.tare.items() if other != name})
     _apply(desk, name, 0.0)
-    return {"removed": book.tare[name].value, "file": tare_book_path(desk.spec.path)}
+    return {"removed": removed, "file": _book_path(desk)}
 
 
 def device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
@@ -76,9 +77,13 @@ def _by_device(desk: CellDesk, name: str, command: str, duration: float) -> dict
 
 
 def _keep(desk: CellDesk, book: TareBook, tares: dict[str, HostTare]) -> None:
-    if not desk.spec.path:
-        raise NotPermitted("a bench without a wiring file has no place for tares; save it first")
-    write_text(tare_book_path(desk.spec.path), tares_toml(TareBook(book.name, tares)))
+    if (path := _book_path(desk)) is not None:
+        write_text(path, tares_toml(TareBook(book.name, tares)))
+
+
+def _book_path(desk: CellDesk) -> str | None:
+    """Where tares are kept; None for a bench without a wiring file."""
+    return tare_book_path(desk.spec.path) if desk.spec.path else None
 
 
 def _apply(desk: CellDesk, name: str, value: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from winchkit.drivers.can.process import ProcessInstrument
 
 __all__ = [
-    "READ_RATE",
     "ROLES",
     "calibration_of",
     "can_buses",
@@ -37,8 +37,6 @@ __all__ = [
     "tares_of",
 ]
 
-READ_RATE = 100.0
-"""Readings a second of every instrument, unless its own rate is lower or the wiring says more."""
 ROLES = ("cell", "load", "length", "temperature")
 
 
@@ -175,7 +173,7 @@ def _modbus(spec: BenchSpec, one: _Wired, bus: BusSpec, clock: Clock) -> Instrum
         device,
         one.ref.unit or 1,
         clock,
-        rate=one.ref.rate or READ_RATE,
+        rate=one.ref.rate or inf,
         timeout=bus.timeout,
     )
     one.prepare(found.publisher)
@@ -189,7 +187,7 @@ def _stream(spec: BenchSpec, one: _Wired, bus: BusSpec, clock: Clock) -> StreamI
         device,
         one.ref.unit,
         clock,
-        rate=one.ref.rate or READ_RATE,
+        rate=one.ref.rate or inf,
         timeout=bus.timeout,
     )
     one.prepare(found.publisher)

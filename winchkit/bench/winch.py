@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from winchkit.bench.cell_tares import host_tare
 from winchkit.bench.homing import HomingRequest, homing
 from winchkit.bench.loop import WinchParts
 from winchkit.bench.motion import DEAD_MAN, Jog, MotionSource, Move
@@ -215,13 +216,20 @@ class Winch:
             raise MotionError(f"winch {self.name}: somebody stopped it before the motion's end")
 
     def tare(self) -> float:
-        """Tare the load cell with its own command, at rest; returns the tension that it then
-        reads, N. Its EEPROM is not touched. Raises NotPermitted, NoReply, DeviceRefused.
+        """Tare the load cell at rest; returns the tension that it then reads, N.
+
+        By its own volatile command where it has one, else the host subtracts what hangs there
+        (:func:`~winchkit.bench.cell_tares.host_tare`). Its EEPROM is not touched. Raises
+        NotPermitted, NoReply, DeviceRefused.
         """
         cell = self.sensors.get("cell")
         if cell is None:
             raise NotPermitted(f"winch {self.name} has no load cell to tare; wire one as `cell`")
         self.require_rest()
+        cells, name = self._bench.cells, f"{self.name}.cell"
+        writes_eeprom = cells.device(name).commands.get("tare")
+        if writes_eeprom is None or writes_eeprom:
+            return float(host_tare(cells, name, _TARE_TIME)["after"])
         self._bench.command(cell, "tare")
         return self._tared(cell)
 

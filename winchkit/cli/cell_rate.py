@@ -30,27 +30,39 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
 
 
 def _lines(report: dict[str, Any]) -> list[str]:
-    lines = [
-        f"{report['cell']}: {report['rate']:.1f} readings a second "
-        f"(planned {report['planned']:.1f}), limited by {report['limited_by']}"
-    ]
-    lines += [f"  {rate:8.1f} /s  {what}" for what, rate in report["limits"].items()]
-    cost = report["exchange"]
-    if cost:
-        wire = f"{cost['bytes']} bytes in {cost['queries']} "
-        wire += "query" if cost["queries"] == 1 else "queries"
-        if cost["baudrate"]:
-            wire += (
-                f", {cost['wire'] * 1e3:.2f} ms at {cost['baudrate']} Bd, "
-                f"{cost['silence'] * 1e3:.2f} ms of silence between frames"
-            )
-        lines.append(f"  a reading is {wire}, about {cost['turnaround'] * 1e3:.2f} ms turnaround")
+    head = f"{report['cell']}: {report['rate']:.1f} readings a second "
+    if report["by_itself"]:
+        head += f"(its device file says {report['planned']:.1f}); the device sends them by itself"
+    else:
+        head += f"(planned {report['planned']:.1f}), limited by {report['limited_by']}"
+    lines = [head, *(f"  {rate:8.1f} /s  {what}" for what, rate in report["limits"].items())]
+    lines += _cost(report["exchange"])
     latency = {key: value * 1e3 for key, value in report["latency"].items()}
+    asked = "from its first byte to its last" if report["by_itself"] else "from request to answer"
     lines.append(
-        f"  from request to answer p50 {latency['p50']:.2f}, p99 {latency['p99']:.2f}, "
+        f"  {asked} p50 {latency['p50']:.2f}, p99 {latency['p99']:.2f}, "
         f"worst {latency['worst']:.2f} ms; {report['duplicates']:.1%} repeat the count before"
     )
     lines.append(
         "  " + ", ".join(f"{key} {value}" for key, value in report["counters"].items() if value)
     )
     return [*lines, f"  {report['advice']}"] if report["advice"] else lines
+
+
+def _cost(cost: dict[str, Any]) -> list[str]:
+    """What a reading keeps the line busy with; nothing for a device that sends by itself."""
+    if not cost:
+        return []
+    lines = [f"  a reading keeps the line busy for {cost['time'] * 1e3:.2f} ms as measured"]
+    if "bytes" in cost:
+        queries = f"{cost['queries']} {'query' if cost['queries'] == 1 else 'queries'}"
+        lines[0] += f": {cost['bytes']} bytes in {queries}"
+    if cost["baudrate"]:
+        lines[0] += f" at {cost['baudrate']} Bd"
+    if cost["baudrate"] and "wire" in cost:
+        lines.append(
+            f"  by the standard {cost['wire'] * 1e3:.2f} ms on the wire, "
+            f"{cost['silence'] * 1e3:.2f} ms of silence between frames, "
+            f"about {cost['turnaround'] * 1e3:.2f} ms turnaround"
+        )
+    return lines

@@ -79,7 +79,7 @@ class DeviceRef(Table):
     calibration: str | None = None
     """A file of kind ``calibration`` beside the bench, applied by the host."""
     rate: Frequency | None = None
-    """Readings a second, where the usual 100 are too few or too many, Hz."""
+    """At most so many readings a second, Hz; else as many as it converts and its line allows."""
 
 
 @dataclass(frozen=True)

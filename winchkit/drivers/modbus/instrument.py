@@ -39,10 +39,10 @@ class Instrument(Publishing):
         unit: int,
         clock: Clock,
         *,
-        rate: float,
         timeout: float,
+        rate: float = inf,
     ) -> None:
-        """Poll at ``rate`` readings a second, or at the device's own rate where that is lower.
+        """Poll as often as the device converts, at most ``rate`` times a second.
 
         ``timeout`` (s) is the line's for one answer.
         """
@@ -111,18 +111,18 @@ class Instrument(Publishing):
         """Note that the line is closed."""
         self.problem = error
 
-    async def poll(self, client: ModbusClient) -> None:
-        """Take one reading; a failure is counted, kept as ``problem`` and retried.
+    async def poll(self, client: ModbusClient) -> bool:
+        """Take one reading, and say whether there is one.
 
-        One that fails again and again is asked less often, so that the others on its line keep
-        their rates.
+        A failure is counted, kept as ``problem`` and retried. An instrument that fails again and
+        again is asked less often, so that the others on its line keep their rates.
         """
         t_request = self._clock.now()
         self.due = max(self.due + self.period, t_request)
         self._take_events(client)
         if self._distrust.silent(t_request):
             self.due = self._distrust.until
-            return
+            return False
         try:
             registers, t_receive = await self._ask_value(client)
             status = await self._ask_status(client)
@@ -134,13 +134,14 @@ class Instrument(Publishing):
             self._failed(error)
         else:
             self._take_events(client)
-            if self._distrust.discards(self._clock.now(), fixed=self._all_alike):
-                self.publisher.tally.drops += 1
-                self._status_before = None
-                self.due = self._distrust.until
-            else:
+            if not self._distrust.discards(self._clock.now(), fixed=self._all_alike):
                 self._distrust.answered(self._clock.now(), fixed=self._all_alike)
                 self._publish(registers, status, (t_request, t_receive))
+                return True
+            self.publisher.tally.drops += 1
+            self._status_before = None
+            self.due = self._distrust.until
+        return False
 
     async def _ask_value(self, client: ModbusClient) -> tuple[list[int], float]:
         """Registers of the value's block, and when they came."""

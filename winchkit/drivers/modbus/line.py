@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from math import inf
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.modbus.client import ModbusClient
 from winchkit.drivers.modbus.commands import command_of, confirm, identity, send
 from winchkit.drivers.modbus.instrument import Instrument
-from winchkit.drivers.modbus.timing import exchange, fair_rates, wire_times
+from winchkit.drivers.modbus.timing import exchange, silence_of, wire_times
 from winchkit.drivers.reading import Sensor
+from winchkit.drivers.sharing import LineShare
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
@@ -18,6 +18,9 @@ __all__ = ["ModbusLine"]
 
 _RECONNECT = 0.3
 _OPENING, _POLL = 1.0, 0.01
+_LEAST = {"modbus-rtu": 1e-4, "modbus-tcp": 1e-3}
+"""What a reading is reckoned with at least, s: over TCP no line is in the way, but this process
+has a control loop to run."""
 _PROBE_SHARE = 4
 """A silent device costs the line a timeout: for each there are four times as long for the rest."""
 
@@ -38,8 +41,13 @@ class ModbusLine:
         self._closing = False
         self._opened = False
         self._next_probe = clock.now()
-        self._gap = max((item.decoder.spec.gap for item in instruments), default=0.0)
-        self._times = [exchange(item.decoder.spec, spec).time for item in instruments]
+        gap = max((item.decoder.spec.gap for item in instruments), default=0.0)
+        self._silence = max(gap, silence_of(spec))
+        self._share = LineShare(
+            [item.wanted_rate for item in instruments],
+            [exchange(item.decoder.spec, spec).time for item in instruments],
+            _LEAST[spec.kind],
+        )
         self._share_out()
 
     async def serve(self) -> None:
@@ -72,11 +80,11 @@ class ModbusLine:
 
     def room_for(self, sensor: Sensor) -> float:
         """Readings a second that the line has room for, were this instrument's wish no limit."""
-        mine = self._own(sensor)
-        rates = fair_rates(
-            [inf if item is mine else item.wanted_rate for item in self.sensors], self._times
-        )
-        return rates[self.sensors.index(mine)]
+        return self._share.room_for(self._place(sensor))
+
+    def time_of(self, sensor: Sensor) -> float:
+        """How long a reading of an instrument keeps the line busy, s."""
+        return self._share.time_of(self._place(sensor))
 
     def close(self) -> None:
         """Close the line and poll no more."""
@@ -89,6 +97,9 @@ class ModbusLine:
         while not self._client.connected and self._clock.now() < deadline:
             await asyncio.sleep(_POLL)
 
+    def _place(self, sensor: Sensor) -> int:
+        return self.sensors.index(self._own(sensor))
+
     def _own(self, sensor: Sensor) -> Instrument:
         return next(item for item in self.sensors if item is sensor)
 
@@ -97,12 +108,14 @@ class ModbusLine:
         return max(instrument.due, self._next_probe) if instrument.dead else instrument.due
 
     async def _poll(self, instrument: Instrument) -> None:
-        probe = instrument.dead
-        await instrument.poll(self._client)
+        probe, begun = instrument.dead, self._clock.now()
+        answered = await instrument.poll(self._client)
         if probe:
             self._next_probe = self._clock.now() + _PROBE_SHARE * self._spec.timeout
-        if self._gap:
-            await asyncio.sleep(self._gap)
+        if self._silence:
+            await asyncio.sleep(self._silence)
+        if answered and self._share.took(self._place(instrument), self._clock.now() - begun):
+            self._share_out()
 
     async def _connect(self) -> bool:
         try:
@@ -118,8 +131,7 @@ class ModbusLine:
 
     def _share_out(self) -> None:
         """Give every instrument the rate that the line has room for."""
-        rates = fair_rates([item.wanted_rate for item in self.sensors], self._times)
-        for item, rate in zip(self.sensors, rates, strict=True):
+        for item, rate in zip(self.sensors, self._share.rates, strict=True):
             item.on_line(
                 1 / rate,
                 wire_times(item.decoder.spec, self._spec),

@@ -1,8 +1,7 @@
-"""How long an exchange takes on a line, and what rates a line allows its instruments."""
+"""How long an exchange takes on a Modbus line."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from winchkit.drivers.modbus.distrust import LISTENING
@@ -10,7 +9,7 @@ from winchkit.schema.bench import BusSpec
 from winchkit.schema.device_modbus import ModbusSpec
 from winchkit.schema.modbus_parts import ReadBlock
 
-__all__ = ["Exchange", "exchange", "fair_rates", "wire_times"]
+__all__ = ["Exchange", "exchange", "silence_of", "wire_times"]
 
 _REQUEST = 8
 _ANSWER = 5
@@ -20,8 +19,6 @@ _SHORTEST_SILENCE = 1.75e-3
 """Above 19200 Bd the specification fixes the silence between frames to this, s."""
 _TURNAROUND = {"modbus-rtu": 2e-3, "modbus-tcp": 0.3e-3}
 """What a device and this machine take between the request's end and the answer's beginning, s."""
-_USE = 0.95
-"""Of a line: the rest is for commands, retries and the machine's own jitter."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +41,10 @@ def exchange(spec: ModbusSpec, bus: BusSpec) -> Exchange:
     """The time that one reading of a device takes on a line, as the standard has it."""
     blocks = [block for block in (spec.read, spec.status_read) if block is not None]
     size = sum(_bytes(block) for block in blocks)
-    if bus.kind == "modbus-tcp":
-        wire = silence = 0.0
-    else:
-        character = _bits(bus) / bus.baudrate
-        wire = size * character
-        silence = 2 * len(blocks) * max(_SILENT_CHARACTERS * character, _SHORTEST_SILENCE)
+    silence = 2 * len(blocks) * silence_of(bus)
+    wire = 0.0
+    if bus.kind == "modbus-rtu":
+        wire = size * _bits(bus) / bus.baudrate
         if spec.read.fixed or len(blocks) > 1:
             silence += len(blocks) * LISTENING
     return Exchange(
@@ -61,20 +56,11 @@ def exchange(spec: ModbusSpec, bus: BusSpec) -> Exchange:
     )
 
 
-def fair_rates(wanted: Sequence[float], times: Sequence[float]) -> tuple[float, ...]:
-    """Rates (1/s) for instruments on one line, each of which takes ``times`` s for a reading.
-
-    Everybody gets what it wants or the same as everybody else who does not, so that the line is
-    full: the max-min fair share.
-    """
-    rates = [0.0] * len(wanted)
-    free, left = _USE, sorted(range(len(wanted)), key=lambda k: wanted[k])
-    while left:
-        share = free / sum(times[k] for k in left)
-        first = left.pop(0)
-        rates[first] = min(wanted[first], share)
-        free -= rates[first] * times[first]
-    return tuple(rates)
+def silence_of(bus: BusSpec) -> float:
+    """Silence that separates frames, s: three and a half characters on a serial line."""
+    if bus.kind == "modbus-tcp":
+        return 0.0
+    return max(_SILENT_CHARACTERS * _bits(bus) / bus.baudrate, _SHORTEST_SILENCE)
 
 
 def wire_times(spec: ModbusSpec, bus: BusSpec) -> tuple[float, float]:

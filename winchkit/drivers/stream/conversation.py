@@ -18,7 +18,7 @@ from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.device_stream import AskSpec
 
-__all__ = ["Conversation"]
+__all__ = ["Conversation", "exchange_time"]
 
 _COMMAND_TIME = 2.0
 """A balance tares when it has come to rest, s."""
@@ -26,6 +26,8 @@ _HUSHES = 3
 """Times in which an instrument may have come to an end after it was stopped."""
 _FLOOD = 0.5
 """So long after its time a wait ends although bytes keep coming, s."""
+_TURNAROUND = 2e-3
+"""What a device and this machine are likely to take before an answer begins, s."""
 _FRESH_TRIES = 4
 """Questions a conversion whether there is a new value."""
 
@@ -42,8 +44,7 @@ class Conversation:
         self._where = f"bus '{name}' ({spec.port})"
         self._clock = clock
         self._selected: StreamInstrument | None = None
-        bits = 1 + spec.bytesize + (spec.parity != "N") + spec.stopbits
-        self.byte_time = bits / spec.baudrate
+        self.byte_time = _byte_time(spec)
         """Of one character with its start, parity and stop bits, s."""
 
     @property
@@ -227,3 +228,15 @@ class Conversation:
         said = heard.text.strip()
         why = "is busy" if heard.meaning is Meaning.BUSY else "refuses"
         return DeviceRefused(f"{self._where}: {instrument.name} {why}: it answers '{said}'")
+
+
+def exchange_time(instrument: StreamInstrument, bus: BusSpec) -> float:
+    """How long a reading of a polled instrument is likely to take on its line, s."""
+    spec = instrument.spec
+    answer = len(spec.example) // 2 if spec.binary else len(spec.example)
+    size = len(instrument.text(spec.poll)) + answer + len(spec.terminator)
+    return size * _byte_time(bus) + _TURNAROUND
+
+
+def _byte_time(bus: BusSpec) -> float:
+    return (1 + bus.bytesize + (bus.parity != "N") + bus.stopbits) / bus.baudrate

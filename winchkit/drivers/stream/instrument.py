@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Protocol
 
 from winchkit.drivers.clock import Clock
@@ -51,12 +52,13 @@ class StreamInstrument(Publishing):
         address: int | None,
         clock: Clock,
         *,
-        rate: float,
         timeout: float,
+        rate: float = inf,
     ) -> None:
-        """Poll at ``rate`` readings a second, or at the device's own rate where that is lower.
+        """Poll as often as the device converts, at most ``rate`` times a second.
 
-        ``timeout`` (s) is the line's for one answer. FileError where the file contradicts itself.
+        One that sends by itself is heard as often as it sends. ``timeout`` (s) is the line's for
+        one answer. Raises FileError where the device file contradicts itself.
         """
         self.name = name
         self.address = address
@@ -65,10 +67,9 @@ class StreamInstrument(Publishing):
         self.talk = StreamParser(talking(device), address)
         """Reads the answers to commands."""
         self.fresh = StreamParser(asking_whether_fresh(device), address) if spec.fresh else None
-        wanted = rate if spec.mode == "polled" else spec.rate
-        self.period = 1.0 / min(wanted, spec.rate)
-        self.max_age = max(_STALE_TIMEOUTS * timeout, 5 * self.period)
-        """A reading older than this is stale, s."""
+        self.wanted_rate = min(rate, spec.rate) if spec.mode == "polled" else spec.rate
+        self._timeout = timeout
+        self.on_line(1.0 / self.wanted_rate)
         self.publisher = Publisher(spec.rate)
         self.problem: ConnectionLost | None = None
         """Why there is no new reading, while there is none."""
@@ -81,6 +82,12 @@ class StreamInstrument(Publishing):
         self._flags = Quality.GOOD
         self._chunk_at = clock.now()
         self._least_step = _JITTER / spec.rate
+
+    def on_line(self, period: float) -> None:
+        """Take the period that the line allows, s."""
+        self.period = period
+        self.max_age = max(_STALE_TIMEOUTS * self._timeout, 5 * period)
+        """A reading older than this is stale, s."""
 
     @property
     def counters(self) -> Counters:

@@ -7,7 +7,8 @@ from collections.abc import Awaitable, Callable
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
-from winchkit.drivers.stream.conversation import Conversation
+from winchkit.drivers.sharing import LineShare
+from winchkit.drivers.stream.conversation import Conversation, exchange_time
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.drivers.stream.port import Port, open_serial
 from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NoReply
@@ -51,17 +52,39 @@ class StreamLine:
         self._closing = False
         self._talk: Conversation | None = None
         self._heard_at = clock.now()
+        self._share = LineShare(
+            [one.wanted_rate for one in instruments],
+            [exchange_time(one, spec) for one in instruments],
+        )
         talkers = [one for one in instruments if one.spec.mode == "continuous"]
         if talkers and len(instruments) > 1:
             raise FileError(
                 f"bus '{name}': {talkers[0].name} sends by itself and must be alone on its line, "
                 f"which has {len(instruments)} devices; give it a line of its own"
             )
+        self._share_out()
+
+    def room_for(self, sensor: Sensor) -> float:
+        """Readings a second that the line has room for, were this instrument's wish no limit."""
+        return self._share.room_for(self._place(sensor))
+
+    def time_of(self, sensor: Sensor) -> float:
+        """How long a reading of an instrument keeps the line busy, s."""
+        return self._share.time_of(self._place(sensor))
 
     @property
     def note(self) -> str:
         """What is to be said about the port, e.g. of its adapter; empty where nothing is."""
         return self._talk.port.note if self._talk else ""
+
+    def _place(self, sensor: Sensor) -> int:
+        return next(k for k, item in enumerate(self.sensors) if item is sensor)
+
+    def _share_out(self) -> None:
+        """Give every instrument that is polled the rate that the line has room for."""
+        for one, rate in zip(self.sensors, self._share.rates, strict=True):
+            if one.spec.mode == "polled":
+                one.on_line(1.0 / rate)
 
     async def serve(self) -> None:
         """Keep the readings new until closed."""
@@ -128,12 +151,17 @@ class StreamLine:
                 await talk.idle(min(instrument.due, now + _LISTEN), instrument)
                 return
             instrument.due = max(instrument.due + instrument.period, self._clock.now())
+            begun, before = self._clock.now(), instrument.publisher.tally.readings
             try:
                 await talk.poll(instrument)
             except DeviceRefused as error:
                 instrument.refused(error)
             except NoReply as error:
                 instrument.failed(error, timeout=talk.was_silent)
+            if instrument.publisher.tally.readings > before:
+                took = self._clock.now() - begun
+                if self._share.took(self._place(instrument), took):
+                    self._share_out()
 
     async def _listen(self, talk: Conversation, instrument: StreamInstrument) -> None:
         """Hear what the instrument sends in the next moments."""

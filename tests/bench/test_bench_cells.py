@@ -1,0 +1,87 @@
+"""Instruments of a bench that is owned: what ``winchkit cell`` does there from outside."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from winchkit import catalog, open_bench
+from winchkit.bench.bench import Bench
+from winchkit.bench.client import attach
+from winchkit.cli.cell import command
+from winchkit.errors import NotPermitted, UsageError
+from winchkit.schema.read import read_simbench
+from winchkit.sim.live import LiveBench
+
+pytestmark = pytest.mark.realtime
+
+WEIGHT = 10 * 9.80665
+
+
+@pytest.fixture
+def wiring(tmp_path: Path) -> Iterator[Path]:
+    declared = read_simbench(catalog.find("sim", "spiral-bench"))
+    with LiveBench(declared, seed=3) as live:
+        yield live.write_bench_file(tmp_path / "bench.toml")
+
+
+@pytest.fixture
+def bench(wiring: Path) -> Iterator[Bench]:
+    with open_bench(wiring) as opened:
+        yield opened
+
+
+def run(*arguments: str | Path, error: type[BaseException] | None = None) -> Result:
+    result = CliRunner().invoke(command, [str(word) for word in arguments])
+    if error is None:
+        assert isinstance(result.exception, SystemExit | None), result.exception
+    else:
+        assert isinstance(result.exception, error)
+    return result
+
+
+def test_every_cell_command_works_at_the_owner(bench: Bench, wiring: Path) -> None:
+    facts = json.loads(run("info", "-b", wiring, "--json").stdout)
+    assert facts["reading"]["value"] == pytest.approx(WEIGHT, abs=8)
+    assert facts["device"]["name"] == "laumas-tlb"
+    rate = json.loads(run("rate", "A", "-b", wiring, "--for", "0.5s", "--json").stdout)
+    assert rate["rate"] > 5
+    assert "noise" in run("diagnose", "-b", wiring, "--for", "0.5s").output
+    tared = json.loads(run("tare", "-b", wiring, "--for", "0.3s", "--json").stdout)
+    assert tared["before"] == pytest.approx(WEIGHT, abs=8)
+    assert abs(bench.winch["A"].tension) < 8, "the owner counts from there"
+    assert (wiring.parent / "bench.tares.toml").is_file()
+    run("tare", "--clear", "-b", wiring)
+    run("zero", "-b", wiring, "--for", "0.3s")
+    assert abs(bench.winch["A"].tension) < 8
+    run("store", "-b", wiring, "--yes")
+
+
+def test_no_zero_and_no_tare_while_the_winch_moves(bench: Bench, wiring: Path) -> None:
+    bench.winch["A"].move_by(-0.5, 0.1, wait=False)
+    end = time.monotonic() + 10
+    while abs(bench.winch["A"].snapshot.speed) < 0.02:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    for words in (["zero"], ["tare"], ["tare", "--device"], ["store", "--yes"]):
+        failed = run(*words, "-b", wiring, error=NotPermitted)
+        assert "stop it first" in str(failed.exception)
+    run("info", "-b", wiring)
+    assert bench.winch["A"].moving, "nobody was disturbed"
+
+
+def test_a_task_that_nobody_knows_is_refused(bench: Bench) -> None:
+    station = attach(bench.spec)
+    assert station is not None
+    try:
+        with pytest.raises(UsageError, match="no task 'melt'"):
+            station.cell("melt", "A")
+        with pytest.raises(UsageError, match="no instrument 'Q'"):
+            station.cell("about", "Q")
+    finally:
+        station.close()

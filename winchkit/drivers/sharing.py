@@ -1,0 +1,75 @@
+"""What rates a line allows the instruments on it: by calculation at first, then by measurement."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from math import inf
+from statistics import median
+
+__all__ = ["LineShare", "fair_rates"]
+
+_USE = 0.95
+"""Of a line: the rest is for commands, retries and the machine's own jitter."""
+_TICK = 1e-6
+"""No clock tells less, s."""
+_WATCHED = 32
+"""Readings of an instrument whose median is what one takes: a machine that stood still is none."""
+
+
+class LineShare:
+    """Shares a line out among its instruments, anew as it is seen how long their readings take."""
+
+    def __init__(
+        self, wanted: Sequence[float], times: Sequence[float], least: float = _TICK
+    ) -> None:
+        """Rates (1/s) that are ``wanted``, and the times (s) that a reading is likely to take.
+
+        ``least`` is the shortest time (s) that is reckoned with, however fast the answers are.
+        """
+        self._wanted, self._least = tuple(wanted), least
+        self._times = [max(time, least) for time in times]
+        self._seen = [deque[float](maxlen=_WATCHED) for _ in times]
+        self._fresh = 0
+
+    @property
+    def rates(self) -> tuple[float, ...]:
+        """The rate of each, 1/s."""
+        return fair_rates(self._wanted, self._times)
+
+    def took(self, index: int, time: float) -> bool:
+        """Note how long a reading has kept the line busy (s); whether the rates are others now."""
+        self._seen[index].append(time)
+        self._fresh += 1
+        if self._fresh < _WATCHED:
+            return False
+        self._fresh = 0
+        for number, seen in enumerate(self._seen):
+            if seen:
+                self._times[number] = max(median(seen), self._least)
+        return True
+
+    def room_for(self, index: int) -> float:
+        """Readings a second that the line has room for, were this instrument's wish no limit."""
+        wanted = [inf if k == index else rate for k, rate in enumerate(self._wanted)]
+        return fair_rates(wanted, self._times)[index]
+
+    def time_of(self, index: int) -> float:
+        """How long a reading keeps the line busy, s."""
+        return self._times[index]
+
+
+def fair_rates(wanted: Sequence[float], times: Sequence[float]) -> tuple[float, ...]:
+    """Rates (1/s) for instruments on one line, each of which takes ``times`` s for a reading.
+
+    Everybody gets what it wants or the same as everybody else who does not, so that the line is
+    full: the max-min fair share.
+    """
+    rates = [0.0] * len(wanted)
+    free, left = _USE, sorted(range(len(wanted)), key=lambda k: wanted[k])
+    while left:
+        share = free / sum(times[k] for k in left)
+        first = left.pop(0)
+        rates[first] = min(wanted[first], share)
+        free -= rates[first] * times[first]
+    return tuple(rates)
