@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 from winchkit.bench.controller import Controller
-from winchkit.bench.loop import ControlLoop, WinchParts
+from winchkit.bench.loop import ControlLoop
+from winchkit.bench.parts import WinchParts
 from winchkit.bench.rope import RopeMap
 from winchkit.bench.supervisor import Supervisor
 from winchkit.drivers.can.axis import AxisFeedback

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from winchkit.bench.motion import DEAD_MAN, Jog, Move
+from winchkit.bench.rope import RopeMap
 from winchkit.bench.snapshot import Phase
+from winchkit.bench.trim import Trim
 from winchkit.drivers.can.cia402 import State
 from winchkit.errors import NotPermitted
 from winchkit.schema.bench import LimitSpec
@@ -73,6 +75,33 @@ def test_a_move_arrives(target: float, position_mode: bool) -> None:
     assert max(map(abs, rig.speeds)) <= 0.5
     assert rig.controller().done
     assert rig.controller().phase is Phase.DISABLED
+
+
+class SoftLine(StraightLine):
+    """The same, and the rope is longer once the winch has come to where it was sent."""
+
+    longer = 0.0
+
+    def cable_length(self, motor_angle: float) -> float:
+        return super().cable_length(motor_angle) + self.longer
+
+
+@pytest.mark.parametrize("longer", [8e-3, -8e-3, 5e-5, 0.5])
+def test_a_trim_corrects_what_the_rope_became_on_the_way(longer: float) -> None:
+    """Small corrections at rest; what is within 0.1 mm, or beyond belief, is left alone."""
+    rig, line = Rig(LIMITS), SoftLine()
+    move = Move(line, LIMITS, 3.0, trim=Trim(RopeMap(line), 3.0, LIMITS))
+    move.prepare(0.0)
+    rig.controller().begin(move)
+    rig.run(move.duration / 2)
+    line.longer = longer
+    rig.run(move.duration / 2 + 4.0)
+    left = 4.0 - 0.005 * rig.axes["A"].angle + longer - 3.0
+    corrected = 1e-4 < abs(longer) < 0.1
+    assert left == pytest.approx(0.0 if corrected else longer, abs=1.5e-4)
+    assert rig.controller().phase is Phase.DISABLED
+    changes = [abs(b - a) for a, b in zip(rig.speeds, rig.speeds[1:], strict=False)]
+    assert max(changes) <= LIMITS.acceleration * CYCLE * 1.1
 
 
 def test_a_held_move_stays_enabled_until_stopped() -> None:

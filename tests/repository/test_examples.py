@@ -36,7 +36,7 @@ def recorded(bench: str, programme: str | Path, **options: Any) -> list[Run]:
 def test_every_example_is_known_here() -> None:
     files = {path.name for path in EXAMPLES.iterdir() if path.is_file()}
     toml = {"ladder.toml", "stroke.toml", "winding-device.toml"}
-    assert files == {"heave.py", "my_effect.py"} | toml
+    assert files == {"better_position.py", "heave.py", "my_effect.py"} | toml
 
 
 def test_ones_own_effect_explains_what_the_catalogue_cannot() -> None:
@@ -80,6 +80,29 @@ def test_the_heave_follows_the_waves(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert middle == pytest.approx(10.0 * 9.80665, rel=0.02)
     assert np.ptp(run["tension"]) / 2 == pytest.approx(swing, abs=5.0)
     assert f"heave.csv: {len(run)} rows" in capsys.readouterr().out
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(
+    ("bench", "effect", "before"),
+    [
+        # The simulator's declarations; what a straight calculation says of the error at 10 kg.
+        ("demo-elastic-rope", 'id = "cable-elongation-linear"\naxial_stiffness = "300 kN"', 0.8e-3),
+        ("soft-frame", 'id = "frame-compliance"\nstiffness = "60 kN/m"', 1.6e-3),
+        ("demo-fat-drum", 'id = "drum-radius"\nradius_error = "0.15 mm"', 2.5e-3),
+    ],
+)
+def test_a_winch_ends_where_it_was_sent_once_its_profile_knows(
+    bench: str, effect: str, before: float, tmp_path: Path
+) -> None:
+    module = runpy.run_path(str(EXAMPLES / "better_position.py"))
+    declared = read_simbench(find("sim", bench))
+    bare = find("profiles", "bench-spiral")
+    better = tmp_path / "better.toml"
+    better.write_text(f"{Path(bare).read_text()}\n[[effect]]\n{effect}\n")
+    off = [max(map(abs, module["position_errors"](declared, p))) for p in (bare, better)]
+    assert off[0] > 0.8 * before
+    assert off[1] < 0.15e-3
 
 
 @pytest.mark.parametrize(

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Protocol
 
-from winchkit.bench.controller import AxisPort, Controller
-from winchkit.bench.rope import RopeMap
-from winchkit.bench.snapshot import BenchSnapshot, Phase, Trip, WinchSnapshot
-from winchkit.bench.supervisor import Instrumented, Supervisor, WinchInput
-from winchkit.drivers.can.cia402 import State
+from winchkit.bench.parts import WinchParts, known, picture
+from winchkit.bench.snapshot import BenchSnapshot, Phase, Trip
+from winchkit.bench.supervisor import Supervisor, WinchInput
 from winchkit.drivers.can.heartbeat import HeartbeatProducer, NmtState
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.reading import Reading
 from winchkit.errors import ConnectionLost
 
-__all__ = ["BusPort", "Callback", "ControlLoop", "SensorPort", "WinchParts"]
+__all__ = ["BusPort", "Callback", "ControlLoop"]
 
 Callback = Callable[[BenchSnapshot], Mapping[str, float] | None]
 
@@ -27,7 +22,6 @@ _DEAF = (
     "the drive does not heed the stop; the host's heartbeat is withheld, so that the watchdogs of "
     "all drives stop them; look at the drive before the reset"
 )
-_FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
 
 
 class BusPort(Protocol):
@@ -42,32 +36,6 @@ class BusPort(Protocol):
 
     def heartbeat(self, node: int, state: int) -> None:
         """Send the host's heartbeat."""
-
-
-class SensorPort(Protocol):
-    """What the loop needs of an instrument."""
-
-    max_age: float
-    """A reading older than this is stale, s."""
-
-    @property
-    def latest(self) -> Reading | None:
-        """Newest reading."""
-
-    @property
-    def problem(self) -> ConnectionLost | None:
-        """Why there is no new reading, while there is none."""
-
-
-@dataclass
-class WinchParts:
-    """One winch as the loop sees it."""
-
-    axis: AxisPort
-    rope: RopeMap
-    controller: Controller
-    sensors: Mapping[str, SensorPort] = field(default_factory=dict)
-    """By role: cell, load, length, temperature."""
 
 
 class ControlLoop:
@@ -136,7 +104,7 @@ class ControlLoop:
         self._count += 1
         self._listen_for_stops(now)
         self._send_sync(now)
-        inputs = {name: _input(parts, now, self._count) for name, parts in self.winches.items()}
+        inputs = {name: known(parts, now, self._count) for name, parts in self.winches.items()}
         blocked = self.supervisor.check(now, inputs)
         # Before anything is stopped: whoever sees a motion ended must see the trip that ended it.
         self.snapshot = snapshot = self._picture(now, inputs, blocked)
@@ -220,78 +188,8 @@ class ControlLoop:
         return BenchSnapshot(
             time=now,
             cycle=self._count,
-            winch={
-                name: _winch_picture(parts, inputs[name], now)
-                for name, parts in self.winches.items()
-            },
+            winch={name: picture(parts, inputs[name], now) for name, parts in self.winches.items()},
             tripped=self.supervisor.tripped,
             blocked=blocked,
             overruns=self.overruns,
         )
-
-
-def _input(parts: WinchParts, now: float, sync: int) -> WinchInput:
-    """What the supervisor needs to know of a winch."""
-    axis, feedback = parts.axis, parts.axis.feedback
-    length = speed = math.nan
-    if feedback is not None:
-        length, arm = parts.rope.at(feedback.angle)
-        speed = feedback.velocity * arm
-    cell = parts.sensors.get("cell")
-    return WinchInput(
-        feedback_age=math.inf if feedback is None else now - feedback.time,
-        missed_syncs=sync if feedback is None else sync - 1 - feedback.sync,
-        heartbeat_lost=axis.heartbeat.lost(now),
-        boot_ups=axis.heartbeat.boot_ups,
-        operational=axis.operational,
-        mode_kept=axis.mode_kept,
-        fault=axis.fault_text if feedback is not None and feedback.state in _FAULTS else "",
-        speed=speed,
-        commanded=parts.controller.commanded,
-        cable_length=length,
-        moving=parts.controller.phase not in (Phase.DISABLED, Phase.RESETTING),
-        tension=None if cell is None else instrumented(cell, now),
-    )
-
-
-def instrumented(sensor: SensorPort, now: float) -> Instrumented:
-    """Newest reading of a sensor and its age."""
-    reading, problem = sensor.latest, str(sensor.problem or "")
-    if reading is None:
-        return Instrumented(math.nan, math.inf, sensor.max_age, "", math.nan, problem)
-    return Instrumented(
-        value=reading.value,
-        age=now - reading.t_receive,
-        max_age=sensor.max_age,
-        quality=str(reading.quality),
-        time=reading.t_sample,
-        problem=problem,
-        gross=reading.gross,
-    )
-
-
-def _winch_picture(parts: WinchParts, known: WinchInput, now: float) -> WinchSnapshot:
-    feedback = parts.axis.feedback
-    sensors = {role: instrumented(sensor, now) for role, sensor in parts.sensors.items()}
-    fresh = {
-        role: item.value if item.age <= item.max_age else math.nan for role, item in sensors.items()
-    }
-    quality = {
-        role: item.quality if item.age <= item.max_age else "stale"
-        for role, item in sensors.items()
-    }
-    return WinchSnapshot(
-        phase=parts.controller.phase,
-        state=str(State.UNKNOWN if feedback is None else feedback.state),
-        time=math.nan if feedback is None else feedback.time,
-        motor_angle=math.nan if feedback is None else feedback.angle,
-        motor_velocity=math.nan if feedback is None else feedback.velocity,
-        motor_torque=math.nan if feedback is None else feedback.torque,
-        cable_length=known.cable_length,
-        speed=known.speed,
-        tension=fresh.get("cell", math.nan),
-        load=fresh.get("load", math.nan),
-        length=fresh.get("length", math.nan),
-        temperature=fresh.get("temperature", math.nan),
-        quality=quality,
-    )

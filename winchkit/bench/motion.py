@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from winchkit.bench.rope import LineModel, RopeMap
+from winchkit.bench.trim import Trim
 from winchkit.errors import NotPermitted
 from winchkit.model.trajectory import plan
 from winchkit.schema.bench import LimitSpec
@@ -27,7 +28,7 @@ _GAIN = 8.0
 """Of the position loop around a speed-controlled drive, 1/s."""
 _MARGIN = 2e-3
 """Of rope, kept to a length limit, m."""
-_SETTLED = 5e-4
+_SETTLED = 1e-4
 """Of rope, from the target of a move that counts as done, m."""
 _SETTLE_TIME = 1.0
 """A move counts as done this long after its end at the latest, s."""
@@ -169,9 +170,14 @@ class Move:
         speed: float | None = None,
         acceleration: float | None = None,
         holds: bool = False,
+        trim: Trim | None = None,
     ) -> None:
-        """Raise NotPermitted for a target or a speed beyond the winch's limits."""
+        """Raise NotPermitted for a target or a speed beyond the winch's limits.
+
+        ``trim`` corrects the end for what the rope has become on the way.
+        """
         self.holds = holds
+        self._trim = trim
         self.length = length
         self._line = line
         self._limits = limits
@@ -188,6 +194,7 @@ class Move:
         self._from = length
         self._knots: list[float] = []
         self._stretched = 0.0
+        self._ended = False
 
     def prepare(self, angle: float) -> None:
         """Plan from a motor angle (rad); called off the control thread, before ``start``."""
@@ -215,6 +222,8 @@ class Move:
 
     def target(self, time: float, angle: float, _now: float) -> Target:
         """Where the plan is, with the position loop's correction for speed control."""
+        if self._trim is not None and self._ended:
+            return self._trimmed(self._trim, time, angle)
         elapsed = time - self._start
         pace = self._plan.duration / self.duration if self._stretched else 1.0
         position, speed, _ = (float(value) for value in self._plan.at(elapsed * pace))
@@ -223,7 +232,14 @@ class Move:
         velocity = speed * slope + _GAIN * (planned - angle)
         late = elapsed - self.duration
         arrived = late >= 0 and abs(planned - angle) <= _SETTLED * abs(slope)
-        return Target(velocity, planned, -speed, done=arrived or late >= _SETTLE_TIME)
+        self._ended = arrived or late >= _SETTLE_TIME
+        done = self._ended and self._trim is None
+        return Target(velocity, planned, -speed, done=done)
+
+    def _trimmed(self, trim: Trim, time: float, angle: float) -> Target:
+        """Where the correction after the plan's end is."""
+        planned, velocity, speed = trim.at(time, self._knots[-1])
+        return Target(velocity + _GAIN * (planned - angle), planned, speed, done=trim.done)
 
     def _angle_at(self, position: float) -> tuple[float, float]:
         """Motor angle at a distance from the start, and its derivative by that distance."""

@@ -146,6 +146,7 @@ def _picture(moment: float, values: Mapping[str, float], told: Mapping[str, Any]
         speed=known["speed"],
         tension=known["tension"],
         load=known["load"],
+        rope_tension=known["load"] if math.isfinite(known["load"]) else known["tension"],
         length=known["length"],
         temperature=known["temperature"],
     )

@@ -59,11 +59,14 @@ class WinchSnapshot:
     motor_velocity: float
     motor_torque: float
     cable_length: float
-    """From the motor angle, by the profile."""
+    """From the motor angle and the tension, by the profile and its effects, m."""
     speed: float
     """Of the rope, positive winds in, m/s."""
     tension: float = math.nan
+    """The load cell's reading, N."""
     load: float = math.nan
+    rope_tension: float = math.nan
+    """At the platform end: the load, else from the cell's reading by the profile's effects, N."""
     length: float = math.nan
     """From the length instrument."""
     temperature: float = math.nan

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from winchkit.bench.cell_tares import host_tare
 from winchkit.bench.homing import HomingRequest, homing
-from winchkit.bench.loop import WinchParts
 from winchkit.bench.motion import DEAD_MAN, Jog, MotionSource, Move
+from winchkit.bench.parts import WinchParts
 from winchkit.bench.rope import RopeMap
 from winchkit.bench.snapshot import Phase, WinchSnapshot
 from winchkit.bench.start_gate import StartGate
 from winchkit.bench.supervisor import direction_of
+from winchkit.bench.trim import Trim
 from winchkit.drivers.reading import Sensor
 from winchkit.errors import DriveFault, MotionError, NoReply, NotPermitted, UsageError
 from winchkit.schema.bench import WinchWiring
@@ -53,13 +54,17 @@ class Winch:
 
     @property
     def cable_length(self) -> float:
-        """Free length from the motor angle, by the profile, m."""
+        """Free length from the motor angle and the tension, by the profile and its effects, m."""
         return self.snapshot.cable_length
 
     @property
     def tension(self) -> float:
-        """Newest reading of the load cell, N; NaN where there is none."""
-        return self.snapshot.tension
+        """In the rope at the platform end, N; NaN where no instrument tells.
+
+        The load's instrument shows it; else the cell's reading, less what the effects of the
+        profile put between the two. The bare reading is ``snapshot.tension``.
+        """
+        return self.snapshot.rope_tension
 
     @property
     def rope(self) -> RopeMap:
@@ -67,12 +72,12 @@ class Winch:
         return self._parts.rope
 
     def length_at(self, motor_angle: float) -> float:
-        """Cable length (m) at a motor angle (rad), by the profile."""
-        return self._parts.rope.line.cable_length(motor_angle)
+        """Cable length (m) at a motor angle (rad) under the present tension, by the profile."""
+        return self._parts.rope.cable_length(motor_angle)
 
     def motor_angle_at(self, length: float) -> float:
-        """Motor angle (rad) at a cable length (m), by the profile."""
-        return self._parts.rope.line.motor_angle(length)
+        """Motor angle (rad) at a cable length (m) under the present tension, by the profile."""
+        return self._parts.rope.motor_angle(length)
 
     @property
     def moving(self) -> bool:
@@ -172,13 +177,15 @@ class Winch:
         hold: bool = False,
     ) -> Move:
         """The move that ``move_to`` would make; nothing begins. Raises as that does."""
+        rope = self._parts.rope
         move = Move(
-            self._parts.rope.line,
+            rope,
             self.wiring.limits,
             length,
             speed=speed,
             acceleration=acceleration,
             holds=hold,
+            trim=Trim(rope, length, self.wiring.limits) if rope.yields else None,
         )
         here = self.snapshot
         self._bench.permit(self.name, direction_of(here.cable_length - length))

@@ -12,7 +12,8 @@ from datetime import UTC, datetime
 from winchkit import __version__, catalog
 from winchkit.bench.controller import Controller
 from winchkit.bench.instruments import can_buses, device_of, instruments
-from winchkit.bench.loop import ControlLoop, WinchParts
+from winchkit.bench.loop import ControlLoop
+from winchkit.bench.parts import WinchParts
 from winchkit.bench.rope import RopeMap
 from winchkit.bench.snapshot import Phase
 from winchkit.bench.supervisor import Supervisor
@@ -24,6 +25,7 @@ from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import ConnectionLost, Fault, FileError
+from winchkit.model.line import GRAVITY
 from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
 from winchkit.schema.winch import WinchProfile
 
@@ -64,10 +66,14 @@ class Wired:
 
 def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
     """Open everything; what is open is closed by ``stack``."""
-    from winchkit.effects import line_of
+    from winchkit.effects.bind import terms_of
+    from winchkit.estimation.rope_now import RopeNow
 
     profiles = {name: _profile(spec, winch) for name, winch in spec.winch.items()}
-    ropes = {name: RopeMap(line_of(profile)) for name, profile in profiles.items()}
+    ropes = {
+        name: RopeMap.of(RopeNow(profile, terms_of(profile), _weight(spec.winch[name])))
+        for name, profile in profiles.items()
+    }
     buses = _open_buses(spec, clock, stack)
     axes = {
         name: _axis(spec, winch, ropes[name], buses, clock) for name, winch in spec.winch.items()
@@ -97,6 +103,11 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
     return Wired(loop, axes, buses, sensors, lines, slow, _metadata(spec, profiles))
 
 
+def _weight(winch: WinchWiring) -> float | None:
+    """Of the load that the wiring file declares, N."""
+    return None if winch.load_mass is None else winch.load_mass * GRAVITY
+
+
 def _moving(axis: Cia402Axis, rope: RopeMap) -> Callable[[], bool]:
     """Whether a winch moves fast enough for its cells to feel it."""
 
@@ -104,7 +115,7 @@ def _moving(axis: Cia402Axis, rope: RopeMap) -> Callable[[], bool]:
         feedback = axis.feedback
         if feedback is None:
             return False
-        return abs(feedback.velocity * rope.line.arm(feedback.angle)) > _FELT
+        return abs(feedback.velocity * rope.arm(feedback.angle)) > _FELT
 
     return moves
 
@@ -139,7 +150,7 @@ def _axis(
     bus = spec.bus[ref.bus]
     if ref.node is None:
         raise FileError(Fault(f"servo '{ref.device}' needs its node number", spec.path))
-    arm = abs(rope.line.arm(0.0))
+    arm = abs(rope.arm(0.0))
     acceleration = _HEADROOM * winch.limits.acceleration / arm
     watch = WatchSpec(
         bus.node,
@@ -159,10 +170,10 @@ def _at_shaft(rope: RopeMap, limits: LimitSpec) -> LimitsAtShaft:
     if limits.in_drive and limits.length is not None:
         low, high = limits.length
         ends = (max(0.0, low - _FURTHER), high + _FURTHER)
-        first, second = sorted(map(rope.line.motor_angle, ends))
+        first, second = sorted(map(rope.motor_angle, ends))
         angle = (first, second)
     error = limits.following_error
-    following = None if error is None else error / abs(rope.line.arm(0.0))
+    following = None if error is None else error / abs(rope.arm(0.0))
     return LimitsAtShaft(angle=angle, following_error=following, torque=limits.torque)
 
 

@@ -87,7 +87,7 @@ def status_table(status: Mapping[str, Any]) -> Table:
             _number(winch["cable_length"], 4, "m"),
             _number(winch["speed"], 3, "m/s"),
             _number(winch["motor_torque"], 3, "N m"),
-            _number(winch["tension"], 1, "N"),
+            _number(winch["rope_tension"], 1, "N"),
             ", ".join([winch["state"], *_complaints(winch["quality"] or {})]),
         )
     return table

@@ -8,12 +8,18 @@ __all__ = ["status_line"]
 
 
 def status_line(status: dict[str, Any]) -> str:
-    """Length, speed, tension and phase of each winch of a station's status."""
+    """Length, speed, tension and phase of each winch of a station's status.
+
+    Beside the length that the profile says, what an instrument shows, where there is one.
+    """
     parts = []
     for name, winch in status["winch"].items():
-        text = f"{name}: {_number(winch['cable_length'])} m {_number(winch['speed'])} m/s"
-        if winch["tension"] is not None:
-            text += f" {_number(winch['tension'], 1)} N"
+        text = f"{name}: {_number(winch['cable_length'])} m"
+        if winch["length"] is not None:
+            text += f" (measured {_number(winch['length'], 4)} m)"
+        text += f" {_number(winch['speed'])} m/s"
+        if winch["rope_tension"] is not None:
+            text += f" {_number(winch['rope_tension'], 1)} N"
         parts.append(f"{text} {winch['phase']}")
     return "  ".join(parts)
 

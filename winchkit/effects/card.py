@@ -96,11 +96,17 @@ def card(effect: Effect) -> str:
         ("Looks like", effect.looks_like),
         ("Confused with", ", ".join(effect.confused_with)),
         ("Told apart by", effect.told_apart),
+        ("In control", _in_control(effect)),
     ]
     lines = [effect.id, ""]
     lines += [_paragraph(title, text) for title, text in paragraphs if text]
     lines += ["", "Parameters", *_table(effect), "", *_drawing(effect)]
     return "\n".join(lines)
+
+
+def _in_control(effect: Effect) -> str:
+    reason = effect.not_in_control
+    return f"left out: {reason}" if reason else "a winch's length or tension uses it"
 
 
 def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
@@ -118,6 +124,7 @@ def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
         "looks_like": effect.looks_like,
         "confused_with": list(effect.confused_with),
         "told_apart": effect.told_apart,
+        "not_in_control": effect.not_in_control,
         "parameters": [_parameter_data(p, _kind(effect, p)) for p in effect.parameters],
         "signature": {
             "values": dict(drawn.values),

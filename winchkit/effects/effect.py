@@ -68,10 +68,30 @@ class Effect:
     """Amplitude and phase fitted as a pair of cosine and sine amplitudes."""
     memory: bool = False
     """Starts in a state that a run may fit: parameter ``start`` of role ``fixed``, null 0."""
+    carry: Callable[[Any, Any, At, Values], float] | None = None
+    """The ``start`` of what follows, from its last value after and before it: for control, which
+    takes a run sample by sample."""
+    rested: float = 0.0
+    """``start`` of a machine that has stood for long under its load."""
+    left_out: str = ""
+    """Why control cannot use it although it changes length or tension, in words."""
     repeatable: bool = False
     """May stand several times, with other orders."""
     probes: tuple[Mapping[str, float], ...] = field(default=())
     """Values whose secants make the signature where single parameters have no gradient."""
+
+    @property
+    def not_in_control(self) -> str:
+        """Why a winch's length and tension do not use it, in words; empty where they do."""
+        if self.left_out:
+            return self.left_out
+        if self.stage is Stage.LENGTH_INSTRUMENT:
+            return "it is in the instrument, not in the rope"
+        if self.stage > Stage.CELL:
+            return "it changes the torque only"
+        if self.memory and self.carry is None:
+            return "it has a memory and does not say what it carries on (Effect.carry)"
+        return ""
 
     def parameter(self, name: str) -> Parameter:
         """A parameter by name."""

@@ -120,6 +120,7 @@ def _plain(output: Output, variable: str, formula: str) -> Effect:
         needs=_NEEDS.get(variable, ()),
         repeatable=True,
         order=9,
+        left_out="it is not understood, and may be in the instrument",
     )
 
 

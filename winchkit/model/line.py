@@ -190,6 +190,45 @@ class Line:
             torque = self._through(stage, torque, at)
         return torque
 
+    def moments(
+        self,
+        time: Array,
+        motor_angle: Array,
+        motor_rate: Array,
+        tension: Array,
+        temperature: Array,
+    ) -> At:
+        """What modifiers look at where the motion is known sample by sample; shapes (n,), SI.
+
+        Accelerations are taken for zero: a single sample has none. Nor has it a fastest speed by
+        which the creep at standstill could be judged.
+        """
+        drum_angle, length = self._nominal_length(motor_angle)
+        speed = self._pace(motor_angle) * motor_rate
+        return At(
+            profile=self.profile,
+            time=time,
+            motor_angle=motor_angle,
+            motor_rate=motor_rate,
+            motor_acceleration=np.zeros_like(time),
+            motor_direction=np.tanh(motor_rate / _CREEP_RATE),
+            drum_angle=drum_angle,
+            wound_angle=self._reference_wound + drum_angle,
+            speed=speed,
+            direction=np.tanh(speed / _CREEP_SPEED),
+            free_length=length,
+            tension=tension,
+            temperature=temperature,
+        )
+
+    def lengths(self, at: At) -> Array:
+        """True cable length with every effect up to the frame, m, shape (n,)."""
+        return np.asarray(self._length(at)[1])
+
+    def readings(self, load: Array, at: At) -> Array:
+        """What the cell shows under a tension at the platform end, N, shape (n,)."""
+        return np.asarray(self._through(Stage.CELL, self._drum_side(load, at), at))
+
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""
         return float(self._length(self._at_rest(motor_angle, tension))[1][0])
@@ -217,20 +256,6 @@ class Line:
 
     def _at_rest(self, motor_angle: float, tension: float) -> At:
         """One sample standing still, at 20 degrees Celsius."""
-        angle, zero = np.array([motor_angle]), np.zeros(1)
-        drum_angle, length = self._nominal_length(angle)
-        return At(
-            profile=self.profile,
-            time=zero,
-            motor_angle=angle,
-            motor_rate=zero,
-            motor_acceleration=zero,
-            motor_direction=zero,
-            drum_angle=drum_angle,
-            wound_angle=self._reference_wound + drum_angle,
-            speed=zero,
-            direction=zero,
-            free_length=length,
-            tension=np.array([tension]),
-            temperature=np.array([20.0]),
-        )
+        zero = np.zeros(1)
+        angle, force = np.array([motor_angle]), np.array([tension])
+        return self.moments(zero, angle, zero, force, np.array([20.0]))

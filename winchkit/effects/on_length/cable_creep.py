@@ -18,6 +18,12 @@ def apply(length: Array, at: At, values: Values) -> Array:
     return length + at.stressed_length * strain
 
 
+def carried(after: Array, before: Array, at: At, values: Values) -> float:
+    """Strain over T/EA_c at the last sample; zero tension keeps what there was."""
+    settled = at.stressed_length[-1] * at.tension[-1] / values["creep_stiffness"]
+    return float((after[-1] - before[-1]) / settled) if settled else values["start"]
+
+
 EFFECT = Effect(
     id="cable-creep",
     stage=Stage.ROPE,
@@ -54,4 +60,6 @@ EFFECT = Effect(
     needs=("rope_force",),
     order=2,
     memory=True,
+    carry=carried,
+    rested=1.0,
 )

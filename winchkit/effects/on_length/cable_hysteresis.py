@@ -24,6 +24,12 @@ def apply(length: Array, at: At, values: Values) -> Array:
     return length - at.stressed_length * held / values["stiffness"]
 
 
+def carried(after: Array, before: Array, at: At, values: Values) -> float:
+    """F/F_c at the last sample."""
+    limit = values["fraction"] * abs(at.tension[-1]) * at.stressed_length[-1] / values["stiffness"]
+    return float((before[-1] - after[-1]) / limit) if limit else 0.0
+
+
 EFFECT = Effect(
     id="cable-hysteresis",
     stage=Stage.ROPE,
@@ -43,5 +49,6 @@ EFFECT = Effect(
     needs=("rope_force",),
     order=1,
     memory=True,
+    carry=carried,
     probes=({"fraction": 0.02}, {"fraction": 0.1}),
 )

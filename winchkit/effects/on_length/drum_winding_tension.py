@@ -75,4 +75,5 @@ EFFECT = Effect(
     told_apart="Wind in under one load, pay out under another.",
     needs=("rope_force",),
     order=5,
+    left_out="the tension at which the rope on the drum was wound in is not known",
 )

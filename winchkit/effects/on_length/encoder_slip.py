@@ -39,4 +39,5 @@ EFFECT = Effect(
     confused_with=("cable-creep", "gear-backlash"),
     told_apart="Return to the same place at the end of the run: creep recovers, a slip stays.",
     order=3,
+    left_out="it happened once, in the run that showed it; set the zero anew (winchkit home)",
 )

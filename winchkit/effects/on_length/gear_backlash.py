@@ -27,6 +27,12 @@ def apply(path: Path, at: At, values: Values) -> Path:
     return Path(drum_angle, path.slope * np.where(meshes, 1.0, values["held"]))
 
 
+def carried(after: Path, before: Path, _at: At, values: Values) -> float:
+    """Place in the gap at the last sample."""
+    gap = values["gap"]
+    return float((after.value[-1] - before.value[-1]) / gap) if gap else values["start"]
+
+
 EFFECT = Effect(
     id="gear-backlash",
     stage=Stage.DRUM_ANGLE,
@@ -47,6 +53,7 @@ EFFECT = Effect(
     needs=("gearing",),
     order=2,
     memory=True,
+    carry=carried,
     probes=(
         {"gap": 1e-3},
         {"gap": 4e-3},

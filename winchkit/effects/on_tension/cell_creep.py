@@ -17,6 +17,12 @@ def apply(tension: Array, at: At, values: Values) -> Array:
     return tension + values["fraction"] * crept
 
 
+def carried(after: Array, before: Array, _at: At, values: Values) -> float:
+    """c/T at the last sample; without a tension or a creep what there was."""
+    settled = values["fraction"] * before[-1]
+    return float((after[-1] - before[-1]) / settled) if settled else values["start"]
+
+
 EFFECT = Effect(
     id="cell-creep",
     stage=Stage.CELL,
@@ -45,4 +51,6 @@ EFFECT = Effect(
     needs=("load",),
     order=4,
     memory=True,
+    carry=carried,
+    rested=1.0,
 )

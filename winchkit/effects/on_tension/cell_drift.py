@@ -28,4 +28,5 @@ EFFECT = Effect(
     told_apart="Temperature up and down; a repeat that starts anew.",
     needs=("load",),
     order=5,
+    left_out="it counts time from a run's start; tare or zero the cell",
 )

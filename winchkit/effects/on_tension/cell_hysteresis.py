@@ -20,6 +20,12 @@ def apply(tension: Array, at: At, values: Values) -> Array:
     return tension - dahl(tension, limit, fraction / _REACH, start=values["start"])
 
 
+def carried(after: Array, before: Array, _at: At, values: Values) -> float:
+    """F/F_c at the last sample."""
+    limit = values["fraction"] * abs(before[-1])
+    return float((before[-1] - after[-1]) / limit) if limit else 0.0
+
+
 EFFECT = Effect(
     id="cell-hysteresis",
     stage=Stage.CELL,
@@ -38,4 +44,5 @@ EFFECT = Effect(
     needs=("load",),
     order=3,
     memory=True,
+    carry=carried,
 )

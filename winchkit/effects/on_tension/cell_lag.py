@@ -29,4 +29,5 @@ EFFECT = Effect(
     told_apart="Fast moves under two loads, and a step of the load.",
     needs=("load",),
     order=7,
+    left_out="undoing a filter would amplify the noise; at rest it vanishes",
 )

@@ -15,9 +15,20 @@ def apply(tension: Array, at: At, values: Values) -> Array:
     friction = values["friction"]
     if friction == 0.0:
         return tension
-    limit = np.abs(tension) * (float(coulomb_ratio(np.asarray(friction), at.wrap)) - 1.0)
+    limit = _limit(tension, friction, at)
     wound_in = -at.free_length
     return tension + dahl(wound_in, limit, values["stiffness"], values["shape"], values["start"])
+
+
+def _limit(tension: Array, friction: float, at: At) -> Array:
+    """F_c = μ N on this pulley, N."""
+    return np.abs(tension) * (float(coulomb_ratio(np.asarray(friction), at.wrap)) - 1.0)
+
+
+def carried(after: Array, before: Array, at: At, values: Values) -> float:
+    """F/F_c at the last sample."""
+    limit = float(_limit(before[-1:], values["friction"], at)[0])
+    return float((after[-1] - before[-1]) / limit) if limit else 0.0
 
 
 EFFECT = Effect(
@@ -50,4 +61,5 @@ EFFECT = Effect(
     contains=("pulley-coulomb", "pulley-capstan"),
     needs=("pulley", "load"),
     memory=True,
+    carry=carried,
 )

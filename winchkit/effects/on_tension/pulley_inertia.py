@@ -28,4 +28,5 @@ EFFECT = Effect(
     told_apart="Fast moves under two loads: a lag's error grows with the load's change.",
     needs=("pulley", "load"),
     order=2,
+    left_out="the rope's acceleration is not measured; at rest it vanishes",
 )
