@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.admit import OUTPUT_UNITS
 from winchkit.diagnosis.dataset import Dataset, prepare
 from winchkit.diagnosis.denoise import contrasts
-from winchkit.diagnosis.follows import follows
+from winchkit.diagnosis.follows import Followed, follows, harmonics
+from winchkit.diagnosis.maps import residual_maps
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.result import Comparison, OutputError
 from winchkit.diagnosis.spectrum import WHOLE_FILTER, low_pass
@@ -63,7 +64,7 @@ def compared(
         column = problem.nuisance_columns[:, 0]
         offset = float(column @ residual / (column @ column))
         residual = residual - offset * column
-    shares = follows(problem, residual)
+    shares, orders = follows(problem, residual), harmonics(problem, residual)
     noise = repeat_noise(problem, residual)
     outputs = {}
     for output in problem.dataset.outputs:
@@ -79,8 +80,10 @@ def compared(
             bias=float(np.mean(error)),
             noise_rms=noise.get(output),
             follows=tuple((f.variable, f.share) for f in shares if f.output == output),
+            orders=tuple((f.variable, _order(f), f.share) for f in orders if f.output == output),
         )
-    return Compared(problem, residual, Comparison(outputs, offset, problem.dataset.notes))
+    maps = tuple(residual_maps(problem, residual))
+    return Compared(problem, residual, Comparison(outputs, offset, problem.dataset.notes, maps))
 
 
 def begin_hypothesis(
@@ -91,6 +94,10 @@ def begin_hypothesis(
     for term in terms_of(profile, catalogue):
         hypothesis = hypothesis.with_term(term, problem.runs)
     return hypothesis
+
+
+def _order(found: Followed) -> int:
+    return found.order or 1
 
 
 def signal_rms(dataset: Dataset, output: str) -> float:

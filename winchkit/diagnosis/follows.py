@@ -11,7 +11,7 @@ from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.problem import Problem
 from winchkit.model.variables import ANGLES, VARIABLES
 
-__all__ = ["Followed", "follows", "harmonics", "variables_of"]
+__all__ = ["Followed", "by_chance", "follows", "harmonics", "kept_rows", "variables_of"]
 
 Array = NDArray[np.float64]
 _BINS = 16
@@ -53,13 +53,13 @@ def follows(problem: Problem, residual: Array) -> list[Followed]:
         own = [(s, t) for s, t in zip(problem.segments, times, strict=True) if s.output == output]
         valid = [problem.dataset.recordings[s.run].valid[output] for s, _ in own]
         error = np.concatenate([t[v] for (_, t), v in zip(own, valid, strict=True)])
-        found = []
+        found, kept = [], kept_rows(problem, output)
         for name in known[own[0][0].run]:
             if any(name not in known[s.run] for s, _ in own):
                 continue
             values = [known[s.run][name][v] for (s, _), v in zip(own, valid, strict=True)]
-            share = _binned_share(np.concatenate(values), error)
-            if share > _WORTH:
+            share = _binned_share(np.concatenate(values), error, kept)
+            if share > by_chance(_BINS, kept):
                 found.append(Followed(output, name, share))
         out += sorted(found, key=lambda f: -f.share)
     return out
@@ -83,8 +83,21 @@ def harmonics(problem: Problem, residual: Array) -> list[Followed]:
     return sorted(out, key=lambda f: -f.share)
 
 
-def _binned_share(variable: Array, error: Array) -> float:
-    """Share of the error's power in its means over bins of the variable, less what chance gives."""
+def kept_rows(problem: Problem, output: str) -> int:
+    """Independent values of an output: what its low-pass keeps, fewer than its samples."""
+    return sum(s.rows.stop - s.rows.start for s in problem.segments if s.output == output)
+
+
+def by_chance(bins: int, kept: int) -> float:
+    """Share that chance hardly reaches: three standard deviations of a chi-square of the bins."""
+    return max(_WORTH, 3 * float(np.sqrt(2 * bins)) / kept)
+
+
+def _binned_share(variable: Array, error: Array, kept: int) -> float:
+    """Share of the error's power in its means over bins of the variable, less what chance gives.
+
+    Chance gives one part in ``kept`` per bin, whatever the number of samples.
+    """
     total = float(error @ error)
     if total == 0.0 or np.ptp(variable) == 0.0:
         return 0.0
@@ -94,7 +107,7 @@ def _binned_share(variable: Array, error: Array) -> float:
     sums = np.bincount(bins, weights=error)
     used = count > 0
     between = float(np.sum(sums[used] ** 2 / count[used]))
-    chance = total * np.count_nonzero(used) / len(error)
+    chance = total * np.count_nonzero(used) / kept
     return max(0.0, (between - chance) / total)
 
 

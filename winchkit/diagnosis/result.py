@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from winchkit.diagnosis.maps import ResidualMap
 from winchkit.effects.empirical import empirical_id
 
 __all__ = [
@@ -39,12 +40,15 @@ class OutputError:
     """From differences of repeats; None without any."""
     follows: tuple[tuple[str, float], ...]
     """Variables and the share of the error that each explains."""
+    orders: tuple[tuple[str, int, float], ...] = ()
+    """Angles, how often per turn the error repeats over them, and the share of that sine."""
 
     def to_json(self) -> dict[str, Any]:
         """As the command prints it."""
-        plain = {k: v for k, v in vars(self).items() if k != "follows"}
+        plain = {k: v for k, v in vars(self).items() if k not in {"follows", "orders"}}
         follows = [{"variable": name, "share": share} for name, share in self.follows]
-        return {**plain, "follows": follows}
+        orders = [{"variable": v, "order": order, "share": s} for v, order, s in self.orders]
+        return {**plain, "follows": follows, "orders": orders}
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,8 @@ class Comparison:
     offset: float | None
     """Fitted offset of the length instrument, m."""
     notes: tuple[str, ...] = ()
+    maps: tuple[ResidualMap, ...] = field(default=(), compare=False)
+    """What the errors do over two variables; per output the most telling first."""
 
     def to_json(self) -> dict[str, Any]:
         """As ``winchkit compare --json`` prints it."""
@@ -63,6 +69,7 @@ class Comparison:
             "schema": 1,
             "outputs": outputs,
             "length_offset": self.offset,
+            "maps": [drawn.to_json() for drawn in self.maps],
             "notes": list(self.notes),
         }
 

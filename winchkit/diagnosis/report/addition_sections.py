@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.add import Addition
 from winchkit.diagnosis.report import tables
 from winchkit.diagnosis.report.markup import Markup, element, join, section, table
-from winchkit.diagnosis.report.parts import bullets, drawings, lead
+from winchkit.diagnosis.report.parts import bullets, lead
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, estimate_text, meaning
-from winchkit.diagnosis.report.plots import OutputPlots
 from winchkit.diagnosis.report.repeat import Command, repeat
 from winchkit.diagnosis.report.sentence import (
     gain_text,
@@ -24,11 +23,13 @@ __all__ = ["addition_sections", "addition_sentence"]
 
 
 def addition_sections(
-    addition: Addition, plots: Sequence[OutputPlots], command: Command, better: str
+    addition: Addition,
+    figures: Sequence[Markup],
+    command: Command,
+    better: str,
 ) -> Markup:
     """Everything below the title; ``better`` is the profile that was written."""
     effect = addition.added[0].effect.id
-    moved = moved_outputs(addition.outputs)
     commands = [
         command.add(effect, command.profile, better),
         command.compare(better),
@@ -37,7 +38,7 @@ def addition_sections(
     return join(
         [
             _lead(addition, better),
-            section("residuals", "What it changes", *drawings(plots, moved)),
+            section("residuals", "What it changes", *figures),
             section("parameters", "All effects of the new profile", _parameters(addition)),
             section("notes", "Notes", bullets(addition.notes)),
             repeat(command, commands, "addition", addition.to_json()),

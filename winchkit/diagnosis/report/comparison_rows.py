@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from winchkit.diagnosis.report.map_words import map_text
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES, listed
+from winchkit.diagnosis.report.sentence import CLEAR_ORDER, often_per_turn
 from winchkit.diagnosis.report.wording import percent, quantity, scale_for
 from winchkit.diagnosis.result import Comparison, OutputError
 
-__all__ = ["HEAD", "followed", "offset_text", "size_rows"]
+__all__ = ["HEAD", "followed", "map_lines", "offset_text", "size_rows"]
 
 HEAD = ("error", "rms", "bias", "largest", "noise", "measured, rms")
 _FOLLOWED = 3
@@ -25,12 +27,25 @@ def size_rows(comparison: Comparison) -> list[list[str]]:
 
 
 def followed(error: OutputError) -> str:
-    """``load 82 % and time 10 %``."""
+    """``follows load 82 % and time 10 %; repeats 5 times per drum turn, 47 %``."""
     shares = [
         f"{VARIABLE_NAMES.get(variable, variable)} {percent(share)}"
         for variable, share in error.follows[:_FOLLOWED]
     ]
-    return listed(shares) if shares else "nothing that was measured"
+    told = [f"follows {listed(shares)}"] if shares else []
+    told += [f"repeats {often_per_turn(a, order)}, {percent(s)}" for a, order, s in _clear(error)]
+    return "; ".join(told) or "follows nothing that was measured"
+
+
+def map_lines(comparison: Comparison) -> list[str]:
+    """Per output its most telling residual map in a line."""
+    out: dict[str, str] = {}
+    for drawn in comparison.maps:
+        error = comparison.outputs[drawn.output]
+        name = OUTPUT_NAMES.get(drawn.output, drawn.output)
+        told = map_text(drawn, scale_for(3 * error.rms, error.unit))
+        out.setdefault(drawn.output, f"{name} {told}")
+    return list(out.values())
 
 
 def offset_text(offset: float) -> str:
@@ -41,3 +56,10 @@ def offset_text(offset: float) -> str:
 def _noticeable(bias: float, rms: float) -> float:
     """A bias, zero where it is only what rounding leaves of a fitted offset."""
     return 0.0 if abs(bias) < 1e-6 * rms else bias
+
+
+def _clear(error: OutputError) -> list[tuple[str, int, float]]:
+    """The clearest order within a turn, where no trend says twice as much."""
+    trend = max((share for _, share in error.follows), default=0.0)
+    orders = [o for o in error.orders if o[2] > CLEAR_ORDER and trend <= 2 * o[2]]
+    return sorted(orders, key=lambda o: -o[2])[:1]

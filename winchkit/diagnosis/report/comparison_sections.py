@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from winchkit.diagnosis.follows import Followed
 from winchkit.diagnosis.report.comparison_rows import HEAD, followed, offset_text, size_rows
 from winchkit.diagnosis.report.markup import Markup, element, join, section, table
-from winchkit.diagnosis.report.parts import bullets, drawings, lead
+from winchkit.diagnosis.report.parts import bullets, lead
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
 from winchkit.diagnosis.report.plots import AT_NOISE, OutputPlots
 from winchkit.diagnosis.report.repeat import Command, repeat
@@ -24,14 +24,17 @@ _NEXT = (
 
 
 def comparison_sections(
-    comparison: Comparison, plots: Sequence[OutputPlots], command: Command
+    comparison: Comparison,
+    plots: Sequence[OutputPlots],
+    figures: Sequence[Markup],
+    command: Command,
 ) -> Markup:
     """Everything below the title."""
     profile = command.profile
     return join(
         [
             _lead(comparison, plots),
-            section("residuals", "Where the model fails", *drawings(plots)),
+            section("residuals", "Where the model fails", *figures),
             section("notes", "Notes", bullets(comparison.notes)),
             repeat(
                 command,
@@ -74,15 +77,14 @@ def _lead(comparison: Comparison, plots: Sequence[OutputPlots]) -> Markup:
         for (name, *sizes), error in zip(size_rows(comparison), outputs.values(), strict=True)
     ]
     caption = "Measured less predicted, the profile's values as they are in the file."
-    inside = [table(caption, ["output", "trends with", *HEAD[1:], "rms / noise"], rows, words=2)]
+    inside = [table(caption, ["output", "follows", *HEAD[1:], "rms / noise"], rows, words=2)]
     if comparison.offset is not None:
         inside.append(element("p", f"{capital(offset_text(comparison.offset))}."))
     return lead(*_chip(list(outputs.values())), told, *inside, element("p", _NEXT, class_="quiet"))
 
 
 def _trends(error: OutputError) -> str:
-    """What the error follows; an order within a turn is no trend, and stands in the sentence."""
-    return unbroken(followed(error)) if error.follows else "–"
+    return unbroken(followed(error).removeprefix("follows "))
 
 
 def _ratio(error: OutputError) -> str:

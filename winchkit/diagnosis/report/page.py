@@ -9,9 +9,13 @@ from winchkit.diagnosis.compare import Compared
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.report.addition_sections import addition_sections
 from winchkit.diagnosis.report.comparison_sections import comparison_sections
-from winchkit.diagnosis.report.plots import Residuals, plots_of
+from winchkit.diagnosis.report.map_figures import maps_drawn
+from winchkit.diagnosis.report.markup import Markup
+from winchkit.diagnosis.report.parts import drawings
+from winchkit.diagnosis.report.plots import OutputPlots, Residuals, plots_of
 from winchkit.diagnosis.report.repeat import Command
 from winchkit.diagnosis.report.sections import sections
+from winchkit.diagnosis.report.sentence import moved_outputs
 from winchkit.diagnosis.report.shell import page
 
 __all__ = ["addition_html", "comparison_html", "report_html", "residuals_of"]
@@ -32,10 +36,12 @@ def report_html(
     last; ``profile`` is the profile as the user named it and ``options`` what else the command
     was given, for the commands that repeat all this.
     """
-    residuals = residuals_of(answer)
+    residuals, diagnosis = residuals_of(answer), answer.diagnosis
     plots = plots_of(residuals)
+    moved = moved_outputs(diagnosis.outputs) if diagnosis.steps else []
+    figures = _figures(residuals, plots, moved)
     command = Command(residuals.problem.dataset, profile, options)
-    return page(title, plots, sections(answer, plots, story, truth, command))
+    return page(title, plots, sections(answer, figures, story, truth, command))
 
 
 def residuals_of(answer: Answer) -> Residuals:
@@ -54,9 +60,11 @@ def comparison_html(
 ) -> str:
     """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`."""
     noise = {name: error.noise_rms for name, error in compared.comparison.outputs.items()}
-    plots = plots_of(Residuals(compared.problem, compared.residual, None, noise))
+    residuals = Residuals(compared.problem, compared.residual, None, noise)
+    plots = plots_of(residuals)
+    figures = _figures(residuals, plots)
     command = Command(compared.problem.dataset, profile, options)
-    return page(title, plots, comparison_sections(compared.comparison, plots, command))
+    return page(title, plots, comparison_sections(compared.comparison, plots, figures, command))
 
 
 def addition_html(
@@ -64,7 +72,16 @@ def addition_html(
 ) -> str:
     """The page of an addition; ``better`` is the profile that was written, the rest as above."""
     noise = {name: output.noise_rms for name, output in grown.addition.outputs.items()}
-    plots = plots_of(Residuals(grown.problem, grown.begin.residual, grown.final.residual, noise))
+    residuals = Residuals(grown.problem, grown.begin.residual, grown.final.residual, noise)
+    plots = plots_of(residuals)
+    figures = _figures(residuals, plots, moved_outputs(grown.addition.outputs))
     command = Command(grown.problem.dataset, profile, options)
     better = better or "better.toml"
-    return page(title, plots, addition_sections(grown.addition, plots, command, better))
+    return page(title, plots, addition_sections(grown.addition, figures, command, better))
+
+
+def _figures(
+    residuals: Residuals, plots: Sequence[OutputPlots], first: Sequence[str] = ()
+) -> list[Markup]:
+    """Curves and maps of every output; some outputs come first."""
+    return drawings(plots, maps_drawn(residuals, {p.output: p.scale for p in plots}), first)

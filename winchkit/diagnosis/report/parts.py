@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.report.markup import Markup, element
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES
@@ -36,21 +36,26 @@ def bullets(lines: Sequence[str]) -> Markup:
     return element("ul", *items) if items else Markup("")
 
 
-def drawings(plots: Sequence[OutputPlots], first: Sequence[str] = ()) -> list[Markup]:
-    """The figures of every output; some outputs come first."""
+def drawings(
+    plots: Sequence[OutputPlots],
+    maps: Mapping[str, Sequence[Markup]],
+    first: Sequence[str] = (),
+) -> list[Markup]:
+    """The figures of every output, with its maps below; some outputs come first."""
     ordered = sorted(
         plots, key=lambda p: first.index(p.output) if p.output in first else len(first)
     )
-    return [_output(own) for own in ordered]
+    return [_output(own, maps.get(own.output, ())) for own in ordered]
 
 
-def _output(own: OutputPlots) -> Markup:
+def _output(own: OutputPlots, maps: Sequence[Markup]) -> Markup:
     title = element("h3", capital(OUTPUT_NAMES.get(own.output, own.output)))
+    pair = element("div", *maps, class_="pair maps") if maps else Markup("")
     if own.over_variable is None:
         words = element("p", "It hardly follows anything that was measured.", class_="quiet")
-        return element("div", title, _figure(own.over_time), words, class_="output")
-    pair = element("div", _figure(own.over_time), _figure(own.over_variable), class_="pair")
-    return element("div", title, pair, class_="output")
+        return element("div", title, _figure(own.over_time), words, pair, class_="output")
+    both = element("div", _figure(own.over_time), _figure(own.over_variable), class_="pair")
+    return element("div", title, both, pair, class_="output")
 
 
 def _figure(plot: Plot) -> Markup:

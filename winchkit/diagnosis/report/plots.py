@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.admit import OUTPUT_UNITS
 from winchkit.diagnosis.follows import Followed, follows, harmonics, variables_of
 from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.report.axes import reading
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.diagnosis.report.sentence import CLEAR_ORDER
 from winchkit.diagnosis.report.thin import bin_means, filled_edges, thin, thin_points
 from winchkit.diagnosis.report.wording import Scale, percent, scale_for
 
@@ -26,7 +28,6 @@ _POINTS = 2000
 _DOTS = 600
 _BINS = 20
 _WORTH_DRAWING = 0.05
-_CLEAR_ORDER = 0.2
 _DIGITS = 4
 _SAME = 1e-3
 _SPREAD = 0.2
@@ -105,7 +106,7 @@ def plots_of(residuals: Residuals) -> tuple[OutputPlots, ...]:
 
 def _strongest(problem: Problem, residual: Array) -> dict[str, Followed]:
     """Per output what to draw its residual over: a clear order, else the largest share."""
-    orders = [f for f in harmonics(problem, residual) if f.share > _CLEAR_ORDER]
+    orders = [f for f in harmonics(problem, residual) if f.share > CLEAR_ORDER]
     trends = [f for f in follows(problem, residual) if f.share > _WORTH_DRAWING]
     out: dict[str, Followed] = {}
     for found in (*sorted(orders, key=lambda f: -f.share), *sorted(trends, key=lambda f: -f.share)):
@@ -241,17 +242,9 @@ def _axis(problem: Problem, curves: _Curves, followed: Followed) -> tuple[Array,
     values = np.concatenate(
         [variables_of(recordings[run])[followed.variable] for run in curves.runs]
     )
-    name = VARIABLE_NAMES.get(followed.variable, followed.variable)
-    if followed.order is not None:
-        return np.mod(values, _TURN) / _TURN * _DEGREES, f"{name} within its turn [°]", False
-    if followed.variable in {"drum_angle", "motor_angle"}:
-        return values / _TURN, f"{name} [turns]", False
-    if followed.variable == "reversal_distance":
-        return 10.0**values, f"{name} [m]", True
-    if followed.variable == "direction":
-        return values, "direction (1 winds in, −1 pays out)", False
-    unit = {"speed": "m/s", "cable_length": "m", "time": "s", "temperature": "°C"}
-    return values, f"{name} [{unit.get(followed.variable, 'N')}]", False
+    within = followed.order is not None
+    how = reading(followed.variable, within_turn=within)
+    return how.shown(np.mod(values, _TURN) if within else values), how.label, how.logarithmic
 
 
 def _series(lines: list[Array], tone: str) -> list[dict[str, Any]]:

@@ -8,11 +8,10 @@ from math import isnan
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.report import tables
 from winchkit.diagnosis.report.markup import Markup, element, join, section, table
-from winchkit.diagnosis.report.parts import bullets, drawings, lead
+from winchkit.diagnosis.report.parts import bullets, lead
 from winchkit.diagnosis.report.phrases import VERDICT_NAMES, listed
-from winchkit.diagnosis.report.plots import OutputPlots
 from winchkit.diagnosis.report.repeat import Command, repeat
-from winchkit.diagnosis.report.sentence import moved_outputs, sentence, where_text
+from winchkit.diagnosis.report.sentence import sentence, where_text
 from winchkit.diagnosis.report.shown import effects_of, smallest_shown
 from winchkit.diagnosis.report.waterfall import waterfall_of
 from winchkit.diagnosis.report.wording import percent
@@ -25,7 +24,7 @@ _TRACE = 0.005
 
 def sections(
     answer: Answer,
-    plots: Sequence[OutputPlots],
+    figures: Sequence[Markup],
     story: Sequence[str],
     truth: Mapping[str, object] | None,
     command: Command,
@@ -33,12 +32,11 @@ def sections(
     """Everything below the title."""
     diagnosis = answer.diagnosis
     effects = effects_of(answer)
-    moved = moved_outputs(diagnosis.outputs) if diagnosis.steps else []
     return join(
         [
             _verdict(answer),
             section("story", "What was done", _story(story)),
-            section("residuals", "Where the model fails", *drawings(plots, moved)),
+            section("residuals", "Where the model fails", *figures),
             section(
                 "waterfall",
                 "What each step buys",

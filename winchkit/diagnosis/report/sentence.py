@@ -16,6 +16,7 @@ from winchkit.diagnosis.report.wording import percent, quantity, significant
 from winchkit.diagnosis.result import Diagnosis, OutputFit, Step, Where
 
 __all__ = [
+    "CLEAR_ORDER",
     "capital",
     "gain_text",
     "moved_outputs",
@@ -28,7 +29,8 @@ __all__ = [
 ]
 
 _MOVED = 1.05
-_CLEAR = 0.2
+CLEAR_ORDER = 0.2
+"""From which share on an order within a turn says more than a trend."""
 _ABOVE = 1.5
 _NO_GAIN = "Adding it leaves the held-out errors as they are."
 _COUNTS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
@@ -72,7 +74,7 @@ def often_per_turn(angle: str, order: int) -> str:
 def telling(places: Sequence[Where]) -> list[Where]:
     """Places with the most telling first, one per output: a clear order says more than a trend."""
     ranked = sorted(
-        places, key=lambda w: (w.order is None or w.share < _CLEAR, w.frequency is not None)
+        places, key=lambda w: (w.order is None or w.share < CLEAR_ORDER, w.frequency is not None)
     )
     first: dict[str, Where] = {}
     for place in ranked:

@@ -7,7 +7,13 @@ from math import degrees, isnan
 from typing import TYPE_CHECKING
 
 from winchkit.diagnosis.report.columns import aligned, paragraph
-from winchkit.diagnosis.report.comparison_rows import HEAD, followed, offset_text, size_rows
+from winchkit.diagnosis.report.comparison_rows import (
+    HEAD,
+    followed,
+    map_lines,
+    offset_text,
+    size_rows,
+)
 from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -53,11 +59,14 @@ def compare_text(comparison: Comparison) -> str:
     """How far the profile is off per output, and what the error follows."""
     followings: list[str] = []
     for name, error in comparison.outputs.items():
-        told = f"{OUTPUT_NAMES.get(name, name)} follows {followed(error)}"
+        told = f"{OUTPUT_NAMES.get(name, name)} {followed(error)}"
         followings += paragraph(told, "  ", "    ")
     blocks = [aligned([HEAD, *size_rows(comparison)])]
     if followings:
         blocks.append(["what the errors follow", *followings])
+    maps = [line for told in map_lines(comparison) for line in paragraph(told, "  ", "    ")]
+    if maps:
+        blocks.append(["over two variables at once, mean error", *maps])
     if comparison.offset is not None:
         blocks.append([offset_text(comparison.offset)])
     blocks.append(_notes(comparison.notes))

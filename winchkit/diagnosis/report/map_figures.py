@@ -1,0 +1,83 @@
+"""Residual maps as figures: violet where measured is above predicted, green below."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from winchkit.diagnosis.maps import ResidualMap, residual_maps, same_cells
+from winchkit.diagnosis.report.axes import Reading
+from winchkit.diagnosis.report.chart import Axis, Chart, legend
+from winchkit.diagnosis.report.map_words import map_reading, map_text, signed
+from winchkit.diagnosis.report.markup import Markup, element
+from winchkit.diagnosis.report.phrases import OUTPUT_NAMES
+from winchkit.diagnosis.report.plots import Residuals
+from winchkit.diagnosis.report.wording import Scale, significant, unbroken
+
+__all__ = ["maps_drawn"]
+
+_FAINTEST = 0.04
+_MOST = 2
+
+
+def maps_drawn(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, list[Markup]]:
+    """Figures per output: the two most telling maps, or the first before and after a change."""
+    out: dict[str, list[Markup]] = {}
+    for output, scale in scales.items():
+        found = [
+            m for m in residual_maps(residuals.problem, residuals.before) if m.output == output
+        ]
+        if not found:
+            continue
+        peak = float(np.nanmax(np.abs(found[0].mean)))
+        after = residuals.after
+        changed = None if after is None else same_cells(residuals.problem, after, found[0])
+        if changed is None:
+            out[output] = [_figure("", drawn, peak, scale) for drawn in found[:_MOST]]
+        else:
+            states = ((", before,", found[0]), (", after,", changed))
+            out[output] = [_figure(name, drawn, peak, scale) for name, drawn in states]
+    return out
+
+
+def _figure(state: str, drawn: ResidualMap, peak: float, scale: Scale) -> Markup:
+    readings = [map_reading(name) for name in drawn.over]
+    shown = [r.shown(edges) for r, edges in zip(readings, drawn.edges, strict=True)]
+    output = OUTPUT_NAMES.get(drawn.output, drawn.output)
+    caption = (
+        f"Mean residual of the {output}{state} {map_text(drawn, scale)}. "
+        "Empty where nothing was measured."
+    )
+    axes = [
+        Axis(r.label, float(e[0]), float(e[-1]), r.logarithmic)
+        for r, e in zip(readings, shown, strict=True)
+    ]
+    chart = Chart(axes[0], axes[1], caption)
+    cells = [
+        chart.cell(
+            (float(shown[0][i]), float(shown[0][i + 1])),
+            (float(shown[1][j]), float(shown[1][j + 1])),
+            "below" if drawn.mean[i, j] < 0 else "above",
+            max(_FAINTEST, min(1.0, abs(float(drawn.mean[i, j])) / peak)),
+            _said(drawn, (i, j), readings, scale),
+        )
+        for i, j in np.argwhere(np.isfinite(drawn.mean)).tolist()
+    ]
+    ends = [
+        ("below", f"{signed(-peak, scale)} or less"),
+        ("above", f"{signed(peak, scale)} or more"),
+    ]
+    words = element("figcaption", unbroken(caption))
+    return element("figure", chart.draw(*cells), legend(ends), words)
+
+
+def _said(
+    drawn: ResidualMap, cell: tuple[int, int], readings: Sequence[Reading], scale: Scale
+) -> str:
+    ends = [
+        f"{significant(float(r.shown(e[at])))} to {significant(float(r.shown(e[at + 1])))} {r.unit}"
+        for r, e, at in zip(readings, drawn.edges, cell, strict=True)
+    ]
+    mean = signed(float(drawn.mean[cell]), scale)
+    return f"{', '.join(part.strip() for part in ends)}: {mean} ({drawn.count[cell]} samples)"
