@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -105,8 +106,12 @@ def test_text_page_and_proposals(run: Path, tmp_path: Path) -> None:
     assert "measure next:" in result.stdout
     assert "fit: step 1" in result.stderr
     text = page.read_text()
-    # Every pose is drawn before and after, fitted and held out.
+    # Every pose is drawn before and after, fitted and held out, and says which it is.
     assert text.count('r="3"') == 2 * 90
+    assert f"<title>row 90 of {run}: " in text
+    # One scale for both figures, so that eyes can compare them.
+    heights = re.findall(r'y="([\d.]+)"[^>]*>1</text>', text)
+    assert len(set(heights[:2])) == 1
     assert "src=" not in text.split("<script")[0]
 
 
@@ -116,6 +121,39 @@ def test_without_a_position_there_is_no_position_error(tmp_path: Path) -> None:
     assert found["fit"]["rms_after"] is None
     assert found["validation"]["max_after"] is None
     assert any("measure positions" in words for words in found["unobservable"])
+
+
+def test_one_coordinate_of_the_position_is_used_and_told(run: Path, tmp_path: Path) -> None:
+    head, *lines = (line.split(",") for line in run.read_text().splitlines())
+    height = tmp_path / "height.csv"
+    at = [k for k, name in enumerate(head) if not name.startswith(("platform_x", "platform_y"))]
+    cut = [",".join(cells[k] for k in at) for cells in (head, *lines)]
+    height.write_text("\n".join(cut) + "\n")
+    check = file(tmp_path / "check.csv", rows(20, 99, noise=EXACT), angles=True)
+    found = answer("cabtive", height, "--validate", check, "-o", tmp_path / "new.toml")
+    assert any("not platform_x, platform_y" in text for text in found["warnings"])
+    assert found["fit"]["rms_after"] is None
+    assert found["rank"] == 65
+    # Without any position the frame is not known, and a third of the error stays.
+    assert found["validation"]["rms_after"] < found["validation"]["rms_before"] / 5
+
+
+def test_gross_errors_are_named_and_poses_of_another_robot_doubted(
+    run: Path, tmp_path: Path
+) -> None:
+    found = answer("ipanema3", run, "-o", tmp_path / "new.toml")
+    assert any("poses are of this robot" in text for text in found["warnings"])
+    assert not any("gross" in text for text in found["warnings"])
+    lines = run.read_text().splitlines()
+    for k in (6, 41):
+        cells = lines[k].split(",")
+        lines[k] = ",".join([*cells[:9], repr(float(cells[9]) + 0.01), *cells[10:]])
+    run.write_text("\n".join(lines) + "\n")
+    found = answer("cabtive", run, "-o", tmp_path / "new.toml")
+    (told,) = (text for text in found["warnings"] if "gross" in text)
+    assert f"positions of row 6 of {run}, row 41 of {run}?" in told
+    found = answer("cabtive", run, "-o", tmp_path / "new.toml", "--loss", "cauchy")
+    assert not any("gross" in text for text in found["warnings"])
 
 
 def refused(code: int, *arguments: object) -> str:
@@ -134,8 +172,8 @@ def test_wrong_columns_are_named(run: Path, tmp_path: Path) -> None:
     told = refused(3, "cabtive", bad, "-o", out)
     assert "'C.motor_angle' is of no line" in told
     assert "no column '3.motor_angle'" in told
-    bad.write_text(text.replace("platform_z [m]", "height [m]"))
-    assert "but not platform_z" in refused(3, "cabtive", bad, "-o", out)
+    bad.write_text(text.replace("platform_z [m]", "platform_qz [1]"))
+    assert "but not platform_qw" in refused(3, "cabtive", bad, "-o", out)
     bad.write_text("time [s],motor_angle [rad]\n0,1\n1,1\n")
     assert "no column '1.motor_angle'" in refused(3, "cabtive", bad, "-o", out)
     assert not out.exists()
@@ -181,6 +219,8 @@ def test_rows_without_motor_angles_are_counted_and_left_out(run: Path, tmp_path:
         (("--noise", "position=1 kg"), "unknown length unit"),
         (("--noise", "position=0 mm"), "above zero"),
         (("--middle-force", "60"), "no unit"),
+        (("--middle-force", "-5 N"), "above 0"),
+        (("--noise", "rope"), "write KIND=VALUE"),
     ],
 )
 def test_options_that_cannot_be_meant(

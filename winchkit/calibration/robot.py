@@ -25,6 +25,7 @@ from winchkit.calibration.robot_forces import RopeForces
 from winchkit.calibration.robot_measured import Measured
 from winchkit.calibration.robot_noise import NOISE, re_estimated
 from winchkit.calibration.robot_observe import Observability, observability
+from winchkit.calibration.robot_outliers import gross_errors
 from winchkit.calibration.robot_parameters import EFFECTS, Parameter, Parameters, parameters_of
 from winchkit.calibration.robot_predict import PoseErrors, errors_at, start_of
 from winchkit.calibration.robot_solve import Loss, Solution, Weights, place, solve
@@ -39,6 +40,7 @@ Told = Callable[[str], None]
 _EVERY = 10
 _NOISE_ROUNDS = 8
 _SETTLED = 0.03
+_COARSE = 5.0
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,10 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
             f"{needing[0]} needs rope forces: record 'LINE.tension [N]', or give the forces that "
             "the robot keeps near, e.g. --middle-force '60 N'"
         )
+    if options.middle_force is not None and not options.middle_force > 0:
+        raise UsageError(
+            f"--middle-force is {options.middle_force:g} N; ropes only pull, so that it is above 0"
+        )
     payload = [e for e in options.effects if e.startswith("payload")]
     if payload and len(robot.names) < 6:
         raise UsageError(
@@ -240,21 +246,35 @@ def _left_out(equations: Equations) -> list[str]:
     return [f"effects of the profile left out here: {', '.join(sorted(names))}"] if names else []
 
 
+def _disagreements(equations: Equations, weights: Weights) -> list[str]:
+    """Noise beyond the doubt in the points: poses of another robot, or read another way."""
+    doubt, sigma = float(equations.parameters.std[0]), weights.sigma
+    causes = {
+        "rope": "gearbox.direction, the lines' order, [home] and the motor angles there",
+        "position": "that the poses are of this robot, in its base frame",
+    }
+    # A camera may well be coarser than a drawing.
+    most = {"rope": doubt, "position": _COARSE * doubt}
+    return [
+        f"{kind}s and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the exit points "
+        f"are in doubt: check {cause}"
+        for kind, cause in causes.items()
+        if sigma.get(kind, 0.0) > most[kind]
+    ]
+
+
 def _warnings(
     equations: Equations, solution: Solution, weights: Weights, observed: Observability, lost: int
 ) -> tuple[str, ...]:
     out = [*equations.measured.notes, *_left_out(equations)]
+    # A robust fit has already done what would be advised.
+    out += gross_errors(equations, solution) if weights.loss == "least-squares" else []
     if lost:
         out.append(
             f"{lost} held-out poses were not found from their motor angles: a tension is missing "
             "that an effect needs, or the ropes contradict each other"
         )
-    if weights.sigma["rope"] > equations.parameters.std[0]:
-        out.append(
-            f"ropes and geometry disagree by {weights.sigma['rope'] * 1e3:.3g} mm, more than the "
-            "exit points are in doubt: check gearbox.direction, the lines' order, [home] and the "
-            "motor angles there"
-        )
+    out += _disagreements(equations, weights)
     if not solution.converged:
         out.append(f"the fit had not settled after {solution.steps} steps")
     held = [p.name for p, at in zip(equations.parameters, solution.held, strict=True) if at != 0]

@@ -37,10 +37,12 @@ def refuse_unfit(equations: Equations) -> None:
         )
     _near(equations)
     if many < _FEW or known <= 6 * many:
+        cure = f"record more poses (90 is a good number, {_FEW} the least)"
+        if known <= 6 * many:
+            cure = "measure more at each: positions, rotations, swivel angles or rope lengths"
         raise UsageError(
             f"{many} poses with {known} measured values cannot calibrate a robot of {lines} lines: "
-            f"{6 * many} of them go into the poses themselves; record more poses (90 is a good "
-            f"number, {_FEW} the least), or measure positions"
+            f"{6 * many} of them go into the poses themselves; {cure}"
         )
 
 

@@ -39,6 +39,8 @@ class Measured:
     """By an instrument at the rope, (p, n), m, each with an offset of its own."""
     tension: Array
     """(p, n), N."""
+    place: NDArray[np.str_]
+    """Which row of which run each pose is, in words, (p,)."""
     length_zeroed: bool = False
     """Whether the length instruments have no offset."""
     notes: tuple[str, ...] = ()
@@ -60,7 +62,7 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
     """Gather the poses of all runs; rows without a motor angle are left out and noted.
 
     Raises RunError with the faults of all runs: lines that the robot does not have, lines without
-    motor angles, half a position.
+    motor angles, half a quaternion.
     """
     faults: list[Fault] = []
     parts: list[Measured] = []
@@ -104,12 +106,16 @@ def _faults(run: Run, profile: RobotProfile) -> list[Fault]:
         for name in names
         if name in there and not np.any(np.isfinite(run[f"{name}.motor_angle"]))
     ]
-    for group in (_POSITION, _QUATERNION):
-        given = [name for name in group if name in run]
-        if given and len(given) < len(group):
-            lacking = ", ".join(name for name in group if name not in given)
-            faults.append(Fault(f"has {', '.join(given)} but not {lacking}", place))
+    given, lacking = _present(run, _QUATERNION)
+    if given and lacking:
+        faults.append(Fault(f"has {', '.join(given)} but not {', '.join(lacking)}", place))
     return faults
+
+
+def _present(run: Run, names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Which of these columns the run has, and which it lacks."""
+    given = [name for name in names if name in run]
+    return given, [name for name in names if name not in given]
 
 
 def _of_run(run: Run, profile: RobotProfile) -> Measured:
@@ -118,19 +124,31 @@ def _of_run(run: Run, profile: RobotProfile) -> Measured:
     def per_line(kind: str) -> Array:
         return np.stack([_column(run, f"{name}.{kind}") for name in names], axis=1)
 
-    position = np.stack([_column(run, name) for name in _POSITION], axis=1)
     found = Measured(
         motor_angle=per_line("motor_angle"),
-        position=np.where(np.all(np.isfinite(position), axis=1)[:, None], position, np.nan),
+        position=np.stack([_column(run, name) for name in _POSITION], axis=1),
         angles=_angles(run),
         swivel=per_line("swivel"),
         cable_length=per_line("cable_length"),
         tension=per_line("tension"),
+        place=np.array([f"row {n} of {run.path or run.name}" for n in range(1, len(run) + 1)]),
         length_zeroed=run.length_zeroed,
     )
     moved = np.any(np.isfinite(found.motor_angle), axis=1)
-    notes = [f"{run.path or run.name}: {note}" for note in _gaps(found, moved)]
+    told = [*_partly(run), *_gaps(found, moved)]
+    notes = [f"{run.path or run.name}: {note}" for note in told]
     return replace(found[moved], notes=tuple(notes))
+
+
+def _partly(run: Run) -> list[str]:
+    """Fair, but more often a misspelt column."""
+    given, lacking = _present(run, _POSITION)
+    if not given or not lacking:
+        return []
+    return [
+        f"has {', '.join(given)} but not {', '.join(lacking)}: fitted so; distances from measured "
+        "positions are not known"
+    ]
 
 
 def _gaps(found: Measured, moved: NDArray[np.bool_]) -> list[str]:

@@ -102,6 +102,7 @@ def _as_measured(found: Calibrated, pose: Pose) -> Measured:
         typical(measured.swivel),
         typical(measured.cable_length),
         typical(measured.tension),
+        np.full(many, "proposed"),
         measured.length_zeroed,
     )
 

@@ -27,6 +27,8 @@ class PoseErrors:
     """(p,), m; NaN where no position was measured or no pose was found."""
     angle: Array
     """(p,), rad; NaN where the rotation was not measured whole."""
+    place: NDArray[np.str_]
+    """Which row of which run each pose is, (p,)."""
     unfound: int
     """Poses that no search found from their rope lengths."""
 
@@ -40,7 +42,7 @@ def errors_at(equations: Equations, values: Array) -> PoseErrors:
     whole = np.all(np.isfinite(measured.angles), axis=1) & np.isfinite(pose.rotation[:, 0, 0])
     seen = np.swapaxes(rotation_of(*measured.angles[whole].T), 1, 2)
     angle[whole] = np.linalg.norm(rotation_vector(pose.rotation[whole] @ seen), axis=1)
-    return PoseErrors(distance, angle, unfound)
+    return PoseErrors(distance, angle, measured.place, unfound)
 
 
 def rms(values: Sequence[float] | Array) -> float:

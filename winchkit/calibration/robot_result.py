@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import degrees, isfinite
+from math import degrees, floor, isfinite, log10
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,13 @@ from winchkit.calibration.robot_next import NextPose
 from winchkit.calibration.robot_noise import NOISE
 from winchkit.calibration.robot_predict import PoseErrors, rms
 
-__all__ = ["calibration_json", "calibration_text", "candidate_lines"]
+__all__ = [
+    "calibration_json",
+    "calibration_text",
+    "candidate_lines",
+    "in_words",
+    "noise_words",
+]
 
 _SHOWN = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0))}
 
@@ -84,9 +90,30 @@ def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
 def candidate_lines(found: Calibrated) -> list[str]:
     """Effects worth trying, in words."""
     return [
-        f"{c.effect}: would explain {c.share:.0%} of what is left over; try --effect {c.effect}"
+        f"the effect {c.effect} would explain {c.share * 100:.0f} % of what is left over; "
+        f"try --effect {c.effect}"
         for c in found.candidates
     ]
+
+
+def noise_words(found: Calibrated) -> str:
+    """What the fit leaves over of each kind of measurement."""
+    return ", ".join(
+        f"{kind.replace('_', ' ')} {_shown(sigma, NOISE[kind].unit)}"
+        for kind, sigma in found.weights.sigma.items()
+    )
+
+
+def in_words(estimate: Estimated) -> tuple[str, str, str, str]:
+    """Nominal value, value, sigma and unit as people read them: to the second digit of sigma."""
+    unit, worth = _SHOWN.get(estimate.parameter.unit, (estimate.parameter.unit, 1.0))
+    std = estimate.std * worth
+    if not (isfinite(std) and std > 0):
+        nominal, value = (f"{v * worth:.6g}" for v in (estimate.nominal, estimate.value))
+        return nominal, value, f"{std:.2g}", unit
+    decimals = max(0, 1 - floor(log10(std)))
+    nominal, value = (f"{v * worth:.{decimals}f}" for v in (estimate.nominal, estimate.value))
+    return nominal, value, f"{std:.{decimals}f}", unit
 
 
 def _errors(found: Calibrated) -> Iterator[str]:
@@ -103,10 +130,7 @@ def _errors(found: Calibrated) -> Iterator[str]:
             f"rotation error held out: {degrees(rms(before.angle)):.4g} deg before, "
             f"{degrees(rms(after.angle)):.4g} deg after"
         )
-    noise = ", ".join(
-        f"{kind} {_shown(sigma, NOISE[kind].unit)}" for kind, sigma in found.weights.sigma.items()
-    )
-    yield f"noise (1 sigma): {noise}"
+    yield f"noise (1 sigma): {noise_words(found)}"
     yield (
         f"{found.observed.rank} of {found.observed.free} parameter directions seen, "
         f"{found.seconds:.2f} s"
@@ -123,11 +147,9 @@ def _table(found: Calibrated) -> Iterator[str]:
     width = max(len(name) for name in found.estimates) + 2
     yield f"{'parameter':{width}}{'nominal':>12}{'value':>12}{'sigma':>10}  unit"
     for name, estimate in found.estimates.items():
-        unit, worth = _SHOWN.get(estimate.parameter.unit, (estimate.parameter.unit, 1.0))
-        cells = (estimate.nominal * worth, estimate.value * worth)
-        nominal, value = (f"{cell:.6g}" for cell in cells)
+        nominal, value, sigma, unit = in_words(estimate)
         at = f"  at its {estimate.bound} bound" if estimate.bound else ""
-        yield f"{name:{width}}{nominal:>12}{value:>12}{estimate.std * worth:>10.2g}  {unit}{at}"
+        yield f"{name:{width}}{nominal:>12}{value:>12}{sigma:>10}  {unit}{at}"
 
 
 def _section(heading: str, lines: Sequence[str]) -> list[str]:

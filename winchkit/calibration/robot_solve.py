@@ -74,12 +74,21 @@ class Linear:
 
     stack: Stack
     cost: float
+    prior: Array
+    """How far the parameters are from their nominal values, in standard deviations, (q,)."""
     factor: Array
     """Inverse Cholesky factors of the poses' normal matrices, (p, 6, 6)."""
     information: Array
     """Of the scaled parameters by the data alone, (q, q)."""
     gradient: Array
     """Of the cost by the scaled parameters, poses moved along, prior included, (q,)."""
+
+    def damped(self, damping: float) -> Linear:
+        """The same equations with poses that are held back as the parameters are.
+
+        Where a pose is hardly measured, its own step is what goes too far.
+        """
+        return self if damping == 0.0 else _reduced(self.cost, self.prior, self.stack, damping)
 
     @property
     def pose_free(self) -> Array:
@@ -123,9 +132,10 @@ def solve(
     linear = linearise(equations, state, weights)
     damping, held = 0.0, np.zeros(len(scale), dtype=int)
     for count in range(1, _STEPS + 1):
-        values, held = _bounded_step(equations, state, linear, damping)
+        slow = linear.damped(damping)
+        values, held = _bounded_step(equations, state, slow, damping)
         change = np.divide(values - state.values, scale, out=np.zeros_like(scale), where=scale > 0)
-        trial = moved(state, values, _pose_steps(linear, change))
+        trial = moved(state, values, _pose_steps(slow, change))
         found = linearise(equations, trial, weights)
         gain = linear.cost - found.cost
         if not gain >= -_DONE:
@@ -182,12 +192,13 @@ def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
     return _reduced(cost, prior, Stack(kinds, known, residual, by_pose, by_values))
 
 
-def _reduced(cost: float, prior: Array, stack: Stack) -> Linear:
+def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> Linear:
     many, rows, count = stack.by_values.shape
     turned = np.swapaxes(stack.by_pose, 1, 2)
     normal = turned @ stack.by_pose
     # A pose of which too little was measured stays where it is in what it is free to do.
     firm = _POSE_DAMPING + _ROUNDING * np.trace(normal, axis1=1, axis2=2)
+    normal[:, range(6), range(6)] *= 1 + damping
     normal[:, range(6), range(6)] += firm[:, None]
     factor = np.linalg.inv(np.linalg.cholesky(normal))
     half = factor @ turned
@@ -196,7 +207,7 @@ def _reduced(cost: float, prior: Array, stack: Stack) -> Linear:
     information = flat.T @ flat - coupled.T @ coupled
     seen = (half @ stack.residual[..., None]).reshape(6 * many)
     gradient = flat.T @ stack.residual.reshape(-1) - coupled.T @ seen + prior
-    return Linear(stack, cost, factor, information, gradient)
+    return Linear(stack, cost, prior, factor, information, gradient)
 
 
 def _pose_steps(linear: Linear, change: Array) -> Array:

@@ -153,7 +153,7 @@ def _noise(given: Sequence[str]) -> Mapping[str, float]:
             known = list(_NOISE_DIMENSIONS)
             raise UsageError(
                 f"--noise '{text}': write KIND=VALUE with one of {', '.join(known)}"
-                + suggest(kind, known)
+                + ("" if kind in known else suggest(kind, known))
             )
         out[kind] = parse(value.strip(), _NOISE_DIMENSIONS[kind])
         if not out[kind] > 0:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from html import escape
-from math import degrees, isfinite, log10
+from math import degrees, floor, isfinite, log10
 from typing import TYPE_CHECKING
 
-from winchkit.calibration.robot_result import candidate_lines
+from winchkit.calibration.robot_result import candidate_lines, in_words, noise_words
 from winchkit.diagnosis.report.markup import Markup, element, section, table
 from winchkit.diagnosis.report.parts import bullets, lead
 from winchkit.diagnosis.report.shell import page
@@ -19,17 +20,16 @@ if TYPE_CHECKING:
 
 __all__ = ["calibration_html"]
 
-Level = Callable[[float], float]
-
-_WIDTH, _HEIGHT, _LEFT, _BELOW = 720.0, 260.0, 64.0, 34.0
+_WIDTH, _HEIGHT = 720.0, 284.0
+_LEFT, _RIGHT, _ABOVE, _BELOW = 64.0, 10.0, 16.0, 52.0
 _BEFORE, _AFTER = "#b45309", "#0f766e"
 _MM = 1e3
+_DECADE = 0.1
 
 
 def calibration_html(found: Calibrated, following: Sequence[NextPose], title: str) -> str:
     """The page; it needs neither network nor script for its figures."""
-    head = "calibrated" if found.solution.converged else "not settled"
-    tone = "explained" if found.solution.converged else "partly"
+    head, tone = _verdict(found)
     return page(
         title,
         (),
@@ -43,6 +43,17 @@ def calibration_html(found: Calibrated, following: Sequence[NextPose], title: st
     )
 
 
+def _verdict(found: Calibrated) -> tuple[str, str]:
+    """A word for what came out, and its colour."""
+    if not found.solution.converged:
+        return "not settled", "partly"
+    if found.candidates:
+        return "calibrated, but something is missing", "partly"
+    if found.observed.unobservable:
+        return "calibrated in part", "partly"
+    return "calibrated", "explained"
+
+
 def _sentences(found: Calibrated) -> Iterator[str]:
     from winchkit.calibration.robot_predict import rms
 
@@ -50,73 +61,120 @@ def _sentences(found: Calibrated) -> Iterator[str]:
     if isfinite(rms(after.distance)):
         yield (
             f"At {len(after.distance)} poses that were not fitted the position error fell from "
-            f"{rms(before.distance) * _MM:.3g} mm to {rms(after.distance) * _MM:.3g} mm rms."
+            f"{rms(before.distance) * _MM:.3g} mm to {rms(after.distance) * _MM:.3g} mm rms"
+            + (
+                f", and the rotation error from {degrees(rms(before.angle)):.3g}° to "
+                f"{degrees(rms(after.angle)):.3g}°."
+                if isfinite(rms(after.angle))
+                else "."
+            )
         )
     else:
         yield "No position was held out: how well the model now predicts one is not known."
     yield (
         f"{found.observed.free} parameters were fitted to {len(found.equations.measured)} poses; "
-        f"the data see {found.observed.rank} directions of them."
+        f"the data see {found.observed.rank} directions of them. Left over, one standard "
+        f"deviation each: {noise_words(found)}."
     )
+    if found.candidates:
+        first = found.candidates[0]
+        yield (
+            f"That is not noise alone: the effect {first.effect} would explain "
+            f"{first.share * 100:.0f} % of it."
+        )
 
 
 def _figures(found: Calibrated) -> Iterator[Markup]:
-    for name, before, after in (
+    pairs = [
         ("Poses fitted", found.fit_before, found.fit_after),
         ("Poses held out", found.validation_before, found.validation_after),
-    ):
-        if any(isfinite(value) for value in after.distance):
-            yield _figure(name, before, after)
-
-
-def _figure(name: str, before: PoseErrors, after: PoseErrors) -> Markup:
-    """Dots over the poses on a logarithmic scale."""
-    rows = [(before.distance * _MM, _BEFORE), (after.distance * _MM, _AFTER)]
-    sizes = [float(v) for values, _ in rows for v in values if isfinite(v) and v > 0]
+    ]
+    sizes = [
+        float(v) * _MM
+        for _, before, after in pairs
+        for values in (before.distance, after.distance)
+        for v in values
+        if isfinite(v) and v > 0
+    ]
     if not sizes:
-        return Markup("")
-    low, high = log10(min(sizes)), log10(max(sizes))
-    low, high = (low - 0.1, high + 0.1)
+        return
+    scale = _Scale(log10(min(sizes)) - _DECADE, log10(max(sizes)) + _DECADE)
+    for name, before, after in pairs:
+        if any(isfinite(value) for value in after.distance):
+            yield _figure(name, scale, before, after)
 
-    def level(value: float) -> float:
-        return (_HEIGHT - _BELOW) * (1 - (log10(value) - low) / (high - low))
 
-    step = (_WIDTH - _LEFT) / max(len(after.distance), 1)
+@dataclass(frozen=True)
+class _Scale:
+    """Millimetres as heights, the same for both figures, by their logarithms."""
+
+    low: float
+    high: float
+
+    def __call__(self, value: float) -> float:
+        share = (log10(value) - self.low) / (self.high - self.low)
+        return _ABOVE + (_HEIGHT - _ABOVE - _BELOW) * (1 - share)
+
+    @property
+    def ticks(self) -> list[float]:
+        """1, 2 and 5 of every decade, of many decades the ones alone."""
+        digits = (1, 2, 5) if self.high - self.low < 3 else (1,)
+        steps = [
+            digit * 10.0**power
+            for power in range(floor(self.low) - 1, floor(self.high) + 2)
+            for digit in digits
+        ]
+        return [step for step in steps if self.low <= log10(step) <= self.high]
+
+
+def _figure(name: str, scale: _Scale, before: PoseErrors, after: PoseErrors) -> Markup:
+    """Dots over the poses on a logarithmic scale; each tells its pose when pointed at."""
+    places = after.place.tolist()
+    step = (_WIDTH - _LEFT - _RIGHT) / len(places)
     dots = [
-        f'<circle cx="{_LEFT + step * (n + 0.5):.1f}" cy="{level(float(v)):.1f}" r="3" '
-        f'fill="{colour}"/>'
-        for values, colour in rows
-        for n, v in enumerate(values)
+        f'<circle cx="{_LEFT + step * (n + 0.5):.1f}" cy="{scale(v * _MM):.1f}" r="3" '
+        f'fill="{colour}"><title>{escape(place)}: {v * _MM:.3g} mm {word}</title></circle>'
+        for word, colour, values in (
+            ("before", _BEFORE, before.distance),
+            ("after", _AFTER, after.distance),
+        )
+        for n, (place, v) in enumerate(zip(places, values.tolist(), strict=True))
         if isfinite(v) and v > 0
     ]
     caption = f"{name}: distance of the predicted from the measured position, before and after."
     drawing = Markup(
         f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" width="100%" role="img" '
-        f'aria-label="{escape(caption)}">{_axes(low, high, level)}{"".join(dots)}</svg>'
+        f'aria-label="{escape(caption)}">{_axes(scale, len(places), step)}{"".join(dots)}</svg>'
     )
     return element("figure", drawing, element("figcaption", caption))
 
 
-def _axes(low: float, high: float, level: Level) -> str:
-    ticks = [
-        digit * 10.0**power
-        for power in range(int(low) - 1, int(high) + 2)
-        for digit in (1, 2, 5)
-        if low <= log10(digit * 10.0**power) <= high
-    ]
+def _axes(scale: _Scale, count: int, step: float) -> str:
     lines = "".join(
-        f'<line x1="{_LEFT:g}" x2="{_WIDTH:g}" y1="{level(t):.1f}" y2="{level(t):.1f}" '
-        f'stroke="currentColor" stroke-opacity="0.15"/><text x="{_LEFT - 6:g}" '
-        f'y="{level(t) + 4:.1f}" text-anchor="end" font-size="12" fill="currentColor">{t:g}</text>'
-        for t in ticks
+        f'<line x1="{_LEFT:g}" x2="{_WIDTH:g}" y1="{scale(t):.1f}" y2="{scale(t):.1f}" '
+        f'stroke="currentColor" stroke-opacity="0.15"/>'
+        + _label(_LEFT - 6, scale(t) + 4, f"{t:g}", "end")
+        for t in scale.ticks
+    )
+    every = next(n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500, 10**6) if count <= 12 * n)
+    numbers = "".join(
+        _label(_LEFT + step * (n - 0.5), _HEIGHT - _BELOW + 16, str(n), "middle")
+        for n in range(every, count + 1, every)
     )
     base = _HEIGHT - 8
     legend = "".join(
-        f'<circle cx="{_LEFT + at:g}" cy="{base - 4:g}" r="4" fill="{colour}"/><text '
-        f'x="{_LEFT + at + 10:g}" y="{base:g}" font-size="12" fill="currentColor">{text}</text>'
+        f'<circle cx="{_LEFT + at:g}" cy="{base - 4:g}" r="4" fill="{colour}"/>'
+        + _label(_LEFT + at + 10, base, text, "start")
         for at, colour, text in ((10, _BEFORE, "before [mm]"), (130, _AFTER, "after [mm]"))
     )
-    return lines + legend
+    return lines + numbers + legend + _label(_WIDTH, base, "number of the pose", "end")
+
+
+def _label(x: float, y: float, text: str, anchor: str) -> str:
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="12" '
+        f'fill="currentColor">{text}</text>'
+    )
 
 
 def _next(following: Sequence[NextPose]) -> Markup:
@@ -138,18 +196,9 @@ def _next(following: Sequence[NextPose]) -> Markup:
 def _parameters(found: Calibrated) -> Markup:
     rows = []
     for name, estimate in found.estimates.items():
-        unit = estimate.parameter.unit
-        shown, worth = ("mm", _MM) if unit == "m" else (unit, 1.0)
-        sigma = f"{estimate.std * worth:.2g}" if isfinite(estimate.std) else "—"
-        rows.append(
-            [
-                name,
-                f"{shown}{', at its ' + estimate.bound + ' bound' if estimate.bound else ''}",
-                f"{estimate.nominal * worth:.6g}",
-                f"{estimate.value * worth:.6g}",
-                sigma,
-            ]
-        )
+        nominal, value, sigma, unit = in_words(estimate)
+        at = f", at its {estimate.bound} bound" if estimate.bound else ""
+        rows.append([name, unit + at, nominal, value, sigma])
     return table(
         "Values with their posterior standard deviation.",
         ["parameter", "unit", "nominal", "value", "sigma"],
