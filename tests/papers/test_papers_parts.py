@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import atan, cos, isnan, pi, sin, tan
 
 import numpy as np
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 
 from winchkit.catalog import find
 from winchkit.errors import UsageError
+from winchkit.model.capacity import turns_at
 from winchkit.model.gearbox import Gearbox, GearStage, worm_stage
-from winchkit.model.guide import FLEET_LIMIT, Guide, guide_of
+from winchkit.model.guide import FLEET_LIMIT, Guide, guide_of, guide_warnings
 from winchkit.schema.read import read_winch
 
 efficiencies = st.floats(0.3, 1.0)
@@ -58,6 +60,15 @@ def test_a_worm_is_a_wedge_with_friction(lead: float, friction: float) -> None:
     own = normal * (sin(lead) - friction * cos(lead))
     assert stage.backward == pytest.approx(max(0.0, own / tan(lead)), rel=1e-9, abs=1e-12)
     assert stage.self_locking == (own <= 0)
+
+
+@given(st.floats(0.02, 0.7), st.floats(0.0, 0.2), st.floats(0.0, 0.5))
+def test_a_worm_is_as_efficient_as_the_textbooks_say(
+    lead: float, friction: float, pressure: float
+) -> None:
+    """Shigley's form, which has neither the angle of friction nor its tangent."""
+    textbook = (cos(pressure) - friction * tan(lead)) / (cos(pressure) + friction / tan(lead))
+    assert worm_stage(1, 30, lead, friction, pressure).efficiency == pytest.approx(textbook)
 
 
 def test_a_worm_locks_below_its_angle_of_friction() -> None:
@@ -123,11 +134,32 @@ def test_travel_limits() -> None:
         guide.check(-pi, 0.3)
 
 
+def test_a_guide_that_runs_away_from_the_rope_is_told() -> None:
+    """5.2 mm a turn in grooves of 5 mm: after 30 turns 6 mm aside of 100 mm are 3.4 degrees."""
+    profile = read_winch(find("profiles", "bench-grooved"))
+    assert profile.guide is not None
+    assert list(guide_warnings(profile)) == []
+    astray = replace(
+        profile,
+        guide=replace(profile.guide, screw_lead=5.2e-3, distance=0.1),
+        drum=replace(profile.drum, groove_pitch=5e-3, width=0.15),
+    )
+    ((key, words),) = guide_warnings(astray)
+    assert key == "guide.screw_lead"
+    assert "30 turns" in words
+    assert "6.0 mm" in words
+    assert f"{np.degrees(np.arctan(0.06)):.2g} deg" in words
+    # Two degrees are passed where 0.2 mm a turn have become 100 mm · tan 2°.
+    assert f"from {100 * tan(np.deg2rad(2)) / 0.2:.3g} turns on" in words
+    # A stroke that stays below that is well.
+    short = turns_at(astray, 8.0)
+    told = bool(list(guide_warnings(astray, 8.0)))
+    assert told == (short > 100 * tan(np.deg2rad(2)) / 0.2)
+
+
 def test_the_guide_of_a_profile() -> None:
     guide = guide_of(read_winch(find("profiles", "bench-grooved")))
     assert guide == Guide(0.005, 1.0, 0.4, 0.005)
-    from dataclasses import replace
-
     bare = replace(read_winch(find("profiles", "bench-grooved")), guide=None)
     with pytest.raises(UsageError, match="has no"):
         guide_of(bare)

@@ -105,6 +105,38 @@ def test_presliding_is_the_simulators_integration() -> None:
     assert np.allclose(found, expected, atol=0.02)
 
 
+def summed_friction(wraps: tuple[float, ...], friction: float, *, printed: bool) -> float:
+    """Eq. 24's second line over T_1: friction of a chain, pulley j = 3 the first on the way."""
+    n = []
+    for wrap in wraps[::-1]:
+        n.append(float(over_pulleys(1.0, (wrap,), 1.0, Bearings(friction))))
+    total = 0.0
+    for j in (1, 2, 3):
+        own = n[3 - j]
+        square = n[2] ** 2 if printed else own**2
+        normal = sqrt(square - 2 * own * cos(wraps[j - 1]) + 1)
+        total += float(np.prod(n[: 3 - j])) * friction * normal
+    return total
+
+
+def test_eq_24_has_the_last_pulleys_ratio_under_every_root() -> None:
+    """What all pulleys rub adds up to what the rope loses, T_4 − T_1; not as it is printed."""
+    wraps = (pi / 2, pi, pi / 3)
+    lost = float(over_pulleys(1.0, wraps[::-1], 1.0, Bearings(0.05))) - 1
+    assert summed_friction(wraps, 0.05, printed=False) == pytest.approx(lost, rel=1e-12)
+    assert lost == pytest.approx(0.24723, abs=5e-6)
+    assert summed_friction(wraps, 0.05, printed=True) == pytest.approx(0.24749, abs=5e-6)
+    # A thousandth there, a hundredth where friction is strong.
+    strong = float(over_pulleys(1.0, wraps[::-1], 1.0, Bearings(0.4))) - 1
+    assert summed_friction(wraps, 0.4, printed=False) == pytest.approx(strong, rel=1e-12)
+    assert summed_friction(wraps, 0.4, printed=True) != pytest.approx(strong, rel=0.01)
+    # Pulleys that are all alike hide it.
+    alike = (pi / 2,) * 3
+    assert summed_friction(alike, 0.05, printed=True) == pytest.approx(
+        summed_friction(alike, 0.05, printed=False), rel=1e-12
+    )
+
+
 @given(
     st.floats(10, 2000),
     st.floats(-0.05, 0.05),

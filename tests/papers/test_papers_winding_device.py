@@ -85,6 +85,15 @@ def test_eq_8_needs_the_transpose() -> None:
     assert np.allclose(-jacobian.T @ tension + wrench, 0, atol=1e-12)
 
 
+def test_eq_9_has_a_derivative_too_many() -> None:
+    """ξ is a velocity (Eq. 6): a platform that accelerates evenly needs m a, ξ̈ says nothing."""
+    mass, rate, step = 40.0, 0.5, 1e-3
+    twist = rate * np.arange(5) * step
+    once, twice = np.diff(twist) / step, np.diff(twist, 2) / step**2
+    assert mass * once == pytest.approx(np.full(4, mass * rate))
+    assert mass * twice == pytest.approx(np.zeros(3), abs=1e-6)
+
+
 def test_eq_10_gives_the_papers_efficiency_with_six_bearings() -> None:
     printed = parts.transmission_efficiency(0.8, 0.95, 2, 0.99, 2)
     assert printed == pytest.approx(0.7076, abs=5e-5)

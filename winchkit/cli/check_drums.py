@@ -1,4 +1,4 @@
-"""What ``winchkit check`` says about drums: too few turns left, or more rope than they take."""
+"""What ``winchkit check`` says about drums: too few turns, too much rope, a guide astray."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ __all__ = ["stroke_of", "warnings_of_drums"]
 def warnings_of_drums(file: str, value: Declared) -> tuple[Fault, ...]:
     """Warnings of a profile at its reference, or of a bench at the ends of its length limits."""
     from winchkit.model.capacity import drum_warnings
+    from winchkit.model.guide import guide_warnings
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.read_source import open_source
     from winchkit.schema.simbench import SimBench
@@ -24,7 +25,8 @@ def warnings_of_drums(file: str, value: Declared) -> tuple[Fault, ...]:
     if isinstance(value, WinchProfile):
         source = open_source(file)
         return tuple(
-            source.fault(tuple(key.split(".")), message) for key, message in drum_warnings(value)
+            source.fault(tuple(key.split(".")), message)
+            for key, message in (*drum_warnings(value), *guide_warnings(value))
         )
     bench = value.bench if isinstance(value, SimBench) else value
     return _bench_warnings(file, bench) if isinstance(bench, BenchSpec) else ()
@@ -33,6 +35,7 @@ def warnings_of_drums(file: str, value: Declared) -> tuple[Fault, ...]:
 def _bench_warnings(file: str, bench: BenchSpec) -> tuple[Fault, ...]:
     from winchkit.catalog import find
     from winchkit.model.capacity import drum_warnings
+    from winchkit.model.guide import guide_warnings
     from winchkit.schema.read import read_winch
     from winchkit.schema.read_source import open_source
 
@@ -43,7 +46,10 @@ def _bench_warnings(file: str, bench: BenchSpec) -> tuple[Fault, ...]:
         profile = read_winch(find("profiles", wiring.profile, beside=bench.path))
         faults += [
             open_source(file).fault(("winch", name, "limits", "length"), message)
-            for _, message in drum_warnings(profile, *wiring.limits.length)
+            for _, message in (
+                *drum_warnings(profile, *wiring.limits.length),
+                *guide_warnings(profile, wiring.limits.length[0]),
+            )
         ]
     return tuple(faults)
 

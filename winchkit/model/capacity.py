@@ -28,7 +28,10 @@ __all__ = [
 ]
 
 DEAD_WRAPS = 2.0
-"""Turns that stay on the drum under load, at least."""
+"""Turns that stay on the drum under load, at least (29 CFR 1910.179(h)(2)(iii)(a), wire ropes).
+
+Slippery fibre ropes need more: Samson asks for eight with AmSteel-Blue. ``wrap_ratio`` tells why.
+"""
 _TURN = 2 * pi
 _ROUNDING = 1e-9
 

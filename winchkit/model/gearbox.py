@@ -81,7 +81,10 @@ def worm_stage(
 
     ``lead_angle`` γ in rad, ``friction`` μ on the flanks, ``pressure_angle`` α_n in rad. With
     ρ = atan(μ / cos α_n): η = tan γ / tan(γ + ρ), backwards tan(γ − ρ) / tan γ; it locks for γ ≤ ρ.
-    Source: Niemann, Winter, *Maschinenelemente* III, worm gears. Raises UsageError.
+    Sources: Niemann, Winter, *Maschinenelemente* III, worm gears; the same as Shigley's
+    η = (cos α_n − μ tan γ)/(cos α_n + μ cot γ). Friction falls with speed, oil and vibration (Mott,
+    *Machine Elements in Mechanical Design*, 8-10, counts on locking below about 5° alone): a gear
+    that locks is no brake. Raises UsageError.
     """
     rub = atan(friction / cos(pressure_angle))
     if starts < 1 or teeth < 1 or friction < 0.0 or not 0.0 < lead_angle < pi / 2 - rub:

@@ -5,21 +5,27 @@ Angles are the total wound angle Φ in rad, lengths in m; arrays of any shape.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from math import pi
+from math import isfinite, pi
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from winchkit.errors import UsageError
+from winchkit.model.capacity import capacity, turns_at
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["FLEET_LIMIT", "Guide", "guide_of"]
+__all__ = ["FLEET_LIMIT", "Guide", "guide_of", "guide_warnings"]
 
 Array = NDArray[np.float64]
 _TURN = 2 * pi
 FLEET_LIMIT = {"grooved": np.deg2rad(2.0), "smooth": np.deg2rad(1.5)}
-"""Fleet angle up to which a rope lies well, rad: what rope makers' handbooks ask for."""
+"""Fleet angle up to which a wire rope lies well, rad: 2° on grooves, 1.5° on a smooth drum.
+
+Source: wire rope users' handbooks, e.g. wirerope.net/jrscom/fleet-angle (Fig. 39). Makers differ:
+Gover allows 2.5° on grooves, Crane Ropes Australia 2° to 4° by the rope's construction.
+"""
 
 
 @dataclass(frozen=True)
@@ -87,3 +93,30 @@ def guide_of(profile: WinchProfile) -> Guide:
     if spec is None:
         raise UsageError(f"the winch '{profile.name}' has no [guide]; add one with its screw_lead")
     return Guide(spec.screw_lead, spec.belt_ratio, spec.distance, profile.drum.groove_pitch)
+
+
+def guide_warnings(
+    profile: WinchProfile, shortest: float | None = None
+) -> Iterator[tuple[str, str]]:
+    """Key and message where a grooved drum's guide runs away from the rope on the way.
+
+    It is taken to stand over the rope on an empty drum. ``shortest`` is the free length (m) down to
+    which the winch is driven; without it a full drum is looked at, or else the reference.
+    """
+    if profile.guide is None or not profile.drum.groove_pitch:
+        return
+    guide, limit = guide_of(profile), float(FLEET_LIMIT["grooved"])
+    full = capacity(profile).turns
+    turns = full if isfinite(full) else profile.reference.wound_turns
+    if shortest is not None:
+        turns = turns_at(profile, shortest)
+    reach = guide.turns_within(limit)
+    if turns > reach:
+        aside = float(guide.aside(_TURN * turns))
+        angle = float(np.degrees(guide.fleet_angle(_TURN * turns)))
+        yield (
+            "guide.screw_lead",
+            f"with {turns:.4g} turns on the drum the guide stands {aside * 1e3:.1f} mm beside the "
+            f"rope, a fleet angle of {angle:.2g} deg; above {np.degrees(limit):g} deg, from "
+            f"{reach:.3g} turns on, ropes climb out of their grooves",
+        )
