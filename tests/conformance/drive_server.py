@@ -10,42 +10,23 @@ import math
 import sys
 import threading
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import can
 
+# Also where it runs as a program.
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from flywheel import Flywheel
+
 from winchkit import catalog
 from winchkit.schema.read import read_device
 from winchkit.sim.drive import SimDrive
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
-from winchkit.sim.servo import DriveCommand
 
 NODE, HOST = 1, 127
 _WAIT = 1e-3
-_LAG = 0.004
-
-
-@dataclass
-class Flywheel:
-    """A motor with nothing on it, that follows its command within milliseconds."""
-
-    motor_angle: float = 0.0
-    motor_velocity: float = 0.0
-    motor_torque: float = 0.25
-
-    def advance(self, duration: float, command: DriveCommand) -> None:
-        wish = 0.0
-        if command.power and not command.brake:
-            wish = command.speed
-            if command.angle is not None:
-                wish += 25.0 * (command.angle - self.motor_angle)
-        self.motor_velocity += (wish - self.motor_velocity) * -math.expm1(-duration / _LAG)
-        self.motor_angle += self.motor_velocity * duration
-
-    def measure(self) -> Flywheel:
-        return self
 
 
 class DriveServer:

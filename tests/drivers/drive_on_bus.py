@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import math
 import os
 import threading
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import can
+from flywheel import INERTIA, Flywheel
 
 from winchkit import catalog
 from winchkit.schema.bench import BusSpec
@@ -18,10 +17,8 @@ from winchkit.schema.device import DeviceSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.drive import SimDrive
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
-from winchkit.sim.servo import DriveCommand
 
-INERTIA = 0.01
-"""Of the flywheel, kg m²."""
+__all__ = ["INERTIA", "DriveOnBus", "bus_spec", "device"]
 
 _channels = itertools.count()
 
@@ -35,30 +32,6 @@ def bus_spec() -> BusSpec:
 def device() -> DeviceSpec:
     """The generic drive."""
     return read_device(catalog.find("devices", "generic-cia402"))
-
-
-@dataclass
-class Flywheel:
-    """A motor with nothing on it, that follows speeds within milliseconds."""
-
-    motor_angle: float = 0.0
-    motor_velocity: float = 0.0
-    motor_torque: float = 0.25
-
-    def advance(self, duration: float, command: DriveCommand) -> None:
-        wish = 0.0
-        if command.power and not command.brake:
-            wish = command.speed
-            if command.angle is not None:
-                wish += 25.0 * (command.angle - self.motor_angle)
-        if command.power and command.torque is not None:
-            self.motor_velocity += command.torque / INERTIA * duration
-        else:
-            self.motor_velocity += (wish - self.motor_velocity) * -math.expm1(-duration / 0.004)
-        self.motor_angle += self.motor_velocity * duration
-
-    def measure(self) -> Flywheel:
-        return self
 
 
 class DriveOnBus:
