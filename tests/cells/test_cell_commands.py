@@ -112,6 +112,20 @@ def test_the_device_tares_and_zeroes_itself(cell: Served, tmp_path: Path) -> Non
     assert told("info", "-b", bench)["tare"]["device"] is True
 
 
+def test_a_zero_of_the_device_leaves_the_hosts_tare_and_says_so(
+    cell: Served, tmp_path: Path
+) -> None:
+    bench = cell.bench(tmp_path)
+    told("tare", "-b", bench, "--for", "0.2s")
+    text = run("zero", "-b", bench, "--for", "0.2s").output
+    assert "it reads -100" in text or "it reads -99" in text
+    assert "the host's own tare of 100" in text or "the host's own tare of 99" in text
+
+
+def test_a_time_below_zero_is_refused(cell: Served, tmp_path: Path) -> None:
+    run("rate", "-b", cell.bench(tmp_path), "--for", "-3s", error=UsageError)
+
+
 def test_the_eeprom_is_written_after_a_yes_only(cell: Served, tmp_path: Path) -> None:
     bench = cell.bench(tmp_path)
     CliRunner().invoke(command, ["store", "-b", str(bench)], input="n\n")

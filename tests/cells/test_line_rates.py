@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit import catalog
 from winchkit.drivers.modbus.timing import exchange, wire_times
-from winchkit.drivers.sharing import LineShare, fair_rates
+from winchkit.drivers.sharing import LineShare, fair_rates, next_of
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.device_modbus import ModbusSpec
 from winchkit.schema.read import read_device
@@ -79,6 +81,30 @@ def test_a_machine_that_stood_still_does_not_slow_a_line_down() -> None:
     for number in range(64):
         share.took(0, 0.3 if number % 16 == 7 else 2e-3)
     assert share.rates == pytest.approx((475.0,))
+
+
+@dataclass
+class Waiting:
+    """An instrument that wants to be asked at a rate."""
+
+    rate: float
+    due: float = 0.0
+    asked: float = 0.0
+    answers: int = 0
+
+
+@given(st.lists(st.floats(1, 400), min_size=1, max_size=6), st.floats(1e-3, 0.02))
+def test_turns_on_a_full_line_are_the_fair_share(rates: list[float], time: float) -> None:
+    line, now = [Waiting(rate) for rate in rates], 0.0
+    while now < 200 * time * len(line):
+        turn = next_of(line, now, lambda item: item.due)
+        now = max(now, turn.due)
+        turn.asked, turn.due = now, max(turn.due + 1 / turn.rate, now)
+        turn.answers += 1
+        now += time
+    fair = fair_rates(rates, [time] * len(line))
+    for item, share in zip(line, fair, strict=True):
+        assert item.answers / now > 0.93 * share - 2 / now
 
 
 def test_over_tcp_a_thousand_readings_a_second_are_enough() -> None:

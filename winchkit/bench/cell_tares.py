@@ -73,6 +73,7 @@ def _by_device(desk: CellDesk, name: str, command: str, duration: float) -> dict
         "std": before.std,
         "readings": before.readings,
         "after": after.mean,
+        "host_tare": desk.publisher(name).scale.tare,
     }
 
 

@@ -15,7 +15,7 @@ from winchkit.cli.completing import complete_winch
 if TYPE_CHECKING:
     from winchkit.bench.cell_tasks import Cells
 
-__all__ = ["cell_options", "cells", "shown", "unit_of"]
+__all__ = ["cell_options", "cells", "host_tare_note", "shown", "unit_of"]
 
 _UNITS = {"cell": "N", "load": "N", "length": "m", "temperature": "degC"}
 
@@ -50,3 +50,14 @@ def unit_of(name: str) -> str:
 def shown(value: float, unit: str, digits: int = 5) -> str:
     """A value for people; ``unknown`` for NaN."""
     return "unknown" if isnan(value) else f"{value:.{digits}g} {unit}".rstrip()
+
+
+def host_tare_note(result: dict[str, Any], unit: str) -> list[str]:
+    """That the host's tare is still taken off, where a device has zeroed or tared itself."""
+    tare = result["host_tare"]
+    if not tare:
+        return []
+    return [
+        f"  the host's own tare of {shown(tare, unit)} is still taken off; "
+        "`winchkit cell tare --clear` takes it away"
+    ]

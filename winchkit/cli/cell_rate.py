@@ -53,7 +53,7 @@ def _cost(cost: dict[str, Any]) -> list[str]:
     """What a reading keeps the line busy with; nothing for a device that sends by itself."""
     if not cost:
         return []
-    lines = [f"  a reading keeps the line busy for {cost['time'] * 1e3:.2f} ms as measured"]
+    lines = [f"  a reading keeps the line busy for {cost['time'] * 1e3:.2f} ms"]
     if "bytes" in cost:
         queries = f"{cost['queries']} {'query' if cost['queries'] == 1 else 'queries'}"
         lines[0] += f": {cost['bytes']} bytes in {queries}"

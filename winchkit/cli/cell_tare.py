@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.cell_option import cell_options, cells, shown, unit_of
+from winchkit.cli.cell_option import cell_options, cells, host_tare_note, shown, unit_of
 from winchkit.cli.output import echo_json
 
 __all__ = ["command"]
@@ -43,3 +43,5 @@ def command(
         f"{shown(result['before'], unit)} ± {shown(result['std'], unit, 2)} is zero now "
         f"({result['readings']} readings); it reads {shown(result['after'], unit)}"
     )
+    for line in host_tare_note(result, unit) if device else ():
+        click.echo(line)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.cell_option import cell_options, cells, shown, unit_of
+from winchkit.cli.cell_option import cell_options, cells, host_tare_note, shown, unit_of
 from winchkit.cli.output import echo_json
 
 __all__ = ["command"]
@@ -31,3 +31,5 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
         f"{name}: the device zeroed itself at {shown(result['before'], unit)}; "
         f"it reads {shown(result['after'], unit)}"
     )
+    for line in host_tare_note(result, unit):
+        click.echo(line)

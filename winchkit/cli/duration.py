@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from winchkit.errors import UsageError
 from winchkit.units import parse
 
 __all__ = ["optional", "quantity", "seconds"]
@@ -12,8 +13,11 @@ _NUMBER = re.compile(r"^\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)$")
 
 
 def quantity(text: str, dimension: str) -> float:
-    """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError."""
-    return parse(_NUMBER.sub(r"\1 \2", text).strip(), dimension)
+    """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError, also for a time below zero."""
+    value = parse(_NUMBER.sub(r"\1 \2", text).strip(), dimension)
+    if dimension == "time" and value < 0:
+        raise UsageError(f"'{text}' is below zero; a duration is not")
+    return value
 
 
 def optional(text: str | None, dimension: str) -> float | None:

@@ -1,13 +1,14 @@
-"""What rates a line allows the instruments on it: by calculation at first, then by measurement."""
+"""Whose turn it is on a line, and what rates the line allows: reckoned at first, then measured."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import inf
 from statistics import median
+from typing import Protocol, TypeVar
 
-__all__ = ["LineShare", "fair_rates"]
+__all__ = ["LineShare", "Polled", "fair_rates", "next_of"]
 
 _USE = 0.95
 """Of a line: the rest is for commands, retries and the machine's own jitter."""
@@ -17,8 +18,32 @@ _WATCHED = 32
 """Readings of an instrument whose median is what one takes: a machine that stood still is none."""
 
 
+class Polled(Protocol):
+    """An instrument that is asked for its readings."""
+
+    due: float
+    """When it wants to be asked next, s."""
+    asked: float
+    """When it was asked last, s."""
+
+
+P = TypeVar("P", bound=Polled)
+
+
+def next_of(instruments: Sequence[P], now: float, due: Callable[[P], float]) -> P:
+    """Who is asked next: of those that are due the one that has waited longest, else the next due.
+
+    On a line that is full everybody thus gets what it wants, or as much as everybody else who does
+    not: the shares of :func:`fair_rates`.
+    """
+    waiting = [item for item in instruments if due(item) <= now]
+    if waiting:
+        return min(waiting, key=lambda item: item.asked)
+    return min(instruments, key=due)
+
+
 class LineShare:
-    """Shares a line out among its instruments, anew as it is seen how long their readings take."""
+    """What rates a line allows its instruments, as it is seen how long their readings take."""
 
     def __init__(
         self, wanted: Sequence[float], times: Sequence[float], least: float = _TICK
@@ -34,8 +59,13 @@ class LineShare:
 
     @property
     def rates(self) -> tuple[float, ...]:
-        """The rate of each, 1/s."""
+        """The rate that is to be expected of each, 1/s."""
         return fair_rates(self._wanted, self._times)
+
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """The rate at which each may be asked at most, 1/s."""
+        return fair_rates(self._wanted, [self._least] * len(self._wanted))
 
     def took(self, index: int, time: float) -> bool:
         """Note how long a reading has kept the line busy (s); whether the rates are others now."""

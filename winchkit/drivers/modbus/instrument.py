@@ -54,7 +54,9 @@ class Instrument(Publishing):
         self.problem: ConnectionLost | None = None
         """Why there is no new reading, while there is none."""
         self.status = 0
-        self.due = clock.now()
+        self.due = self.asked = clock.now()
+        self.pace = 1 / self.wanted_rate
+        """Between two requests at least, s."""
         self.may_store = False
         """Whether commands that write the device's EEPROM are let through."""
         self.publisher = Publisher(self.decoder.spec.rate)
@@ -72,7 +74,7 @@ class Instrument(Publishing):
         self.on_line(1 / self.wanted_rate, (0.0, 0.0), tagged=False)
 
     def on_line(self, period: float, wire: tuple[float, float], *, tagged: bool) -> None:
-        """Take the period that the line allows, and the times of request and answer on it, s.
+        """Take the period that is to be expected, and the times of request and answer on it, s.
 
         On a ``tagged`` line (TCP) every answer names its request, so none can be mistaken.
         """
@@ -118,7 +120,7 @@ class Instrument(Publishing):
         again is asked less often, so that the others on its line keep their rates.
         """
         t_request = self._clock.now()
-        self.due = max(self.due + self.period, t_request)
+        self.due, self.asked = max(self.due + self.pace, t_request), t_request
         self._take_events(client)
         if self._distrust.silent(t_request):
             self.due = self._distrust.until

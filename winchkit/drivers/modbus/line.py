@@ -10,7 +10,7 @@ from winchkit.drivers.modbus.commands import command_of, confirm, identity, send
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.timing import exchange, silence_of, wire_times
 from winchkit.drivers.reading import Sensor
-from winchkit.drivers.sharing import LineShare
+from winchkit.drivers.sharing import LineShare, next_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
@@ -48,6 +48,8 @@ class ModbusLine:
             [exchange(item.decoder.spec, spec).time for item in instruments],
             _LEAST[spec.kind],
         )
+        for item, limit in zip(instruments, self._share.limits, strict=True):
+            item.pace = 1 / limit
         self._share_out()
 
     async def serve(self) -> None:
@@ -57,7 +59,7 @@ class ModbusLine:
             if not self._client.connected and not await self._connect():
                 await asyncio.sleep(_RECONNECT)
                 continue
-            instrument = min(self.sensors, key=self._due)
+            instrument = next_of(self.sensors, self._clock.now(), self._due)
             await asyncio.sleep(max(0.0, self._due(instrument) - self._clock.now()))
             async with self._lock:
                 await self._poll(instrument)
@@ -130,7 +132,7 @@ class ModbusLine:
         return True
 
     def _share_out(self) -> None:
-        """Give every instrument the rate that the line has room for."""
+        """Tell every instrument the rate that is to be expected."""
         for item, rate in zip(self.sensors, self._share.rates, strict=True):
             item.on_line(
                 1 / rate,

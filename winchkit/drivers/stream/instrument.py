@@ -73,7 +73,7 @@ class StreamInstrument(Publishing):
         self.publisher = Publisher(spec.rate)
         self.problem: ConnectionLost | None = None
         """Why there is no new reading, while there is none."""
-        self.due = clock.now()
+        self.due = self.asked = clock.now()
         self.started = False
         """Whether it was told what to send."""
         self._clock = clock
@@ -84,7 +84,7 @@ class StreamInstrument(Publishing):
         self._least_step = _JITTER / spec.rate
 
     def on_line(self, period: float) -> None:
-        """Take the period that the line allows, s."""
+        """Take the period that is to be expected, s."""
         self.period = period
         self.max_age = max(_STALE_TIMEOUTS * self._timeout, 5 * period)
         """A reading older than this is stale, s."""

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
-from winchkit.drivers.sharing import LineShare
+from winchkit.drivers.sharing import LineShare, next_of
 from winchkit.drivers.stream.conversation import Conversation, exchange_time
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.drivers.stream.port import Port, open_serial
@@ -81,7 +81,7 @@ class StreamLine:
         return next(k for k, item in enumerate(self.sensors) if item is sensor)
 
     def _share_out(self) -> None:
-        """Give every instrument that is polled the rate that the line has room for."""
+        """Tell every instrument that is polled the rate that is to be expected."""
         for one, rate in zip(self.sensors, self._share.rates, strict=True):
             if one.spec.mode == "polled":
                 one.on_line(1.0 / rate)
@@ -97,7 +97,8 @@ class StreamLine:
                 if self.sensors[0].spec.mode == "continuous":
                     await self._listen(talk, self.sensors[0])
                 else:
-                    await self._poll(talk, min(self.sensors, key=lambda one: one.due))
+                    now = self._clock.now()
+                    await self._poll(talk, next_of(self.sensors, now, lambda one: one.due))
             except ConnectionLost as error:
                 self._lost(error)
                 await self._pause(_RECONNECT)
@@ -150,8 +151,9 @@ class StreamLine:
             if now < instrument.due:
                 await talk.idle(min(instrument.due, now + _LISTEN), instrument)
                 return
-            instrument.due = max(instrument.due + instrument.period, self._clock.now())
-            begun, before = self._clock.now(), instrument.publisher.tally.readings
+            instrument.asked = begun = self._clock.now()
+            instrument.due = max(instrument.due + 1 / instrument.wanted_rate, begun)
+            before = instrument.publisher.tally.readings
             try:
                 await talk.poll(instrument)
             except DeviceRefused as error:
