@@ -112,7 +112,7 @@ def grow(
     effect = catalogue[effect_id]
     if not effect.repeatable and any(table.id == effect_id for table in profile.effect):
         raise UsageError(f"profile '{profile.name}' has the effect '{effect_id}' already")
-    dataset = prepare(runs, profile, band)
+    dataset = prepare(runs, profile, band, thin=True)
     candidates = Catalogue([*catalogue, _placed(effect, dataset)])
     inquiry = inquire(dataset, candidates)
     lacking = missing_needs(effect, inquiry.problem)

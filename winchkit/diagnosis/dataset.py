@@ -16,6 +16,7 @@ from winchkit.diagnosis.admit import OUTPUTS, admit
 from winchkit.diagnosis.calm import calm_motions
 from winchkit.diagnosis.repeats import Repeats, find_repeats
 from winchkit.diagnosis.spectrum import Band, torque_band
+from winchkit.diagnosis.thin import Thinning, thinning_for
 from winchkit.errors import UsageError
 from winchkit.model.derivatives import reach_of
 from winchkit.model.line import Line, Motion
@@ -23,12 +24,23 @@ from winchkit.model.stages import Signals
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Dataset", "Recording", "assemble", "prepare"]
+__all__ = ["Dataset", "Filtering", "Recording", "assemble", "prepare"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Filtered = tuple[float | None, float]
-"""Low-pass of the torque, Hz, or None for the usual one; and how far beyond it is kept."""
+
+
+@dataclass(frozen=True)
+class Filtering:
+    """How outputs are filtered before they are compared."""
+
+    band: float | None = None
+    """Low-pass of the torque, Hz; None for the usual one."""
+    skirt: float = 1.0
+    """How far beyond a cut-off is kept."""
+    thinning: Thinning | None = None
+    """How long runs are thinned out, if they are."""
+
 
 _GAP = 2.5
 _SHAKEN = 0.25
@@ -79,30 +91,44 @@ class Dataset:
 
 
 def prepare(
-    runs: Sequence[Run], profile: WinchProfile, band: float | None = None, skirt: float = 1.0
+    runs: Sequence[Run],
+    profile: WinchProfile,
+    band: float | None = None,
+    skirt: float = 1.0,
+    *,
+    thin: bool = False,
 ) -> Dataset:
     """Build a dataset of one winch's runs. Raises RunError with every fault of every run.
 
     ``band`` overrides the torque's low-pass, Hz; ``skirt`` is how far beyond it is kept: what
     the filter all but removes tells nothing and is left out of fits, but belongs to an rms.
+    ``thin`` lets long runs be thinned out as far as their signals allow.
     """
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
     notes = admit(runs, profile)
-    return replace(assemble(runs, profile, band, skirt), notes=tuple(notes))
+    thinning = thinning_for(runs) if thin else None
+    if thinning is not None:
+        notes.append(thinning.words)
+    filtering = Filtering(band, skirt, thinning)
+    return replace(assemble(runs, profile, filtering), notes=tuple(notes))
 
 
 def assemble(
-    runs: Sequence[Run], profile: WinchProfile, band: float | None = None, skirt: float = 1.0
+    runs: Sequence[Run], profile: WinchProfile, filtering: Filtering | None = None
 ) -> Dataset:
     """Build a dataset of runs that are known to fit the profile."""
+    line, filtering = Line(profile), filtering or Filtering()
+    raw = [line.motion(_signals(run)) for run in runs]
+    thinning = filtering.thinning
+    if thinning is not None:
+        raw = [thinning.motion(motion) for motion in raw]
+        runs = [thinning.run(run) for run in runs]
     signals = [_signals(run) for run in runs]
     repeats = find_repeats(signals)
-    line = Line(profile)
-    raw = [line.motion(own) for own in signals]
     smooth = calm_motions(line, signals, raw, repeats)
     recordings = tuple(
-        _recording(run, own, (motion, calm), line, (band, skirt))
+        _recording(run, own, (motion, calm), line, filtering)
         for run, own, motion, calm in zip(runs, signals, raw, smooth, strict=True)
     )
     return Dataset(profile, recordings, tuple(repeats))
@@ -133,12 +159,12 @@ def _signals(run: Run) -> Signals:
 
 
 def _recording(
-    run: Run, signals: Signals, motions: tuple[Motion, Motion], line: Line, filtered: Filtered
+    run: Run, signals: Signals, motions: tuple[Motion, Motion], line: Line, filtering: Filtering
 ) -> Recording:
     raw, smooth = motions
     nominal = line.predict(raw)
     outputs = [output for output in OUTPUTS if output in run and output in nominal]
-    bands = {output: _band(run, output, filtered) for output in outputs}
+    bands = {output: _band(run, output, filtering) for output in outputs}
     return Recording(
         name=run.name,
         signals=signals,
@@ -155,10 +181,14 @@ def _recording(
     )
 
 
-def _band(run: Run, output: str, filtered: Filtered) -> Band:
-    rate, (band, skirt) = 1 / run.interval, filtered
-    cut_off = (band or torque_band(rate)) if output == "motor_torque" else None
-    return Band(len(run), rate, cut_off, skirt)
+def _band(run: Run, output: str, filtering: Filtering) -> Band:
+    rate, thinning, cut_off = 1 / run.interval, filtering.thinning, None
+    if output == "motor_torque":
+        full = rate if thinning is None else rate * thinning.factor
+        cut_off = filtering.band or torque_band(full)
+    if thinning is not None:
+        cut_off = min(cut_off or np.inf, thinning.cut_off)
+    return Band(len(run), rate, cut_off, filtering.skirt)
 
 
 def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
@@ -34,10 +35,14 @@ from winchkit.effects.coordinates import Coordinates
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Answer", "diagnose", "inquire"]
+__all__ = ["Answer", "Told", "diagnose", "diagnose_each", "inquire"]
 
-_CANDIDATES_FITTED = 5
 _WHERE = 6
+_AT_A_TIME = 2
+
+
+Told = Callable[[str, float], None]
+"""Hears what is begun, and the share of the work that is done."""
 
 
 class Answer:
@@ -57,19 +62,33 @@ class Answer:
         self.diagnosis = diagnosis
 
 
+def _silent(what: str, share: float) -> None:
+    """Tells nobody."""
+
+
 def diagnose(
     runs: Sequence[Run],
     profile: WinchProfile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
+    *,
+    thin: bool = True,
+    told: Told = _silent,
 ) -> Answer:
     """Find which effect of the catalogue the profile lacks on these runs.
 
-    Raises RunError with every fault of every run, FileError for effects that do not bind.
+    ``thin`` lets long runs be thinned out as far as their signals allow; ``told`` hears what is
+    begun and which share (0 to 1) of the work is about done. Raises RunError with every fault of
+    every run, FileError for effects that do not bind.
     """
     catalogue = catalogue or load_catalogue()
-    inquiry = inquire(prepare(runs, profile, band), catalogue)
+    told("reading the signals", 0.0)
+    dataset = prepare(runs, profile, band, thin=thin)
+    told("drawing the candidates", 0.2)
+    inquiry = inquire(dataset, catalogue)
+    told("searching", 0.4)
     found = search(inquiry)
+    told("naming", 0.8)
     judgement = judge(inquiry, found)
     shown = judgement.shown
     added = range(inquiry.given, len(shown.final.hypothesis.terms))
@@ -91,6 +110,30 @@ def diagnose(
         ),
     )
     return Answer(inquiry, shown, diagnosis, sets)
+
+
+def diagnose_each(
+    winches: Mapping[str, Sequence[Run]],
+    profile: WinchProfile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+    *,
+    thin: bool = True,
+    told: Told = _silent,
+) -> dict[str, Answer]:
+    """A diagnosis of every winch by itself, two at a time: numpy leaves the second core to it."""
+    catalogue = catalogue or load_catalogue()
+    shares = dict.fromkeys(winches, 0.0)
+
+    def one(name: str) -> Answer:
+        def heard(what: str, share: float) -> None:
+            shares[name] = share
+            told(f"winch {name}: {what}", sum(shares.values()) / len(shares))
+
+        return diagnose(winches[name], profile, catalogue, band, thin=thin, told=heard)
+
+    with ThreadPoolExecutor(_AT_A_TIME) as pool:
+        return dict(zip(winches, pool.map(one, winches), strict=True))
 
 
 def inquire(dataset: Dataset, catalogue: Catalogue) -> Inquiry:
@@ -147,10 +190,9 @@ def _gains(inquiry: Inquiry, final: Fit, noise: Noise) -> list[float]:
 def _candidates(inquiry: Inquiry, found: Found) -> tuple[Candidate, ...]:
     out = []
     folds = inquiry.folds(found.final, found.noise)
-    for rank, item in enumerate(found.scores):
+    for item, fitted in zip_longest(found.scores, found.tried):
         rms: dict[str, float] = {}
-        if found.alarmed and rank < _CANDIDATES_FITTED and item.value > 0:
-            fitted = inquiry.trial(found.begin, item, found.begin_noise).fit
+        if fitted is not None:
             rms = held_out_rms(inquiry.problem, fitted, found.begin_noise, folds)
         out.append(Candidate(item.atom.effect.id, item.value, rms))
     return tuple(out)

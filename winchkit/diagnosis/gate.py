@@ -7,6 +7,7 @@ linear solve, so that cross-validation needs no fit of its own.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,7 +165,7 @@ def _shared(fit: Fit) -> Array:
 def _in_time(problem: Problem, columns: Array) -> Array:
     """Columns back in time, (samples, k)."""
     samples = sum(s.band.count for s in problem.segments)
-    out = np.empty((samples, columns.shape[1]))
+    out = np.empty((columns.shape[1], samples)).T
     for index, column in enumerate(columns.T):
         out[:, index] = np.concatenate(problem.in_time(column))
     return out
@@ -179,10 +180,12 @@ def _steps(residual: Array, columns: Array, fold: NDArray[np.intp], count: int) 
     """Change of the unknowns when a fold is left out, (folds, unknowns)."""
     k = columns.shape[1]
     normal, gradient = np.zeros((count, k, k)), np.zeros((count, k))
-    for index in range(count):
-        inside = fold == index
-        normal[index] = columns[inside].T @ columns[inside]
-        gradient[index] = columns[inside].T @ residual[inside]
+    order = np.argsort(fold, kind="stable")
+    ends = np.searchsorted(fold[order], np.arange(count + 1))
+    for index, (low, high) in enumerate(pairwise(ends.tolist())):
+        inside = columns[order[low:high]]
+        normal[index] = inside.T @ inside
+        gradient[index] = inside.T @ residual[order[low:high]]
     whole, pull = normal.sum(axis=0), gradient.sum(axis=0)
     size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     out = np.empty((count, k))

@@ -59,6 +59,7 @@ class Inquiry:
 
     def look_again(self, present: Hypothesis) -> None:
         """Draw the signatures anew beside a grown model: a lag acts on what is there."""
+        del self.signatures  # Both at once would be the most memory of a whole diagnosis.
         self.signatures = self._signatures(present)
 
     @property

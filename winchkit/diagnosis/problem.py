@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.dataset import Dataset
-from winchkit.diagnosis.spectrum import Band, band_edges, narrow_edges, to_frequency, to_time
-from winchkit.effects.bind import Term, modifiers_of
+from winchkit.diagnosis.predictor import Predictor, masked
+from winchkit.diagnosis.spectrum import Band, band_edges, narrow_edges, to_time
+from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.model.line import Line
 
@@ -71,6 +72,7 @@ class Problem:
         self.runs = len(dataset.recordings)
         self.segments = _segments(dataset)
         self.rows = self.segments[-1].rows.stop
+        self._predictors = [Predictor(dataset.profile, r) for r in dataset.recordings]
         self.base = self._base()
         offset, rounding = self._offset_column(), self._rounding_column()
         self.fits_offset = bool(np.any(offset))
@@ -111,18 +113,11 @@ class Problem:
         """What the terms add to the nominal prediction, rows."""
         if not hypothesis.terms:
             return np.zeros(self.rows)
-        predicted = [
-            Line(self.dataset.profile, modifiers_of(_started(hypothesis, run))).predict(
-                recording.smooth
-            )
-            for run, recording in enumerate(self.dataset.recordings)
-        ]
-        out = np.zeros(self.rows)
+        terms = [_started(hypothesis, run) for run in range(self.runs)]
+        out = np.empty(self.rows)
         for segment in self.segments:
-            recording = self.dataset.recordings[segment.run]
-            moved = predicted[segment.run][segment.output]
-            moved = moved - recording.nominal_smooth[segment.output]
-            out[segment.rows] = self._masked(segment, moved)
+            predictor = self._predictors[segment.run]
+            out[segment.rows] = predictor.change(segment.output, terms[segment.run])
         return out
 
     def residual(self, hypothesis: Hypothesis) -> Array:
@@ -176,7 +171,7 @@ class Problem:
         """Derivative of the prediction by the vector, by differences; (rows, len)."""
         here = self.change(self.hypothesis(vector, like))
         _, high = self.bounds(like)
-        out = np.empty((self.rows, len(vector)))
+        out = np.empty((len(vector), self.rows)).T  # Columns are written one by one.
         states = sum(len(start) for start in like.starts)
         count = self.nuisance_columns.shape[1]
         out[:, :count] = self.nuisance_columns
@@ -209,8 +204,7 @@ class Problem:
             first += len(start)
 
     def _masked(self, segment: Segment, signal: Array) -> Array:
-        valid = self.dataset.recordings[segment.run].valid[segment.output]
-        return to_frequency(np.where(valid, signal, 0.0), segment.band)
+        return masked(self.dataset.recordings[segment.run], segment.output, signal)
 
     def _base(self) -> Array:
         out = np.zeros(self.rows)

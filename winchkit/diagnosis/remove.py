@@ -47,7 +47,7 @@ def remove(
     Raises UsageError for an effect that the profile does not have, RunError with every fault of
     every run.
     """
-    inquiry = inquire(prepare(runs, profile, band), catalogue or load_catalogue())
+    inquiry = inquire(prepare(runs, profile, band, thin=True), catalogue or load_catalogue())
     begin, noise = inquiry.settle(inquiry.begin)
     terms = begin.hypothesis.terms
     there = [index for index, term in enumerate(terms) if term.effect.id == effect_id]

@@ -43,6 +43,8 @@ class Found:
     """Whether anything beyond noise is left at the end."""
     scores: tuple[Score, ...]
     """Of all candidates at the start, best first."""
+    tried: tuple[Fit, ...]
+    """The first of them as fitted beside the model it began with; none without an alarm."""
     threshold: float
     """Score that noise alone reaches in one case of a hundred."""
 
@@ -55,10 +57,13 @@ def search(inquiry: Inquiry) -> Found:
     begin_scores = scores = inquiry.scores(present, noise)
     chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
     threshold = max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
+    tried: tuple[Fit, ...] = ()
     for _ in range(_MOST_STEPS):
         if not scores or scores[0].value <= threshold:
             break
-        grown = _grow(inquiry, present, noise, scores)
+        trials = _short_list(inquiry, present, noise, scores)
+        tried = tried or _fits(trials)
+        grown = _grow(inquiry, present, noise, trials)
         if grown is None:
             break
         inquiry.look_again(grown.hypothesis)
@@ -68,16 +73,20 @@ def search(inquiry: Inquiry) -> Found:
     present, noise = _without_the_doubtful(inquiry, present, noise)
     grew = len(present.hypothesis.terms) > inquiry.given
     end_presence = inquiry.presence(present, noise)
+    alarmed = grew or _missing(begin_presence, begin_scores, threshold)
+    if alarmed and not tried:
+        tried = _fits(_short_list(inquiry, begin, begin_noise, begin_scores))
     return Found(
         begin=begin,
         begin_noise=begin_noise,
         begin_presence=begin_presence,
-        alarmed=grew or _missing(begin_presence, begin_scores, threshold),
+        alarmed=alarmed,
         final=present,
         noise=noise,
         presence=end_presence,
         still=_missing(end_presence, inquiry.scores(present, noise), threshold),
         scores=tuple(begin_scores),
+        tried=tried if alarmed else (),
         threshold=threshold,
     )
 
@@ -93,10 +102,18 @@ def _missing(presence: Presence, scores: list[Score], threshold: float) -> bool:
     return bool(scores) and scores[0].value > threshold
 
 
-def _grow(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> Fit | None:
-    """The best of the short list that passes the gate, all refitted; None where none does."""
+def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> list[Trial]:
+    """The candidates that score best, each fitted beside the present terms, in their order."""
     listed = [item for item in scores if item.value > 0][:_SHORT_LIST]
-    trials = [inquiry.trial(present, item, noise) for item in listed]
+    return [inquiry.trial(present, item, noise) for item in listed]
+
+
+def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
+    return tuple(trial.fit for trial in trials)
+
+
+def _grow(inquiry: Inquiry, present: Fit, noise: Noise, trials: list[Trial]) -> Fit | None:
+    """The best of the short list that passes the gate, all refitted; None where none does."""
     before = inquiry.criterion(present)
     for trial in sorted(trials, key=lambda t: t.criterion):
         if trial.criterion < before - _BETTER and _holds(inquiry, present, trial, noise):

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -116,29 +115,37 @@ def missing_needs(effect: Effect, problem: Problem) -> list[str]:
 def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect]) -> Signatures:
     """Columns and inner products of every candidate among ``effects`` beside a present model."""
     here = problem.change(present)
+    points = list(_points(problem, effects))
     atoms: list[Atom] = []
-    columns: list[Array] = []
+    # One column after another in memory: thousands of rows each, written and read whole.
+    columns, count = np.empty((sum(len(secants) for *_, secants in points), problem.rows)), 0
+    for effect, shape, secants in points:
+        own = []
+        for secant in secants:
+            values = {**effect.null, **shape, **secant}
+            columns[count] = _column(problem, present, here, effect, values)
+            if columns[count].any():
+                own.append(secant)
+                count += 1
+        if own:
+            atoms.append(Atom(effect, shape, slice(count - len(own), count), tuple(own)))
+    kept = columns[:count].T
+    return Signatures(tuple(atoms), kept, _gram(problem, kept))
+
+
+Point = tuple[Effect, dict[str, float], list[dict[str, float]]]
+"""An effect, a point of its shape grid, and its values of a usual size there."""
+
+
+def _points(problem: Problem, effects: Iterable[Effect]) -> Iterator[Point]:
+    """What candidates are scored at, where these runs could show them at all."""
     for effect in effects:
         if missing_needs(effect, problem):
             continue
         coordinates = Coordinates(effect)
-        added = partial(_column, problem, present, here, effect)
         for shape in coordinates.grid():
-            if not _turns_enough(problem, shape):
-                continue
-            own = [
-                (secant, added({**effect.null, **shape, **secant}))
-                for secant in coordinates.secants()
-            ]
-            own = [(secant, column) for secant, column in own if column @ column > 0]
-            if own:
-                place = slice(len(columns), len(columns) + len(own))
-                atoms.append(Atom(effect, shape, place, tuple(secant for secant, _ in own)))
-                columns += [column for _, column in own]
-    stacked = np.empty((problem.rows, len(columns)))
-    for index in reversed(range(len(columns))):
-        stacked[:, index] = columns.pop()
-    return Signatures(tuple(atoms), stacked, _gram(problem, stacked))
+            if _turns_enough(problem, shape):
+                yield effect, shape, coordinates.secants()
 
 
 def _turns_enough(problem: Problem, shape: dict[str, float]) -> bool:
@@ -172,15 +179,13 @@ class Projected:
         self._jacobian = jacobian
         self._weight2 = noise.weight(problem) ** 2
         self._freedom = noise.freedom
-        cross, normal = _cross(problem, jacobian, found.columns)
-        share = 1 / noise.power
-        self._through = -np.linalg.pinv(
-            np.tensordot(share, normal, axes=1), rcond=1e-12, hermitian=True
-        ) @ np.tensordot(share, cross, axes=1)
-        mixed = cross.transpose(0, 2, 1) @ self._through
-        own = self._through.T @ normal @ self._through
-        self._parts = share[:, None, None] * (found.gram + mixed + mixed.transpose(0, 2, 1) + own)
-        self.inner = self._parts.sum(axis=0)
+        self._cross, self._normal = _cross(problem, jacobian, found.columns)
+        self._share = share = 1 / noise.power
+        cross, normal, gram = (
+            np.tensordot(share, part, axes=1) for part in (self._cross, self._normal, found.gram)
+        )
+        self._through = -np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ cross
+        self.inner = _projected(gram, cross, normal, self._through)
         """Inner products of the whitened, projected columns, (p, p)."""
         plain = np.einsum("b,bii->i", share, found.gram)
         self._roots = [self._root(atom, plain) for atom in found.atoms]
@@ -215,12 +220,17 @@ class Projected:
         """Products that noise alone would give, its power known only so well; (p, samples)."""
         random = np.random.default_rng(0)
         out = np.zeros((len(self.inner), samples))
-        for part, freedom in zip(self._parts, self._freedom, strict=True):
+        bands = zip(
+            self._share, self.found.gram, self._cross, self._normal, self._freedom, strict=True
+        )
+        for share, gram, cross, normal, freedom in bands:
+            part = share * _projected(gram, cross, normal, self._through)
             # No Cholesky factor: what the present model explains whole is left with rounding only.
             values, vectors = np.linalg.eigh(part)
             factor = np.sqrt(freedom / random.chisquare(freedom, samples))
             noise = random.standard_normal((len(part), samples)) * factor
-            out += (vectors * np.sqrt(np.maximum(values, 0.0))) @ noise
+            # The symmetric root: the same draws whichever way rounding turns the vectors.
+            out += (vectors * np.sqrt(np.maximum(values, 0.0))) @ (vectors.T @ noise)
         return out
 
     def _root(self, atom: Atom, plain: Array) -> Array:
@@ -233,6 +243,12 @@ class Projected:
         values, vectors = np.linalg.eigh(inner / np.outer(size, size))
         kept = values > _UNIDENTIFIABLE
         return np.asarray((vectors[:, kept] / np.sqrt(values[kept])) / size[:, None])
+
+
+def _projected(gram: Array, cross: Array, normal: Array, through: Array) -> Array:
+    """Inner products of columns from which unknowns were taken out by ``through``, (p, p)."""
+    mixed = cross.T @ through
+    return np.asarray(gram + mixed + mixed.T + through.T @ normal @ through)
 
 
 def _cross(problem: Problem, jacobian: Array, columns: Array) -> tuple[Array, Array]:

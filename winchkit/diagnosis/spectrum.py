@@ -7,6 +7,7 @@ for stationary noise its coefficients are independent, with the noise's spectrum
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class Band:
     skirt: float = 1.0
     """How far beyond the cut-off coefficients are kept, in units of it."""
 
-    @property
+    @cached_property
     def frequency(self) -> Array:
         """Of every kept coefficient, Hz, shape (kept,)."""
         frequency = np.arange(self.count) * self.rate / (2 * self.count)
@@ -62,7 +63,7 @@ class Band:
             return frequency
         return frequency[frequency <= self.skirt * self.cut_off]
 
-    @property
+    @cached_property
     def gain(self) -> Array:
         """Of a Butterworth filter run forward and backward, shape (kept,)."""
         frequency = self.frequency

@@ -26,7 +26,7 @@ from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["GRAVITY", "Line", "Motion"]
+__all__ = ["GRAVITY", "Line", "Motion", "Way"]
 
 Array = NDArray[np.float64]
 GRAVITY = 9.80665
@@ -48,6 +48,17 @@ class Motion:
     """The weight whose acceleration makes the load, kg, where no instrument measures it."""
     rounding: Array | None = None
     """Curvature of that load over the span of its differences, N: how far it may be rounded."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """How the motor's angle comes to the rope; every array of shape (n,)."""
+
+    drum_angle: Array
+    free_length: Array
+    """Unstrained, from exit point to attachment, m."""
+    arm: Array
+    """Rope wound in per motor angle, m/rad."""
 
 
 @dataclass(frozen=True)
@@ -130,33 +141,39 @@ class Line:
     def predict(self, motion: Motion) -> dict[str, Array]:
         """``cable_length``, ``motor_torque`` and, where a load is known, ``tension``."""
         at = motion.at
-        free, length, path = self._length(at)
-        shown = self._through(Stage.LENGTH_INSTRUMENT, length, at)
-        out = {"cable_length": shown}
+        way = self.way(at)
+        out = {"cable_length": self.shown_length(at, way)}
+        drum_side = self.drum_side(motion, way)
         if motion.load is not None:
-            drum_side = self._drum_side(self._load(motion, free, path.slope), at)
-            out["tension"] = self._through(Stage.CELL, drum_side, at)
-        elif motion.drum_tension is not None:
-            drum_side = motion.drum_tension
-        else:
-            drum_side = np.zeros_like(at.time)
-        out["motor_torque"] = self._torque(drum_side, path, at)
+            out["tension"] = self.shown_tension(at, drum_side)
+        out["motor_torque"] = self.shown_torque(at, way, drum_side)
         return out
 
-    def _length(self, at: At) -> tuple[Array, Array, Path]:
-        """Unstrained and true length, m, and the wound length over the motor angle, m/rad."""
+    def way(self, at: At) -> Way:
+        """What gearbox, drum and guide make of the motor's angle."""
         turned = self._through(Stage.DRUM_ANGLE, self._gear(at.motor_angle), at)
-        at = replace(at, drum_angle=turned.value, wound_angle=self._reference_wound + turned.value)
+        wound_angle = self._reference_wound + turned.value
+        at = replace(at, drum_angle=turned.value, wound_angle=wound_angle)
         drum = self._through(Stage.DRUM, self._drum, at)
-        wound = drum.wound(at.wound_angle) - drum.wound(np.asarray(self._reference_wound))
-        path = self._through(Stage.WOUND, Path(wound, drum.arm(at.wound_angle)), at)
+        wound = drum.wound(wound_angle) - drum.wound(np.asarray(self._reference_wound))
+        path = self._through(Stage.WOUND, Path(wound, drum.arm(wound_angle)), at)
         free = (self.profile.reference.cable_length or 0.0) - path.value
-        at = replace(at, free_length=free)
-        length = self._through(Stage.ROPE, free, at)
-        length = self._through(Stage.FRAME, length, at)
-        return free, length, Path(path.value, path.slope * turned.slope)
+        return Way(turned.value, free, path.slope * turned.slope)
 
-    def _load(self, motion: Motion, free: Array, arm: Array) -> Array:
+    def shown_length(self, at: At, way: Way) -> Array:
+        """Length as its instrument shows it, m."""
+        at = replace(
+            at,
+            drum_angle=way.drum_angle,
+            wound_angle=self._reference_wound + way.drum_angle,
+            free_length=way.free_length,
+        )
+        length: Array = way.free_length
+        for stage in (Stage.ROPE, Stage.FRAME, Stage.LENGTH_INSTRUMENT):
+            length = self._through(stage, length, at)
+        return length
+
+    def _load(self, motion: Motion, way: Way) -> Array:
         """A known weight follows the rope as it is really paid out, kinematic effects included.
 
         How fast that is follows from the arm (m/rad) and the motor's rate, so that a ripple of
@@ -166,26 +183,33 @@ class Line:
         """
         load = motion.load
         assert load is not None
-        if motion.load_mass is None or not self.modifiers:
+        if motion.load_mass is None or not any(m.stage <= Stage.WOUND for m in self.modifiers):
             return load
         at = motion.at
-        paid_out = (self._pace(at.motor_angle) - arm) * at.motor_rate
-        rest = sharp_gradient(free - at.free_length, at.time) - paid_out
+        paid_out = (self._pace(at.motor_angle) - way.arm) * at.motor_rate
+        rest = sharp_gradient(way.free_length - at.free_length, at.time) - paid_out
         added = sharp_gradient(paid_out, at.time) + wide_gradient(rest, at.time)
         return load - motion.load_mass * added
 
-    def _drum_side(self, load: Array, at: At) -> Array:
-        """Tension at the drum: from the load up the rope and back over the pulleys."""
-        tension = self._through(Stage.ROPE_WEIGHT, load, at)
+    def drum_side(self, motion: Motion, way: Way) -> Array:
+        """Tension at the drum: from the load up the rope and back over the pulleys, N."""
+        at = motion.at
+        if motion.load is None:
+            return np.zeros_like(at.time) if motion.drum_tension is None else motion.drum_tension
+        tension = self._through(Stage.ROPE_WEIGHT, self._load(motion, way), at)
         if self._stages[Stage.PULLEY]:
             for index in reversed(range(len(self.profile.pulley))):
                 here = replace(at, pulley=index, wrap=self.profile.pulley[index].wrap)
                 tension = self._through(Stage.PULLEY, tension, here)
         return np.asarray(tension)
 
-    def _torque(self, drum_side: Array, path: Path, at: At) -> Array:
-        """Virtual work: rope force times the derivative of the wound length."""
-        torque: Array = drum_side * path.slope
+    def shown_tension(self, at: At, drum_side: Array) -> Array:
+        """Tension as the cell shows it, N."""
+        return np.asarray(self._through(Stage.CELL, drum_side, at))
+
+    def shown_torque(self, at: At, way: Way, drum_side: Array) -> Array:
+        """Virtual work: rope force times the derivative of the wound length, as reported, N m."""
+        torque: Array = drum_side * way.arm
         for stage in (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL):
             torque = self._through(stage, torque, at)
         return torque
@@ -231,11 +255,12 @@ class Line:
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""
-        return float(self._length(self._at_rest(motor_angle, tension))[1][0])
+        at = self._at_rest(motor_angle, tension)
+        return float(self.shown_length(at, self.way(at))[0])
 
     def arm(self, motor_angle: float) -> float:
         """Rope wound in per motor angle, signed by the gearbox's direction, m/rad."""
-        return float(self._length(self._at_rest(motor_angle, 0.0))[2].slope[0])
+        return float(self.way(self._at_rest(motor_angle, 0.0)).arm[0])
 
     def motor_angle(self, cable_length: float, tension: float = 0.0) -> float:
         """Motor angle at which the rope has ``cable_length`` under a tension, rad.

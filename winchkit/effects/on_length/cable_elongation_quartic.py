@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -13,6 +14,7 @@ Array = NDArray[np.float64]
 _SOFTEST = 0.1
 _TABLE = 513
 _NEWTON_STEPS = 4
+_LAST_STEP = 1e-8
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
@@ -30,14 +32,18 @@ def _solve(force: Array, law: Polynomial) -> Array:
 
     def reach(strain: Array) -> tuple[Array, Array]:
         inner = np.minimum(strain, end)
-        rate = np.maximum(slope(inner), _SOFTEST)
-        return law(inner) + rate * (strain - inner), rate
+        rate = np.maximum(polyval(inner, slope.coef), _SOFTEST)
+        return polyval(inner, law.coef) + rate * (strain - inner), rate
 
     table = np.linspace(0.0, _largest(reach, float(np.max(force, initial=0.0))), _TABLE)
     strain = np.interp(force, reach(table)[0], table)
     for _ in range(_NEWTON_STEPS):
         value, rate = reach(strain)
-        strain = strain - (value - force) / rate
+        step = (value - force) / rate
+        strain = strain - step
+        # Steps shrink by their square: after one this small the rest is rounding.
+        if np.max(np.abs(step), initial=0.0) < _LAST_STEP * table[-1]:
+            break
     return strain
 
 

@@ -1,0 +1,185 @@
+"""What a diagnosis of a long recording of several winches costs, and whether it is right; JSON.
+
+``python benchmarks/diagnosis_hour.py``: 60 minutes at 1 kHz of 8 winches, load measured, every
+winch with a rope that stretches and a motor that rubs, made by the campaign's own physics. The
+promise is 60 s after reading and 4 GB; exits 1 when it is not kept or a value is wrong.
+``--minutes 2 --winches 1`` is small enough for CI; ``--full`` diagnoses the first winch a second
+time with every sample, to compare; ``--csv FOLDER`` writes the recording as one file, reads it
+back and tells what reading costs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter, process_time
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent))
+
+import numpy as np
+from campaign.motion import programme
+from campaign.truth import Situation, show
+from campaign.winch import Winch, turns_for, write_profile
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.diagnose import diagnose, diagnose_each
+from winchkit.diagnosis.result import Diagnosis
+from winchkit.effects import load_catalogue
+from winchkit.runs import read_run
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.read import read_winch
+
+Array = NDArray[np.float64]
+RATE = 1000.0
+WINCH = Winch("grooved", 0.06, 5e-3, 20.4, 1, 0.0, 6.0, 5.0, 1.5, 90.0, (90.0, 60.0), 0.0)
+NOISE = {"motor_angle": 1e-4, "cable_length": 3e-4, "tension": 0.8, "load": 0.8}
+TORQUE_NOISE = 5e-3
+UNITS = {
+    "motor_angle": "rad",
+    "cable_length": "m",
+    "tension": "N",
+    "load": "N",
+    "motor_torque": "N m",
+}
+MASSES = (10.0, 24.0, 16.0, 32.0)
+STIFFNESS = 1.5e5
+RUBBING = 0.08
+LIMIT = 60.0
+MEMORY = 4000.0
+
+
+def hidden(index: int) -> dict[str, dict[str, float]]:
+    """What one of the winches hides: not two alike."""
+    return {
+        "cable-elongation-linear": {"axial_stiffness": STIFFNESS * (1 + 0.1 * index)},
+        "motor-coulomb": {"torque": RUBBING * (1 + 0.1 * index)},
+    }
+
+
+def recording(minutes: float, winches: int, seed: int = 1) -> Run:
+    """One run of all winches, named A, B …"""
+    random = np.random.default_rng(seed)
+    channels: dict[str, Channel] = {}
+    time = np.zeros(0)
+    for index in range(winches):
+        time, wound = programme(random, RATE, 60 * minutes, 4.0)
+        angle = WINCH.ratio * turns_for(WINCH, wound)
+        turns = np.arange(len(time)) * len(MASSES) // len(time)
+        mass = np.array(MASSES)[turns]
+        shown = show(
+            WINCH,
+            Situation(time, angle, mass, np.full_like(time, 20.0), np.zeros_like(time)),
+            hidden(index),
+        )
+        ideal = {
+            "motor_angle": angle,
+            "cable_length": shown.cable_length,
+            "tension": shown.tension,
+            "load": shown.load,
+            "motor_torque": shown.motor_torque,
+        }
+        for name, values in ideal.items():
+            noise = NOISE.get(name, TORQUE_NOISE) * random.standard_normal(len(time))
+            channels[f"{chr(65 + index)}.{name}"] = Channel(values + noise, UNITS[name])
+    return Run("hour", time, channels)
+
+
+def written(run: Run, path: Path) -> None:
+    """Write a run as CSV, a block of rows at a time."""
+    with path.open("w", encoding="utf-8") as file:
+        cells = ["time [s]", *(f"{name} [{c.unit}]" for name, c in run.channels.items())]
+        file.write(",".join(cells) + "\n")
+        columns = [run.time, *(channel.values for channel in run.channels.values())]
+        for start in range(0, len(run), 10_000):
+            block = np.column_stack([column[start : start + 10_000] for column in columns])
+            np.savetxt(file, block, fmt="%.9g", delimiter=",")
+
+
+def peak() -> float:
+    """Most memory of this process so far, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def told(found: Diagnosis, index: int) -> dict[str, object]:
+    """What was named on one winch, and how far its values are from the truth."""
+    apart = {}
+    for step in found.steps:
+        for effect, values in hidden(index).items():
+            if step.effects[0] == effect:
+                name, true = next(iter(values.items()))
+                estimate = step.parameters[effect][name]
+                apart[effect] = {
+                    "value": estimate.value,
+                    "std": estimate.std,
+                    "true": true,
+                    "deviations": (estimate.value - true) / estimate.std,
+                }
+    return {
+        "verdict": found.verdict,
+        "named": [step.effects for step in found.steps],
+        "values": apart,
+        "notes": [note for note in found.notes if "sample of the runs" in note],
+    }
+
+
+def is_right(answers: Sequence[dict[str, object]]) -> bool:
+    """Whether every winch's effects were named, and nothing else."""
+    return all(
+        sorted(effects[0] for effects in answer["named"]) == sorted(hidden(0))  # type: ignore[attr-defined]
+        for answer in answers
+    )
+
+
+def main() -> int:
+    """Make, diagnose every winch, print, judge."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--winches", type=int, default=8)
+    parser.add_argument("--full", action="store_true", help="the first winch with every sample too")
+    parser.add_argument("--csv", type=Path, metavar="FOLDER", help="through a CSV file there")
+    args = parser.parse_args()
+    folder = args.csv or Path(tempfile.mkdtemp())
+    write_profile(WINCH, folder / "hour.toml")
+    profile = read_winch(folder / "hour.toml")
+    run, read = recording(args.minutes, args.winches), {}
+    if args.csv:
+        written(run, folder / "hour.csv")
+        size = (folder / "hour.csv").stat().st_size / 1e6
+        before, begun = peak(), perf_counter()
+        run = read_run(folder / "hour.csv")
+        seconds = perf_counter() - begun
+        read = {"csv_mb": size, "seconds": seconds, "peak_before": before, "peak_after": peak()}
+    begun, worked = perf_counter(), process_time()
+    of_winch = {name: [run.of_winch(name)] for name in run.winches()}
+    answers = diagnose_each(of_winch, profile, load_catalogue())
+    seconds, cpu = perf_counter() - begun, process_time() - worked
+    tellings = [told(a.diagnosis, index) for index, a in enumerate(answers.values())]
+    result: dict[str, object] = {
+        "schema": 1,
+        "samples": len(run),
+        "winches": args.winches,
+        "seconds": seconds,
+        "cpu_seconds": cpu,
+        "limit": LIMIT,
+        "peak_memory_mb": peak(),
+        "memory_limit_mb": MEMORY,
+        "reading": read,
+        "answers": tellings,
+    }
+    if args.full:
+        begun = perf_counter()
+        every = diagnose([run.of_winch("A")], profile, load_catalogue(), thin=False).diagnosis
+        result["every_sample"] = told(every, 0) | {"seconds": perf_counter() - begun}
+    print(json.dumps(result, indent=1))
+    return 0 if seconds <= LIMIT and peak() <= MEMORY and is_right(tellings) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
