@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue
     from winchkit.runs.run import Run
 
-__all__ = ["ManyValues", "catalogue_of", "model_options", "read_runs"]
+__all__ = ["ALL", "ManyValues", "catalogue_of", "model_options", "read_each", "read_runs"]
+
+ALL = "all"
+"""Said to ``--winch``: every winch of the runs by itself."""
 
 
 class ManyValues(click.Command):
@@ -55,13 +58,27 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:
     """Runs of one winch. Raises FileError with the faults of all files."""
+    return [_of_winch(run, winch) for run in _read(paths)]
+
+
+def read_each(paths: Sequence[str]) -> dict[str, list[Run]]:
+    """Runs of every winch that is in all of them, each file read once. Raises FileError."""
+    runs = _read(paths)
+    names = [name for name in runs[0].winches() if all(name in run.winches() for run in runs)]
+    if not names:
+        listed = "; ".join(f"{run.path}: {', '.join(run.winches())}" for run in runs)
+        raise UsageError(f"no winch is in all of the runs: {listed}")
+    return {name: [run.of_winch(name) for run in runs] for name in names}
+
+
+def _read(paths: Sequence[str]) -> list[Run]:
     from winchkit.runs import read_run
 
     runs: list[Run] = []
     faults: list[Fault] = []
     for path in paths:
         try:
-            runs.append(_of_winch(read_run(path), winch))
+            runs.append(read_run(path))
         except FileError as error:
             faults += error.faults
     if faults:

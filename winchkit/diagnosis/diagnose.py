@@ -128,7 +128,7 @@ def diagnose_each(
     def one(name: str) -> Answer:
         def heard(what: str, share: float) -> None:
             shares[name] = share
-            told(f"winch {name}: {what}", sum(shares.values()) / len(shares))
+            told(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
 
         return diagnose(winches[name], profile, catalogue, band, thin=thin, told=heard)
 

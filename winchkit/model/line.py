@@ -196,7 +196,11 @@ class Line:
         at = motion.at
         if motion.load is None:
             return np.zeros_like(at.time) if motion.drum_tension is None else motion.drum_tension
-        tension = self._through(Stage.ROPE_WEIGHT, self._load(motion, way), at)
+        return self._over_the_pulleys(self._load(motion, way), at)
+
+    def _over_the_pulleys(self, load: Array, at: At) -> Array:
+        """Tension at the drum of one at the platform, N."""
+        tension = self._through(Stage.ROPE_WEIGHT, load, at)
         if self._stages[Stage.PULLEY]:
             for index in reversed(range(len(self.profile.pulley))):
                 here = replace(at, pulley=index, wrap=self.profile.pulley[index].wrap)
@@ -247,11 +251,11 @@ class Line:
 
     def lengths(self, at: At) -> Array:
         """True cable length with every effect up to the frame, m, shape (n,)."""
-        return np.asarray(self._length(at)[1])
+        return self.shown_length(at, self.way(at))
 
     def readings(self, load: Array, at: At) -> Array:
         """What the cell shows under a tension at the platform end, N, shape (n,)."""
-        return np.asarray(self._through(Stage.CELL, self._drum_side(load, at), at))
+        return self.shown_tension(at, self._over_the_pulleys(load, at))
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""
