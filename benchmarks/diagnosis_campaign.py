@@ -49,6 +49,7 @@ def main() -> None:
     parser.add_argument("--small", action="store_true", help="shorter runs")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="folder in which the cases' files stay")
+    parser.add_argument("--log", type=Path, help="file that gets every score as a line of JSON")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     todo = plans(
@@ -58,7 +59,7 @@ def main() -> None:
         tuple(args.effect or ()),
         args.small,
     )
-    scores = run_cases(args.seed, todo, args.jobs, args.keep)
+    scores = run_cases(args.seed, todo, args.jobs, args.keep, args.log)
     result = summary(scores)
     print(table(result), file=sys.stderr)
     if args.json:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 
 from campaign.case import Case, Plan, make_case
@@ -48,8 +50,10 @@ def _one(job: tuple[int, Plan, str | None]) -> Score | None:
         return run_case(seed, plan, Path(folder))
 
 
-def run_cases(seed: int, plans: Sequence[Plan], jobs: int, keep: Path | None) -> list[Score]:
-    """Scores in the order of the plans; progress on stderr."""
+def run_cases(
+    seed: int, plans: Sequence[Plan], jobs: int, keep: Path | None, log: Path | None = None
+) -> list[Score]:
+    """Scores in the order of the plans; progress on stderr, each score as a line of ``log``."""
     work = [(seed * 100_000 + i, p, str(keep) if keep else None) for i, p in enumerate(plans)]
     if jobs > 1:
         with ProcessPoolExecutor(jobs) as pool:
@@ -61,6 +65,9 @@ def run_cases(seed: int, plans: Sequence[Plan], jobs: int, keep: Path | None) ->
             print(f"none {job[0]} cannot be made: {job[1]}", file=sys.stderr)
             continue
         out.append(got)
+        if log is not None:
+            with log.open("a", encoding="utf-8") as lines:
+                lines.write(json.dumps(asdict(got)) + "\n")
         told = "ok  " if got.ok else "FAIL"
         print(
             f"{told} {got.seed} {got.kind} {got.snr:g} {','.join(got.truth)} -> {got.verdict} "

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from campaign.case import Case
+from campaign.truth import Hidden
 
 __all__ = ["Score", "refused", "score", "summary", "table"]
 
@@ -18,6 +19,25 @@ AIMS = {
     "pair": {"all_found": ">= 0.92"},
     "outside": {"unknown_or_partly": ">= 0.97", "wrong_single_name": "<= 0.02"},
 }
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A fitted value of a hidden effect, beside what is true."""
+
+    effect: str
+    parameter: str
+    true: float
+    value: float
+    low: float
+    high: float
+    off: float
+    """Deviation in standard deviations."""
+
+    @property
+    def covers(self) -> bool:
+        """Whether the 95 % interval holds the truth."""
+        return self.low <= self.true <= self.high
 
 
 @dataclass(frozen=True)
@@ -37,9 +57,14 @@ class Score:
     wrong_single_names: tuple[str, ...]
     found: int
     heldout_over_noise: float
-    covered: tuple[int, int]
+    intervals: tuple[Interval, ...]
     seconds: float
     scene: str
+
+    @property
+    def covered(self) -> tuple[int, int]:
+        """How many 95 % intervals hold the truth, and of how many."""
+        return sum(i.covers for i in self.intervals), len(self.intervals)
 
     @property
     def ok(self) -> bool:
@@ -58,15 +83,6 @@ def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) ->
     steps = tuple(tuple(s["effects"]) for s in answer["steps"])
     truth = tuple(case.hidden)
     inside = [t for t in truth if not t.startswith("outside-")]
-    covered = [0, 0]
-    for step in answer["steps"]:
-        for effect, values in step["parameters"].items():
-            for name, estimate in values.items() if effect in case.hidden else ():
-                true, std = case.hidden[effect].get(name), estimate["std"]
-                if true is not None and std is not None and np.isfinite(std) and std > 0:
-                    off = _apart(effect, name, estimate["value"], true)
-                    covered[0] += abs(off) <= 1.96 * std
-                    covered[1] += 1
     ratios = [
         o["heldout_rms_after"] / o["noise_rms"]
         for o in answer["outputs"].values()
@@ -86,7 +102,7 @@ def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) ->
         tuple(s[0] for s in steps if len(s) == 1 and s[0] not in inside),
         sum(any(t in s for s in steps) for t in inside),
         max(ratios, default=float("nan")),
-        (covered[0], covered[1]),
+        tuple(_intervals(case.hidden, answer["steps"])),
         seconds,
         case.scene,
     )
@@ -103,9 +119,26 @@ def refused(case: Case, message: str, seconds: float) -> Score:
     return score(case, nothing, float("nan"), seconds)
 
 
+def _intervals(hidden: Hidden, steps: Sequence[dict[str, Any]]) -> Iterator[Interval]:
+    """The intervals of every hidden effect that was found, where one was given."""
+    for step in steps:
+        for effect, values in step["parameters"].items():
+            for name, estimate in values.items() if effect in hidden else ():
+                true, std = hidden[effect].get(name), estimate["std"]
+                if true is None or std is None or not np.isfinite(std) or std <= 0:
+                    continue
+                value = float(estimate["value"])
+                low, high = estimate.get("interval") or (value - 1.96 * std, value + 1.96 * std)
+                # The same truth, told as near the value as its symmetries allow.
+                near = value - _apart(effect, name, value, true)
+                yield Interval(effect, name, near, value, low, high, (value - near) / std)
+
+
 def _apart(effect: str, name: str, value: float, true: float) -> float:
     """How far off; a guide's path is the same with offset and mismatch both negative."""
-    off = abs(value) - abs(true) if effect == "guide-offset" else value - true
+    off = value - true
+    if effect == "guide-offset":
+        off = min(off, value + true, key=abs)
     return float((off + np.pi) % (2 * np.pi) - np.pi) if name == "phase" else off
 
 

@@ -91,7 +91,6 @@ _ONE = {
     "gear-ratio": ("ratio_error", 5e-3, True),
     "layer-thickness": ("thickness_error", 1e-4, True),
     "cable-thermal": ("expansion", 1.1e-5, True),
-    "cable-sag": ("mass_per_length", 0.14, False),
     "drum-winding-tension": ("fraction", 5e-3, False),
     "length-time-offset": ("delay", 0.02, False),
     "pulley-coulomb": ("friction", 0.02, False),
@@ -172,6 +171,11 @@ def _slip(d: _Shape) -> Sized:
     when = d.random.uniform(0.2, 0.8) * d.scene.seconds
     sign = float(d.random.choice([-1.0, 1.0]))
     return lambda z: {"step": sign * 0.02 * z, "time": when}
+
+
+def _sag(_: _Shape) -> Sized:
+    # What it takes from the length goes with the square of the weight.
+    return lambda z: {"mass_per_length": 0.14 * z**0.5}
 
 
 def _guide(d: _Shape) -> Sized:
@@ -259,6 +263,7 @@ _SHAPED: dict[str, Callable[[_Shape], Sized]] = {
     "motor-cogging": _cogging,
     "encoder-slip": _slip,
     "guide-offset": _guide,
+    "cable-sag": _sag,
     "cable-elongation-quartic": _quartic,
     "cable-elongation-exponential": _exponential,
     "cable-hysteresis": _rope_loop,

@@ -6,14 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from diagnosis_runs import GROOVED, Array, Ride, made, term
+from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
+from scipy.optimize import least_squares
 
 from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.fit import fit
+from winchkit.diagnosis.fit import Fit, fit
 from winchkit.diagnosis.gate import blocks_of
-from winchkit.diagnosis.noise import noise_from_repeats
+from winchkit.diagnosis.noise import Noise, noise_from_repeats
 from winchkit.diagnosis.problem import Hypothesis, Problem
-from winchkit.diagnosis.uncertainty import estimates, unknown_std
+from winchkit.diagnosis.profile_likelihood import profile_ends
+from winchkit.diagnosis.uncertainty import estimates, spread_of
 
 RIDE = Ride(samples=400)
 GAIN = term("cell-gain", gain_error=0.01)
@@ -53,8 +55,8 @@ def test_two_deviations_hold_the_truth_in_95_of_100_cases(
         first = fit(problem, start, np.ones(problem.rows))
         noise = noise_from_repeats(problem, first.residual, np.zeros((problem.rows, 0)))
         found = fit(problem, start, noise.weight(problem))
-        std = unknown_std(problem, found, noise, blocks)
-        ((_, values),) = estimates(problem, found, std)
+        spread = spread_of(problem, found, noise, blocks)
+        ((_, values),) = estimates(problem, found, spread)
         off.append(values["gain_error"].value - 0.01)
         said.append(values["gain_error"].std)
     ratio = np.array(off) / np.array(said)
@@ -79,15 +81,81 @@ def test_estimates_have_values_units_and_deviations_in_files_terms() -> None:
     first = fit(problem, start, np.ones(problem.rows))
     noise = noise_from_repeats(problem, first.residual, np.zeros((problem.rows, 0)))
     found = fit(problem, start, noise.weight(problem))
-    std = unknown_std(problem, found, noise, blocks_of(problem))
-    (rope, stretch), (cell, gain) = estimates(problem, found, std)
+    spread = spread_of(problem, found, noise, blocks_of(problem))
+    (rope, stretch), (cell, gain) = estimates(problem, found, spread)
     assert (rope.effect.id, cell.effect.id) == ("cable-elongation-linear", "cell-gain")
     stiffness = stretch["axial_stiffness"]
     assert (stiffness.unit, gain["gain_error"].unit) == ("N", "1")
     # A compliance of relative deviation s is a stiffness of the same.
     coordinate = problem.nuisance_columns.shape[1]
     assert stiffness.std / stiffness.value == pytest.approx(
-        float(std[coordinate] / found.vector[coordinate]), rel=0.01
+        float(spread.std[coordinate] / found.vector[coordinate]), rel=0.01
     )
     assert abs(stiffness.value - 2e5) < 4 * stiffness.std
     assert abs(gain["gain_error"].value - 0.01) < 4 * gain["gain_error"].std
+
+
+def _settled(problem: Problem, start: Hypothesis) -> tuple[Fit, Noise]:
+    first = fit(problem, start, np.ones(problem.rows))
+    noise = noise_from_repeats(problem, first.residual, np.zeros((problem.rows, 0)))
+    return fit(problem, start, noise.weight(problem)), noise
+
+
+def test_ends_are_where_a_full_refit_rises_by_the_wanted_squares() -> None:
+    """Against scipy's own least squares with the coordinate held: a weak, crooked friction."""
+    friction = term("motor-stribeck", torque=0.006, stribeck_speed=8.0)
+    runs = [made(seed, GROOVED, (friction,), {"motor_torque": 6e-3}, ride=RIDE) for seed in (1, 2)]
+    problem = Problem(prepare(runs, GROOVED))
+    found, noise = _settled(problem, Hypothesis().with_term(friction, 2))
+    weight = noise.weight(problem)
+    whitened = found.jacobian * weight[:, None]
+    covariance = np.linalg.inv(whitened.T @ whitened)
+    low, high = profile_ends(problem, found, weight, covariance, np.full(len(covariance), 1.96))
+
+    def risen(index: int, at: float) -> float:
+        others = np.arange(len(found.vector)) != index
+
+        def residual(free: Array) -> Array:
+            vector = found.vector.copy()
+            vector[index], vector[others] = at, free
+            return problem.residual(problem.hypothesis(vector, found.hypothesis)) * weight
+
+        best = least_squares(residual, found.vector[others], x_scale="jac")
+        return 2 * float(best.cost) - found.cost
+
+    first = problem.nuisance_columns.shape[1]
+    for index in range(first, len(found.vector)):
+        for end in (low[index], high[index]):
+            assert risen(index, float(end)) == pytest.approx(1.96**2, rel=0.35)
+    # The logarithm of the speed at which it fades is no parabola's: the two sides differ.
+    speed = first + 1
+    below, above = found.vector[speed] - low[speed], high[speed] - found.vector[speed]
+    assert abs(below / above - 1) > 0.05
+
+
+def test_outputs_that_contradict_each_other_widen_an_interval() -> None:
+    """The length says one radius, the torque another: the truth may be either."""
+    one, other = term("drum-radius", radius_error=6e-4), term("drum-radius", radius_error=9e-4)
+    runs = []
+    for mass in (10.0, 25.0):
+        for seed in range(2):
+            run = made(int(mass) + seed, GROOVED, (one,), load_mass=mass, ride=RIDE)
+            torque = made(int(mass) + seed, GROOVED, (other,), load_mass=mass, ride=RIDE)
+            runs.append(with_channel(run, "motor_torque", torque["motor_torque"], "N m"))
+    problem = Problem(prepare(runs, GROOVED))
+    start = Hypothesis().with_term(one, 4)
+    found, noise = _settled(problem, start)
+    blocks = blocks_of(problem)
+    ((_, told),) = estimates(problem, found, spread_of(problem, found, noise, blocks))
+    low, high = told["radius_error"].interval or (np.nan, np.nan)
+    assert low < 6e-4 < high
+    # The same runs without the contradiction know it far better.
+    whole = [
+        made(int(mass) + seed, GROOVED, (one,), load_mass=mass, ride=RIDE)
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    problem = Problem(prepare(whole, GROOVED))
+    found, noise = _settled(problem, start)
+    ((_, sure),) = estimates(problem, found, spread_of(problem, found, noise, blocks))
+    assert sure["radius_error"].std < 0.5 * told["radius_error"].std

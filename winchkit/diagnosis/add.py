@@ -15,7 +15,7 @@ from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Estimate, OutputFit
 from winchkit.diagnosis.signature import Score, missing_needs, score
-from winchkit.diagnosis.uncertainty import estimates, unknown_std
+from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import output_fits
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -126,9 +126,9 @@ def grow(
         raise UsageError(f"effect '{effect_id}' changes nothing that these runs measured")
     best = min(trials, key=lambda trial: trial.fit.cost)
     final, final_noise = inquiry.settle(best.fit.hypothesis, noise)
-    std = unknown_std(inquiry.problem, final, final_noise, inquiry.blocks)
+    spread = spread_of(inquiry.problem, final, final_noise, inquiry.blocks)
     outputs = output_fits(inquiry, (begin, noise), (final, final_noise))
-    terms = tuple(estimates(inquiry.problem, final, std))
+    terms = tuple(estimates(inquiry.problem, final, spread))
     addition = Addition(outputs, terms, inquiry.problem.dataset.notes)
     return Grown(inquiry.problem, begin, final, addition)
 

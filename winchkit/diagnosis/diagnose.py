@@ -28,7 +28,7 @@ from winchkit.diagnosis.result import (
     Where,
 )
 from winchkit.diagnosis.search import Found, search
-from winchkit.diagnosis.uncertainty import estimates, unknown_std
+from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import judge
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.coordinates import Coordinates
@@ -147,8 +147,8 @@ def _steps(inquiry: Inquiry, found: Found, sets: Sequence[Confusion]) -> tuple[S
     """Every addition with its confusion set, values and held-out gain."""
     final, noise = found.final, found.noise
     gains = _gains(inquiry, final, noise)
-    std = unknown_std(inquiry.problem, final, noise, inquiry.blocks)
-    own = estimates(inquiry.problem, final, std)
+    spread = spread_of(inquiry.problem, final, noise, inquiry.blocks)
+    own = estimates(inquiry.problem, final, spread)
     out = []
     for confusion, gain, (term, values) in zip(sets, gains, own[inquiry.given :], strict=True):
         parameters = {term.effect.id: values} | {

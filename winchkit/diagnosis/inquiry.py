@@ -19,6 +19,7 @@ from winchkit.diagnosis.noise import (
     presence,
 )
 from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.resolution import without_rounding
 from winchkit.diagnosis.signature import Projected, Score, Signatures, score, signatures
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -119,8 +120,9 @@ class Inquiry:
         return fit(self.problem, first.hypothesis, noise.weight(self.problem)), noise
 
     def presence(self, present: Fit, noise: Noise) -> Presence:
-        """Whether a fit leaves more than noise."""
-        return presence(self.problem, present.residual, present.jacobian, noise)
+        """Whether a fit leaves more than noise, and more than sampling may have rounded."""
+        left = without_rounding(self.problem, present, noise.weight(self.problem))
+        return presence(self.problem, left, present.jacobian, noise)
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
         """Signatures with a fit's unknowns projected out."""

@@ -22,7 +22,7 @@ from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.model.line import Line
 
-__all__ = ["Hypothesis", "Problem", "Segment"]
+__all__ = ["Hypothesis", "Problem", "Segment", "started"]
 
 Array = NDArray[np.float64]
 _START = "start"
@@ -113,7 +113,7 @@ class Problem:
         """What the terms add to the nominal prediction, rows."""
         if not hypothesis.terms:
             return np.zeros(self.rows)
-        terms = [_started(hypothesis, run) for run in range(self.runs)]
+        terms = [started(hypothesis, run) for run in range(self.runs)]
         out = np.empty(self.rows)
         for segment in self.segments:
             predictor = self._predictors[segment.run]
@@ -270,7 +270,7 @@ def _segments(dataset: Dataset) -> list[Segment]:
     return segments
 
 
-def _started(hypothesis: Hypothesis, run: int) -> Sequence[Term]:
+def started(hypothesis: Hypothesis, run: int) -> Sequence[Term]:
     """Terms with the initial states of one run."""
     out = []
     for term, start in zip(hypothesis.terms, hypothesis.starts, strict=True):

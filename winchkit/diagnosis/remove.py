@@ -10,7 +10,7 @@ from winchkit.diagnosis.add import fitted_json
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.result import Estimate, OutputFit
-from winchkit.diagnosis.uncertainty import estimates, unknown_std
+from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import output_fits
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -57,6 +57,6 @@ def remove(
     final, final_noise = inquiry.settle(begin.hypothesis.without(there[-1]))
     # Judged by the noise of the better model: without the effect its trace would pass for noise.
     outputs = output_fits(inquiry, (begin, noise), (final, noise))
-    std = unknown_std(inquiry.problem, final, final_noise, inquiry.blocks)
-    left = tuple(estimates(inquiry.problem, final, std))
+    spread = spread_of(inquiry.problem, final, final_noise, inquiry.blocks)
+    left = tuple(estimates(inquiry.problem, final, spread))
     return Removal(effect_id, outputs, left, inquiry.problem.dataset.notes)

@@ -1,8 +1,18 @@
-"""How sure fitted values are: block jackknife beside the covariance of the whitened fit."""
+"""How sure fitted values are: profile likelihood, widened by what a likelihood does not know.
+
+A likelihood believes the model and the noise. So its 95 % interval is widened
+
+- to the block jackknife's, where blocks of time vary by more than the noise says;
+- by half of what parts of the data (outputs, groups of runs) contradict each other, where they do;
+- by what the sampling of the runs may have rounded.
+
+Never the covariance of independent residuals: they are correlated.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,44 +21,111 @@ from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import Folds, left_out_steps
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.profile_likelihood import profile_ends
+from winchkit.diagnosis.resolution import rounded
 from winchkit.diagnosis.result import Estimate
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Parameter
 
-__all__ = ["estimates", "unknown_std"]
+__all__ = ["Spread", "estimates", "spread_of"]
 
 Array = NDArray[np.float64]
+_95 = 1.959964
+_CONTRADICTS = 3.5
+_LEAST_SAY = 1e-3
 
 
-def unknown_std(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Array:
-    """Standard deviation of every unknown: the larger of jackknife and whitened covariance.
+@dataclass(frozen=True)
+class Spread:
+    """How far every unknown of a fit may be off, in the coordinates of the fit."""
 
-    Never the covariance of independent residuals: they are correlated.
-    """
-    whitened = fit.jacobian * noise.weight(problem)[:, None]
+    std: Array
+    """(unknowns,)."""
+    low: Array
+    """Lower ends of 95 % intervals, (unknowns,)."""
+    high: Array
+
+
+def spread_of(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
+    """Standard deviations and 95 % intervals of every unknown."""
+    weight = noise.weight(problem)
+    whitened = fit.jacobian * weight[:, None]
     normal = whitened.T @ whitened
-    covariance = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal, rcond=1e-12)), 0.0))
+    covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
+    likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    statistical = np.maximum(likelihood, _jackknife(problem, fit, noise, blocks))
+    shift = covariance @ (whitened.T @ (rounded(problem, fit.hypothesis) * weight))
+    contradiction = _contradiction(problem, whitened, fit.residual * weight, covariance)
+    systematic = np.hypot(shift, contradiction)
+    wider = np.divide(
+        statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
+    )
+    low, high = profile_ends(problem, fit, weight, covariance, _95 * wider)
+    return Spread(
+        np.hypot(statistical, systematic),
+        fit.vector - np.hypot(fit.vector - low, _95 * systematic),
+        fit.vector + np.hypot(high - fit.vector, _95 * systematic),
+    )
+
+
+def _jackknife(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Array:
+    """Standard deviation of every unknown from leaving out each block of time."""
     steps = left_out_steps(problem, fit, noise, blocks)
     n = blocks.count
-    jackknife = np.sqrt((n - 1) / n * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0))
-    return np.asarray(np.maximum(covariance, jackknife))
+    return np.asarray(np.sqrt((n - 1) / n * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
 
 
-def estimates(problem: Problem, fit: Fit, std: Array) -> list[tuple[Term, dict[str, Estimate]]]:
-    """Every term of a fit with its values, standard deviations and units."""
+def _contradiction(problem: Problem, whitened: Array, residual: Array, covariance: Array) -> Array:
+    """Half of the largest difference between what a part and the rest of the data say.
+
+    Zero where noise alone may have made it. A part's pull on an unknown u = C Jᵀr, of say
+    w = (C N C)/C, is w (1 − w) times the difference of what it and the rest would have found.
+    """
+    out = np.zeros(len(covariance))
+    variance = np.maximum(np.diag(covariance), 1e-300)
+    for part in _parts(problem):
+        own = whitened[part]
+        normal = own.T @ own
+        pull = covariance @ (own.T @ residual[part])
+        through = covariance @ normal @ covariance
+        say = np.clip(np.diag(through) / variance, 0.0, 1.0)
+        left = np.diag(through - through @ normal @ covariance)
+        both = (say > _LEAST_SAY) & (say < 1 - _LEAST_SAY) & (left > 0)
+        sure = both & (pull**2 > _CONTRADICTS**2 * np.where(both, left, 1.0))
+        apart = np.abs(pull) / np.where(sure, say * (1 - say), 1.0) / 2
+        out = np.maximum(out, np.where(sure, apart, 0.0))
+    return out
+
+
+def _parts(problem: Problem) -> Iterator[NDArray[np.intp]]:
+    """Rows of each output, and of each group of programme and load, where there are several."""
+    groups = {run: i for i, group in enumerate(problem.dataset.repeats) for run in group.runs}
+    for key in (lambda s: s.output, lambda s: groups[s.run]):
+        kinds = dict.fromkeys(key(s) for s in problem.segments)
+        for kind in kinds if len(kinds) > 1 else ():
+            rows = [
+                np.arange(s.rows.start, s.rows.stop) for s in problem.segments if key(s) == kind
+            ]
+            yield np.concatenate(rows)
+
+
+def estimates(problem: Problem, fit: Fit, spread: Spread) -> list[tuple[Term, dict[str, Estimate]]]:
+    """Every term of a fit with its values, standard deviations, 95 % intervals and units."""
     at = problem.nuisance_columns.shape[1]
     out = []
     for term in fit.hypothesis.terms:
         coordinates = Coordinates(term.effect)
         part = slice(at, at + len(coordinates))
         at += len(coordinates)
-        deviation = coordinates.deviations(fit.vector[part], std[part], term.values)
+        vector = fit.vector[part]
+        deviation = coordinates.deviations(vector, spread.std[part], term.values)
+        ends = _ends(coordinates, vector, (spread.low[part], spread.high[part]), term.values)
         out.append(
             (
                 term,
                 {
-                    p.name: Estimate(term.values[p.name], _believed(deviation, p), p.unit)
+                    p.name: _estimate(p, term.values[p.name], deviation, ends.get(p.name))
                     for p in term.effect.parameters
                     if p.name in deviation or p.whole
                 },
@@ -57,7 +134,32 @@ def estimates(problem: Problem, fit: Fit, std: Array) -> list[tuple[Term, dict[s
     return out
 
 
-def _believed(deviation: Mapping[str, float], parameter: Parameter) -> float:
-    """Standard deviation of a value; NaN where the data leave it anywhere within its bounds."""
+def _ends(
+    coordinates: Coordinates, vector: Array, ends: tuple[Array, Array], base: Mapping[str, float]
+) -> dict[str, tuple[float, float]]:
+    """Intervals of values with a coordinate of their own; an amplitude with a phase has none."""
+    out: dict[str, tuple[float, float]] = {}
+    for index, name in enumerate(coordinates.names):
+        if name in (coordinates.effect.polar or ()):
+            continue
+        told = []
+        for end in ends:
+            moved = vector.copy()
+            moved[index] = end[index]
+            told.append(coordinates.values(moved, base)[name])
+        out[name] = min(told), max(told)
+    return out
+
+
+def _estimate(
+    parameter: Parameter,
+    value: float,
+    deviation: Mapping[str, float],
+    ends: tuple[float, float] | None,
+) -> Estimate:
+    """A value; how sure is NaN where the data leave it anywhere within its bounds."""
     std = deviation.get(parameter.name, 0.0)
-    return float("nan") if std >= parameter.high - parameter.low else std
+    if std >= parameter.high - parameter.low:
+        return Estimate(value, float("nan"), parameter.unit)
+    low, high = ends or (value - _95 * std, value + _95 * std)
+    return Estimate(value, std, parameter.unit, (low, high))

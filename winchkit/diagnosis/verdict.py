@@ -22,7 +22,9 @@ __all__ = ["Judgement", "judge", "output_fits"]
 
 _HALF = 0.5
 _GENERALISES = 0.15
-_TRACE = 0.25
+_TRACE = 0.1
+_DOUBTFUL_TRACE = 0.25
+_DOUBTFUL = 1e-3
 _NEGLIGIBLE = 0.02
 _AT_NOISE = 1.1
 _NEAR_NOISE = 1.5
@@ -108,7 +110,9 @@ def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Ve
         fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
         for fitted in outputs.values()
     )
-    allowed = _TRACE if over < _AT_NOISE else _NEGLIGIBLE if over < _NEAR_NOISE else 0.0
+    # What imitates something unknown leaves as much; where the trace is certain it must be small.
+    trace = _DOUBTFUL_TRACE if found.presence.p_value > _DOUBTFUL else _TRACE
+    allowed = trace if over < _AT_NOISE else _NEGLIGIBLE if over < _NEAR_NOISE else 0.0
     return "explained" if share < allowed else "partly"
 
 

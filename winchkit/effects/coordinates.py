@@ -56,6 +56,11 @@ class Coordinates:
         return len(self._fitted)
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters in the order of the vector."""
+        return tuple(p.name for p in self._fitted)
+
+    @property
     def freedom(self) -> int:
         """Degrees of freedom, a scanned order included."""
         return len(self) + sum(p.whole for p in self.effect.parameters)
