@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 from winchkit.catalog import find
@@ -54,6 +55,19 @@ def told(verdict: str, *steps: Step, **more: object) -> Diagnosis:
 def recorded(bench: str) -> tuple[Run, ...]:
     """Runs of the demo's programme on a shipped simulated bench."""
     declared = read_simbench(find("sim", bench))
+    programme = read_programme(programme_path("programme-demo"))
+    return tuple(record(declared, profiles_of(declared), programme, seed=3, rate=25.0))
+
+
+@cache
+def recorded_both(first: str, second: str) -> tuple[Run, ...]:
+    """The same on a bench that hides what two shipped ones hide."""
+    one, other = (read_simbench(find("sim", name)) for name in (first, second))
+    truth = {
+        name: replace(own, hidden=(*own.hidden, *other.truth[name].hidden))
+        for name, own in one.truth.items()
+    }
+    declared = replace(one, truth=truth)
     programme = read_programme(programme_path("programme-demo"))
     return tuple(record(declared, profiles_of(declared), programme, seed=3, rate=25.0))
 

@@ -64,7 +64,8 @@ def test_variants_without_the_plain_one_are_still_of_one_kind() -> None:
 
 def test_several_effects_are_counted() -> None:
     text = sentence(told("explained", STRETCH, FRICTION))
-    assert text.startswith("Two effects are missing: your rope stretches (EA = 249.9 ± 7.0 kN) and")
+    first = "(1) your rope stretches (EA = 249.9 ± 7.0 kN)"
+    assert text.startswith(f"Two effects are missing: {first}; (2) your pulleys rub (")
     assert "Add them" in text
 
 

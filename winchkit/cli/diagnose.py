@@ -65,7 +65,9 @@ def command(
 
 def _tell(answers: Mapping[str, Answer], as_json: bool, *, each: bool) -> None:
     if as_json:
-        found = {name: answer.diagnosis.to_json() for name, answer in answers.items()}
+        from winchkit.diagnosis.report.as_json import report_json
+
+        found = {name: report_json(answer) for name, answer in answers.items()}
         echo_json({"schema": 1, "winches": found} if each else next(iter(found.values())))
         return
     from winchkit.diagnosis.report.text import report_text

@@ -34,6 +34,8 @@ _ACROSS, _UP = 16, 10
 _FEWEST = 3
 _TAILS = 0.002
 _DIGITS = 5
+_LEAST_CHANGE = {"temperature": 1.0}
+"""What less is noise of the instrument rather than a change, K."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +149,8 @@ def _map_of(output: str, places: _Places, error: Array, kept: int) -> ResidualMa
     names, (x, y) = places
     edges = (_edges(names[0], x, _ACROSS), _edges(names[1], y, _UP))
     total = float(error @ error)
-    if total == 0.0 or any(np.ptp(e) == 0.0 for e in edges):
+    still = (np.ptp(e) <= _LEAST_CHANGE.get(n, 0.0) for n, e in zip(names, edges, strict=True))
+    if total == 0.0 or any(still):
         return None
     cell = _index(x, edges[0]) * _UP + _index(y, edges[1])
     count = np.bincount(cell, minlength=_ACROSS * _UP)

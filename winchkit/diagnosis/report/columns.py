@@ -7,9 +7,9 @@ from textwrap import wrap
 
 from winchkit.diagnosis.report.wording import unbroken
 
-__all__ = ["aligned", "paragraph"]
+__all__ = ["aligned", "hanging", "paragraph"]
 
-_WIDTH = 96
+_WIDTH = 80
 
 
 def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
@@ -27,7 +27,18 @@ def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
     return lines
 
 
+def hanging(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
+    """Rows as by :func:`aligned`, the last cell of each as words that go on below themselves."""
+    heads = aligned([row[:-1] for row in rows], words)
+    width = max((len(head) for head in heads), default=0) + 2
+    return [
+        line
+        for head, row in zip(heads, rows, strict=True)
+        for line in paragraph(row[-1], head.ljust(width), " " * width)
+    ]
+
+
 def paragraph(text: str, first: str = "", then: str = "") -> list[str]:
-    """Text in lines of at most 96 characters."""
+    """Text in lines of at most 80 characters."""
     lines = wrap(unbroken(text), _WIDTH, initial_indent=first, subsequent_indent=then)
     return [line.replace("\u00a0", " ") for line in lines]

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.admit import OUTPUT_UNITS
-from winchkit.diagnosis.follows import Followed, follows, harmonics, variables_of
+from winchkit.diagnosis.follows import Followed, variables_of
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.report.axes import reading
+from winchkit.diagnosis.report.curves import bin_edges, strongest
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
-from winchkit.diagnosis.report.sentence import CLEAR_ORDER
-from winchkit.diagnosis.report.thin import bin_means, filled_edges, thin, thin_points
+from winchkit.diagnosis.report.thin import bin_means, thin, thin_points
 from winchkit.diagnosis.report.wording import Scale, percent, scale_for
 
 __all__ = ["AT_NOISE", "OutputPlots", "Plot", "Residuals", "plots_of"]
@@ -26,12 +26,9 @@ AT_NOISE = 1.15
 """Up to how many times its noise an error counts as noise."""
 _POINTS = 2000
 _DOTS = 600
-_BINS = 20
-_WORTH_DRAWING = 0.05
 _DIGITS = 4
 _SAME = 1e-3
 _SPREAD = 0.2
-_PER_PERIOD = 8
 _DEGREES = 360.0
 _TURN = 2 * np.pi
 
@@ -87,11 +84,11 @@ class _Curves:
 def plots_of(residuals: Residuals) -> tuple[OutputPlots, ...]:
     """Drawings per output; ``after`` only of outputs that the change of the model changed."""
     problem = residuals.problem
-    strongest = _strongest(problem, residuals.before)
+    found = strongest(problem, residuals.before)
     out = []
     for output in problem.dataset.outputs:
         curves = _curves(residuals, output)
-        followed = strongest.get(output)
+        followed = found.get(output)
         out.append(
             OutputPlots(
                 output,
@@ -102,18 +99,6 @@ def plots_of(residuals: Residuals) -> tuple[OutputPlots, ...]:
             )
         )
     return tuple(out)
-
-
-def _strongest(problem: Problem, residual: Array) -> dict[str, Followed]:
-    """Per output what to draw its residual over: a clear order, else the largest share."""
-    orders = [f for f in harmonics(problem, residual) if f.share > CLEAR_ORDER]
-    trends = [f for f in follows(problem, residual) if f.share > _WORTH_DRAWING]
-    out: dict[str, Followed] = {}
-    for found in (*sorted(orders, key=lambda f: -f.share), *sorted(trends, key=lambda f: -f.share)):
-        known = out.get(found.output)
-        if known is None or (known.order is not None and found.share > 2 * known.share):
-            out[found.output] = found
-    return out
 
 
 def _curves(residuals: Residuals, output: str) -> _Curves:
@@ -192,7 +177,7 @@ def _over_variable(problem: Problem, curves: _Curves, followed: Followed) -> Plo
     good = np.isfinite(before) & np.isfinite(variable)
     x, lines = variable[good], [line[good] for line in lines]
     dots = thin_points(x, _DOTS)
-    centres, means = bin_means(x, lines, _edges(x, followed))
+    centres, means = bin_means(x, lines, bin_edges(x, followed, _DEGREES))
     placed = _spread(x[dots]) if followed.variable == "direction" else x[dots]
     whole = np.concatenate([placed, centres])
     order = np.argsort(whole, kind="stable")
@@ -218,13 +203,6 @@ def _over_variable(problem: Problem, curves: _Curves, followed: Followed) -> Plo
             "noise": None if curves.noise is None else _number(curves.noise),
         },
     )
-
-
-def _edges(x: Array, followed: Followed) -> Array:
-    """Inner edges of bins: even within a turn, fine enough for the order; else equally filled."""
-    if followed.order is None:
-        return filled_edges(x, _BINS)
-    return np.linspace(0, _DEGREES, max(_BINS, _PER_PERIOD * followed.order) + 1)[1:-1]
 
 
 def _spread(values: Array) -> Array:

@@ -44,6 +44,11 @@ class Command:
         named = f"{_quoted(effect)} --profile {_quoted(profile)}"
         return f"winchkit add {named} --fit {self._runs} -o {_quoted(better)}{self._options}"
 
+    def begin_effect(self, profile: str, file: str) -> str:
+        """Begin an effect of one's own from what is left."""
+        named = f"{_quoted(file)} --profile {_quoted(profile)}"
+        return f"winchkit effects new {named} --fit {self._runs}{self._options}"
+
     @property
     def _runs(self) -> str:
         return " ".join(_quoted(r.path or r.name) for r in self.dataset.recordings)

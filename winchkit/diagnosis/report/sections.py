@@ -7,11 +7,13 @@ from math import isnan
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.report import tables
+from winchkit.diagnosis.report.as_json import report_json
 from winchkit.diagnosis.report.markup import Markup, element, join, section, table
 from winchkit.diagnosis.report.parts import bullets, lead
 from winchkit.diagnosis.report.phrases import VERDICT_NAMES, listed
 from winchkit.diagnosis.report.repeat import Command, repeat
-from winchkit.diagnosis.report.sentence import sentence, where_text
+from winchkit.diagnosis.report.rest_figures import rest_figures
+from winchkit.diagnosis.report.sentence import changes_text, sentence, where_text
 from winchkit.diagnosis.report.shown import effects_of, smallest_shown
 from winchkit.diagnosis.report.waterfall import waterfall_of
 from winchkit.diagnosis.report.wording import percent
@@ -49,11 +51,11 @@ def sections(
                 tables.confusion(diagnosis, effects),
             ),
             section("detectable", "What these runs could show", tables.detectable(answer)),
-            section("unexplained", "What is left unexplained", _unexplained(diagnosis)),
+            section("unexplained", "What is left unexplained", _unexplained(answer)),
             section("next", "What to run next", _next(diagnosis)),
             section("notes", "Notes", bullets(diagnosis.notes)),
             section("truth", "What was hidden", _truth(truth)),
-            repeat(command, _commands(diagnosis, command), "diagnosis", diagnosis.to_json()),
+            repeat(command, _commands(diagnosis, command), "diagnosis", report_json(answer)),
         ]
     )
 
@@ -69,7 +71,7 @@ def _verdict(answer: Answer) -> Markup:
         *([shown] if seen else []),
         _named(answer),
         tables.figures(diagnosis),
-        element("p", _changes(diagnosis), class_="quiet"),
+        element("p", changes_text(diagnosis), class_="quiet"),
     )
 
 
@@ -82,32 +84,13 @@ def _named(answer: Answer) -> Markup:
     )
 
 
-def _changes(diagnosis: Diagnosis) -> str:
-    """What would change the verdict."""
-    if diagnosis.verdict == "adequate":
-        return (
-            "What would change this: runs with other loads, strokes, speeds or temperatures in "
-            "which the error rises above the noise."
-        )
-    if not diagnosis.steps:
-        return (
-            "No name is given, because with so much left it would be a guess. What would change "
-            "this: an effect of your own that explains the place below, or a run that isolates it."
-        )
-    if any(len(step.effects) > 1 for step in diagnosis.steps):
-        return "What would change this: a run in which the rivals below differ."
-    return (
-        "What would change this: a run with another load, stroke or speed that the fitted values "
-        "do not predict down to the noise."
-    )
-
-
 def _story(story: Sequence[str]) -> Markup:
     items = [element("li", line) for line in story]
     return element("ol", *items) if items else Markup("")
 
 
-def _unexplained(diagnosis: Diagnosis) -> Markup:
+def _unexplained(answer: Answer) -> Markup:
+    diagnosis = answer.diagnosis
     if diagnosis.verdict == "explained" and diagnosis.unexplained_share >= _TRACE:
         left = percent(diagnosis.unexplained_share)
         trace = f"A trace of {left} of what stood above the noise is left, below the noise itself."
@@ -117,7 +100,22 @@ def _unexplained(diagnosis: Diagnosis) -> Markup:
     left = f"{percent(diagnosis.unexplained_share)} of what stood above the noise is left."
     places = bullets([where_text(where) for where in diagnosis.where])
     lead = "Where it shows; variables that move together show the same error more than once:"
-    return join([element("p", left), element("p", lead) if places else Markup(""), places])
+    lives = element("p", lead) if places else Markup("")
+    return join([element("p", left), lives, places, *rest_figures(answer), _offer(diagnosis)])
+
+
+def _offer(diagnosis: Diagnosis) -> Markup:
+    """How to take up a rest that is not understood."""
+    if not diagnosis.empirical:
+        return Markup("")
+    return element(
+        "p",
+        "Until it is understood, ",
+        element("code", f"winchkit add {diagnosis.empirical[0]}"),
+        " adds it as a curve that is marked as not understood, and ",
+        element("code", "winchkit effects new"),
+        " begins an effect of your own from it; both stand below in full.",
+    )
 
 
 def _next(diagnosis: Diagnosis) -> Markup:
@@ -149,4 +147,7 @@ def _commands(diagnosis: Diagnosis, command: Command) -> list[str]:
         better = f"better-{number}.toml"
         commands.append(command.add(step.effects[0], profile, better))
         profile = better
+    if diagnosis.empirical and diagnosis.verdict in {"partly", "unknown"}:
+        commands.append(command.add(diagnosis.empirical[0], profile, "with-curve.toml"))
+        commands.append(command.begin_effect(profile, "my_effect.py"))
     return commands

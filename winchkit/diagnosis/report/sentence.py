@@ -18,6 +18,7 @@ from winchkit.diagnosis.result import Diagnosis, OutputFit, Step, Where
 __all__ = [
     "CLEAR_ORDER",
     "capital",
+    "changes_text",
     "gain_text",
     "moved_outputs",
     "often_per_turn",
@@ -50,6 +51,30 @@ def sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "partly":
         return _rest(diagnosis, "Something is missing, and known effects explain only part of it")
     return _rest(diagnosis, "Something is missing that no known effect explains")
+
+
+def changes_text(diagnosis: Diagnosis) -> str:
+    """What would change the verdict, in a sentence."""
+    if diagnosis.verdict == "adequate":
+        return (
+            "What would change this: runs with other loads, strokes, speeds or temperatures in "
+            "which the error rises above the noise."
+        )
+    if not diagnosis.steps:
+        return (
+            "No name is given, because with so much left it would be a guess. What would change "
+            "this: an effect of your own that explains the rest where it lives, or a run that "
+            "isolates it."
+        )
+    if any(len(step.effects) > 1 for step in diagnosis.steps):
+        return (
+            "What would change this: a run in which the effects differ that these runs cannot "
+            "tell apart."
+        )
+    return (
+        "What would change this: a run with another load, stroke or speed that the fitted values "
+        "do not predict down to the noise."
+    )
 
 
 def where_text(where: Where) -> str:
@@ -152,7 +177,8 @@ def _named(steps: tuple[Step, ...]) -> str:
     if len(steps) == 1:
         return capital(_step(steps[0])) + "."
     count = _COUNTS.get(len(steps), str(len(steps)))
-    return f"{count} effects are missing: {listed([_step(step, ' ({})') for step in steps])}."
+    numbered = [f"({n}) {_step(step, ' ({})')}" for n, step in enumerate(steps, start=1)]
+    return f"{count} effects are missing: {'; '.join(numbered)}."
 
 
 def _them(steps: Sequence[Step]) -> str:

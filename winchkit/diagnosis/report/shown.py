@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import ceil, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.report.phrases import listed, parameter_name, parameter_unit
+from winchkit.diagnosis.report.phrases import parameter_name, parameter_unit
 from winchkit.diagnosis.report.wording import quantity
 from winchkit.diagnosis.result import Detectable
 from winchkit.diagnosis.signature import missing_needs
@@ -53,14 +53,14 @@ def smallest_shown(answer: Answer) -> list[str]:
     return [f"{row.effect}: {row.parameter} {row.text}" for row in seen[:_FEW]]
 
 
-def unseen(answer: Answer) -> list[str]:
-    """Effects of the catalogue that no run could show, each with what they lack."""
+def unseen(answer: Answer) -> list[tuple[str, list[str]]]:
+    """Effects of the catalogue that no run could show, each with what it lacks."""
     problem, tried = answer.inquiry.problem, effects_of(answer)
     out = []
     for effect in load_catalogue():
         lacking = missing_needs(effect, problem) if effect.id not in tried else []
         if lacking:
-            out.append(f"{effect.id}: needs {listed(lacking)}")
+            out.append((effect.id, list(lacking)))
     return out
 
 

@@ -17,7 +17,14 @@ from winchkit.diagnosis.report.phrases import (
 )
 from winchkit.diagnosis.report.shown import unseen, visible
 from winchkit.diagnosis.report.waterfall import Waterfall
-from winchkit.diagnosis.report.wording import Scale, grouped, quantity, scale_for, significant
+from winchkit.diagnosis.report.wording import (
+    Scale,
+    grouped,
+    quantity,
+    scale_for,
+    significant,
+    unbroken,
+)
 from winchkit.diagnosis.result import Candidate, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect
 
@@ -59,7 +66,7 @@ def named(
     entries: list[Markup] = []
     for effect, effect_id, estimates in found:
         values = [estimate_text(name, estimate) for name, estimate in estimates.items()]
-        entries.append(element("dt", element("code", effect_id), " ", ", ".join(values)))
+        entries.append(element("dt", element("code", effect_id), " ", unbroken(", ".join(values))))
         if effect is not None:
             words = join([effect.what, " ", element("span", effect.formula, class_="formula")])
             entries.append(element("dd", words, element("small", f"Source: {effect.source}")))
@@ -183,6 +190,9 @@ def detectable(answer: Answer) -> Markup:
     caption = "The smallest size of each effect that these runs would have shown in 9 of 10 cases."
     head = ["effect", "parameter", "would have been seen"]
     seen = _shortened(caption, head, rows, "more, seen less easily")
-    blind = element("ul", *(element("li", line) for line in unseen(answer)))
-    lost = details("Not looked for: a part or a channel is missing", blind)
-    return join([seen, lost]) if unseen(answer) else seen
+    blind = [
+        element("li", element("code", effect), f" needs {listed(needs)}")
+        for effect, needs in unseen(answer)
+    ]
+    lost = details("Not looked for: a part or a channel is missing", element("ul", *blind))
+    return join([seen, lost]) if blind else seen

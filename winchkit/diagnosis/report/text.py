@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
-from winchkit.diagnosis.report.columns import aligned, paragraph
+from winchkit.diagnosis.admit import OUTPUT_UNITS
+from winchkit.diagnosis.follows import Followed
+from winchkit.diagnosis.report.columns import aligned, hanging, paragraph
 from winchkit.diagnosis.report.comparison_rows import (
     HEAD,
     followed,
@@ -14,16 +16,19 @@ from winchkit.diagnosis.report.comparison_rows import (
     offset_text,
     size_rows,
 )
+from winchkit.diagnosis.report.curves import curve_of
 from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
     clause,
     estimate_text,
 )
-from winchkit.diagnosis.report.sentence import sentence, telling, where_text
-from winchkit.diagnosis.report.shown import smallest_shown
-from winchkit.diagnosis.report.wording import grouped, percent, scale_for
-from winchkit.diagnosis.result import Comparison, Diagnosis, OutputFit
+from winchkit.diagnosis.report.sentence import changes_text, sentence, telling, where_text
+from winchkit.diagnosis.report.shown import unseen, visible
+from winchkit.diagnosis.report.waterfall import waterfall_of
+from winchkit.diagnosis.report.wording import Scale, grouped, percent, scale_for, significant
+from winchkit.diagnosis.result import Comparison, Diagnosis, OutputFit, Where
+from winchkit.effects.card import sparkline
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
@@ -32,21 +37,25 @@ if TYPE_CHECKING:
 
 __all__ = ["addition_text", "compare_text", "report_text"]
 
-_MOST_LINES = 40
+_MOST_LINES = 70
 _FEW = 3
+_SOONEST = 4
+_BARS = 40
 
 
 def report_text(answer: Answer) -> str:
-    """The story of a diagnosis in at most 40 lines of at most 100 characters."""
+    """The story of a diagnosis in at most 70 lines of at most 80 characters."""
     diagnosis = answer.diagnosis
     blocks = [
         [VERDICT_NAMES[diagnosis.verdict].upper(), *paragraph(sentence(diagnosis))],
         _errors(diagnosis.outputs, grown=bool(diagnosis.steps)),
-        _shown(answer),
+        _ladder(answer),
         _confusion(diagnosis),
-        _places(diagnosis),
+        _places(answer),
         _next(diagnosis),
-        _candidates(diagnosis),
+        paragraph(changes_text(diagnosis)),
+        _shown(answer),
+        _candidates(answer),
         _notes(diagnosis.notes),
     ]
     lines = [line for block in blocks if block for line in (*block, "")][:-1]
@@ -96,14 +105,50 @@ def _errors(outputs: Mapping[str, OutputFit], *, grown: bool) -> list[str]:
         after = [scale.text(output.heldout_rms_after)] if grown else []
         before = scale.text(output.heldout_rms_before)
         rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
-    return aligned(rows)
+    told = "held out: each group of runs is predicted with values fitted without it"
+    return [*aligned(rows), f"  ({told})"]
+
+
+def _ladder(answer: Answer) -> list[str]:
+    """What each of several effects buys: added first alone, and dropped last."""
+    ladder = waterfall_of(answer)
+    if ladder is None or len(ladder.first) < 2:
+        return []
+    outputs = answer.diagnosis.outputs
+    scales = {n: scale_for(o.heldout_rms_before, o.unit) for n, o in outputs.items()}
+    states = [
+        *ladder.rungs,
+        *((f"only {name}", rms) for name, rms in ladder.first.items()),
+        *((f"all but {name}", rms) for name, rms in ladder.last.items()),
+    ]
+    rows = [["held-out error, rms", *(OUTPUT_NAMES.get(name, name) for name in scales)]]
+    rows += [[label, *(scales[n].text(rms[n]) for n in scales)] for label, rms in states]
+    noise = {name: output.noise_rms for name, output in outputs.items()}
+    rows.append(["noise", *(_text_or_unknown(scales[n], noise[n]) for n in scales)])
+    return ["what each effect buys", *aligned(rows)]
+
+
+def _text_or_unknown(scale: Scale, value: float | None) -> str:
+    return "unknown" if value is None else scale.text(value)
 
 
 def _shown(answer: Answer) -> list[str]:
-    if answer.diagnosis.verdict != "adequate":
+    """Which effects these runs could show at all, and how small."""
+    rows, blind = visible(answer), [effect for effect, _ in unseen(answer)]
+    if not rows:
         return []
-    seen = smallest_shown(answer)
-    return ["these runs would have shown, for instance", *(f"  {line}" for line in seen)]
+    able = [row for row in rows if not isnan(row.share)]
+    head = f"these runs would have shown {len(able)} of {len(rows) + len(blind)} effects, soonest"
+    soonest = [[row.effect, f"{row.parameter} {row.text}"] for row in able[:_SOONEST]]
+    lines = [head, *aligned(soonest, words=2)]
+    never = [row.effect for row in rows if isnan(row.share)]
+    if never:
+        lines += paragraph(f"too small to be seen at any size: {', '.join(never)}", "  ", "    ")
+    if blind:
+        lines += paragraph(
+            f"not looked for, a part or channel lacks: {', '.join(blind)}", "  ", "    "
+        )
+    return lines
 
 
 def _confusion(diagnosis: Diagnosis) -> list[str]:
@@ -115,16 +160,34 @@ def _confusion(diagnosis: Diagnosis) -> list[str]:
     return ["these runs cannot tell apart", *aligned(rows, words=2)] if rows else []
 
 
-def _places(diagnosis: Diagnosis) -> list[str]:
-    lines = [
-        line
-        for where in telling(diagnosis.where)[:_FEW]
-        for line in paragraph(where_text(where), "  ", "    ")
-    ]
+def _places(answer: Answer) -> list[str]:
+    """Where an unexplained rest lives, its shape, and how to go on with it."""
+    diagnosis, lines = answer.diagnosis, []
+    for where in telling(diagnosis.where)[:_FEW]:
+        lines += paragraph(where_text(where), "  ", "    ")
+        if diagnosis.verdict in {"partly", "unknown"} and where.frequency is None:
+            lines.append(f"    {_shape(answer, where)}")
     if not lines:
         return []
-    try_it = f"try: winchkit add {diagnosis.empirical[0]} (a curve, marked as not understood)"
-    return ["where the rest lives", *lines, *([f"  {try_it}"] if diagnosis.empirical else [])]
+    if diagnosis.empirical:
+        name = diagnosis.empirical[0]
+        lines += paragraph(
+            f"'winchkit add {name}' adds it as a curve, marked as not understood; "
+            "'winchkit effects new' begins an effect of your own from it",
+            "  ",
+            "  ",
+        )
+    return ["where the rest lives", *lines]
+
+
+def _shape(answer: Answer, where: Where) -> str:
+    """The mean residual along where it lives, as bars from its lowest to its highest."""
+    over = Followed(where.output, where.variable, where.share, where.order)
+    mean = curve_of(answer.inquiry.problem, answer.found.final.residual, over).mean
+    low, high = float(mean.min()), float(mean.max())
+    scale = scale_for((low, high), OUTPUT_UNITS[where.output])
+    bars = sparkline(mean, min(_BARS, len(mean)))
+    return f"{bars}  {scale.text(low, 2)} to {scale.text(high, 2)}"
 
 
 def _next(diagnosis: Diagnosis) -> list[str]:
@@ -136,12 +199,17 @@ def _next(diagnosis: Diagnosis) -> list[str]:
     return ["what to run next", *lines] if lines else []
 
 
-def _candidates(diagnosis: Diagnosis) -> list[str]:
+def _candidates(answer: Answer) -> list[str]:
+    diagnosis = answer.diagnosis
     if diagnosis.verdict == "adequate":
         return []
     best = [c for c in diagnosis.candidates if c.score > 0][:_FEW]
-    rows = [[c.effect, clause(c.effect), grouped(c.score)] for c in best]
-    return ["strongest evidence, each alone", *aligned(rows, words=2)] if rows else []
+    if not best:
+        return []
+    chance = significant(max(answer.found.threshold, 0.0), 2)
+    rows = [[c.effect, grouped(c.score), clause(c.effect)] for c in best]
+    head = f"strongest evidence, each alone (noise reaches {chance} once in a hundred cases)"
+    return [head, *hanging(rows)]
 
 
 def _notes(notes: tuple[str, ...]) -> list[str]:

@@ -36,14 +36,14 @@ _LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
     "kg/m": ((0.1, "g/m", 1e-3), (float("inf"), "kg/m", 1.0)),
     "kg m^2": ((1e-7, "g cm²", 1e-7), (0.1, "kg cm²", 1e-4), (float("inf"), "kg m²", 1.0)),
     "s": ((1e-3, "µs", 1e-6), (1.0, "ms", 1e-3), (float("inf"), "s", 1.0)),
-    "rad": ((1e-3, "mrad", 1e-3), (float("inf"), "°", 1 / _DEG)),
+    "rad": ((1e-5, "µrad", 1e-6), (1e-3, "mrad", 1e-3), (float("inf"), "°", 1 / _DEG)),
     "1/K": ((1e-2, "·10⁻⁶/K", 1e-6), (float("inf"), "/K", 1.0)),
     "degC": ((float("inf"), "°C", 1.0),),
     "%": ((float("inf"), "%", 1e-2),),
     "1": ((float("inf"), "", 1.0),),
 }
 """Per SI unit: below which size which label, and the label's worth in SI."""
-_WITHIN_A_FIGURE = pattern(r"(?<=[\d±=]) | (?=±)|(?<=N) (?=m\b)|(?<=m) (?=s\b)")
+_WITHIN_A_FIGURE = pattern(r"(?<=[\d±=]) | (?=[±=])|(?<=N) (?=m\b)|(?<=m) (?=s\b)")
 _SIGNS = str.maketrans("-", "−")
 
 
