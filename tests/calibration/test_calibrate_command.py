@@ -156,6 +156,15 @@ def test_gross_errors_are_named_and_poses_of_another_robot_doubted(
     assert not any("gross" in text for text in found["warnings"])
 
 
+def test_nominal_values_that_their_bounds_exclude_are_told(run: Path, tmp_path: Path) -> None:
+    text = find("profiles", "cabtive").read_text()
+    odd = tmp_path / "odd.toml"
+    odd.write_text(text.replace('bounds = ["59 mm", "61 mm"]', 'bounds = ["60.1 mm", "62 mm"]'))
+    found = answer(odd, run, "-o", tmp_path / "new.toml")
+    (told,) = (text for text in found["warnings"] if "outside their bounds" in text)
+    assert told.count("winding_radius") == 8
+
+
 def refused(code: int, *arguments: object) -> str:
     result = invoke(*arguments)
     assert result.exit_code == code, result.output

@@ -43,7 +43,9 @@ def test_the_papers_gearbox_fails_its_own_torque_limit() -> None:
     assert torque.ok is False
     assert torque.value == pytest.approx(2.45, abs=5e-3)
     assert torque.limit == pytest.approx(1.273, abs=5e-4)
-    assert torque.alternatives[0].startswith("a gear ratio from 57.8 to 314; offered: 60, 80, 100")
+    assert torque.alternatives[0].startswith(
+        "a gear ratio from 57.8 to 314 of the same efficiency; offered: 60, 80, 100"
+    )
     assert [each.name for each in sized(PAPER) if each.ok is False] == [
         "motor torque",
         "drum width",
@@ -188,7 +190,10 @@ def test_the_table_of_the_command_line() -> None:
     result = invoke(EXAMPLE)
     assert result.exit_code == 1
     assert re.search(r"motor torque +Eq\. 13 +2\.452 N m +<= +1\.273 N m +FAILS", result.stdout)
-    assert "would do: a gear ratio from 57.8 to 314; offered: 60, 80, 100" in result.stdout
+    assert (
+        "would do: a gear ratio from 57.8 to 314 of the same efficiency; offered: 60, 80, 100"
+        in result.stdout
+    )
     assert result.stdout.rstrip().endswith("2 requirements not met")
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.calibration.robot_candidates import Candidate, candidates
-from winchkit.calibration.robot_checks import refuse_unfit
+from winchkit.calibration.robot_checks import outside_bounds, refuse_unfit
 from winchkit.calibration.robot_effects import own_effects
 from winchkit.calibration.robot_equations import Equations, State
 from winchkit.calibration.robot_forces import RopeForces
@@ -267,6 +267,7 @@ def _warnings(
     equations: Equations, solution: Solution, weights: Weights, observed: Observability, lost: int
 ) -> tuple[str, ...]:
     out = [*equations.measured.notes, *_left_out(equations)]
+    out += outside_bounds(equations.parameters)
     # A robust fit has already done what would be advised.
     out += gross_errors(equations, solution) if weights.loss == "least-squares" else []
     if lost:

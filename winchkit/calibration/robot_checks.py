@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from winchkit.calibration.robot_equations import Equations
+from winchkit.calibration.robot_parameters import Parameters
 from winchkit.errors import UsageError
 
-__all__ = ["refuse_unfit"]
+__all__ = ["outside_bounds", "refuse_unfit"]
 
 _FEW, _MOST = 3, 20_000
 _REACH = 2.0
@@ -58,3 +59,11 @@ def _near(equations: Equations) -> None:
             f"whose exit points are at most {size:.4g} m apart; is platform_x … in its unit and in "
             "the base frame?"
         )
+
+
+def outside_bounds(parameters: Parameters) -> list[str]:
+    """Nominal values that their own bounds exclude: a bound, or the profile, is mistaken."""
+    names = [p.name for p in parameters if p.std > 0 and not p.low <= p.nominal <= p.high]
+    if not names:
+        return []
+    return [f"nominal values outside their bounds, begun from the bound: {', '.join(names)}"]

@@ -98,7 +98,9 @@ def _other_ratio(spec: SizeSpec) -> tuple[str, ...]:
         return ("no gear ratio gives both the torque and the speed: take a stronger motor",)
     fit = [ratio for ratio in spec.gearbox.offered if lowest <= ratio <= highest]
     offered = f"; offered: {', '.join(f'{ratio:g}' for ratio in fit)}" if fit else ""
-    return (f"a gear ratio from {up(lowest, 3)} to {down(highest, 3)}{offered}",)
+    ratios = f"a gear ratio from {up(lowest, 3)} to {down(highest, 3)}"
+    # Of a worm the efficiency falls as the ratio grows.
+    return (f"{ratios} of the same efficiency{offered}",)
 
 
 def _gearbox_rows(spec: SizeSpec) -> Iterator[Row]:
