@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from typing import Any
 
 import pytest
 from can_bridge import Bridge
+from npm_install import install
 
 from winchkit import catalog
 from winchkit.drivers.can.bus import CanBus
@@ -38,20 +38,7 @@ MASTER, SLAVE, DRIVE = 100, 5, 1
 @pytest.fixture(scope="session")
 def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the package installed by npm."""
-    for tool in ("node", "npm"):
-        if shutil.which(tool) is None:
-            pytest.skip(f"this machine has no {tool}: apt-get install nodejs npm")
-    folder = tmp_path_factory.mktemp("npm")
-    done = subprocess.run(
-        ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(folder), PACKAGE],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-    if done.returncode != 0:
-        pytest.skip(f"npm cannot install {PACKAGE}: {done.stderr[-500:]}")
-    return folder / "node_modules"
+    return install(tmp_path_factory.mktemp("npm"), PACKAGE)
 
 
 class Peer:
