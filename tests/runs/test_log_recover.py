@@ -126,3 +126,23 @@ def test_what_cannot_be_recovered(tmp_path: Path, data: bytes) -> None:
     with pytest.raises(RunError, match="no format of a log"):
         recover(tmp_path / "b.txt")
     assert path.read_bytes() == data
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full disk")
+def test_what_cannot_be_saved_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target = tmp_path / "a.mcap", tmp_path / "saved.mcap"
+    written(source, 0.3)
+    target.write_bytes(b"what was there")
+
+    def full(_self: Path, data: bytes) -> int:
+        with Path("/dev/full").open("wb", buffering=0) as disk:
+            return disk.write(data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        with pytest.raises(FileError, match="No space left"):
+            recover(source, target)
+    assert target.read_bytes() == b"what was there"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "saved.mcap"]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.errors import Fault, FileError, UsageError
+from winchkit.runs.whole_file import write_whole
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
 from winchkit.units import convert, format_quantity
 
@@ -63,13 +64,7 @@ def tares_toml(book: TareBook) -> str:
 def write_text(path: str | Path, text: str) -> Path:
     """Write a file whole or not at all; raises FileError."""
     target = Path(path)
-    beside = target.with_name(f".{target.name}.new")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(target)
-    except OSError as error:
-        beside.unlink(missing_ok=True)
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(target))) from error
+    write_whole(target, text.encode())
     return target
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from winchkit.errors import Fault, FileError, RunError, UsageError
+from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.mcap_file import McapFile
 from winchkit.runs.mcap_layout import MARK, PROFILE
 from winchkit.runs.mcap_records import (
@@ -22,6 +22,7 @@ from winchkit.runs.mcap_records import (
     records,
 )
 from winchkit.runs.text import read_bytes
+from winchkit.runs.whole_file import write_whole
 
 __all__ = ["Recovered", "recover", "recovered_path"]
 
@@ -68,10 +69,7 @@ def recover(path: str | Path, output: str | Path | None = None) -> Recovered:
         saved, found = _csv(data, target)
     else:
         raise RunError(Fault(f"'{suffix}' is no format of a log; use .mcap or .csv", str(path)))
-    try:
-        target.write_bytes(saved)
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(target))) from None
+    write_whole(target, saved)
     return found
 
 

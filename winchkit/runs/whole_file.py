@@ -1,4 +1,4 @@
-"""Files that keep what was whole of them when they can no longer be written."""
+"""Files that are whole, or keep what was whole when they can no longer be written."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import BinaryIO
 
 from winchkit.errors import Fault, FileError
 
-__all__ = ["abandoned", "open_new"]
+__all__ = ["abandoned", "open_new", "write_whole"]
 
 _BUFFER = 1 << 20
 
@@ -19,6 +19,18 @@ def open_new(path: Path) -> BinaryIO:
     try:
         return path.open("wb", buffering=_BUFFER)
     except OSError as error:
+        raise _refused(path, error) from None
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file whole, or leave what was there; raises FileError."""
+    beside = path.with_name(f".{path.name}.new")
+    try:
+        beside.write_bytes(data)
+        beside.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            beside.unlink()
         raise _refused(path, error) from None
 
 
