@@ -13,7 +13,7 @@ from winchkit.diagnosis.dataset import Filtering, assemble, prepare
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.thin import Thinning, thinning_for
-from winchkit.diagnosis.uncertainty import unknown_std
+from winchkit.diagnosis.uncertainty import spread_of
 from winchkit.effects.bind import Term, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
@@ -131,7 +131,7 @@ def test_thinned_by_twenty_the_same_values_are_found() -> None:
     for effect in candidates:
         begun = begun.with_term(Term(effect, effect.null), problem.runs)
     fitted, noise = inquiry.settle(begun)
-    std = unknown_std(problem, fitted, noise, inquiry.blocks)
+    std = spread_of(problem, fitted, noise, inquiry.blocks).std
     for index, term in enumerate(true_terms(), start=1):
         name, true = next(iter(term.values.items()))
         found = fitted.hypothesis.terms[index - 1].values[name]
