@@ -26,9 +26,9 @@ from robot_poses.nested import ITERATIONS, NestedProblem, nominal
 from robot_poses.truth import Noise, Truth, csv, poses
 
 from winchkit.calibration.robot import Calibrated, calibrate
-from winchkit.calibration.robot_measured import Measured, read_poses
 from winchkit.calibration.robot_predict import rms
 from winchkit.catalog import find
+from winchkit.effects.robot_poses import Measured, read_poses
 from winchkit.model.robot import Robot, robot_of
 from winchkit.runs import read_run
 from winchkit.schema.read import read_robot

@@ -24,9 +24,10 @@ _OUTPUTS = ("cable_length", "tension", "motor_torque")
 def page(catalogue: Catalogue) -> str:
     """The page: effects by the first output that they change, each with its card."""
     parts = [_BEGIN]
-    for output in _OUTPUTS:
-        own = sorted(e.id for e in catalogue if e.outputs[0] == output)
-        parts.append(f"## On the way to {output}\n\n{', '.join(f'[{i}](#{i})' for i in own)}\n")
+    for output in (*_OUTPUTS, ""):
+        own = sorted(e.id for e in catalogue if ("" if e.of_robots else e.outputs[0]) == output)
+        heading = f"On the way to {output}" if output else "On a robot"
+        parts.append(f"## {heading}\n\n{', '.join(f'[{i}](#{i})' for i in own)}\n")
         for name in own:
             text, _, _ = card(catalogue[name]).partition("\n\nSignature over")
             body = text.removeprefix(name).strip()

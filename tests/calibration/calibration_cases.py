@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 from robot_poses.truth import Noise, Row, Truth, csv, poses
 
-from winchkit.calibration.robot_measured import Measured, read_poses
 from winchkit.catalog import find
+from winchkit.effects.robot_poses import Measured, read_poses
 from winchkit.model.robot import Robot, robot_of
 from winchkit.runs import read_run
 from winchkit.schema.read import read_robot

@@ -21,9 +21,9 @@ from calibration_cases import (
 )
 
 from winchkit.calibration.robot import Calibrated, Options, calibrate, split
-from winchkit.calibration.robot_measured import Measured
 from winchkit.calibration.robot_next import next_poses
 from winchkit.calibration.robot_predict import rms
+from winchkit.effects.robot_poses import Measured
 from winchkit.errors import UsageError
 from winchkit.model.robot import robot_of
 from winchkit.schema.robot import PriorSpec

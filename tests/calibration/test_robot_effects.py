@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from robot_poses.truth import GRAVITY, HOME, Row, turn
 
 from winchkit.calibration.robot import Calibrated, Options, calibrate
-from winchkit.calibration.robot_measured import Measured
 from winchkit.calibration.robot_predict import rms
+from winchkit.effects.robot_poses import Measured
 from winchkit.errors import UsageError
 
 Array = NDArray[np.float64]

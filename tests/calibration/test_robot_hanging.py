@@ -14,8 +14,8 @@ from robot_poses.truth import HOME, turn
 from scipy.optimize import brentq, minimize
 
 from winchkit.calibration.robot import calibrate, split
-from winchkit.calibration.robot_measured import Measured
 from winchkit.calibration.robot_predict import rms
+from winchkit.effects.robot_poses import Measured
 from winchkit.errors import UsageError
 from winchkit.model.robot import Robot, robot_of
 

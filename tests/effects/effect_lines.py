@@ -13,8 +13,10 @@ from winchkit.model.stages import Signals
 from winchkit.schema.winch import DrumSpec, WinchProfile
 
 CATALOGUE = load_catalogue()
-EFFECTS = list(CATALOGUE)
+EFFECTS = [effect for effect in CATALOGUE if not effect.of_robots]
 IDS = [effect.id for effect in EFFECTS]
+ROBOT_EFFECTS = [effect for effect in CATALOGUE if effect.of_robots]
+ALL_IDS = [effect.id for effect in CATALOGUE]
 
 DRUMS = {
     "spiral": DrumSpec("spiral", 0.06),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from effect_lines import CATALOGUE, EFFECTS, IDS, MINE
+from effect_lines import ALL_IDS, CATALOGUE, MINE
 
 from winchkit.cli.effects import command
 from winchkit.effects import Effect
@@ -18,7 +18,7 @@ from winchkit.effects.card import card, card_data, signature, sparkline
 from winchkit.errors import UsageError
 
 
-@pytest.mark.parametrize("effect", EFFECTS, ids=IDS)
+@pytest.mark.parametrize("effect", list(CATALOGUE), ids=ALL_IDS)
 def test_a_card_says_everything_and_fits_a_terminal(effect: Effect) -> None:
     text = card(effect)
     lines = text.splitlines()
@@ -56,14 +56,14 @@ def test_the_command_lists_every_effect_once() -> None:
     result = CliRunner().invoke(command, [])
     assert result.exit_code == 0
     listed = [line.split()[0] for line in result.output.splitlines() if line.startswith("  ")]
-    assert sorted(listed) == sorted(IDS)
+    assert sorted(listed) == sorted(ALL_IDS)
 
 
 def test_the_command_prints_json_without_nan_or_infinity() -> None:
     result = CliRunner().invoke(command, ["--json"])
     data = json.loads(result.output, parse_constant=pytest.fail)
     assert data["schema"] == 1
-    assert [effect["id"] for effect in data["effects"]] == IDS
+    assert [effect["id"] for effect in data["effects"]] == ALL_IDS
     one = json.loads(CliRunner().invoke(command, ["frame-compliance", "--json"]).output)
     assert one["parameters"][0]["null"] is None
     assert one["signature"]["changes"]["cable_length"]["unit"] == "m"
@@ -74,7 +74,7 @@ def test_an_effect_of_the_users_own_is_listed_and_shown(tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
     file.write_text(MINE)
     listed = CliRunner().invoke(command, ["--effects", str(file)])
-    assert f"{len(IDS) + 1} effects" in listed.output
+    assert f"{len(ALL_IDS) + 1} effects" in listed.output
     shown = CliRunner().invoke(command, ["my-own", "--effects", str(file)])
     assert shown.output.startswith("my-own")
     assert "+0.001 to +0.001 m" in shown.output

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from effect_lines import IDS, MINE
+from effect_lines import ALL_IDS, MINE
 
 import winchkit.effects.catalogue as module
 from winchkit.effects import Effect, Term, line_of, load_catalogue
@@ -25,7 +25,7 @@ def write(tmp_path: Path, text: str, name: str = "mine.py") -> Path:
 
 def test_a_file_adds_its_effects_to_the_catalogue(tmp_path: Path) -> None:
     catalogue = load_catalogue([write(tmp_path, MINE)])
-    assert len(catalogue) == len(IDS) + 1
+    assert len(catalogue) == len(ALL_IDS) + 1
     effect = catalogue["my-own"]
     line = Line(STANDARD_PROFILE, (Term(effect, {"size": 0.25}).modifier(),))
     motion = standard_motion()

@@ -22,13 +22,13 @@ from winchkit.calibration.robot_checks import outside_bounds, refuse_unfit
 from winchkit.calibration.robot_effects import own_effects
 from winchkit.calibration.robot_equations import Equations, State
 from winchkit.calibration.robot_forces import RopeForces
-from winchkit.calibration.robot_measured import Measured
 from winchkit.calibration.robot_noise import NOISE, re_estimated
 from winchkit.calibration.robot_observe import Observability, observability
 from winchkit.calibration.robot_outliers import gross_errors
 from winchkit.calibration.robot_parameters import EFFECTS, Parameter, Parameters, parameters_of
 from winchkit.calibration.robot_predict import PoseErrors, errors_at, start_of
 from winchkit.calibration.robot_solve import Loss, Solution, Weights, place, solve
+from winchkit.effects.robot_poses import Measured
 from winchkit.errors import UsageError
 from winchkit.model.robot import Robot
 

@@ -25,18 +25,22 @@ def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
     out: dict[str, dict[str, float]] = {}
     faults: list[Fault] = []
     for table in profile.effect:
-        if table.id in LAWS:
+        if table.id in LAWS and "line" not in table.values:
             units = {p.name: p.unit for p in LAWS[table.id]}
             given: Mapping[str, Any] = table.values
         elif table.id == _HOME:
             units = {line.name: "m" for line in profile.line}
             lengths = table.values.get("length")
-            given = lengths if isinstance(lengths, Mapping) else {}
-            given = {**dict.fromkeys(units, "0 m"), **given}
+            if not isinstance(lengths, Mapping):
+                lengths = {str(table.values.get("line")): lengths}
+            given = {**dict.fromkeys(units, "0 m"), **lengths}
         else:
             continue
         try:
-            out[table.id] = _values(given, units)
+            found = _values(given, units)
+            if before := out.get(table.id):
+                found = {name: value + before[name] for name, value in found.items()}
+            out[table.id] = found
         except UsageError as error:
             faults.append(_fault(table, str(error)))
     if faults:

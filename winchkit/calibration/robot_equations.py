@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from winchkit.calibration.robot_elongation import strain_of
 from winchkit.calibration.robot_forces import RopeForces, balance
-from winchkit.calibration.robot_measured import Measured
 from winchkit.calibration.robot_parameters import Parameters
 from winchkit.calibration.robot_winding import Winding, winding_of
+from winchkit.effects.robot_poses import Measured
 from winchkit.model.robot import (
     Geometry,
     Pose,
@@ -32,7 +32,7 @@ from winchkit.model.robot import (
     swivel_angle,
     swivel_sensitivities,
 )
-from winchkit.model.robot.rotation import rotation_vector
+from winchkit.model.robot.rotation import angle_rates, rotation_vector
 
 __all__ = ["Equations", "Rows", "State"]
 
@@ -186,7 +186,7 @@ class Equations:
         whole = np.all(np.isfinite(angles), axis=1)
         residual = _wrapped(angles_of(rotation) - angles)
         by = np.zeros((len(angles), 3, 6))
-        by[..., 3:] = _angle_rates(rotation)
+        by[..., 3:] = angle_rates(rotation)
         off = rotation[whole] @ np.swapaxes(rotation_of(*angles[whole].T), 1, 2)
         residual[whole] = rotation_vector(off)
         by[whole, :, 3:] = np.eye(3)
@@ -237,18 +237,3 @@ def _by_pose(by: Sensitivities) -> Array:
 
 def _wrapped(angle: Array) -> Array:
     return np.asarray(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
-
-
-def _angle_rates(rotation: Array) -> Array:
-    """Derivatives of roll, pitch and yaw by a rotation vector in the base frame, (p, 3, 3)."""
-    _, pitch, yaw = angles_of(rotation).T
-    cp, sp, cy, sy = np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
-    zero, one = np.zeros_like(cp), np.ones_like(cp)
-    # Near a pitch of a right angle roll and yaw are one: no finite rate says anything there.
-    level = np.where(np.abs(cp) > 1e-6, cp, np.nan)
-    rows = (
-        (cy / level, sy / level, zero),
-        (-sy, cy, zero),
-        (cy * sp / level, sy * sp / level, one),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from winchkit.calibration.robot import Calibrated
 from winchkit.calibration.robot_equations import State
-from winchkit.calibration.robot_measured import Measured
 from winchkit.calibration.robot_solve import linearise
+from winchkit.effects.robot_poses import Measured
 from winchkit.model.robot import Pose, Robot, angles_of, lengths, robot_of, rotation_of
 
 __all__ = ["NextPose", "next_poses"]
@@ -102,6 +102,8 @@ def _as_measured(found: Calibrated, pose: Pose) -> Measured:
         typical(measured.swivel),
         typical(measured.cable_length),
         typical(measured.tension),
+        typical(measured.temperature),
+        np.zeros(many, dtype=np.intp),
         np.full(many, "proposed"),
         measured.length_zeroed,
     )

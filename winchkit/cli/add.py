@@ -41,11 +41,23 @@ def command(
     deviation, the runs and the date.
     """
     from winchkit.catalog import find
+    from winchkit.cli.robot_model import read_poses_of, read_profile, refuse_options
     from winchkit.diagnosis.add import grow
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.robot import RobotProfile
 
     source = find("profiles", profile)
-    declared, catalogue = read_winch(source), catalogue_of(effect_files)
+    declared, catalogue = read_profile(source), catalogue_of(effect_files)
+    if isinstance(declared, RobotProfile):
+        from winchkit.diagnosis.robot.add import add_to_robot
+
+        refuse_options(band, html)
+        name, _, place = effect.partition("/")
+        poses = read_poses_of(runs)
+        addition = add_to_robot(name, poses, declared, winch or place or None, catalogue)
+        write_addition(source, addition, [Path(run).name for run in runs], Path(output))
+        click.echo(f"written: {output}", err=True)
+        _tell(addition, as_json)
+        return
     grown = grow(effect, read_runs(runs, winch), declared, catalogue, band)
     write_addition(source, grown.addition, [Path(run).name for run in runs], Path(output))
     click.echo(f"written: {output}", err=True)

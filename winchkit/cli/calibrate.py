@@ -99,7 +99,7 @@ def _calibrated(
 ) -> Calibrated:
     """Fit all rows where others validate, else nine of ten."""
     from winchkit.calibration.robot import calibrate, split
-    from winchkit.calibration.robot_measured import read_poses
+    from winchkit.effects.robot_poses import read_poses
     from winchkit.model.robot import robot_of
     from winchkit.schema.read import read_robot
 

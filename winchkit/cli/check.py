@@ -90,7 +90,9 @@ def _declaration(file: str) -> Verdict:
     declaration = load(file)
     drive_faults, drive_warnings = faults_and_warnings(declaration.value)
     robot_faults, robot_warnings = of_robots(file, declaration.value)
-    effect_faults = dict.fromkeys(_effect_faults(_profiles(declaration.value)))
+    effect_faults = dict.fromkeys(
+        (*_effect_faults(_profiles(declaration.value)), *_of_robot(declaration.value))
+    )
     faults = (*effect_faults, *drive_faults, *robot_faults)
     warnings = (
         *declaration.warnings,
@@ -129,6 +131,17 @@ def _effect_faults(profiles: list[WinchProfile]) -> list[Fault]:
     from winchkit.effects import check_profile
 
     return [fault for profile in profiles for fault in check_profile(profile)]
+
+
+def _of_robot(value: Declared) -> list[Fault]:
+    """What is wrong with the effects that a robot declares itself."""
+    from winchkit.schema.robot import RobotProfile
+
+    if not isinstance(value, RobotProfile) or not value.effect:
+        return []
+    from winchkit.effects.bind_robot import check_robot
+
+    return check_robot(value)
 
 
 def _show(verdict: Verdict) -> None:

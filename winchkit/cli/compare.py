@@ -32,10 +32,18 @@ def command(
 ) -> None:
     """Compare runs with a profile at its file values; only the length offset is fitted."""
     from winchkit.catalog import find
+    from winchkit.cli.robot_model import read_poses_of, read_profile, refuse_options
     from winchkit.diagnosis.compare import compared
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.robot import RobotProfile
 
-    declared = read_winch(find("profiles", profile))
+    declared = read_profile(find("profiles", profile))
+    if isinstance(declared, RobotProfile):
+        from winchkit.diagnosis.robot.compare import compare_robot
+
+        refuse_options(band, html, winch)
+        poses = read_poses_of(runs)
+        _tell(compare_robot(poses, declared, catalogue_of(effect_files)), as_json)
+        return
     answer = compared(read_runs(runs, winch), declared, catalogue_of(effect_files), band)
     _tell(answer.comparison, as_json)
     if html:

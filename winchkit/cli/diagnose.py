@@ -15,6 +15,8 @@ from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.diagnose import Answer
+    from winchkit.effects.catalogue import Catalogue
+    from winchkit.schema.robot import RobotProfile
 
 __all__ = ["command"]
 
@@ -41,12 +43,17 @@ def command(
     runs by itself, each against the same profile.
     """
     from winchkit.catalog import find
+    from winchkit.cli.robot_model import read_profile, refuse_options
     from winchkit.diagnosis.diagnose import diagnose_each
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.robot import RobotProfile
 
     if html and winch == ALL:
         raise UsageError("--html is a page of one winch; name it with --winch")
-    declared = read_winch(find("profiles", profile))
+    declared = read_profile(find("profiles", profile))
+    if isinstance(declared, RobotProfile):
+        refuse_options(band, html, winch)
+        _tell_robot(runs, declared, catalogue_of(effect_files), as_json)
+        return
     catalogue = catalogue_of(effect_files)
     with progress_bar() as told:
         of_winch = read_each(runs) if winch == ALL else {winch or "": read_runs(runs, winch)}
@@ -61,6 +68,22 @@ def command(
         title = page_title(declared.name, runs)
         options = given_options(effect_files, winch, band)
         write_page(html, report_html(answer, title, profile=profile, options=options))
+
+
+def _tell_robot(
+    runs: Sequence[str], declared: RobotProfile, catalogue: Catalogue, as_json: bool
+) -> None:
+    """What a robot's model lacks, from poses."""
+    from winchkit.cli.robot_model import read_poses_of
+    from winchkit.diagnosis.report.sentence import sentence
+    from winchkit.diagnosis.report.text import report_text
+    from winchkit.diagnosis.robot.diagnose import diagnose_robot
+
+    answer = diagnose_robot(read_poses_of(runs), declared, catalogue)
+    if as_json:
+        echo_json({**answer.diagnosis.to_json(), "sentence": sentence(answer.diagnosis)})
+    else:
+        click.echo(report_text(answer))
 
 
 def _tell(answers: Mapping[str, Answer], as_json: bool, *, each: bool) -> None:

@@ -70,15 +70,15 @@ def show(effect_id: str | None, files: Sequence[str], as_json: bool) -> None:
 
 
 def _listing(catalogue: Catalogue) -> str:
-    """Effects by the first output that they change."""
+    """Effects by the first output that they change; those that only a robot has by themselves."""
     width = max(len(effect.id) for effect in catalogue)
     lines: list[str] = []
-    for output in _OUTPUTS:
-        lines.append(f"On the way to {output}")
+    for place in (*_OUTPUTS, ""):
+        lines.append(f"On the way to {place}" if place else "On a robot")
         lines += [
             f"  {effect.id:<{width}}  {effect.what}"
             for effect in catalogue
-            if effect.outputs[0] == output
+            if ("" if effect.of_robots else effect.outputs[0]) == place
         ]
         lines.append("")
     return "\n".join([*lines, f"{len(catalogue)} effects; 'winchkit effects ID' shows one."])

@@ -35,7 +35,15 @@ from winchkit.effects.coordinates import Coordinates
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Answer", "Told", "diagnose", "diagnose_each", "inquire"]
+__all__ = [
+    "Answer",
+    "Told",
+    "candidates_of",
+    "diagnose",
+    "diagnose_each",
+    "inquire",
+    "steps_of",
+]
 
 _WHERE = 6
 _AT_A_TIME = 2
@@ -97,8 +105,8 @@ def diagnose(
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,
-        steps=_steps(inquiry, shown, sets) if sets else (),
-        candidates=_candidates(inquiry, found),
+        steps=steps_of(inquiry, shown, sets) if sets else (),
+        candidates=candidates_of(inquiry, found),
         detectable=detectable(found.scores, inquiry.price, found.threshold),
         unexplained_share=judgement.share,
         where=_where(inquiry, found, shown.final) if found.still else (),
@@ -143,7 +151,7 @@ def inquire(dataset: Dataset, catalogue: Catalogue) -> Inquiry:
     return Inquiry(problem, begin, catalogue)
 
 
-def _steps(inquiry: Inquiry, found: Found, sets: Sequence[Confusion]) -> tuple[Step, ...]:
+def steps_of(inquiry: Inquiry, found: Found, sets: Sequence[Confusion]) -> tuple[Step, ...]:
     """Every addition with its confusion set, values and held-out gain."""
     final, noise = found.final, found.noise
     gains = _gains(inquiry, final, noise)
@@ -187,7 +195,8 @@ def _gains(inquiry: Inquiry, final: Fit, noise: Noise) -> list[float]:
     return [1 - after / before for before, after in pairwise(squares)]
 
 
-def _candidates(inquiry: Inquiry, found: Found) -> tuple[Candidate, ...]:
+def candidates_of(inquiry: Inquiry, found: Found) -> tuple[Candidate, ...]:
+    """Every candidate with its score, the strongest with what it would leave held out."""
     out = []
     folds = inquiry.folds(found.final, found.noise)
     for item, fitted in zip_longest(found.scores, found.tried):

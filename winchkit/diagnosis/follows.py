@@ -11,7 +11,15 @@ from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.problem import Problem
 from winchkit.model.variables import ANGLES, VARIABLES
 
-__all__ = ["Followed", "by_chance", "follows", "harmonics", "kept_rows", "variables_of"]
+__all__ = [
+    "Followed",
+    "binned_share",
+    "by_chance",
+    "follows",
+    "harmonics",
+    "kept_rows",
+    "variables_of",
+]
 
 Array = NDArray[np.float64]
 _BINS = 16
@@ -58,7 +66,7 @@ def follows(problem: Problem, residual: Array) -> list[Followed]:
             if any(name not in known[s.run] for s, _ in own):
                 continue
             values = [known[s.run][name][v] for (s, _), v in zip(own, valid, strict=True)]
-            share = _binned_share(np.concatenate(values), error, kept)
+            share = binned_share(np.concatenate(values), error, kept)
             if share > by_chance(_BINS, kept):
                 found.append(Followed(output, name, share))
         out += sorted(found, key=lambda f: -f.share)
@@ -93,7 +101,7 @@ def by_chance(bins: int, kept: int) -> float:
     return max(_WORTH, 3 * float(np.sqrt(2 * bins)) / kept)
 
 
-def _binned_share(variable: Array, error: Array, kept: int) -> float:
+def binned_share(variable: Array, error: Array, kept: int) -> float:
     """Share of the error's power in its means over bins of the variable, less what chance gives.
 
     Chance gives one part in ``kept`` per bin, whatever the number of samples.

@@ -34,9 +34,9 @@ _DEGREE = 3
 def rounded(problem: Problem, hypothesis: Hypothesis) -> Array:
     """What the terms add on a motion of finer steps, less what they add on the samples, rows."""
     out = np.zeros(problem.rows)
-    if not hypothesis.terms:
-        return out
     dataset = problem.dataset
+    if not hypothesis.terms or not dataset.recordings:
+        return out
     moved = [
         _moved(Line(dataset.profile, modifiers_of(started(hypothesis, run))), recording)
         for run, recording in enumerate(dataset.recordings)

@@ -45,6 +45,7 @@ _NEEDED = {
     "load": "a load channel or load_mass",
     "rope_force": "a load, load_mass or tension",
     "gearing": "a gearbox",
+    "robot": "a robot's profile",
 }
 _UNIDENTIFIABLE = 1e-7
 _ROUNDING = 1e-9
@@ -93,6 +94,9 @@ class Score:
 def missing_needs(effect: Effect, problem: Problem) -> list[str]:
     """Parts and channels that an effect needs and that are not there, in words."""
     dataset = problem.dataset
+    if not effect.needs:
+        measured = set(effect.outputs) & set(dataset.outputs)
+        return [] if measured else ["a measured " + " or ".join(effect.outputs)]
     profile, recordings = dataset.profile, dataset.recordings
     cable = profile.cable
     roped = cable.diameter or cable.dead_length or profile.pulley
@@ -105,6 +109,7 @@ def missing_needs(effect: Effect, problem: Problem) -> list[str]:
         "load": any(r.raw.load is not None for r in recordings),
         "rope_force": any(bool(r.raw.at.tension.any()) for r in recordings),
         "gearing": True,
+        "robot": False,
     }
     lacking = [_NEEDED[need] for need in effect.needs if not have[need]]
     if not set(effect.outputs) & set(dataset.outputs):
@@ -151,6 +156,8 @@ def _points(problem: Problem, effects: Iterable[Effect]) -> Iterator[Point]:
 def _turns_enough(problem: Problem, shape: dict[str, float]) -> bool:
     """Whether the motor turns through two periods of an order in some run."""
     orders = [shape["order"]] if "order" in shape else []
+    if not orders:
+        return True
     stroke = max(float(np.ptp(r.signals.motor_angle)) for r in problem.dataset.recordings)
     return all(order * stroke >= _PERIODS * 2 * np.pi for order in orders)
 

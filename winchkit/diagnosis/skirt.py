@@ -36,6 +36,8 @@ class Skirt:
 
     def residual(self, hypothesis: Hypothesis) -> dict[str, float]:
         """Of what a hypothesis leaves unexplained."""
+        if not self._filtered:
+            return {}
         beyond = self._beyond(hypothesis)
         out = {}
         for output in self._filtered:
@@ -46,6 +48,8 @@ class Skirt:
 
     def noise(self, hypothesis: Hypothesis) -> dict[str, float]:
         """Of how repeats differ; without repeats of what is left unexplained."""
+        if not self._filtered:
+            return {}
         apart = repeat_noise(self._problem, self._beyond(hypothesis))
         return self.residual(hypothesis) | {o: apart[o] ** 2 for o in self._filtered & set(apart)}
 

@@ -1,6 +1,7 @@
 """One file per physical effect, and what binds them to a profile."""
 
 from winchkit.effects.bind import Term, check_profile, line_of, modifiers_of, terms_of
+from winchkit.effects.bind_robot import robot_terms, robot_with_effects, robot_with_terms
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter, Values
 
@@ -14,5 +15,8 @@ __all__ = [
     "line_of",
     "load_catalogue",
     "modifiers_of",
+    "robot_terms",
+    "robot_with_effects",
+    "robot_with_terms",
     "terms_of",
 ]

@@ -15,7 +15,7 @@ from winchkit.model.stages import At, Modifier
 from winchkit.schema.winch import EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse, suggest
 
-__all__ = ["Term", "check_profile", "line_of", "modifiers_of", "terms_of"]
+__all__ = ["Term", "check_profile", "line_of", "modifiers_of", "terms_of", "values_of"]
 
 _BESIDE_PARAMETERS = {"id", "fitted"}
 
@@ -76,10 +76,14 @@ def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list
             faults.append(Fault(message, table.path, table.line, "effect.id"))
             continue
         effect = catalogue[table.id]
+        if effect.of_robots:
+            message = "only a robot can have it; it stands in the profile of kind 'robot'"
+            faults.append(Fault(message, table.path, table.line, f"effect {table.id}"))
+            continue
         if not effect.repeatable and any(term.effect.id == effect.id for term in terms):
             message = "stands twice; it has no order, so once is enough"
             faults.append(Fault(message, table.path, table.line, f"effect {table.id}"))
-        values, wrong = _values(effect, table)
+        values, wrong = values_of(effect, table)
         faults.extend(wrong)
         terms.append(Term(effect, values))
     return terms, faults
@@ -102,7 +106,7 @@ def _shorthand(effect: Effect, values: Mapping[str, float]) -> Term:
     return Term(effect, effect.null | dict(values))
 
 
-def _values(effect: Effect, table: EffectTable) -> tuple[dict[str, float], list[Fault]]:
+def values_of(effect: Effect, table: EffectTable) -> tuple[dict[str, float], list[Fault]]:
     """Values of a table in SI, missing ones at their null, and what is wrong with them."""
     values, faults = dict(effect.null), []
     names = [p.name for p in effect.parameters]

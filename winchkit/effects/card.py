@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
+from winchkit.effects.standard_robot import robot_changes
 from winchkit.model.line import Line
 
 __all__ = ["Signature", "card", "card_data", "signature", "sparkline", "usual_values"]
 
 Array = NDArray[np.float64]
+_PLACES = {"all": "all lines alike", "one": "one line", "platform": "the platform"}
 _UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 64
@@ -47,7 +49,12 @@ def usual_values(effect: Effect) -> dict[str, float]:
 
 
 def signature(effect: Effect) -> Signature:
-    """Signature of an effect on the standard motion."""
+    """Signature of an effect on the standard motion; of a robot's on the standard poses."""
+    if effect.of_robots:
+        values = usual_values(effect)
+        length, changed = robot_changes(effect, values)
+        poses = np.arange(len(length), dtype=float)
+        return Signature(values, poses, length, changed)
     motion = standard_motion()
     values = usual_values(effect)
     bare = Line(STANDARD_PROFILE).predict(motion)
@@ -91,6 +98,7 @@ def card(effect: Effect) -> str:
         ("Source", effect.source),
         ("Changes", ", ".join(effect.outputs)),
         ("Needs", ", ".join(effect.needs) or "nothing beside the motor angle"),
+        ("On a robot", ", ".join(_PLACES[p] for p in sorted(effect.on_robot))),
         ("Family", effect.family),
         ("Contains", ", ".join(effect.contains)),
         ("Looks like", effect.looks_like),
@@ -119,6 +127,7 @@ def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
         "source": effect.source,
         "outputs": list(effect.outputs),
         "needs": list(effect.needs),
+        "on_robot": sorted(effect.on_robot),
         "family": effect.family,
         "contains": list(effect.contains),
         "looks_like": effect.looks_like,
@@ -178,9 +187,14 @@ def _drawing(effect: Effect) -> list[str]:
     """The signature over time, one line per output that changes."""
     drawn = signature(effect)
     usual = ", ".join(f"{name} {x:g}" for name, x in drawn.values.items() if isfinite(x))
-    lines = [
+    over = [
         f"Signature over {drawn.time[-1]:.0f} s of the standard motion"
         " (fast and slow stroke under 15 kg, then 45 kg), with",
+    ]
+    if effect.of_robots:
+        over = [f"Signature over {len(drawn.time)} poses of the standard robot, on line 1, with"]
+    lines = [
+        *over,
         f"  {usual}",
         f"  {'moves':<13}{sparkline(drawn.cable_length)}  cable_length",
     ]

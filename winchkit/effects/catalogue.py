@@ -16,7 +16,7 @@ from winchkit.units import dimension_of, suggest
 
 __all__ = ["Catalogue", "load_catalogue"]
 
-_ROOMS = ("on_length", "on_tension", "on_torque")
+_ROOMS = ("on_length", "on_tension", "on_torque", "on_robot")
 
 
 class Catalogue:

@@ -10,13 +10,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from winchkit.model.stages import At, Stage
+from winchkit.model.stages import ROBOT_STAGES, At, Stage
 
-__all__ = ["Effect", "Need", "Parameter", "Values"]
+__all__ = ["Effect", "Need", "Parameter", "Placement", "Values"]
 
 Values = Mapping[str, float]
-Need = Literal["cable", "layers", "guide", "pulley", "temperature", "load", "rope_force", "gearing"]
+Need = Literal[
+    "cable", "layers", "guide", "pulley", "temperature", "load", "rope_force", "gearing", "robot"
+]
 Output = Literal["cable_length", "tension", "motor_torque"]
+Placement = Literal["one", "all", "platform"]
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,9 @@ class Effect:
     """May stand several times, with other orders."""
     probes: tuple[Mapping[str, float], ...] = field(default=())
     """Values whose secants make the signature where single parameters have no gradient."""
+    on_robot: frozenset[Placement] = frozenset()
+    """How it acts on a robot that stands: on ``one`` line, on ``all`` lines alike, on either, or on
+    the ``platform``; empty where it takes a motion to show."""
 
     @property
     def not_in_control(self) -> str:
@@ -96,6 +102,11 @@ class Effect:
     def parameter(self, name: str) -> Parameter:
         """A parameter by name."""
         return next(p for p in self.parameters if p.name == name)
+
+    @property
+    def of_robots(self) -> bool:
+        """Whether only a robot can have it."""
+        return self.stage in ROBOT_STAGES
 
     @property
     def null(self) -> dict[str, float]:

@@ -17,6 +17,7 @@ import tomlkit
 from tomlkit.items import InlineTable
 
 from winchkit.effects.bind import Term
+from winchkit.effects.placed import HOME, base_of, line_of_effect
 from winchkit.effects.profile_document import (
     effect_tables,
     read_document,
@@ -81,15 +82,35 @@ def _put(document: Any, fitted: Sequence[Fitted]) -> None:
     for item in fitted:
         if _update_shorthand(document, item):
             continue
-        table = next((t for t in unused if t["id"] == item.term.effect.id), None)
+        name, line = base_of(item.term.effect), line_of_effect(item.term.effect)
+        table = next((t for t in unused if (t["id"], t.get("line", "")) == (name, line)), None)
         if table is None:
             table = tomlkit.table()
-            table["id"] = item.term.effect.id
+            table["id"] = name
+            if line:
+                table["line"] = line
             effect_tables(document).append(table)
             table = effect_tables(document)[-1]
         else:
             unused.remove(table)
         _fill(table, item)
+        _put_home_lengths(document, item)
+
+
+def _put_home_lengths(document: Any, item: Fitted) -> None:
+    """What a rope's law brought along on a robot, as an effect of its own beside those there."""
+    values = item.term.values
+    homes = {n.removeprefix(HOME): values[n] for n in values if n.startswith(HOME)}
+    if not homes:
+        return
+    tables = [t for t in effect_tables(document) if t["id"] == "home-length" and "line" not in t]
+    if not tables:
+        effect_tables(document).append(tomlkit.item({"id": "home-length"}))
+        tables = [effect_tables(document)[-1]]
+    lengths = tomlkit.inline_table()
+    lengths.update({line: written(value, "m") for line, value in homes.items()})
+    tables[0]["length"] = lengths
+    tables[0]["fitted"] = {"runs": list(item.runs), "date": item.date}
 
 
 def _update_shorthand(document: Any, item: Fitted) -> bool:
@@ -112,6 +133,8 @@ def _update_shorthand(document: Any, item: Fitted) -> bool:
 def _fill(table: Any, item: Fitted) -> None:
     effect = item.term.effect
     for parameter in effect.parameters:
+        if parameter.name.startswith(HOME):
+            continue
         value = item.term.values[parameter.name]
         if isinf(value):
             table.pop(parameter.name, None)
@@ -123,7 +146,7 @@ def _fill(table: Any, item: Fitted) -> None:
 def _provenance(item: Fitted) -> InlineTable:
     std = tomlkit.inline_table()
     for name, value in item.std.items():
-        if isnan(value):
+        if isnan(value) or name.startswith(HOME):
             continue
         std[name] = written(value, item.term.effect.parameter(name).unit)
     fitted = tomlkit.inline_table()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["At", "Modifier", "Path", "Signals", "Stage"]
+__all__ = ["ROBOT_STAGES", "At", "LinePlace", "Modifier", "Path", "Signals", "Stage"]
 
 Array = NDArray[np.float64]
 
@@ -46,6 +46,27 @@ class Stage(IntEnum):
     """Value: torque with the motor's own terms, N m."""
     TORQUE_SIGNAL = 13
     """Value: torque as the drive reports it, N m."""
+    LINE_PLACE = 14
+    """Value: :class:`LinePlace` of a robot's line."""
+    HOME_LENGTH = 15
+    """Value: rope of a robot's line at home, m."""
+    PAYLOAD = 16
+    """Value: the :class:`~winchkit.schema.robot.PlatformSpec` of a robot."""
+
+
+ROBOT_STAGES = frozenset({Stage.LINE_PLACE, Stage.HOME_LENGTH, Stage.PAYLOAD})
+"""Where effects act that only a robot can have."""
+
+
+@dataclass(frozen=True)
+class LinePlace:
+    """Where one line of a robot leaves the frame and meets the platform, SI."""
+
+    exit_point: Array
+    """In the base frame, (3,)."""
+    anchor_point: Array
+    """In the platform frame, (3,)."""
+    swivel_radius: float
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ OUTPUT_NAMES = {
     "cable_length": "cable length",
     "tension": "tension",
     "motor_torque": "motor torque",
+    "platform_position": "platform position",
 }
 VARIABLE_NAMES = {
     "drum_angle": "drum angle",
@@ -40,8 +41,11 @@ VARIABLE_NAMES = {
     "temperature": "temperature",
     "time": "time",
     "reversal_distance": "distance since reversal",
+    "winch": "line",
+    "pose": "pose",
 }
 _CLAUSES = {
+    "anchor-point": "your rope meets the platform elsewhere",
     "cable-creep": "your rope creeps under load",
     "cable-elongation-exponential": "your rope stretches, and stiffens with its tension",
     "cable-elongation-linear": "your rope stretches",
@@ -60,6 +64,11 @@ _CLAUSES = {
     "cell-thermal": "your load cell's zero follows the temperature",
     "drum-eccentricity": "your drum runs out of true",
     "drum-radius": "your drum's winding radius is off",
+    "exit-point": "your rope leaves the frame elsewhere",
+    "home-length": "your rope had another length at home",
+    "payload-centre": "your platform's centre of mass lies elsewhere",
+    "payload-mass": "your platform's mass is off",
+    "swivel-radius": "your swivel pulley's radius is off",
     "drum-winding-tension": "your rope lies on the drum with the strain of its winding",
     "encoder-slip": "your drum slipped against its encoder",
     "frame-compliance": "your frame gives way to the load",
@@ -95,8 +104,10 @@ def clause(effect: str) -> str:
 
 
 def meaning(effect: str) -> str:
-    """What an effect of winchkit's own means; empty for any other."""
-    return _CLAUSES.get(effect, "")
+    """What an effect of winchkit's own means, and on which line; empty for any other."""
+    own, _, line = effect.partition("/")
+    words = _CLAUSES.get(own, "")
+    return f"{words} (line {line})" if words and line else words
 
 
 def kind(effect: str) -> str:

@@ -46,4 +46,5 @@ EFFECT = Effect(
     family="rope law",
     contains=("cable-elongation-linear",),
     needs=("rope_force",),
+    on_robot=frozenset({"all"}),
 )

@@ -32,4 +32,5 @@ EFFECT = Effect(
     told_apart="The same load at several lengths; several loads over the full stroke.",
     family="rope law",
     needs=("rope_force",),
+    on_robot=frozenset({"one", "all"}),
 )

@@ -87,4 +87,5 @@ EFFECT = Effect(
     contains=("cable-elongation-linear",),
     needs=("rope_force",),
     probes=({"k1": 2e5}, {"k1": 2e5, "b2": 100.0}, {"k1": 2e5, "b3": 3e4}),
+    on_robot=frozenset({"all"}),
 )

@@ -30,4 +30,5 @@ EFFECT = Effect(
     told_apart="Temperature up and down at constant load.",
     needs=("temperature",),
     order=3,
+    on_robot=frozenset({"all"}),
 )

@@ -31,4 +31,5 @@ EFFECT = Effect(
     confused_with=("gear-transmission-error",),
     told_apart="Two loads: the torque's sine grows with the load. A ratio that is not whole.",
     polar=("eccentricity", "phase"),
+    on_robot=frozenset({"one"}),
 )

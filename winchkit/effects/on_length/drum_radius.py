@@ -26,4 +26,5 @@ EFFECT = Effect(
     looks_like="A length error that grows in proportion to the drum angle, whatever the tension.",
     confused_with=("gear-ratio", "layer-thickness"),
     told_apart="An encoder on the drum; on a layered drum a stroke over several layers.",
+    on_robot=frozenset({"one", "all"}),
 )

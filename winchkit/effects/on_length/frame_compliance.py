@@ -31,4 +31,5 @@ EFFECT = Effect(
     confused_with=("cable-elongation-linear",),
     told_apart="The same load at several lengths; several loads over the full stroke.",
     needs=("rope_force",),
+    on_robot=frozenset({"one", "all"}),
 )

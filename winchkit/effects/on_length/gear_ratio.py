@@ -23,4 +23,5 @@ EFFECT = Effect(
     confused_with=("drum-radius", "layer-thickness"),
     told_apart="An encoder on the drum; on a layered drum a stroke over several layers.",
     needs=("gearing",),
+    on_robot=frozenset({"one", "all"}),
 )

@@ -41,4 +41,5 @@ EFFECT = Effect(
         {"offset": 0.01, "mismatch": 1e-3},
         {"offset": -0.02, "mismatch": 1e-3},
     ),
+    on_robot=frozenset({"one"}),
 )

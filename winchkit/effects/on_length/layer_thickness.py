@@ -27,4 +27,5 @@ EFFECT = Effect(
     confused_with=("guide-offset", "drum-radius"),
     told_apart="The torque at constant weight over the full stroke: the guide moves it far less.",
     needs=("layers",),
+    on_robot=frozenset({"all"}),
 )

@@ -30,4 +30,5 @@ EFFECT = Effect(
     family="cell static",
     needs=("load",),
     order=2,
+    on_robot=frozenset({"one"}),
 )

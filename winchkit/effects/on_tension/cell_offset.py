@@ -29,4 +29,5 @@ EFFECT = Effect(
     family="cell static",
     needs=("load",),
     order=1,
+    on_robot=frozenset({"one"}),
 )

@@ -29,4 +29,5 @@ EFFECT = Effect(
     told_apart="Temperature up and down.",
     needs=("load", "temperature"),
     order=6,
+    on_robot=frozenset({"one"}),
 )

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
+from winchkit.model.line import Line
 from winchkit.model.robot.forward import Found, forward
 from winchkit.model.robot.kernels import RopeLine
 from winchkit.model.robot.kinematics import (
@@ -20,21 +23,23 @@ from winchkit.model.robot.kinematics import (
     structure_matrix,
 )
 from winchkit.model.robot.wrench import gravity_wrench
-from winchkit.schema.robot import RobotProfile
+from winchkit.model.stages import ROBOT_STAGES, LinePlace, Modifier, Stage
+from winchkit.schema.robot import PlatformSpec, RobotProfile
 from winchkit.schema.winch import WinchProfile
 
 __all__ = ["Robot", "robot_of", "ropes_of"]
 
 Array = NDArray[np.float64]
 _TURN = 2 * np.pi
+_NEWTON_STEPS = 5
 
 
 @dataclass(frozen=True)
 class Robot:
-    """Geometry, winches and home pose of a robot; every line is its nominal profile.
+    """Geometry, winches and home pose of a robot, its effects included.
 
     A line's length at a pose is L(home) − (W(Φ_ref + φ) − W(Φ_ref)), with the drum's W and its
-    wound angle Φ; L(home) comes from the geometry.
+    wound angle Φ; L(home) comes from the geometry. Modifiers, made by effects, act on the way.
     """
 
     profile: RobotProfile
@@ -42,6 +47,9 @@ class Robot:
     home: Pose
     home_length: Array
     """(n,), m."""
+    platform: PlatformSpec
+    modifiers: tuple[tuple[Modifier, ...], ...]
+    """Per line, in the stages of a winch."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -52,6 +60,19 @@ class Robot:
     def winches(self) -> list[WinchProfile]:
         """Profiles of the lines' winches."""
         return _winches(self.profile)
+
+    @cached_property
+    def lines(self) -> tuple[Line, ...]:
+        """The winches as lines that begin with their rope at home."""
+        return tuple(
+            Line(
+                replace(winch, reference=replace(winch.reference, cable_length=float(there))),
+                modifiers,
+            )
+            for winch, there, modifiers in zip(
+                self.winches, self.home_length, self.modifiers, strict=True
+            )
+        )
 
     @property
     def dead_length(self) -> Array:
@@ -68,49 +89,101 @@ class Robot:
 
     def weight(self, pose: Pose) -> Array:
         """Wrench of the platform's weight, (p, 6)."""
-        return gravity_wrench(self.profile.platform, pose.rotation)
+        return gravity_wrench(self.platform, pose.rotation)
 
-    def motor_angles(self, pose: Pose, strain: Array | float = 0.0) -> Array:
-        """Motor angles at poses, (p, n), rad, with ropes strained more than at home by ``strain``.
+    def motor_angles(
+        self, pose: Pose, strain: Array | float = 0.0, tension: Array | float = 0.0
+    ) -> Array:
+        """Motor angles at poses, (p, n), rad, at which the ropes reach there under ``tension``, N.
 
-        ``strain`` is one number, (n,) or (p, n); it acts on length and dead length.
+        ``strain`` is by how much more they are strained than at home, by whatever is no effect of
+        the profile; it acts on length and dead length. Both are one number, (n,) or (p, n).
         """
         there = self.lengths(pose)
         slack = there - strain * (there + self.dead_length)
+        pulled = np.broadcast_to(tension, slack.shape)
         out = np.empty_like(slack)
-        for i, winch in enumerate(self.winches):
+        for i, (winch, line) in enumerate(zip(self.winches, self.lines, strict=True)):
             drum, home = drum_of(winch), _TURN * winch.reference.wound_turns
             wound = drum.wound(np.asarray(home)) + self.home_length[i] - slack[:, i]
             turned = drum.angle(wound) - home
             out[:, i] = winch.reference.motor_angle + _ratio(winch) * turned
+            for _ in range(_NEWTON_STEPS if line.modifiers else 0):
+                length, arm = line.lengths_and_arms(line.standing(out[:, i], pulled[:, i]))
+                out[:, i] += (length - slack[:, i]) / arm
         return out
 
-    def lengths_at(self, motor_angles: Array) -> Array:
-        """Rope lengths that motor angles (p, n) stand for, (p, n), m."""
+    def lengths_at(
+        self,
+        motor_angles: Array,
+        tension: Array | float = 0.0,
+        temperature: Array | float = 20.0,
+    ) -> Array:
+        """Rope lengths that motor angles (p, n) stand for, effects included, (p, n), m.
+
+        Ropes that stretch do so under ``tension``, N; it and the temperature (degrees Celsius)
+        are one number, (n,) or (p, n).
+        """
         angles = np.atleast_2d(np.asarray(motor_angles, dtype=float))
         if angles.shape[1] != len(self.profile.line):
             raise UsageError(
                 f"{angles.shape[1]} motor angles were given for a robot of "
                 f"{len(self.profile.line)} lines"
             )
+        pulled, warm = (np.broadcast_to(x, angles.shape) for x in (tension, temperature))
         out = np.empty_like(angles)
-        for i, winch in enumerate(self.winches):
-            drum, home = drum_of(winch), _TURN * winch.reference.wound_turns
-            turned = (angles[:, i] - winch.reference.motor_angle) / _ratio(winch)
-            wound = drum.wound(home + turned) - drum.wound(np.asarray(home))
-            out[:, i] = self.home_length[i] - wound
+        for i, line in enumerate(self.lines):
+            at = line.standing(angles[:, i], pulled[:, i], warm[:, i])
+            out[:, i] = line.lengths(at)
         return out
 
-    def poses_at(self, motor_angles: Array, start: Pose | None = None) -> Found:
+    def poses_at(
+        self,
+        motor_angles: Array,
+        start: Pose | None = None,
+        tension: Array | float = 0.0,
+        temperature: Array | float = 20.0,
+    ) -> Found:
         """Poses at motor angles (p, n), searched from ``start``, else from home."""
-        given = self.lengths_at(motor_angles)
-        return forward(self.geometry, given, start or self.home, self.profile.platform)
+        given = self.lengths_at(motor_angles, tension, temperature)
+        return forward(self.geometry, given, start or self.home, self.platform)
 
 
-def robot_of(profile: RobotProfile) -> Robot:
-    """The robot that a profile declares."""
-    geometry, home = geometry_of(profile), home_of(profile)
-    return Robot(profile, geometry, home, lengths(geometry, home.position, home.rotation)[0])
+def robot_of(
+    profile: RobotProfile,
+    modifiers: Sequence[Sequence[Modifier]] = (),
+    payload: Sequence[Modifier] = (),
+) -> Robot:
+    """The robot that a profile declares, with modifiers per line and of its platform.
+
+    Without them it is the nominal robot; ``winchkit.effects.robot_with_effects`` has those of the
+    profile's own effects.
+    """
+    home, geometry = home_of(profile), geometry_of(profile)
+    own = tuple(tuple(m) for m in modifiers) or ((),) * len(profile.line)
+    if not any(own) and not payload:
+        there = lengths(geometry, home.position, home.rotation)[0]
+        return Robot(profile, geometry, home, there, profile.platform, own)
+    exits, anchors = geometry.exit_point.copy(), geometry.anchor_point.copy()
+    radii, offsets = geometry.swivel_radius.copy(), np.zeros(len(own))
+    # Effects of place look at no motion: one line at rest serves them all.
+    rest = Line(_winches(profile)[0]).standing(np.zeros(1))
+    for i, stages in enumerate(own):
+        place, offset = LinePlace(exits[i], anchors[i], float(radii[i])), 0.0
+        for modifier in stages:
+            if modifier.stage is Stage.LINE_PLACE:
+                place = modifier.apply(place, rest)
+            elif modifier.stage is Stage.HOME_LENGTH:
+                offset = modifier.apply(offset, rest)
+        exits[i], anchors[i], radii[i] = place.exit_point, place.anchor_point, place.swivel_radius
+        offsets[i] = offset
+    geometry = Geometry(exits, anchors, radii, geometry.swivel_axis)
+    there = lengths(geometry, home.position, home.rotation)[0] + offsets
+    platform = profile.platform
+    for modifier in payload:
+        platform = modifier.apply(platform, rest)
+    lines = tuple(tuple(m for m in stages if m.stage not in ROBOT_STAGES) for stages in own)
+    return Robot(profile, geometry, home, there, platform, lines)
 
 
 def ropes_of(robot: Robot) -> list[RopeLine]:
@@ -120,7 +193,8 @@ def ropes_of(robot: Robot) -> list[RopeLine]:
 
 def _rope(robot: Robot, index: int, winch: WinchProfile) -> RopeLine:
     place = robot.geometry
-    drum, home = drum_of(winch), _TURN * winch.reference.wound_turns
+    _only_drums(robot, index)
+    drum, home = robot.lines[index].drum, _TURN * winch.reference.wound_turns
     stepped, winding, growth = _law(drum)
     ex, ey, ez = place.exit_point[index].tolist()
     bx, by, bz = place.anchor_point[index].tolist()
@@ -146,6 +220,15 @@ def _rope(robot: Robot, index: int, winch: WinchProfile) -> RopeLine:
         motor_angle=winch.reference.motor_angle,
         dead_length=winch.cable.dead_length,
     )
+
+
+def _only_drums(robot: Robot, index: int) -> None:
+    """The loops know drums; what else acts on a line they would leave out unseen."""
+    if any(m.stage not in (Stage.DRUM, Stage.CELL) for m in robot.modifiers[index]):
+        raise UsageError(
+            f"line {robot.names[index]} has effects beside its drum's; the loops of a control "
+            "cycle leave them out: take Robot.motor_angles, or the robot without them and strains"
+        )
 
 
 def _law(drum: Drum) -> tuple[float, float, float]:

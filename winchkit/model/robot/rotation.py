@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "angle_rates",
     "angles_of",
     "quaternion_of",
     "rotation_by",
@@ -118,3 +119,18 @@ def quaternion_of(rotation: ArrayLike) -> Array:
     row = np.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :]
     unit = row / np.linalg.norm(row, axis=-1, keepdims=True)
     return np.asarray(np.where(unit[..., :1] < 0, -unit, unit))
+
+
+def angle_rates(rotation: Array) -> Array:
+    """Derivatives of roll, pitch and yaw by a rotation vector in the base frame, (p, 3, 3)."""
+    _, pitch, yaw = angles_of(rotation).T
+    cp, sp, cy, sy = np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
+    zero, one = np.zeros_like(cp), np.ones_like(cp)
+    # Near a pitch of a right angle roll and yaw are one: no finite rate says anything there.
+    level = np.where(np.abs(cp) > 1e-6, cp, np.nan)
+    rows = (
+        (cy / level, sy / level, zero),
+        (-sy, cy, zero),
+        (cy * sp / level, sy * sp / level, one),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -39,6 +39,10 @@ class Measured:
     """By an instrument at the rope, (p, n), m, each with an offset of its own."""
     tension: Array
     """(p, n), N."""
+    temperature: Array
+    """Of the ropes, (p, n), degrees Celsius."""
+    run: NDArray[np.intp]
+    """Which of the runs each pose is from, (p,)."""
     place: NDArray[np.str_]
     """Which row of which run each pose is, in words, (p,)."""
     length_zeroed: bool = False
@@ -70,7 +74,7 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
         found = _faults(run, profile)
         faults += found
         if not found:
-            parts.append(_of_run(run, profile))
+            parts.append(_of_run(run, profile, len(parts)))
     if faults:
         raise RunError(faults)
     joined: dict[str, Any] = {
@@ -118,7 +122,7 @@ def _present(run: Run, names: Sequence[str]) -> tuple[list[str], list[str]]:
     return given, [name for name in names if name not in given]
 
 
-def _of_run(run: Run, profile: RobotProfile) -> Measured:
+def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
     names = [line.name for line in profile.line]
 
     def per_line(kind: str) -> Array:
@@ -131,6 +135,8 @@ def _of_run(run: Run, profile: RobotProfile) -> Measured:
         swivel=per_line("swivel"),
         cable_length=per_line("cable_length"),
         tension=per_line("tension"),
+        temperature=_temperature(run, names),
+        run=np.full(len(run), number, dtype=np.intp),
         place=np.array([f"row {n} of {run.path or run.name}" for n in range(1, len(run) + 1)]),
         length_zeroed=run.length_zeroed,
     )
@@ -162,6 +168,13 @@ def _gaps(found: Measured, moved: NDArray[np.bool_]) -> list[str]:
         if 0 < missing < values.size:
             notes.append(f"{missing} of {values.size} values of {name} are missing")
     return notes
+
+
+def _temperature(run: Run, names: Sequence[str]) -> Array:
+    """Line by line where it was measured so, else one for all."""
+    common = _column(run, "temperature")
+    own = [_column(run, f"{name}.temperature") for name in names]
+    return np.stack([np.where(np.isfinite(t), t, common) for t in own], axis=1)
 
 
 def _column(run: Run, name: str) -> Array:

@@ -1,0 +1,80 @@
+"""Adding an effect to a robot: fitted on its poses, judged on those held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from winchkit.diagnosis.add import Addition
+from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.robot.diagnose import Study, study_of
+from winchkit.diagnosis.robot.figures import Shown, figures
+from winchkit.diagnosis.robot.places import lacking, needless
+from winchkit.diagnosis.uncertainty import estimates, spread_of
+from winchkit.effects.bind_robot import declared_terms, robot_terms
+from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.effect import Effect
+from winchkit.effects.placed import at_line
+from winchkit.errors import UsageError
+from winchkit.runs.run import Run
+from winchkit.schema.robot import RobotProfile
+
+__all__ = ["add_to_robot"]
+
+
+def add_to_robot(
+    effect_id: str,
+    runs: Sequence[Run],
+    profile: RobotProfile,
+    line: str | None = None,
+    catalogue: Catalogue | None = None,
+) -> Addition:
+    """Fit an effect at its place beside those that a robot has, its geometry as it is.
+
+    Raises UsageError for an effect that is unknown, there already, at no such place, or that the
+    poses cannot show; RunError with every fault of every run.
+    """
+    catalogue = catalogue or load_catalogue()
+    effect = _placed(catalogue[effect_id], profile, line)
+    if any(term.effect.id == effect.id for term in robot_terms(profile, catalogue)):
+        raise UsageError(f"robot '{profile.name}' has the effect '{effect.id}' already")
+    study = study_of(runs, profile, catalogue)
+    if missing := lacking(effect, study.dataset):
+        raise UsageError(
+            f"effect '{effect_id}' cannot be seen in these poses: without {', '.join(missing)}"
+        )
+    return _added(study, needless(effect, study.dataset))
+
+
+def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
+    names = [known.name for known in profile.line]
+    if not effect.on_robot:
+        raise UsageError(f"effect '{effect.id}' shows in motion only; poses stand still")
+    if line is None:
+        if not effect.on_robot & {"all", "platform"}:
+            raise UsageError(
+                f"effect '{effect.id}' acts on one line: name it with --winch, one of "
+                f"{', '.join(names)}"
+            )
+        return effect
+    if "one" not in effect.on_robot:
+        raise UsageError(f"effect '{effect.id}' acts on the robot as a whole; leave --winch out")
+    if line not in names:
+        raise UsageError(f"no line '{line}'; the lines are {', '.join(names)}")
+    return at_line(effect, line)
+
+
+def _added(study: Study, effect: Effect) -> Addition:
+    inquiry = study.as_filed()
+    begin, noise = inquiry.settle(inquiry.begin)
+    scores = [s for s in inquiry.scores(begin, noise) if s.atom.effect.id == effect.id]
+    if not scores:
+        raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
+    final: Fit = inquiry.trial(begin, scores[0], noise).fit
+    problem = inquiry.robot_problem
+    before, after = (Shown(problem, fit, noise, inquiry.groups) for fit in (begin, final))
+    spread = spread_of(problem, final, noise, inquiry.blocks)
+    own = {term.effect.id for term in declared_terms(study.dataset.robot, study.catalogue)}
+    found = estimates(problem, final, spread)
+    # What a line's winch brings along is refitted beside it and stays in the winch's own profile.
+    terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
+    return Addition(figures(before, after, study.noise), terms, study.dataset.notes)

@@ -1,0 +1,76 @@
+"""A robot's profile against poses: how far off, and what the error follows. Nothing is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.result import Comparison, OutputError
+from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
+from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
+from winchkit.diagnosis.robot.figures import UNITS, Errors, errors_of, rms, signals
+from winchkit.diagnosis.robot.noise import START, contrasts
+from winchkit.diagnosis.robot.problem import RobotProblem, Standing
+from winchkit.diagnosis.robot.where import follows_of
+from winchkit.effects.bind_robot import robot_terms, robot_with_effects
+from winchkit.effects.catalogue import Catalogue
+from winchkit.runs.run import Run
+from winchkit.schema.robot import RobotProfile
+
+__all__ = ["compare_robot"]
+
+Array = NDArray[np.float64]
+
+
+def compare_robot(
+    runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue | None = None
+) -> Comparison:
+    """Compare poses with a robot's profile at its file values.
+
+    Raises RunError with every fault of every run, FileError for effects that do not bind.
+    """
+    dataset = prepare_poses(runs, profile)
+    robot = robot_with_effects(profile, catalogue)
+    equations = Equations(dataset, start_pose(dataset), robot)
+    pose = placed_by(equations, robot, START)
+    problem = RobotProblem(Standing(dataset, pose, START))
+    errors = errors_of(problem, problem.residuals(robot_terms(profile, catalogue)))
+    noise = _noise(errors, dataset)
+    follows = follows_of(problem, errors)
+    size = signals(problem)
+    outputs = {
+        name: OutputError(
+            unit=UNITS[name],
+            samples=int(np.count_nonzero(np.isfinite(error))),
+            band=None,
+            signal_rms=size[name],
+            rms=rms(name, error),
+            max=_largest(name, error),
+            bias=float(np.nanmean(error)),
+            noise_rms=noise.get(name),
+            follows=tuple((f.variable, f.share) for f in follows if f.output == name),
+        )
+        for name, error in errors.items()
+    }
+    return Comparison(outputs, None, dataset.notes)
+
+
+def _largest(name: str, error: Array) -> float:
+    if name == "platform_position":
+        return float(np.sqrt(np.nanmax(np.sum(error**2, axis=1))))
+    return float(np.nanmax(np.abs(error)))
+
+
+def _noise(errors: Errors, dataset: RobotDataset) -> dict[str, float]:
+    """Rms of the differences of repeated poses; empty without any."""
+    groups = [np.flatnonzero(dataset.pose == n) for n in range(int(dataset.pose.max()) + 1)]
+    many = [group for group in groups if len(group) > 1]
+    if not many:
+        return {}
+    apart = {
+        name: np.concatenate([contrasts(error[group]) for group in many])
+        for name, error in errors.items()
+    }
+    return {name: rms(name, values) for name, values in apart.items()}

@@ -1,0 +1,123 @@
+"""A robot's poses made ready: which of them repeat each other, and what their runs cannot show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.dataset import Dataset
+from winchkit.diagnosis.repeats import Repeats
+from winchkit.effects.robot_poses import Measured, read_poses
+from winchkit.errors import Fault, RunError
+from winchkit.runs.run import Run
+from winchkit.schema.robot import RobotProfile
+from winchkit.schema.winch import WinchProfile
+
+__all__ = ["RobotDataset", "prepare_poses"]
+
+Array = NDArray[np.float64]
+_FEWEST = 10
+_ANGLES_AGREE = 0.02
+_TENSIONS_AGREE = 0.03
+_MOSTLY = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotDataset(Dataset):
+    """Poses of one robot. A row is a pose at rest; there is no time between rows."""
+
+    robot: RobotProfile
+    measured: Measured
+    pose: NDArray[np.intp]
+    """Number of the distinct pose that each row takes, (p,)."""
+    runs: tuple[str, ...]
+    """Files."""
+    balanced: bool = True
+    """Whether the tensions measured carry the platform's weight at all."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Kinds of equations: lengths, and tensions where they were measured."""
+        return ("cable_length", "tension") if self.has_balance else ("cable_length",)
+
+    @property
+    def has_balance(self) -> bool:
+        """Whether tensions are compared with the weight."""
+        return self.balanced and self.has_tension
+
+    @property
+    def has_tension(self) -> bool:
+        """Whether most rows have the tension of their rope."""
+        return bool(np.mean(np.isfinite(self.measured.tension)) > _MOSTLY)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the lines."""
+        return tuple(line.name for line in self.robot.line)
+
+
+def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
+    """Read the poses of a robot's runs. Raises RunError with every fault of every run."""
+    if not runs:
+        raise RunError("no run given")
+    measured = read_poses(runs, robot)
+    place = ", ".join(run.path or run.name for run in runs)
+    if len(measured) < _FEWEST:
+        raise RunError(
+            Fault(f"only {len(measured)} poses; at least {_FEWEST} are needed to judge", place)
+        )
+    known = np.isfinite(measured.position).sum() + np.isfinite(measured.angles).sum()
+    spare = np.isfinite(measured.motor_angle).sum() + known - 6 * len(measured)
+    if spare <= 0:
+        raise RunError(
+            Fault(
+                "nothing measured beside what the poses themselves take up; measure the platform "
+                "(platform_x, platform_y, platform_z)",
+                place,
+            )
+        )
+    winch = robot.line[0].winch
+    assert isinstance(winch, WinchProfile)
+    return RobotDataset(
+        profile=winch,
+        recordings=(),
+        repeats=(Repeats((0,), (np.arange(len(measured)),)),),
+        notes=measured.notes,
+        robot=robot,
+        measured=measured,
+        pose=_distinct(measured),
+        runs=tuple(run.path or run.name for run in runs),
+    )
+
+
+def _distinct(measured: Measured) -> NDArray[np.intp]:
+    """Number of each row's pose: motor angles agree to 2 % of their spread, tensions to 3 %."""
+    angle = measured.motor_angle
+    spread = np.maximum(np.nanstd(angle, axis=0), 1e-9)
+    scaled = np.where(np.isfinite(angle), angle / spread, np.inf)
+    pull = _mean_pull(measured.tension)
+    first: list[int] = []
+    out = np.empty(len(angle), dtype=np.intp)
+    for row in range(len(angle)):
+        same = [n for n, other in enumerate(first) if _alike(row, other, scaled, pull)]
+        out[row] = same[0] if same else len(first)
+        if not same:
+            first.append(row)
+    return out
+
+
+def _mean_pull(tension: Array) -> Array:
+    known = np.isfinite(tension)
+    count = np.maximum(known.sum(axis=1), 1)
+    return np.asarray(np.where(known, tension, 0.0).sum(axis=1) / count)
+
+
+def _alike(row: int, other: int, scaled: Array, pull: Array) -> bool:
+    with np.errstate(invalid="ignore"):
+        apart = scaled[row] - scaled[other]
+    if not np.sqrt(np.mean(apart**2)) < _ANGLES_AGREE:
+        return False
+    return bool(abs(pull[row] - pull[other]) <= _TENSIONS_AGREE * max(abs(pull[row]), 1e-9))

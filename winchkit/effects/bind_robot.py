@@ -1,0 +1,146 @@
+"""Binds effects to a robot: its ``[[effect]]`` tables and those of its winches become terms.
+
+A table with ``line = "1"`` acts on that line, one without on all lines or on the platform. Home
+lengths of several lines may stand in one table, ``length = { 1 = "0.4 mm", 2 = "-0.2 mm" }``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+
+from winchkit.effects.bind import Term, terms_of, values_of
+from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.effect import Effect
+from winchkit.effects.placed import HOME, at_line, line_of_effect
+from winchkit.errors import Fault, FileError
+from winchkit.model.robot import Robot, robot_of
+from winchkit.model.stages import Modifier, Stage
+from winchkit.schema.robot import RobotProfile
+from winchkit.schema.winch import EffectTable, WinchProfile
+from winchkit.units import suggest
+
+__all__ = [
+    "check_robot",
+    "declared_terms",
+    "robot_terms",
+    "robot_with_effects",
+    "robot_with_terms",
+]
+
+_HOME_LENGTH = "home-length"
+
+
+def robot_with_effects(profile: RobotProfile, catalogue: Catalogue | None = None) -> Robot:
+    """The robot that a profile declares, its effects included. Raises FileError."""
+    return robot_with_terms(profile, robot_terms(profile, catalogue))
+
+
+def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
+    """The robot with other effects than its own."""
+    lines: dict[str, list[Modifier]] = {line.name: [] for line in profile.line}
+    payload: list[Modifier] = []
+    for term in terms:
+        modifier, place = term.modifier(), line_of_effect(term.effect)
+        if term.effect.stage is Stage.PAYLOAD:
+            payload.append(modifier)
+            continue
+        for name in [place] if place else lines:
+            lines[name].append(modifier)
+            if offset := term.values.get(HOME + name):
+                lines[name].append(Modifier(Stage.HOME_LENGTH, _Longer(offset)))
+    return robot_of(profile, list(lines.values()), payload)
+
+
+class _Longer:
+    """A constant more of rope."""
+
+    def __init__(self, offset: float) -> None:
+        self.offset = offset
+
+    def __call__(self, length: float, at: object) -> float:
+        return length + self.offset
+
+
+def robot_terms(profile: RobotProfile, catalogue: Catalogue | None = None) -> tuple[Term, ...]:
+    """Terms of a robot and of its lines' winches. Raises FileError with every fault.
+
+    What a winch has that takes a motion to show, such as friction, is left out.
+    """
+    catalogue = catalogue or load_catalogue()
+    terms = declared_terms(profile, catalogue)
+    for line in profile.line:
+        if isinstance(line.winch, WinchProfile):
+            terms += [
+                Term(at_line(term.effect, line.name), term.values)
+                for term in terms_of(line.winch, catalogue)
+                if term.effect.on_robot
+            ]
+    return tuple(terms)
+
+
+def declared_terms(profile: RobotProfile, catalogue: Catalogue) -> list[Term]:
+    """Terms of the robot's own tables alone. Raises FileError with every fault."""
+    terms, faults = _bind(profile, catalogue)
+    if faults:
+        raise FileError(faults)
+    return terms
+
+
+def check_robot(profile: RobotProfile, catalogue: Catalogue | None = None) -> list[Fault]:
+    """Every fault of the effects that a robot declares itself."""
+    return _bind(profile, catalogue or load_catalogue())[1]
+
+
+def _bind(profile: RobotProfile, catalogue: Catalogue) -> tuple[list[Term], list[Fault]]:
+    terms: list[Term] = []
+    faults: list[Fault] = []
+    names = [line.name for line in profile.line]
+    for table in _single(profile.effect):
+        if table.id not in catalogue:
+            hint = suggest(table.id, [effect.id for effect in catalogue])
+            faults.append(_fault(table, f"no effect '{table.id}'{hint}", "effect.id"))
+            continue
+        effect = catalogue[table.id]
+        given = {key: value for key, value in table.values.items() if key != "line"}
+        wrong = _misplaced(effect, table.values.get("line"), names)
+        values, faulty = values_of(effect, replace(table, values=given))
+        if wrong:
+            faulty = [*faulty, _fault(table, wrong, f"effect {table.id}.line")]
+        elif (place := table.values.get("line")) is not None:
+            effect = at_line(effect, str(place))
+        if not wrong and any(term.effect.id == effect.id for term in terms):
+            message = "stands twice at one place; once is enough"
+            faulty = [*faulty, _fault(table, message, f"effect {effect.id}")]
+        faults += faulty
+        terms.append(Term(effect, values))
+    return terms, faults
+
+
+def _single(tables: Iterable[EffectTable]) -> Iterator[EffectTable]:
+    """Tables of one line each: home lengths of several lines are taken apart."""
+    for table in tables:
+        lengths = table.values.get("length")
+        if table.id == _HOME_LENGTH and isinstance(lengths, Mapping):
+            for line, length in lengths.items():
+                yield replace(table, values={"line": line, "length": length})
+        else:
+            yield table
+
+
+def _misplaced(effect: Effect, line: object, names: list[str]) -> str:
+    """What is wrong with where a table puts an effect; empty where nothing is."""
+    known = ", ".join(names)
+    if not effect.on_robot:
+        return "acts in motion only, a robot's poses stand still; give it to the line's winch"
+    if line is None and not effect.on_robot & {"all", "platform"}:
+        return f'missing: this effect acts on one line, named as line = "{names[0]}"'
+    if line is not None and "one" not in effect.on_robot:
+        return "this effect acts on the robot as a whole; leave the line out"
+    if line is not None and str(line) not in names:
+        return f"no line '{line}'; the lines are {known}{suggest(str(line), names)}"
+    return ""
+
+
+def _fault(table: EffectTable, message: str, where: str) -> Fault:
+    return Fault(message, table.path, table.line, where)

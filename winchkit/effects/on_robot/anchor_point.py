@@ -1,0 +1,33 @@
+"""anchor-point: the rope meets the platform elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.stages import At, LinePlace, Stage
+
+
+def apply(place: LinePlace, at: At, values: Values) -> LinePlace:
+    """A line whose anchor point is shifted."""
+    shift = np.array([values["x"], values["y"], values["z"]])
+    return replace(place, anchor_point=place.anchor_point + shift)
+
+
+EFFECT = Effect(
+    id="anchor-point",
+    stage=Stage.LINE_PLACE,
+    parameters=tuple(
+        Parameter(axis, "m", null=0.0, typical=3e-3, low=-0.2, high=0.2) for axis in "xyz"
+    ),
+    apply=apply,
+    outputs=("cable_length",),
+    what="The rope meets the platform at another point than the profile says.",
+    formula="b + δb, δb in the platform frame",
+    source="CABTIVE paper, Tables 3 and 6 (up to 10 mm apart, nominal to calibrated)",
+    looks_like="One line's length error along the rope's direction, turning with the platform.",
+    confused_with=("exit-point", "home-length"),
+    told_apart="Poses that turn the platform: without rotation it is an exit point the other way.",
+    needs=("robot",),
+    on_robot=frozenset({"one"}),
+)

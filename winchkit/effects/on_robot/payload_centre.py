@@ -1,0 +1,33 @@
+"""payload-centre: the platform's centre of mass lies elsewhere."""
+
+from dataclasses import replace
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.stages import At, Stage
+from winchkit.schema.robot import PlatformSpec
+
+
+def apply(platform: PlatformSpec, at: At, values: Values) -> PlatformSpec:
+    """A platform whose centre of mass is shifted."""
+    x, y, z = platform.center_of_mass
+    centre = (x + values["x"], y + values["y"], z + values["z"])
+    return replace(platform, center_of_mass=centre)
+
+
+EFFECT = Effect(
+    id="payload-centre",
+    stage=Stage.PAYLOAD,
+    parameters=tuple(
+        Parameter(axis, "m", null=0.0, typical=0.01, low=-5.0, high=5.0) for axis in "xyz"
+    ),
+    apply=apply,
+    outputs=("tension",),
+    what="The platform's centre of mass lies elsewhere than the profile says.",
+    formula="Δt = A⁺ᵀ Δw, Δw = −(0, R δc × m g)",
+    source="Static balance A t + w = 0; IPAnema 3 paper, Eq. 7 and 8 with the sign corrected",
+    looks_like="Lines on one side pull more, on the other less, by a constant moment.",
+    confused_with=("payload-mass", "cell-gain"),
+    told_apart="Poses that turn the platform: its height matters only where the platform tilts.",
+    needs=("robot", "rope_force"),
+    on_robot=frozenset({"platform"}),
+)

@@ -1,0 +1,29 @@
+"""payload-mass: the platform is heavier or lighter."""
+
+from dataclasses import replace
+
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.stages import At, Stage
+from winchkit.schema.robot import PlatformSpec
+
+
+def apply(platform: PlatformSpec, at: At, values: Values) -> PlatformSpec:
+    """A platform of mass m + δm."""
+    return replace(platform, mass=platform.mass + values["mass_error"])
+
+
+EFFECT = Effect(
+    id="payload-mass",
+    stage=Stage.PAYLOAD,
+    parameters=(Parameter("mass_error", "kg", null=0.0, typical=0.3, low=-1e4, high=1e4),),
+    apply=apply,
+    outputs=("tension",),
+    what="The platform weighs more or less than the profile says: a tool, a payload, a hose.",
+    formula="Δt = A⁺ᵀ Δw, Δw = −(δm g, c × δm g)",
+    source="Static balance A t + w = 0; IPAnema 3 paper, Eq. 7 and 8 with the sign corrected",
+    looks_like="Upper lines pull more than the weight asks for, lower ones less, at every pose.",
+    confused_with=("payload-centre", "cell-gain"),
+    told_apart="A weight known well on the platform: it changes the mass, and no cell.",
+    needs=("robot", "rope_force"),
+    on_robot=frozenset({"platform"}),
+)

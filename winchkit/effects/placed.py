@@ -1,0 +1,77 @@
+"""An effect at a place of a robot is an effect: on one line, or on all lines alike.
+
+Everything that searches, fits and names effects thereby works on robots as it does on winches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+
+from winchkit.effects.effect import Effect, Parameter
+
+__all__ = [
+    "HOME",
+    "LineEffect",
+    "at_line",
+    "base_of",
+    "line_of_effect",
+    "placements",
+    "with_home_lengths",
+]
+
+HOME = "home_length_"
+"""Parameters of a rope's law on a robot: a home length per line, named after it."""
+_HOME_TYPICAL = 1e-3
+
+
+@dataclass(frozen=True)
+class LineEffect(Effect):
+    """An effect on one line of a robot; its id is ``EFFECT/LINE``."""
+
+    base: str = ""
+    """Id of the effect itself."""
+    line: str = ""
+
+
+def at_line(effect: Effect, line: str) -> LineEffect:
+    """An effect placed on one line."""
+    own = {f.name: getattr(effect, f.name) for f in fields(Effect)}
+    own["id"] = f"{effect.id}/{line}"
+    own["contains"] = tuple(f"{name}/{line}" for name in effect.contains)
+    return LineEffect(**own, base=effect.id, line=line)
+
+
+def with_home_lengths(effect: Effect, lines: Sequence[str]) -> Effect:
+    """A law of the rope with a home length per line on which it acts.
+
+    The ropes were stretched at home too, by tensions that nobody knows: what the law adds is a
+    strain beyond that of home.
+    """
+    place = line_of_effect(effect)
+    on = [place] if place else list(lines)
+    homes = tuple(
+        Parameter(HOME + line, "m", null=0.0, typical=_HOME_TYPICAL, low=-1.0, high=1.0)
+        for line in on
+    )
+    contains = (*effect.contains, *(f"home-length/{line}" for line in on))
+    parameters = (*effect.parameters, *homes)
+    return replace(effect, parameters=parameters, contains=contains, probes=())
+
+
+def base_of(effect: Effect) -> str:
+    """Id of an effect without its place."""
+    return effect.base if isinstance(effect, LineEffect) else effect.id
+
+
+def line_of_effect(effect: Effect) -> str:
+    """Line on which an effect was placed; empty where it acts on all."""
+    return effect.line if isinstance(effect, LineEffect) else ""
+
+
+def placements(effect: Effect, lines: Sequence[str]) -> Iterator[Effect]:
+    """Every place that an effect can have on a robot at rest."""
+    if effect.on_robot & {"all", "platform"}:
+        yield effect
+    if "one" in effect.on_robot:
+        yield from (at_line(effect, line) for line in lines)
