@@ -87,6 +87,10 @@ class Inquiry:
         unsure = extrapolation(self.problem, fitted, noise, self.groups) > _UNSURE
         return self._five_blocks if unsure else self.groups
 
+    def grouped(self, folds: Folds) -> bool:
+        """Whether folds are whole groups of programme and load, two at least."""
+        return folds is self.groups and len(self.problem.dataset.repeats) > 1
+
     @cached_property
     def _five_blocks(self) -> Folds:
         return five_blocks(self.problem)

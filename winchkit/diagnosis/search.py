@@ -12,12 +12,15 @@ from winchkit.diagnosis.gate import confidence, held_out, held_out_rms
 from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
 from winchkit.diagnosis.signature import Score, chance_level
+from winchkit.effects.coordinates import Coordinates
 
 __all__ = ["Found", "search"]
 
 Array = NDArray[np.float64]
 _MOST_STEPS = 6
 _SHORT_LIST = 5
+_RIVALS = 2
+_RECONSIDERED = 3
 _PRESENCE_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
 _GATE_LEVEL = 0.02
@@ -122,15 +125,20 @@ def _grow(inquiry: Inquiry, present: Fit, noise: Noise, trials: list[Trial]) -> 
 
 
 def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
-    """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum."""
+    """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
+
+    An effect that shows in few blocks, such as those of one kind of move, cannot be certain by
+    rank; that it pays for itself in every single group, none of which it was fitted on, can.
+    """
     problem = inquiry.problem
     blocks = inquiry.blocks
     before = held_out(problem, present, noise, blocks)
     after = held_out(problem, trial.fit, noise, blocks)
-    if np.sum(before - after) <= 0 or confidence(before, after) > _GATE_LEVEL:
-        return False
     groups = inquiry.folds(trial.fit, noise)
     gain = held_out(problem, present, noise, groups) - held_out(problem, trial.fit, noise, groups)
+    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _freedom(trial))
+    if np.sum(before - after) <= 0 or (confidence(before, after) > _GATE_LEVEL and not pays):
+        return False
     was = held_out_rms(problem, present, noise, groups)
     now = held_out_rms(problem, trial.fit, noise, groups)
     ratios = [now[output] / was[output] for output in problem.dataset.outputs]
@@ -139,19 +147,38 @@ def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
     return bool(np.sum(gain) > 0) and matters
 
 
+def _freedom(trial: Trial) -> int:
+    return Coordinates(trial.effect).freedom
+
+
 def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
-    """Drop what is no longer needed, and replace what another effect explains better."""
-    present = _without_the_needless(inquiry, present, noise)
+    """Drop what is no longer needed, and replace what another effect explains better.
+
+    Again while that changes anything: the first of two effects may have stood for both, and what
+    it is best replaced by shows only beside the second.
+    """
+    for _ in range(_RECONSIDERED):
+        before = present.labels
+        present = _replaced(inquiry, _without_the_needless(inquiry, present, noise), noise)
+        present = _without_the_needless(inquiry, present, noise)
+        if present.labels == before or len(present.hypothesis.terms) < inquiry.given + 2:
+            break
+    return inquiry.settle(present.hypothesis, noise)
+
+
+def _replaced(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
+    """With every addition replaced by the best of its rivals that fits better."""
     for index in range(inquiry.given, len(present.hypothesis.terms)):
+        if index >= len(present.hypothesis.terms):
+            break  # A rival stood for two.
         own = present.hypothesis.terms[index].effect
         base = inquiry.refit(present.hypothesis.without(index), noise)
-        rivals = [s for s in inquiry.scores(base, noise) if s.atom.effect.id != own.id][:2]
+        rivals = [s for s in inquiry.scores(base, noise) if s.atom.effect.id != own.id][:_RIVALS]
         trials = [inquiry.trial(base, item, noise) for item in rivals if item.value > 0]
         best = min(trials, key=lambda t: t.criterion, default=None)
         if best is not None and best.criterion < inquiry.criterion(present) - _BETTER:
             present = best.fit
-    present = _without_the_needless(inquiry, present, noise)
-    return inquiry.settle(present.hypothesis, noise)
+    return present
 
 
 def _without_the_doubtful(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
