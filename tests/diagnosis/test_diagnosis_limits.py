@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from diagnosis_runs import GROOVED, NOISE, Ride, made, with_channel
+from diagnosis_runs import GROOVED, NOISE, Array, Ride, made, with_channel
 
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.limits import what_runs_cannot_show
@@ -21,6 +21,8 @@ NOTES = {
     "one load": "one load only",
     "no load": "no load known",
     "one way": "one direction only",
+    "no reversal": "no reversals",
+    "one speed": "one speed only",
     "no warmth": "no temperature measured",
     "constant warmth": "temperature nearly constant",
 }
@@ -94,6 +96,38 @@ def test_one_direction_is_said(sign: int) -> None:
         one = with_channel(one, "motor_angle", turned, "rad")
         given.append(with_channel(one, "cable_length", length, "m"))
     assert said(given) == {"one way"}
+
+
+def one_way(run: Run, inwards: bool) -> Run:
+    """The first half of a ride, or its second, in which the motor turns back."""
+    half = slice(0, len(run) // 2) if inwards else slice(len(run) // 2, len(run))
+    channels = {k: replace(c, values=c.values[half]) for k, c in run.channels.items()}
+    return replace(run, time=run.time[half] - run.time[half][0], channels=channels)
+
+
+def test_both_directions_without_a_reversal_are_said() -> None:
+    given = [one_way(run, inwards) for inwards in (True, False) for run in runs()]
+    assert said(given) == {"no reversal"}
+
+
+@dataclass(frozen=True)
+class Steady(Ride):
+    """Back and forth at one speed, turned around within a tenth of a second."""
+
+    @property
+    def angle(self) -> Array:
+        speed = np.sign(np.sin(2 * np.pi * self.time / self.period))
+        smooth = np.convolve(np.pad(speed, 5, mode="edge"), np.ones(11) / 11, mode="valid")
+        return np.asarray(np.cumsum(smooth) / self.rate * 100.0)
+
+
+def test_one_speed_is_said() -> None:
+    given = [
+        warm(made(10 * index + seed, load_mass=mass, ride=Steady(samples=400)))
+        for index, mass in enumerate((10.0, 20.0))
+        for seed in range(2)
+    ]
+    assert said(given) == {"one speed"}
 
 
 def test_a_note_tells_what_to_do() -> None:

@@ -68,6 +68,8 @@ class Recording:
     programme: str = ""
     path: str = ""
     """File that it was read from."""
+    thinned: bool = False
+    """Its derivatives were taken at a higher rate than its samples have now."""
 
 
 @dataclass(frozen=True)
@@ -178,6 +180,7 @@ def _recording(
         nominal_smooth=line.predict(smooth),
         programme=run.metadata.get("programme", ""),
         path=run.path,
+        thinned=filtering.thinning is not None,
     )
 
 

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.repeats import mean_load
 
 __all__ = ["what_runs_cannot_show"]
 
+Array = NDArray[np.float64]
 _DIFFERENT_LOADS = 0.05
 _ONE_WAY = 0.02
 _WARMED = 1.0
+_MOVES = 1e-3
+_ONE_SPEED = 0.1
+_PLATEAU = 0.75
 
 
 def what_runs_cannot_show(problem: Problem) -> list[str]:
-    """Sentences on missing repeats, loads, directions, speeds and temperatures."""
+    """Sentences on missing repeats, loads, directions, reversals, speeds and temperatures."""
     dataset = problem.dataset
     notes = []
     if not dataset.repeated:
@@ -36,17 +43,38 @@ def what_runs_cannot_show(problem: Problem) -> list[str]:
             "no load known: pulley friction and cell errors cannot be seen; give load_mass or "
             "a second cell"
         )
-    speed = np.concatenate([r.raw.at.speed for r in dataset.recordings])
-    moving = np.abs(speed) > 1e-3
-    inwards = float(np.mean(speed[moving] > 0)) if moving.any() else 0.0
+    notes += _motions([r.raw.at.speed for r in dataset.recordings])
+    warmth = [r.signals.temperature for r in dataset.recordings]
+    if any(t is None for t in warmth):
+        notes.append("no temperature measured: thermal effects cannot be seen")
+    elif np.ptp(np.concatenate([t for t in warmth if t is not None])) < _WARMED:
+        notes.append(
+            "temperature nearly constant: a thermal effect looks like an offset or a wrong radius, "
+            "if it shows at all; record one run cold and one warm"
+        )
+    return notes
+
+
+def _motions(speeds: Sequence[Array]) -> list[str]:
+    """Sentences on directions, reversals and speeds; ``speeds`` in m/s, one array per run."""
+    moving = [speed[np.abs(speed) > _MOVES] for speed in speeds]
+    every = np.concatenate(moving)
+    notes = []
+    inwards = float(np.mean(every > 0)) if len(every) else 0.0
     if not _ONE_WAY < inwards < 1 - _ONE_WAY:
         notes.append(
             "one direction only: friction and backlash cannot be told from gains and offsets; "
             "run back as well"
         )
-    warmth = [r.signals.temperature for r in dataset.recordings]
-    if any(t is None for t in warmth):
-        notes.append("no temperature measured: thermal effects cannot be seen")
-    elif np.ptp(np.concatenate([t for t in warmth if t is not None])) < _WARMED:
-        notes.append("temperature nearly constant: thermal effects cannot be seen")
+    elif not any(np.any(np.diff(np.sign(run))) for run in moving):
+        notes.append(
+            "no reversals: each run goes one way, so that play, Dahl friction and hysteresis show "
+            "at most in how a run begins; turn back within a run"
+        )
+    pace = np.abs(every)
+    if len(pace) and np.mean(np.abs(pace / np.median(pace) - 1) < _ONE_SPEED) > _PLATEAU:
+        notes.append(
+            "one speed only: dry and viscous friction, play and a late instrument differ in the "
+            "ramps alone; run at several speeds"
+        )
     return notes

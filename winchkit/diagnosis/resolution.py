@@ -84,10 +84,12 @@ def _moved(line: Line, recording: Recording) -> dict[str, Array]:
 def _finer(recording: Recording, line: Line) -> Motion | None:
     """A run's calm motion interpolated between its samples.
 
-    None where the drive's own velocity is calmer than differences of the angle: the jitter of
-    its time stamps would be interpolated.
+    None where derivatives are not differences of these samples: they were taken before a long run
+    was thinned out, or the drive's own velocity is calmer than the jitter of its time stamps.
     """
     signals, smooth = recording.signals, recording.smooth
+    if recording.thinned:
+        return None
     velocity = signals.motor_velocity
     if velocity is not None and is_calmer(velocity, np.gradient(signals.motor_angle, signals.time)):
         return None
