@@ -20,7 +20,7 @@ from winchkit.diagnosis.noise import (
 )
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.resolution import without_rounding
-from winchkit.diagnosis.signature import Projected, Score, Signatures, score, signatures
+from winchkit.diagnosis.signature import Projected, Score, Signatures, score, signatures, worthless
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
@@ -133,8 +133,14 @@ class Inquiry:
         return Projected(self.problem, self.signatures, present.jacobian, noise)
 
     def scores(self, present: Fit, noise: Noise) -> list[Score]:
-        """Candidates beside a fit, best first, one point of its grid each; none that is there."""
-        ranked = score(self.projected(present, noise), present.residual, self.problem.rows)
+        """Candidates beside a fit, best first, one point of its grid each; none that is there.
+
+        What would help only with the wrong sign, such as an inertia below zero, gains nothing.
+        """
+        rows = self.problem.rows
+        ranked = score(self.projected(present, noise), present.residual, rows)
+        ranked = [item if _possible(item) else worthless(item, rows) for item in ranked]
+        ranked.sort(key=lambda item: -item.value)
         out: list[Score] = []
         seen: set[str] = set()
         for item in ranked:
@@ -240,6 +246,17 @@ def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
             ):
                 return True
     return False
+
+
+def _possible(item: Score) -> bool:
+    """Whether the amplitudes that fit best are within an effect's bounds at all."""
+    coordinates = Coordinates(item.atom.effect)
+    if item.atom.effect.probes:
+        return True
+    base = {**item.atom.effect.null, **item.atom.shape}
+    amplitudes = slice(len(coordinates.amplitudes))
+    begun = coordinates.vector(_starting_values(item)[0])[amplitudes]
+    return bool(np.any(begun != coordinates.vector(base)[amplitudes]))
 
 
 def _in_disguise(term: Term) -> bool:

@@ -9,7 +9,7 @@ with another noise, or simulating what noise alone would score, costs next to no
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -30,6 +30,7 @@ __all__ = [
     "missing_needs",
     "score",
     "signatures",
+    "worthless",
 ]
 
 Array = NDArray[np.float64]
@@ -287,6 +288,12 @@ def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
         strength = projected.strength(index)
         out.append(Score(atom, gain, value, projected.amplitudes(index, products), strength))
     return sorted(out, key=lambda s: -s.value)
+
+
+def worthless(item: Score, rows: int) -> Score:
+    """The score of an atom that takes nothing of the residual."""
+    value = -item.atom.freedom * float(np.log(rows))
+    return replace(item, gain=0.0, value=value, amplitudes=np.zeros_like(item.amplitudes))
 
 
 def chance_level(projected: Projected, rows: int) -> Array:

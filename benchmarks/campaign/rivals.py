@@ -1,0 +1,197 @@
+"""What usual ways to select terms name on the same cases, from the same signatures.
+
+Each gets what winchkit's own search begins with: the residual of the profile and the columns that
+every candidate effect adds, scaled per output to a residual of unit size. None of them knows of
+repeats or of coloured noise; that is how they are used.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from winchkit.diagnosis.inquiry import Inquiry
+from winchkit.diagnosis.spectrum import Band, to_time
+
+__all__ = ["RIVALS", "Regression", "regression_of"]
+
+Array = NDArray[np.float64]
+_LEVEL = 0.05
+_MOST = 15
+_FOLDS = 5
+_MOST_ROWS = 10_000
+_THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
+_NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class Regression:
+    """A residual in time and the columns of every candidate, nuisances projected out."""
+
+    residual: Array
+    """(rows,), unit size per output."""
+    columns: Array
+    """(rows, p), unit length."""
+    effects: tuple[str, ...]
+    """To which effect each column belongs."""
+    atoms: tuple[slice, ...]
+    """Columns that stand or fall together."""
+    fold: NDArray[np.intp]
+    """Block of time of every row."""
+
+
+def regression_of(inquiry: Inquiry) -> Regression:
+    """The regression of an inquiry before anything is added, thinned to what solvers bear."""
+    problem = inquiry.problem
+    # Each output by its own size: metres and newtons on one scale.
+    known = problem.nuisance_columns
+    left = problem.base - known @ np.linalg.lstsq(known, problem.base, rcond=None)[0]
+    size = np.empty(problem.rows)
+    for output in problem.dataset.outputs:
+        own = [s for s in problem.segments if s.output == output]
+        total = sum(float(np.sum(left[s.rows] ** 2)) for s in own)
+        count = sum(s.rows.stop - s.rows.start for s in own)
+        for segment in own:
+            size[segment.rows] = np.sqrt(total / count) or 1.0
+    rows = np.column_stack([problem.base, problem.nuisance_columns, inquiry.signatures.columns])
+    rows = rows / size[:, None]
+    every = max(1, problem.rows // _MOST_ROWS)
+    times, folds = [], []
+    for segment in problem.segments:
+        block = _in_time(rows[segment.rows], segment.band)
+        # Means of neighbours, not every n-th: thinning must not throw information away.
+        kept = len(block) // every * every
+        times.append(block[:kept].reshape(-1, every, block.shape[1]).mean(axis=1))
+        folds.append((np.arange(kept // every) * _FOLDS) // max(1, kept // every))
+    whole = np.concatenate(times)
+    nuisances = problem.nuisance_columns.shape[1]
+    basis = np.linalg.qr(whole[:, 1 : 1 + nuisances])[0]
+    whole = whole - basis @ (basis.T @ whole)
+    columns = whole[:, 1 + nuisances :]
+    length = np.sqrt(np.sum(columns**2, axis=0))
+    columns = columns / np.maximum(length, _NOTHING)
+    atoms = inquiry.signatures.atoms
+    effects = [""] * columns.shape[1]
+    for atom in atoms:
+        for index in range(atom.columns.start, atom.columns.stop):
+            effects[index] = atom.effect.id
+    residual = whole[:, 0] / max(float(np.std(whole[:, 0])), _NOTHING)
+    return Regression(
+        residual, columns, tuple(effects), tuple(a.columns for a in atoms), np.concatenate(folds)
+    )
+
+
+def _in_time(rows: Array, band: Band) -> Array:
+    return np.column_stack([to_time(column, band) for column in rows.T])
+
+
+def bic_forward(data: Regression) -> tuple[str, ...]:
+    """Add the group of columns that lowers n ln RSS + k ln n most, until none does."""
+    count = len(data.residual)
+
+    def enough(gain: float, squares: float, freedom: int) -> bool:
+        saved = count * (np.log(squares) - np.log(max(squares - gain, _NOTHING)))
+        return saved > freedom * np.log(count)
+
+    return _forward(data, enough)
+
+
+def score_test(data: Regression) -> tuple[str, ...]:
+    """Add the most significant group while its score test passes Bonferroni, rows independent."""
+    count, tests = len(data.residual), len(data.atoms)
+
+    def enough(gain: float, squares: float, freedom: int) -> bool:
+        return bool(chi2.sf(gain / (squares / count), freedom) * tests < _LEVEL)
+
+    return _forward(data, enough)
+
+
+def lasso(data: Regression) -> tuple[str, ...]:
+    """LassoCV with folds that are blocks of time."""
+    from sklearn.linear_model import LassoCV
+
+    folds = [(data.fold != k, data.fold == k) for k in range(_FOLDS)]
+    splits = [(np.flatnonzero(train), np.flatnonzero(test)) for train, test in folds]
+    with warnings.catch_warnings():
+        # Columns that are nearly alike never quite converge; what is chosen no longer changes.
+        warnings.simplefilter("ignore")
+        scale = np.sqrt(len(data.residual))
+        model = LassoCV(cv=splits, alphas=40, max_iter=3000, fit_intercept=False)
+        model.fit(data.columns * scale, data.residual)
+    return _named(data, np.asarray(model.coef_))
+
+
+def stlsq(data: Regression) -> tuple[str, ...]:
+    """Sequentially thresholded least squares, its threshold chosen on blocks of time."""
+    from pysindy.optimizers import STLSQ
+
+    scale = np.sqrt(len(data.residual))
+    columns, target = data.columns * scale, data.residual[:, None]
+
+    def coefficients(threshold: float, kept: NDArray[np.bool_]) -> Array:
+        with warnings.catch_warnings():
+            # It warns where every term falls below the threshold: then it names none.
+            warnings.simplefilter("ignore")
+            model = STLSQ(threshold=threshold, alpha=1e-3)
+            model.fit(columns[kept], target[kept])
+        return np.asarray(model.coef_)[0]
+
+    def missed(threshold: float) -> float:
+        total = 0.0
+        for k in range(_FOLDS):
+            test = data.fold == k
+            left = data.residual[test] - columns[test] @ coefficients(threshold, ~test)
+            total += float(left @ left)
+        return total
+
+    best = min(_THRESHOLDS, key=missed)
+    return _named(data, coefficients(best, np.ones(len(target), dtype=bool)))
+
+
+RIVALS: dict[str, Callable[[Regression], tuple[str, ...]]] = {
+    "BIC forward selection": bic_forward,
+    "iid score test": score_test,
+    "LassoCV, block folds": lasso,
+    "pysindy STLSQ": stlsq,
+}
+
+
+def _forward(data: Regression, enough: Callable[[float, float, int], bool]) -> tuple[str, ...]:
+    """Effects in the order in which they were added."""
+    residual, columns = data.residual.copy(), data.columns.copy()
+    squares = float(residual @ residual)
+    named: list[str] = []
+    for _ in range(_MOST):
+        found = [(gain, atom, basis) for gain, atom, basis in _gains(data, columns, residual)]
+        passing = [f for f in found if enough(f[0], squares, f[2].shape[1])]
+        if not passing:
+            break
+        gain, atom, basis = max(passing, key=lambda f: f[0])
+        residual -= basis @ (basis.T @ residual)
+        columns -= basis @ (basis.T @ columns)
+        squares -= gain
+        named.append(data.effects[atom.start])
+    return tuple(dict.fromkeys(named))
+
+
+def _gains(
+    data: Regression, columns: Array, residual: Array
+) -> Iterator[tuple[float, slice, Array]]:
+    """Squares that each group of columns would take, and its orthonormal basis."""
+    for atom in data.atoms:
+        left, size, _ = np.linalg.svd(columns[:, atom], full_matrices=False)
+        basis = left[:, size > 1e-3]
+        if basis.shape[1]:
+            yield float(np.sum((basis.T @ residual) ** 2)), atom, basis
+
+
+def _named(data: Regression, coefficients: Array) -> tuple[str, ...]:
+    """Effects with a coefficient that is not zero, largest first."""
+    order = np.argsort(-np.abs(coefficients))
+    there = [data.effects[i] for i in order if abs(coefficients[i]) > 1e-6]
+    return tuple(dict.fromkeys(there))
