@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,42 +20,112 @@ __all__ = ["read_csv"]
 
 Array = NDArray[np.float64]
 Rows = list[list[str]]
+_BLOCK = 4096
+"""Rows whose text is held at a time."""
 
 
 def read_csv(path: str | Path) -> Run:
     """Read a run; raises RunError with every fault of the file, each with its line."""
     name, lines = str(path), read_lines(Path(path))
-    start = next((n for n, line in enumerate(lines) if not _is_comment(line)), len(lines))
-    metadata, metadata_lines, faults = _metadata(name, lines[:start])
-    if start == len(lines):
+    above: list[str] = []
+    first = next((line for line in lines if not _is_comment_kept(line, above)), None)
+    metadata, metadata_lines, faults = _metadata(name, above)
+    if first is None:
         faults.append(Fault("there is no header line; it names the columns, 'time [s],…'", name))
     refuse(faults)
-    header = _header(name, lines[start], start + 1)
-    rows, numbers = _rows(name, lines, start + 1)
-    refuse(_ragged(name, rows, numbers, len(header)))
-    columns: list[Array | None] = []
-    for index, (column, _) in enumerate(header):
-        values, wrong = _numbers([row[index] for row in rows])
-        if wrong and column_dimension(column) is None:
-            columns.append(None)
-            continue
-        columns.append(values)
-        faults += [
-            Fault(f"column '{column}' holds {rows[row][index]!r}, not a number", name, numbers[row])
-            for row in wrong
-        ]
+    number = len(above) + 1
+    header = _header(name, first or "", number)
+    table = _Table(name, header)
+    for rows, numbers in _blocks(name, lines, number):
+        table.add(rows, numbers)
+    refuse(table.ragged())
     return assemble(
         Recording(
             name,
             header,
-            columns,
-            numbers.__getitem__,
+            table.columns(),
+            table.line_of,
             metadata,
             metadata_lines,
-            start + 1,
-            faults=faults,
+            number,
+            faults=faults + table.faults,
         )
     )
+
+
+class _Table:
+    """Columns of numbers that grow block by block; the text of a block is not kept."""
+
+    def __init__(self, path: str, header: Sequence[tuple[str, str]]) -> None:
+        self.faults: list[Fault] = []
+        self._path, self._names = path, [name for name, _ in header]
+        self._pieces: list[list[Array] | None] = [[] for _ in header]
+        self._numbers: list[NDArray[np.intp]] = []
+        self._ragged: list[tuple[int, int]] = []
+        """Line and cells of rows of another width than the header."""
+
+    def add(self, rows: Rows, numbers: list[int]) -> None:
+        """Take the next rows, with the line of each."""
+        self._numbers.append(np.array(numbers, dtype=np.intp))
+        width = len(self._names)
+        self._ragged += [
+            (number, len(row))
+            for row, number in zip(rows, numbers, strict=True)
+            if len(row) != width
+        ]
+        if self._ragged:
+            return
+        for index, (name, cells) in enumerate(
+            zip(self._names, zip(*rows, strict=True), strict=True)
+        ):
+            self._extend(index, name, cells, numbers)
+
+    def _extend(self, index: int, name: str, cells: Sequence[str], numbers: list[int]) -> None:
+        pieces = self._pieces[index]
+        if pieces is None:
+            return
+        values, wrong = _numbers(cells)
+        if wrong and column_dimension(name) is None:
+            self._pieces[index] = None
+            return
+        pieces.append(values)
+        self.faults += [
+            Fault(f"column '{name}' holds {cells[row]!r}, not a number", self._path, numbers[row])
+            for row in wrong
+        ]
+
+    def ragged(self) -> list[Fault]:
+        """A fault for every row that has another width than the header."""
+        width = len(self._names)
+        faults = [
+            Fault(f"{cells} cells in this row, {width} columns in the header", self._path, line)
+            for line, cells in self._ragged
+        ]
+        if faults and faults[-1].line == self.line_of(-1) and self._ragged[-1][1] < width:
+            last = faults.pop()
+            faults.append(Fault(last.message + "; is the file cut off?", self._path, last.line))
+        return faults
+
+    def columns(self) -> list[Array | None]:
+        """All values so far; None for an unknown column that holds text."""
+        out: list[Array | None] = []
+        for index, pieces in enumerate(self._pieces):
+            out.append(None if pieces is None else np.concatenate([np.empty(0), *pieces]))
+            self._pieces[index] = []  # Each column once: a long run is as large as its numbers.
+        return out
+
+    def line_of(self, row: int) -> int:
+        """Line at which a row stands."""
+        block = -1 if row < 0 else row // _BLOCK
+        return int(self._numbers[block][row if row < 0 else row % _BLOCK])
+
+
+def _is_comment_kept(line: str, above: list[str]) -> bool:
+    """Whether a line stands above the header; it is kept then."""
+    if not _is_comment(line):
+        return False
+    above.append(line)
+    return True
 
 
 def _is_comment(line: str) -> bool:
@@ -110,31 +180,23 @@ def _header(path: str, line: str, number: int) -> list[tuple[str, str]]:
     return [read for _, read in header if read is not None]
 
 
-def _rows(path: str, lines: list[str], start: int) -> tuple[Rows, list[int]]:
-    """Cells of every row that is not blank, and its line."""
+def _blocks(path: str, lines: Iterator[str], start: int) -> Iterator[tuple[Rows, list[int]]]:
+    """Cells of every row that is not blank, and its line, so many rows at a time."""
     rows: Rows = []
     numbers: list[int] = []
-    reader = csv.reader(lines[start:])
+    reader = csv.reader(lines)
     try:
         for row in reader:
             if row and (len(row) > 1 or row[0].strip()):
                 rows.append(row)
                 numbers.append(start + reader.line_num)
+            if len(rows) == _BLOCK:
+                yield rows, numbers
+                rows, numbers = [], []
     except csv.Error as error:
         raise RunError(Fault(f"cannot be read: {error}", path, start + reader.line_num)) from None
-    return rows, numbers
-
-
-def _ragged(path: str, rows: Rows, numbers: list[int], width: int) -> list[Fault]:
-    faults = [
-        Fault(f"{len(row)} cells in this row, {width} columns in the header", path, number)
-        for row, number in zip(rows, numbers, strict=True)
-        if len(row) != width
-    ]
-    if faults and faults[-1].line == numbers[-1] and len(rows[-1]) < width:
-        last = faults.pop()
-        faults.append(Fault(last.message + "; is the file cut off?", path, last.line))
-    return faults
+    if rows:
+        yield rows, numbers
 
 
 def _numbers(cells: Sequence[str]) -> tuple[Array, list[int]]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import codecs
+from collections.abc import Iterator
 from pathlib import Path
 
 from winchkit.errors import Fault, RunError
 
 __all__ = ["read_bytes", "read_lines"]
+
+_PIECE = 1 << 20
 
 
 def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
@@ -27,22 +30,41 @@ def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
     return data
 
 
-def read_lines(path: Path) -> list[str]:
-    """Lines of a text file in UTF-8, UTF-16 with its mark, or Windows-1252."""
-    data = read_bytes(path)
-    try:
-        text = _decode(data)
-    except UnicodeDecodeError:
-        raise RunError(Fault("is not a text file; save it as CSV in UTF-8", str(path))) from None
-    if "\0" in text:
-        raise RunError(Fault("is a binary file, not CSV text", str(path)))
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+def read_lines(path: Path) -> Iterator[str]:
+    """Lines of a text file in UTF-8, UTF-16 with its mark, or Windows-1252, one after another.
+
+    The file is gone through twice and never held whole: an hour of eight winches is gigabytes.
+    """
+    encoding = _encoding(path)
+    with path.open(encoding=encoding) as file:
+        for line in file:
+            yield line.removesuffix("\n")
 
 
-def _decode(data: bytes) -> str:
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16")
+def _encoding(path: Path) -> str:
+    """The first encoding in which all of a file reads; raises RunError where it is no text."""
+    marked = _beginning(path).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
+        try:
+            is_text = _holds_no_zero(path, encoding)
+        except UnicodeDecodeError:
+            continue
+        if not is_text:
+            raise RunError(Fault("is a binary file, not CSV text", str(path)))
+        return encoding
+    raise RunError(Fault("is not a text file; save it as CSV in UTF-8", str(path)))
+
+
+def _holds_no_zero(path: Path, encoding: str) -> bool:
+    with path.open(encoding=encoding) as file:
+        return not any("\0" in piece for piece in iter(lambda: file.read(_PIECE), ""))
+
+
+def _beginning(path: Path) -> bytes:
+    """First bytes of a file; raises RunError where there is none to read."""
     try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("cp1252")
+        with path.open("rb") as file:
+            data = file.read(4)
+    except (OSError, ValueError):
+        return read_bytes(path)
+    return data or read_bytes(path)
