@@ -253,3 +253,25 @@ def test_one_winch_of_several(runs: list[Path], tmp_path: Path) -> None:
     wrong = invoke("compare", both, "-p", "bench-spiral", "--winch", "C")
     assert wrong.exit_code == 2
     assert "no winch 'C'; it has A, B" in wrong.stderr
+
+
+def test_all_winches_of_a_recording_each_by_itself(runs: list[Path], tmp_path: Path) -> None:
+    both = [tmp_path / "both-1.csv", tmp_path / "both-2.csv"]
+    for path, (first, second) in zip(both, ((0, 2), (1, 3)), strict=True):
+        write_csv(side_by_side(read_run(runs[first]), read_run(runs[second])), path)
+    each = answer("diagnose", *both, "-p", "bench-spiral", "--winch", "all")
+    assert each["schema"] == 1
+    assert list(each["winches"]) == ["A", "B"]
+    for name, found in each["winches"].items():
+        assert found == answer("diagnose", *both, "-p", "bench-spiral", "--winch", name)
+    told = invoke("diagnose", *both, "-p", "bench-spiral", "--winch", "all")
+    assert [line for line in told.stdout.splitlines() if line.startswith("winch ")] == [
+        "winch A",
+        "winch B",
+    ]
+    assert told.stderr == ""
+    page = invoke(
+        "diagnose", *both, "-p", "bench-spiral", "--winch", "all", "--html", tmp_path / "p.html"
+    )
+    assert page.exit_code == 2
+    assert "a page of one winch" in page.stderr

@@ -58,8 +58,8 @@ class Thinning:
     def words(self) -> str:
         """For the notes of a diagnosis."""
         return (
-            f"every {self.factor}th sample of the runs, low-passed at {self.cut_off:.3g} Hz, is "
-            f"compared: above that lies less than {_LOST:.0%} of what any channel does"
+            f"every {_ordinal(self.factor)} sample of the runs, low-passed at {self.cut_off:.3g} "
+            f"Hz, is compared: above that lies less than {_LOST:.0%} of what any channel does"
         )
 
     def run(self, run: Run) -> Run:
@@ -123,6 +123,11 @@ class Thinning:
             whole = upfirdn(taps, padded, down=self.factor)
             out.append(whole[_TAPS : _TAPS + count])
         return np.concatenate(out)
+
+
+def _ordinal(number: int) -> str:
+    ends = {1: "st", 2: "nd", 3: "rd"}
+    return f"{number}{'th' if number % 100 in (11, 12, 13) else ends.get(number % 10, 'th')}"
 
 
 def thinning_for(runs: Sequence[Run]) -> Thinning | None:

@@ -1,0 +1,61 @@
+"""A small one of the benchmark's long recordings: thinned out, and what it hides is named."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from winchkit.diagnosis.diagnose import Answer, diagnose_each
+from winchkit.effects import load_catalogue
+from winchkit.schema.read import read_winch
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+sys.path.insert(0, str(BENCHMARKS))
+
+import diagnosis_hour as hour  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def heard() -> list[tuple[str, float]]:
+    """What the progress bar is told."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, float]]) -> Answer:
+    runs = hour.recordings(minutes=4, winches=1)
+    path = tmp_path_factory.mktemp("hour") / "hour.toml"
+    hour.write_profile(hour.WINCH, path)
+    of_winch = {"A": [run.of_winch("A") for run in runs]}
+    answers = diagnose_each(
+        of_winch,
+        read_winch(path),
+        load_catalogue(),
+        told=lambda what, share: heard.append((what, share)),
+    )
+    return answers["A"]
+
+
+def test_it_is_thinned_and_says_so(answer: Answer) -> None:
+    assert any(note.startswith("every 3rd sample of the runs") for note in answer.diagnosis.notes)
+    problem = answer.inquiry.problem
+    assert [len(r.signals.time) for r in problem.dataset.recordings] == [40_000, 40_000]
+
+
+def test_what_it_hides_is_named_with_its_size(answer: Answer) -> None:
+    told = hour.told(answer.diagnosis, 0)
+    assert told["verdict"] == "explained"
+    assert hour.is_right([told])
+    for step in answer.diagnosis.steps:
+        name, true = next(iter(hour.hidden(0)[step.effects[0]].items()))
+        assert step.parameters[step.effects[0]][name].value == pytest.approx(true, rel=2e-3)
+
+
+def test_the_bar_moves_on(answer: Answer, heard: list[tuple[str, float]]) -> None:
+    assert answer
+    shares = [share for _, share in heard]
+    assert shares == sorted(shares)
+    assert len(set(shares)) > 3
+    assert all(what.startswith("winch A: ") for what, _ in heard)
