@@ -258,6 +258,33 @@ def test_a_programme_writes_a_run_per_load_and_repeat(
         assert run.metadata["programme"] == "short"
 
 
+def test_the_first_repeat_begins_where_repeats_end(
+    bench: Bench, live: LiveBench, tmp_path: Path
+) -> None:
+    """A run of a programme is a motion of its own, wherever the winch stood before."""
+    steps = (Step(to=3.7, speed=0.4), Step(to=3.85, speed=0.4))
+    written = run_programme(bench, Programme("same", steps, repeat=2), tmp_path, live.answer)
+    first, second = (read_run(path) for path in written)
+    begins = [float(run["motor_angle"][0]) for run in (first, second)]
+    assert bench.winch["A"].length_at(begins[0]) == pytest.approx(3.85, abs=2e-3)
+    assert begins[0] == pytest.approx(begins[1], abs=0.05)
+    assert np.ptp(first["motor_angle"]) == pytest.approx(np.ptp(second["motor_angle"]), rel=0.01)
+
+
+def test_a_question_of_temperature_is_answered_by_the_simulation(
+    bench: Bench, live: LiveBench, tmp_path: Path
+) -> None:
+    steps = (
+        Step(ask="bring rope and machine to 20 degC", temperature=20.0),
+        Step(by=-0.1, speed=0.3),
+        Step(ask="bring rope and machine to 35 degC", temperature=35.0),
+        Step(by=0.1, speed=0.3),
+    )
+    written = run_programme(bench, Programme("warm", steps), tmp_path, live.answer)
+    means = [float(np.nanmean(read_run(path)["temperature"])) for path in written]
+    assert means == pytest.approx([20.0, 35.0], abs=0.5)
+
+
 def test_what_stops_a_programme_keeps_its_log(
     bench: Bench, live: LiveBench, tmp_path: Path
 ) -> None:

@@ -9,10 +9,13 @@ import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term, with_channel
 from scipy.stats import norm
 
+from winchkit.cli.plan import _silent
 from winchkit.diagnosis.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.kinds import KINDS
+from winchkit.diagnosis.kinds import KINDS, seen
 from winchkit.diagnosis.next_run import next_runs
+from winchkit.diagnosis.plan import hopeless
+from winchkit.diagnosis.plan import offers as plan_offers
 from winchkit.diagnosis.power import detectable
 from winchkit.diagnosis.result import Detectable, NextRun
 from winchkit.diagnosis.signature import chance_level
@@ -84,6 +87,21 @@ def test_what_no_motion_separates_is_left_to_the_card() -> None:
     (offer,) = offers("drum-radius", "gear-ratio")
     assert offer.programme == CATALOGUE["drum-radius"].told_apart
     assert np.isnan(offer.power)
+
+
+def test_the_plan_says_what_no_motion_separates() -> None:
+    grooved = dataset()
+    radius, ratio = _usual("drum-radius"), _usual("gear-ratio")
+    problem = inquire(grooved, CATALOGUE).problem
+    pairs = [(radius, ratio), (ROPE, FRAME)]
+    found = plan_offers(problem, pairs, NOISE, [])
+    assert hopeless(found, pairs) == [(radius, ratio)]
+    # The best is the one that separates the other pair.
+    assert found[0].powers[1] > 0.9
+    lines = _silent(found, pairs, seen(grooved), widened=False)
+    assert lines[0].startswith("drum-radius / gear-ratio: no such motion within")
+    assert lines[0].endswith(CATALOGUE["drum-radius"].told_apart)
+    assert "--bench" in lines[1]
 
 
 @cache

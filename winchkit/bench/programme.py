@@ -37,7 +37,8 @@ def run_programme(
 ) -> list[Path]:
     """Run every step of every repeat; returns the files written, in order.
 
-    Files are ``<programme>-<load>kg-<repeat>.csv``, without the load where none is known. A
+    A programme with repeats begins where they end: the winches go there first, unlogged. Files
+    are ``<programme>-<load>kg-<repeat>.csv``, without the load where none is known. A
     question about a load that this programme has hung already is not asked again. At a question
     the winches are disabled. Raises whatever stops a motion, and what was logged until then is
     kept, unless ``again`` says to try that run once more: then the bench is reset, its file
@@ -58,14 +59,17 @@ def run_programme(
 def _parts(steps: list[tuple[int, Step]]) -> list[list[tuple[int, Step]]]:
     """Steps cut where a question follows a motion: a question begins a new run.
 
-    One about the load that was hung last is none, and is left out.
+    One about the load and the temperature that were asked for last is none, and is left out.
     """
     parts: list[list[tuple[int, Step]]] = []
-    hanging = None
+    hanging: float | None = None
+    warm: float | None = None
     for number, step in steps:
-        if step.ask is not None and step.load_mass is not None and step.load_mass == hanging:
-            continue
-        hanging = step.load_mass or hanging
+        if step.ask is not None:
+            if not step.asks_beyond(hanging, warm):
+                continue
+            hanging = hanging if step.load_mass is None else step.load_mass
+            warm = warm if step.temperature is None else step.temperature
         if not parts or (step.ask is not None and parts[-1][-1][1].ask is None):
             parts.append([])
         parts[-1].append((number, step))
@@ -82,10 +86,12 @@ class _Execution:
         self.written: list[Path] = []
         self._bench, self._programme, self._ask, self._suffix = bench, programme, ask, suffix
         self._recorder: Recorder | None = None
+        self._approached = False
         asks = any(step.load_mass is not None for step in programme.step)
         # What hangs there now is known only once it was asked for: another programme may have
         # left another load than the wiring declares.
         self._hanging = None if asks else _declared_load(bench)
+        self._warm: float | None = None
 
     def run(
         self, repeat: int, part: list[tuple[int, Step]], progress: Progress, again: Again
@@ -98,6 +104,7 @@ class _Execution:
                     if step.ask is not None and begun:
                         continue
                     if step.ask is None and not begun:
+                        self.approach()
                         begun = {n: w.cable_length for n, w in self._bench.winch.items()}
                     progress(repeat, number, step)
                     self.execute(repeat, step)
@@ -142,13 +149,31 @@ class _Execution:
             self._finish()
 
     def _question(self, step: Step) -> None:
-        if step.load_mass is not None and step.load_mass == self._hanging:
+        if not step.asks_beyond(self._hanging, self._warm):
             return
         self.end_run()
         self._bench.stop()
         self._ask(step)
         if step.load_mass is not None:
             self._hanging = step.load_mass
+        if step.temperature is not None:
+            self._warm = step.temperature
+
+    def approach(self) -> None:
+        """Go to where every repeat ends, unlogged, so that the first one begins there too."""
+        if self._approached or self._programme.repeat == 1:
+            return
+        places = {
+            name: way for name in self._bench.winch if (way := self._programme.approach(name))
+        }
+        for place in range(max(map(len, places.values()), default=0)):
+            lengths = {name: way[min(place, len(way) - 1)] for name, way in places.items()}
+            self._bench.move_together(lengths, self._fastest(), hold=True)
+        self._approached = True
+
+    def _fastest(self) -> float | None:
+        """Of the programme's speeds: no faster than what is to come."""
+        return max((step.speed for step in self._programme.step if step.speed), default=None)
 
     def _log(self, repeat: int) -> None:
         if self._recorder is not None:

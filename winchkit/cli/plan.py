@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.completing import complete_bench
 from winchkit.cli.output import echo_json
 from winchkit.cli.runs_option import catalogue_of, model_options, read_runs
+from winchkit.errors import UsageError
+from winchkit.units import suggest
 
 if TYPE_CHECKING:
+    from winchkit.diagnosis.dataset import Dataset
+    from winchkit.diagnosis.kinds import Room
     from winchkit.diagnosis.plan import Offer
     from winchkit.effects.bind import Term
 
@@ -21,10 +26,18 @@ __all__ = ["command"]
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @click.option("-o", "--output", metavar="NEXT.toml", help="Programme to write.")
+@click.option(
+    "-b",
+    "--bench",
+    metavar="FILE",
+    shell_complete=complete_bench,
+    help="Wiring file whose limits say how far, how fast and how heavy; else as the RUNs were.",
+)
 @model_options
 def command(
     runs: Sequence[str],
     output: str | None,
+    bench: str | None,
     profile: str,
     effect_files: Sequence[str],
     winch: str | None,
@@ -47,16 +60,57 @@ def command(
     declared, catalogue = read_winch(find("profiles", profile)), catalogue_of(effect_files)
     answer = diagnose(read_runs(runs, winch), declared, catalogue, band)
     problem, pairs = answer.inquiry.problem, pairs_of(answer.sets)
-    found = offers(problem, pairs, answer.found.noise.rms, list(catalogue))
+    room = _room(problem.dataset, bench, winch)
+    found = offers(problem, pairs, answer.found.noise.rms, list(catalogue), room)
     if output:
         path = Path(output)
-        write_programme(programme_of(problem.dataset, found[0].kind, path.stem), path)
+        write_programme(programme_of(problem.dataset, found[0].kind, path.stem, room), path)
         click.echo(f"written: {output}", err=True)
     if as_json:
         listed = [offer.to_json(pairs) for offer in found]
         echo_json({"schema": 1, "offers": listed, "programme": output})
     else:
         click.echo(_text(found, pairs))
+        for line in _silent(found, pairs, room, widened=bench is not None):
+            click.echo(line)
+
+
+def _room(dataset: Dataset, bench: str | None, winch: str | None) -> Room:
+    """Where the next programme may go: within a bench's limits, else where the runs went."""
+    from winchkit.diagnosis.kinds import allowed, seen
+    from winchkit.schema.read import read_bench
+
+    if bench is None:
+        return seen(dataset)
+    wired = read_bench(bench).winch
+    if winch is None and len(wired) > 1:
+        raise UsageError(f"which winch? {bench} has {', '.join(wired)}; give --winch")
+    name = winch or next(iter(wired))
+    if name not in wired:
+        known = list(wired)
+        raise UsageError(
+            f"{bench} has no winch '{name}'; it has {', '.join(known)}{suggest(name, known)}"
+        )
+    return allowed(dataset, wired[name].limits)
+
+
+def _silent(
+    found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], room: Room, *, widened: bool
+) -> list[str]:
+    """What none of these programmes tells apart, and what does."""
+    from winchkit.diagnosis.plan import hopeless
+    from winchkit.effects.effect import told_apart
+
+    lines = []
+    for first, second in hopeless(found, pairs):
+        names = f"{first.effect.id} / {second.effect.id}"
+        lines.append(
+            f"{names}: no such motion within {room.low:.2f} m to {room.high:.2f} m tells them "
+            f"apart. What does: {told_apart(first.effect, second.effect)}"
+        )
+    if lines and not widened:
+        lines.append("With --bench BENCH.toml the plan goes as far as that bench may.")
+    return lines
 
 
 def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,16 @@ from winchkit.model.line import GRAVITY, Line
 from winchkit.model.stages import Signals
 from winchkit.model.trajectory import plan
 from winchkit.runs.run import Channel, Run
+from winchkit.schema.bench import LimitSpec
 
-__all__ = ["KINDS", "Kind", "Seen", "imagined", "seen"]
+__all__ = ["KINDS", "Kind", "Room", "allowed", "imagined", "seen", "usual_temperature"]
 
 Array = NDArray[np.float64]
 _RATE = 20.0
+_MARGIN = 0.05
+"""Share of a bench's stroke that is kept off each end."""
+_RESERVE = 1.5
+"""Between a bench's limits of speed and tension and what is proposed."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +63,8 @@ KINDS = (
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What the runs so far covered; a programme stays within it."""
+class Room:
+    """What a programme stays within."""
 
     low: float
     """Shortest free length, m."""
@@ -67,39 +72,71 @@ class Seen:
     fastest: float
     """Highest speed of the rope, m/s."""
     mass: float | None
-    """Mean load as a mass, kg; None where none is known."""
+    """Mean load so far as a mass, kg; None where none is known."""
+    lightest: float = 0.0
+    """Load that keeps the rope from going slack, kg."""
+    heaviest: float = np.inf
+    """Load that the bench's tension limit leaves room for, kg."""
 
     def at(self, share: float) -> float:
         """Length at a share of the stroke, m."""
         return self.low + (self.high - self.low) * share
 
+    def load(self, share: float) -> float | None:
+        """A share of the mean load, kg."""
+        if self.mass is None:
+            return None
+        return max(self.lightest, min(self.heaviest, self.mass * share))
 
-def seen(dataset: Dataset) -> Seen:
-    """Stroke, speed and load of a dataset."""
+
+def seen(dataset: Dataset) -> Room:
+    """Stroke, speed and load of a dataset: the room that runs have shown to be there."""
     recordings = dataset.recordings
     lengths = np.concatenate([r.raw.at.free_length for r in recordings])
     fastest = max(float(np.max(np.abs(r.raw.at.speed))) for r in recordings)
     usual = [m for m in (mean_load(r.signals) for r in recordings) if m is not None]
     mass = float(np.mean(usual)) / GRAVITY if usual else None
-    return Seen(float(lengths.min()), float(lengths.max()), fastest, mass)
+    return Room(float(lengths.min()), float(lengths.max()), fastest, mass)
 
 
-def imagined(dataset: Dataset, kind: Kind) -> Problem:
+def allowed(dataset: Dataset, limits: LimitSpec) -> Room:
+    """The room that a bench's limits leave, with a margin; what they do not say, as it was seen."""
+    room = seen(dataset)
+    if limits.length is not None:
+        margin = _MARGIN * (limits.length[1] - limits.length[0])
+        room = replace(room, low=limits.length[0] + margin, high=limits.length[1] - margin)
+    if limits.tension_slack is not None:
+        room = replace(room, lightest=limits.tension_slack * _RESERVE / GRAVITY)
+    if limits.tension_high is not None:
+        room = replace(room, heaviest=limits.tension_high / _RESERVE / GRAVITY)
+    return replace(room, fastest=limits.speed / _RESERVE)
+
+
+def usual_temperature(dataset: Dataset) -> float | None:
+    """Mean temperature of the runs, degC; None where one of them does not know it."""
+    known = [r.signals.temperature for r in dataset.recordings]
+    if any(t is None for t in known):
+        return None
+    return float(np.mean([np.mean(t) for t in known if t is not None]))
+
+
+def imagined(dataset: Dataset, kind: Kind, room: Room | None = None) -> Problem:
     """A problem whose runs follow a kind of programme and measure what the nominal line says."""
-    warm = all(r.signals.temperature is not None for r in dataset.recordings)
+    usual = usual_temperature(dataset)
+    room = room or seen(dataset)
     runs = []
     for load in kind.loads:
-        for warmed in kind.warmed if warm else (0.0,):
-            runs.append(_run(dataset, kind, load, warmed))
+        for warmed in kind.warmed if usual is not None else (0.0,):
+            warm = None if usual is None else usual + warmed
+            runs.append(_run(dataset, kind, room, room.load(load), warm))
     return Problem(assemble(runs, dataset.profile))
 
 
-def _run(dataset: Dataset, kind: Kind, load: float, warmed: float) -> Run:
-    stroke = seen(dataset)
-    at = stroke.low
+def _run(dataset: Dataset, kind: Kind, room: Room, mass: float | None, warm: float | None) -> Run:
+    at = room.low
     pieces = [np.full(round(kind.hold * _RATE), at)]
     for share, speed in kind.moves:
-        target, fastest = stroke.at(share), stroke.fastest
+        target, fastest = room.at(share), room.fastest
         move = plan(target - at, max(speed * fastest, 1e-4), 4 * fastest, 40 * fastest)
         time = np.arange(0.0, move.duration, 1 / _RATE)
         pieces += [at + np.asarray(move.at(time)[0]), np.full(round(kind.hold * _RATE), target)]
@@ -108,16 +145,8 @@ def _run(dataset: Dataset, kind: Kind, load: float, warmed: float) -> Run:
     time = np.arange(len(length)) / _RATE
     line = Line(dataset.profile)
     angle = np.array([line.motor_angle(float(x)) for x in length])
-    mass = None if stroke.mass is None else load * stroke.mass
-    return _as_run(dataset, time, angle, mass, _temperature(dataset, time, warmed))
-
-
-def _temperature(dataset: Dataset, time: Array, warmed: float) -> Array | None:
-    known = [r.signals.temperature for r in dataset.recordings]
-    if any(t is None for t in known):
-        return None
-    usual = float(np.mean([np.mean(t) for t in known if t is not None]))
-    return usual + warmed * np.ones_like(time)
+    temperature = None if warm is None else warm * np.ones_like(time)
+    return _as_run(dataset, time, angle, mass, temperature)
 
 
 def _as_run(

@@ -17,6 +17,7 @@ from winchkit.diagnosis.kinds import KINDS, imagined
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.result import NextRun
 from winchkit.effects.bind import Term
+from winchkit.effects.effect import told_apart
 
 __all__ = ["next_runs", "power_of", "separation"]
 
@@ -47,7 +48,7 @@ def next_runs(
         out += [NextRun(names, name, power) for _, power, name in useful]
         if not useful:
             # No motion separates them: what does is on the card, and its power is not known.
-            out.append(NextRun(names, first.effect.told_apart, float("nan")))
+            out.append(NextRun(names, told_apart(first.effect, second.effect), float("nan")))
     return tuple(out)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from winchkit.diagnosis.dataset import Dataset
-from winchkit.diagnosis.kinds import KINDS, Kind, imagined, seen
+from winchkit.diagnosis.kinds import KINDS, Kind, Room, imagined, seen, usual_temperature
 from winchkit.diagnosis.next_run import power_of, separation
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.signature import missing_needs
@@ -16,9 +16,13 @@ from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
 from winchkit.schema.programme import Programme, Step
 
-__all__ = ["Offer", "offers", "programme_of"]
+__all__ = ["Offer", "hopeless", "offers", "programme_of"]
 
 _SURE = 0.9
+_FAINT = 0.2
+"""A power that is not worth a run."""
+_HANGING, _WARMING = 1 / 3, 20.0
+"""What an operator needs to hang a load and to warm a machine through, minutes."""
 _REPEATS = 2
 _HANGS = 0.5
 
@@ -29,17 +33,23 @@ class Offer:
 
     kind: Kind
     minutes: float
-    """Of motion, both repeats."""
+    """Of motion and of the operator's work, both repeats."""
     powers: tuple[float, ...]
     """Chance of telling each pair apart."""
     shows: tuple[str, ...]
     """Effects of a usual size that it shows and the runs so far do not."""
 
     @property
-    def per_minute(self) -> tuple[float, float]:
-        """What it separates, then what it shows, a minute: more is better."""
-        worst = min(self.powers, default=0.0)
-        return round(worst, 2) / self.minutes ** (worst >= _SURE), len(self.shows) / self.minutes
+    def worth(self) -> tuple[float, ...]:
+        """To be compared in this order: more is better.
+
+        First what it tells apart for sure, then with a fair chance, then a minute's worth of it;
+        where there is nothing to tell apart, what it shows a minute.
+        """
+        sure = sum(power >= _SURE for power in self.powers)
+        told = round(sum(power for power in self.powers if power >= _FAINT), 1)
+        quick, shown = 1 / self.minutes, len(self.shows) / self.minutes
+        return (sure, told, quick, shown) if told else (0.0, 0.0, shown, quick)
 
     def to_json(self, pairs: Sequence[tuple[Term, Term]]) -> dict[str, Any]:
         """As ``winchkit plan --json`` prints it."""
@@ -60,9 +70,11 @@ def offers(
     pairs: Sequence[tuple[Term, Term]],
     noise: Mapping[str, float],
     effects: Sequence[Effect],
+    room: Room | None = None,
 ) -> list[Offer]:
-    """Every kind of programme, the most telling per minute first."""
+    """Every kind of programme within a room, else within what was seen; the most telling first."""
     dataset = problem.dataset
+    room = room or seen(dataset)
     hidden = [
         term
         for term in _usual(effects, problem)
@@ -70,8 +82,9 @@ def offers(
     ]
     out = []
     for kind in KINDS:
-        tried = imagined(dataset, kind)
-        minutes = sum(r.signals.time[-1] for r in tried.dataset.recordings) / 60 * _REPEATS
+        tried = imagined(dataset, kind, room)
+        motion = sum(r.signals.time[-1] for r in tried.dataset.recordings) / 60
+        minutes = _REPEATS * (motion + _work(kind, dataset))
         powers = tuple(power_of(_twice(separation(tried, a, b, noise))) for a, b in pairs)
         shows = tuple(
             term.effect.id
@@ -79,34 +92,60 @@ def offers(
             if power_of(_twice(separation(tried, term, None, noise))) >= _SURE
         )
         out.append(Offer(kind, minutes, powers, shows))
-    return sorted(out, key=lambda offer: offer.per_minute, reverse=True)
+    return sorted(out, key=lambda offer: offer.worth, reverse=True)
 
 
-def programme_of(dataset: Dataset, kind: Kind, name: str) -> Programme:
-    """A kind as a programme for ``winchkit run``: within the stroke and speed seen so far, twice.
+def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list[tuple[Term, Term]]:
+    """Pairs that none of these programmes tells apart."""
+    return [
+        pair
+        for index, pair in enumerate(pairs)
+        if max(offer.powers[index] for offer in found) < _FAINT
+    ]
+
+
+def programme_of(dataset: Dataset, kind: Kind, name: str, room: Room | None = None) -> Programme:
+    """A kind as a programme for ``winchkit run``: within a room, else what was seen; twice.
 
     It begins and ends at the shortest length, so that its repeats are equal.
     """
-    stroke = seen(dataset)
+    room = room or seen(dataset)
     steps: list[Step] = []
     for warmed in kind.warmed if _warm(dataset) else (0.0,):
-        if warmed:
-            steps.append(Step(ask=f"warm rope and machine up by {warmed:g} K"))
+        if len(kind.warmed) > 1:
+            steps += _bring(dataset, warmed)
         for load in kind.loads:
-            steps += _hang(stroke.mass, load)
-            steps.append(_move(stroke.low, stroke.fastest))
+            steps += _hang(room.load(load))
+            steps.append(_move(room.low, room.fastest))
             for share, speed in kind.moves:
-                steps += [_move(stroke.at(share), speed * stroke.fastest), Step(hold=kind.hold)]
+                steps += [_move(room.at(share), speed * room.fastest), Step(hold=kind.hold)]
     about = f"{kind.name}; proposed from {len(dataset.recordings)} runs of {dataset.profile.name}"
     return Programme(name, tuple(steps), repeat=_REPEATS, description=about)
 
 
-def _hang(mass: float | None, share: float) -> list[Step]:
+def _bring(dataset: Dataset, warmed: float) -> list[Step]:
+    """Ask for a temperature, in whole degrees."""
+    usual = usual_temperature(dataset)
+    if usual is None:
+        return []
+    wanted = float(round(usual + warmed))
+    ask = f"bring rope and machine to {wanted:g} degC"
+    return [Step(ask=ask, temperature=wanted)]
+
+
+def _hang(mass: float | None) -> list[Step]:
     """Ask for a load, rounded to what a bench has at hand."""
     if mass is None:
         return []
-    wanted = max(_HANGS, round(mass * share / _HANGS) * _HANGS)
+    wanted = max(_HANGS, round(mass / _HANGS) * _HANGS)
     return [Step(ask=f"hang the {wanted:g} kg load", load_mass=wanted)]
+
+
+def _work(kind: Kind, dataset: Dataset) -> float:
+    """What the operator has to do in one repeat, minutes."""
+    warmings = len(kind.warmed) - 1 if _warm(dataset) else 0
+    hangs = len(kind.loads) if len(kind.loads) > 1 else 0
+    return warmings * _WARMING + hangs * _HANGING
 
 
 def _move(length: float, speed: float) -> Step:
@@ -119,7 +158,7 @@ def _twice(strength: float) -> float:
 
 
 def _warm(dataset: Dataset) -> bool:
-    return all(r.signals.temperature is not None for r in dataset.recordings)
+    return usual_temperature(dataset) is not None
 
 
 def _usual(effects: Sequence[Effect], problem: Problem) -> list[Term]:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from winchkit.model.stages import ROBOT_STAGES, At, Stage
 
-__all__ = ["Effect", "Need", "Parameter", "Placement", "Values"]
+__all__ = ["Effect", "Need", "Parameter", "Placement", "Values", "told_apart"]
 
 Values = Mapping[str, float]
 Need = Literal[
@@ -112,3 +112,10 @@ class Effect:
     def null(self) -> dict[str, float]:
         """The values at which it vanishes."""
         return {p.name: p.null for p in self.parameters}
+
+
+def told_apart(first: Effect, second: Effect) -> str:
+    """Which run separates two effects: by the card that names the other one."""
+    if second.id not in first.confused_with and first.id in second.confused_with:
+        return second.told_apart
+    return first.told_apart

@@ -11,12 +11,15 @@ from winchkit.schema.quantity import (
     PositiveDuration,
     PositiveMass,
     PositiveSpeed,
+    Temperature,
     WholeNumber,
 )
 from winchkit.schema.table import Rule, Table
 
 __all__ = ["Programme", "Step"]
 
+_RUN_UP = 0.1
+"""Over which a programme's first place is approached, m."""
 STEP_ACTIONS = ("to", "by", "hold", "ask")
 
 
@@ -36,6 +39,8 @@ class Step(Table):
     """What the operator is asked to do; waits for the answer."""
     load_mass: PositiveMass | None = None
     """The known weight that hangs on the rope from this step on, kg."""
+    temperature: Temperature | None = None
+    """Of rope and machine from this step on, degC."""
 
     def rules(self) -> Iterator[Rule]:
         """A step does one thing, and has the keys of that thing."""
@@ -51,8 +56,20 @@ class Step(Table):
             for key in ("speed", "acceleration"):
                 if getattr(self, key) is not None:
                     yield key, f"belongs to a move, not to '{given[0]}'"
-        if self.load_mass is not None and given[0] != "ask":
-            yield "load_mass", f"belongs to a step with 'ask', not to '{given[0]}'"
+        for key in ("load_mass", "temperature"):
+            if getattr(self, key) is not None and given[0] != "ask":
+                yield key, f"belongs to a step with 'ask', not to '{given[0]}'"
+
+    def asks_beyond(self, hanging: float | None, warm: float | None) -> bool:
+        """Whether its question is about more than the load and the temperature that there are."""
+        if self.ask is None:
+            return False
+        told = self.load_mass is not None or self.temperature is not None
+        return (
+            not told
+            or self.load_mass not in (None, hanging)
+            or self.temperature not in (None, warm)
+        )
 
 
 @dataclass(frozen=True)
@@ -63,6 +80,28 @@ class Programme(Table):
     step: tuple[Step, ...]
     repeat: WholeNumber = 1
     description: str = ""
+
+    def approach(self, winch: str) -> tuple[float, ...]:
+        """Cable lengths (m) to come from and to begin at, so that all repeats are one motion.
+
+        It begins where a repeat ends, and comes there from the same side. Empty where the
+        programme does not say where it ends.
+        """
+        here: float | None = None
+        before: float | None = None
+        for step in self.step:
+            if step.winch not in ("all", winch) or (step.to is None and step.by is None):
+                continue
+            goal = step.to if step.to is not None else None
+            if goal is None and here is not None:
+                goal = here + (step.by or 0.0)
+            if goal is not None and goal != here:
+                before, here = here, goal
+        if here is None:
+            return ()
+        if before is None:
+            return (here,)
+        return here + max(-_RUN_UP, min(_RUN_UP, before - here)), here
 
     def rules(self) -> Iterator[Rule]:
         """A programme without a step does nothing."""

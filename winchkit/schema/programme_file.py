@@ -18,8 +18,9 @@ _UNITS = {
     "acceleration": "m/s^2",
     "hold": "s",
     "load_mass": "kg",
+    "temperature": "degC",
 }
-_ORDER = ("ask", "load_mass", "to", "by", "speed", "acceleration", "hold")
+_ORDER = ("ask", "load_mass", "temperature", "to", "by", "speed", "acceleration", "hold")
 
 
 def write_programme(programme: Programme, path: Path) -> None:

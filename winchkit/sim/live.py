@@ -100,15 +100,22 @@ class LiveBench:
         return write_bench(self.bench_spec, Path(path))
 
     def answer(self, step: Step) -> None:
-        """Do what a programme's ``ask`` asks for: hang its ``load_mass``, where it has one."""
-        if step.load_mass is not None:
-            for name in self.winches if step.winch == "all" else [step.winch]:
+        """Do what a programme's ``ask`` asks for: its ``load_mass``, its ``temperature``."""
+        for name in self.winches if step.winch == "all" else [step.winch]:
+            if step.load_mass is not None:
                 self.hang(name, step.load_mass)
+            if step.temperature is not None:
+                self.warm(name, step.temperature)
 
     def hang(self, winch: str, mass: float) -> None:
         """Hang a load (kg) on a winch; NotPermitted while it moves."""
         with self.up_to_date():
             self._winch(winch).hang(mass)
+
+    def warm(self, winch: str, temperature: float) -> None:
+        """Bring a winch to a temperature (degC); NotPermitted while it moves."""
+        with self.up_to_date():
+            self._winch(winch).warm(temperature)
 
     def inject(self, target: str, kind: str) -> None:
         """Make ``WINCH.ROLE`` go wrong, e.g. ``A.servo`` or ``A.cell``."""

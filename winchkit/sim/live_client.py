@@ -50,10 +50,14 @@ def tell(bench_file: str | Path, line: str) -> str:
 def answer(bench_file: str | Path, step: Step) -> bool:
     """Do what a programme's ``ask`` asks for, where the bench is simulated.
 
-    Hangs the step's ``load_mass``; True where that was done, False for a real bench or a
-    question about something else. Raises as :func:`tell`.
+    Its ``load_mass``, its ``temperature``; True where that was done, False for a real bench or
+    a question about something else. Raises as :func:`tell`.
     """
-    if step.load_mass is None or not is_simulated(bench_file):
+    told = step.load_mass is not None or step.temperature is not None
+    if not told or not is_simulated(bench_file):
         return False
-    tell(bench_file, f"load {step.winch} {step.load_mass!r} kg")
+    if step.load_mass is not None:
+        tell(bench_file, f"load {step.winch} {step.load_mass!r} kg")
+    if step.temperature is not None:
+        tell(bench_file, f"warm {step.winch} {step.temperature!r} degC")
     return True

@@ -17,6 +17,7 @@ __all__ = ["HELP", "ControlServer", "obey"]
 
 HELP = """\
 load WINCH MASS     hang another load, e.g. load A 32 kg (WINCH may be all)
+warm WINCH TEMP     bring rope and machine to a temperature, e.g. warm A 35 degC
 fault TARGET KIND   make a device go wrong, e.g. fault A.cell silence
 recover TARGET      end its lasting faults, e.g. recover A.cell
 status              what is true now
@@ -32,6 +33,11 @@ def obey(live: LiveBench, line: str) -> str:
         for name in live.winches if first == "all" else [first]:
             live.hang(name, mass)
         return f"{more} on {first}"
+    if word == "warm":
+        temperature = parse(more, "temperature")
+        for name in live.winches if first == "all" else [first]:
+            live.warm(name, temperature)
+        return f"{more} on {first}"
     if word == "fault":
         live.inject(first, more.strip())
         return f"{first}: {more.strip()}"
@@ -40,7 +46,7 @@ def obey(live: LiveBench, line: str) -> str:
         return f"{first}: recovered"
     if word == "status":
         return _status(live)
-    known = ["load", "fault", "recover", "status", "quit"]
+    known = ["load", "warm", "fault", "recover", "status", "quit"]
     raise UsageError(f"unknown line '{word}'; use {', '.join(known)}{suggest(word, known)}")
 
 

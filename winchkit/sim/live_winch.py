@@ -105,13 +105,21 @@ class LiveWinch:
 
     def hang(self, mass: float) -> None:
         """Hang another load (kg); NotPermitted while the winch moves."""
+        self._at_rest("a load")
+        self.plant.hang(mass)
+
+    def warm(self, temperature: float) -> None:
+        """Bring rope and machine to a temperature (degC); NotPermitted while the winch moves."""
+        self._at_rest("the temperature")
+        self.plant.warm(temperature)
+
+    def _at_rest(self, what: str) -> None:
         speed = self.plant.motor_velocity
         if abs(speed) > _AT_REST:
             raise NotPermitted(
-                f"winch {self.name}: its motor turns at {speed:.3g} rad/s; a load can be "
+                f"winch {self.name}: its motor turns at {speed:.3g} rad/s; {what} can be "
                 f"changed below {_AT_REST:g} rad/s only; stop it first"
             )
-        self.plant.hang(mass)
 
     def check_fault(self, role: str, kind: str) -> None:
         """Raise UsageError where there is no such device on this winch, or no such fault of it."""

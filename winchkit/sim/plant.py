@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import ceil
 from typing import Any
 
@@ -139,6 +140,13 @@ class WinchPlant:
         if not mass > 0:
             raise UsageError(f"a load of {mass:g} kg cannot hang; it must be above 0 kg")
         self._load.mass = mass
+        self._settle()
+
+    def warm(self, temperature: float) -> None:
+        """Bring everything to a temperature (degC), from where it drifts on."""
+        drifted = self._truth.temperature_drift / 3600 * self._state.time
+        self._truth = replace(self._truth, temperature=temperature - drifted)
+        self._state.temperature = temperature
         self._settle()
 
     def advance(self, duration: float, command: DriveCommand) -> None:

@@ -38,6 +38,10 @@ class RunPlan:
     legs: tuple[Leg, ...]
     elapsed: float
     """Since the programme began, pauses included, s."""
+    temperature: Mapping[str, float] = field(default_factory=dict)
+    """What winches were brought to, degC, where somebody was asked to."""
+    warmed: float = 0.0
+    """When that was, s since the programme began."""
 
     @property
     def duration(self) -> float:
@@ -54,7 +58,8 @@ class _Layout:
         self.limits = limits
         self.length = length
         self.load = load
-        self.elapsed = 0.0
+        self.elapsed = self.warmed = 0.0
+        self.temperature: dict[str, float] = {}
         self.legs: list[Leg] = []
         self.plans: list[RunPlan] = []
         self._begin()
@@ -66,7 +71,14 @@ class _Layout:
     def end_run(self) -> None:
         """Close the run of the legs so far, if there are any."""
         if self.legs:
-            run = RunPlan(self._start, dict(self.load), tuple(self.legs), self.elapsed)
+            run = RunPlan(
+                self._start,
+                dict(self.load),
+                tuple(self.legs),
+                self.elapsed,
+                dict(self.temperature),
+                self.warmed,
+            )
             self.plans.append(run)
             self.elapsed += run.duration
         self._begin()
@@ -78,6 +90,12 @@ class _Layout:
         ):
             self.end_run()
             self.load.update(dict.fromkeys(winches, step.load_mass))
+        if step.temperature is not None and any(
+            self.temperature.get(name) != step.temperature for name in winches
+        ):
+            self.end_run()
+            self.temperature.update(dict.fromkeys(winches, step.temperature))
+            self.warmed = self.elapsed
         if step.ask is not None:
             self.elapsed += ASK_PAUSE
         elif step.hold is not None:
