@@ -15,10 +15,10 @@ from winchkit.errors import UsageError
 from winchkit.units import suggest
 
 if TYPE_CHECKING:
-    from winchkit.diagnosis.dataset import Dataset
     from winchkit.diagnosis.kinds import Room
     from winchkit.diagnosis.plan import Offer
     from winchkit.effects.bind import Term
+    from winchkit.schema.bench import LimitSpec
 
 __all__ = ["command"]
 
@@ -53,14 +53,16 @@ def command(
     from winchkit.catalog import find
     from winchkit.diagnosis.confusion import pairs_of
     from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.diagnosis.kinds import allowed, seen
     from winchkit.diagnosis.plan import offers, programme_of
     from winchkit.schema.programme_file import write_programme
     from winchkit.schema.read import read_winch
 
+    limits = None if bench is None else _limits(bench, winch)
     declared, catalogue = read_winch(find("profiles", profile)), catalogue_of(effect_files)
     answer = diagnose(read_runs(runs, winch), declared, catalogue, band)
     problem, pairs = answer.inquiry.problem, pairs_of(answer.sets)
-    room = _room(problem.dataset, bench, winch)
+    room = seen(problem.dataset) if limits is None else allowed(problem.dataset, limits)
     found = offers(problem, pairs, answer.found.noise.rms, list(catalogue), room)
     if output:
         path = Path(output)
@@ -71,17 +73,14 @@ def command(
         echo_json({"schema": 1, "offers": listed, "programme": output})
     else:
         click.echo(_text(found, pairs))
-        for line in _silent(found, pairs, room, widened=bench is not None):
+        for line in _silent(found, pairs, room, widened=limits is not None):
             click.echo(line)
 
 
-def _room(dataset: Dataset, bench: str | None, winch: str | None) -> Room:
-    """Where the next programme may go: within a bench's limits, else where the runs went."""
-    from winchkit.diagnosis.kinds import allowed, seen
+def _limits(bench: str, winch: str | None) -> LimitSpec:
+    """How far, how fast and how heavy the next programme may go on a bench."""
     from winchkit.schema.read import read_bench
 
-    if bench is None:
-        return seen(dataset)
     wired = read_bench(bench).winch
     if winch is None and len(wired) > 1:
         raise UsageError(f"which winch? {bench} has {', '.join(wired)}; give --winch")
@@ -91,7 +90,7 @@ def _room(dataset: Dataset, bench: str | None, winch: str | None) -> Room:
         raise UsageError(
             f"{bench} has no winch '{name}'; it has {', '.join(known)}{suggest(name, known)}"
         )
-    return allowed(dataset, wired[name].limits)
+    return wired[name].limits
 
 
 def _silent(
