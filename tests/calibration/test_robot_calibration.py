@@ -19,13 +19,14 @@ from calibration_cases import (
     true_values,
     with_turns,
 )
+from scipy.optimize import nnls
 
 from winchkit.calibration.robot import Calibrated, Options, calibrate, split
 from winchkit.calibration.robot_next import next_poses
 from winchkit.calibration.robot_predict import rms
 from winchkit.effects.robot_poses import Measured
 from winchkit.errors import UsageError
-from winchkit.model.robot import robot_of
+from winchkit.model.robot import robot_of, rotation_of, structure_matrix
 from winchkit.schema.robot import PriorSpec
 
 NO_BOUNDS = {
@@ -255,6 +256,13 @@ def test_proposed_poses_say_more_than_poses_at_random() -> None:
     gains = [pose.gain for pose in chosen]
     assert gains == sorted(gains, reverse=True)
     assert gains[-1] > 0
+
+    geometry = found.equations.geometry(found.values)
+    for pose in chosen:
+        place, turned = np.array([pose.position]), rotation_of(*np.array([pose.angles]).T)
+        structure = structure_matrix(geometry, place, turned)[0]
+        weight = np.array([0, 0, -3 * 9.80665, 0, 0, 0])
+        assert nnls(structure, -weight)[1] < 1e-9, "ropes that pull hold the platform"
 
     def volume(extra: Measured) -> float:
         joined = {

@@ -11,13 +11,15 @@ import pytest
 from calibration_cases import Truth, robot
 from numpy.typing import NDArray
 from robot_poses.truth import HOME, turn
+from scipy.linalg import null_space
 from scipy.optimize import brentq, minimize
 
 from winchkit.calibration.robot import calibrate, split
+from winchkit.calibration.robot_next import next_poses
 from winchkit.calibration.robot_predict import rms
 from winchkit.effects.robot_poses import Measured
 from winchkit.errors import UsageError
-from winchkit.model.robot import Robot, robot_of
+from winchkit.model.robot import Robot, lengths, robot_of, rotation_of
 
 Array = NDArray[np.float64]
 CENTRE = np.array([0.0, 0.0, -0.05])
@@ -118,6 +120,28 @@ def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None
     before, after = rms(found.validation_before.distance), rms(found.validation_after.distance)
     assert before > 2e-3
     assert after < before / (10 if rotations else 3)
+
+
+def test_proposed_poses_are_such_that_it_rests_there() -> None:
+    """No motion that keeps the ropes' lengths moves the centre of mass up or down."""
+    believed, measured = hanging()
+    fit, held = split(measured)
+    found = calibrate(believed, fit, held)
+    geometry = found.equations.geometry(found.values)
+    proposed = next_poses(found, 3)
+    assert len(proposed) == 3
+    for pose in proposed:
+        at = np.array([*pose.position, *pose.angles])
+
+        def given(x: Array) -> Array:
+            return lengths(geometry, x[None, :3], rotation_of(*x[3:, None]))[0]
+
+        steps = np.eye(6) * 1e-6
+        slope = np.array([(given(at + d) - given(at - d)) / 2e-6 for d in steps])
+        rise = np.array([(height(at + d) - height(at - d)) / 2e-6 for d in steps])
+        free = null_space(slope.T)
+        assert free.shape == (6, 2)
+        np.testing.assert_allclose(free.T @ rise, 0.0, atol=1e-6)
 
 
 def test_motor_angles_alone_are_not_enough_for_four_ropes() -> None:

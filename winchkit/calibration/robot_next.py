@@ -11,7 +11,18 @@ from winchkit.calibration.robot import Calibrated
 from winchkit.calibration.robot_equations import State
 from winchkit.calibration.robot_solve import linearise
 from winchkit.effects.robot_poses import Measured
-from winchkit.model.robot import Pose, Robot, angles_of, lengths, robot_of, rotation_of
+from winchkit.model.robot import (
+    ForceLimits,
+    Pose,
+    Robot,
+    angles_of,
+    forward,
+    lengths,
+    robot_of,
+    rotation_of,
+    structure_matrix,
+    wrench_feasibility,
+)
 
 __all__ = ["NextPose", "next_poses"]
 
@@ -20,6 +31,8 @@ _CANDIDATES = 400
 _WIDER = 1.25
 _LEAST_BOX, _LEAST_TILT = 0.02, np.radians(5.0)
 _SEED = 20
+_FREEDOMS = 6
+_PULLING = ForceLimits(0.0, float("inf"))
 
 
 @dataclass(frozen=True)
@@ -37,8 +50,9 @@ class NextPose:
 def next_poses(found: Calibrated, count: int) -> list[NextPose]:
     """Choose ``count`` of random candidates, one after another, for the greatest gain each.
 
-    Candidates lie in the box of positions and rotations measured so far, a quarter wider; that the
-    robot can take them is for its user to check. What is measured at each is what was measured.
+    Candidates lie in the box of positions and rotations measured so far, a quarter wider, where
+    pulling ropes can hold the platform; what else is in the way is for the user to check. What is
+    measured at each is what was measured. Fewer are returned where fewer can be held.
     """
     candidates = _candidates(found)
     parts = _information(found, candidates)
@@ -47,12 +61,14 @@ def next_poses(found: Calibrated, count: int) -> list[NextPose]:
     angles = angles_of(candidates.rotation)
     out: list[NextPose] = []
     left = np.ones(len(parts), dtype=bool)
-    for _ in range(min(count, len(parts))):
+    while len(out) < count and np.any(left):
         inner = parts @ np.linalg.inv(matrix) @ np.swapaxes(parts, 1, 2)
         size = np.eye(inner.shape[1]) + inner
         gains = np.where(left, np.linalg.slogdet(size)[1], -np.inf)
         best = int(np.argmax(gains))
         left[best] = False
+        if not _held(found, candidates, best):
+            continue
         matrix = matrix + parts[best].T @ parts[best]
         place, turn = candidates.position[best], angles[best]
         out.append(NextPose(tuple(place.tolist()), tuple(turn.tolist()), gains[best] / np.log(4)))
@@ -72,8 +88,26 @@ def _candidates(found: Calibrated) -> Pose:
     position = spread(pose.position, _LEAST_BOX)
     rotation = rotation_of(*spread(angles_of(pose.rotation), _LEAST_TILT).T)
     geometry = found.equations.geometry(found.values)
-    sound = np.all(np.isfinite(lengths(geometry, position, rotation)), axis=1)
-    return Pose(position[sound], rotation[sound])
+    length = lengths(geometry, position, rotation)
+    sound = np.all(np.isfinite(length), axis=1)
+    pose = Pose(position[sound], rotation[sound])
+    if len(geometry.exit_point) >= _FREEDOMS:
+        return pose
+    # A platform that hangs takes none of them, but comes to rest near by.
+    rest = forward(geometry, length[sound], pose, found.equations.robot.profile.platform)
+    taut = rest.converged & np.all(rest.forces > 0, axis=1)
+    return Pose(rest.pose.position[taut], rest.pose.rotation[taut])
+
+
+def _held(found: Calibrated, pose: Pose, index: int) -> bool:
+    """Whether ropes that only pull balance the platform's weight at one of the poses."""
+    geometry, robot = found.equations.geometry(found.values), found.equations.robot
+    if len(robot.names) < _FREEDOMS:
+        return True
+    at = Pose(pose.position[[index]], pose.rotation[[index]])
+    structure = structure_matrix(geometry, at.position, at.rotation)[0]
+    margin = wrench_feasibility(structure, robot.weight(at)[0], _PULLING).margin
+    return bool(margin > 0)
 
 
 def _information(found: Calibrated, pose: Pose) -> Array:
