@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from winchkit.catalog import find
-from winchkit.model.robot import Pose, Robot, approximate_forces, robot_of
+from winchkit.estimation.elongation import ElongationCorrection
+from winchkit.model.robot import Linear, Pose, Robot, approximate_forces, flat_pose, robot_of
 from winchkit.schema.read import read_robot
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
@@ -104,6 +105,18 @@ def test_eq_8_leaves_what_ropes_can_bear() -> None:
     assert figures()["predicted_without_correction"]["lowest_force_n"] == pytest.approx(
         float(lowest.min())
     )
+
+
+def test_k0_is_an_origin_that_cancels(robot: Robot) -> None:
+    """As printed a rope under 500 N would be shorter by 2.5 % than one that nothing pulls."""
+    assert Linear(439.13e3, 11382.76).strain(500.0) < -0.02
+    away = flat_pose(Pose(np.array([[0.55, -0.55, 1.8]]), np.eye(3)[None]))
+    stretches = [
+        ElongationCorrection(robot, [law] * 8, robot.home, np.full(8, 500.0)).update(away)
+        for law in (Linear(439.13e3, 11382.76), Linear(439.13e3))
+    ]
+    np.testing.assert_allclose(stretches[0].length, stretches[1].length, rtol=1e-9, atol=1e-12)
+    assert max(map(abs, stretches[0].length)) > 1e-3
 
 
 def test_k1_as_newtons_per_millimetre_is_too_stiff() -> None:
