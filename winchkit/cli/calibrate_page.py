@@ -190,7 +190,11 @@ def _next(following: Sequence[NextPose]) -> Markup:
         for number, pose in enumerate(following, start=1)
     ]
     head = ["", "x [mm]", "y [mm]", "z [mm]", "roll [°]", "pitch [°]", "yaw [°]", "gain [bit]"]
-    return table("In this order; check that the robot can take them.", head, rows)
+    return table(
+        "In this order. Ropes hold the platform in each; look that nothing else is in the way.",
+        head,
+        rows,
+    )
 
 
 def _parameters(found: Calibrated) -> Markup:
