@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import dataclass
 from itertools import pairwise
 from math import pi, sin
 from typing import Any
@@ -98,20 +99,30 @@ def learning(rate: float, seconds: float) -> tuple[Array, Array]:
     return position + np.array([0, 0, 0.3]), acceleration
 
 
+@dataclass(frozen=True)
+class Rub:
+    """What the pulleys' friction is on the average; assumed, for the paper does not say."""
+
+    friction: float = FRICTION
+    stiffness: float = STIFFNESS
+    """N/m."""
+    shape: float = SHAPE
+
+
 class Winch:
     """Three pulleys with numbers of their own, by the simulator, and a noisy cell."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
-        self.rng = rng
+    def __init__(self, rng: np.random.Generator, rub: Rub) -> None:
+        self.rng, self.shape = rng, rub.shape
         spread = np.maximum(0.3, 1 + SPREAD * rng.normal(0, 1, (3, 2)))
-        self.numbers = [(FRICTION * float(f), STIFFNESS * float(s)) for f, s in spread]
+        self.numbers = [(rub.friction * float(f), rub.stiffness * float(s)) for f, s in spread]
 
     def readings(self, platform: Array, length: Array) -> tuple[Array, Array]:
         """What the cell shows and what the encoder says is wound in.
 
         Before the first sample the rope has come some way from somewhere.
         """
-        pulleys = [PreslidingPulleys(*numbers, SHAPE) for numbers in self.numbers]
+        pulleys = [PreslidingPulleys(*numbers, self.shape) for numbers in self.numbers]
         state, out = State(), []
         approach = np.full(100, self.rng.uniform(-APPROACH, APPROACH) / 100)
         moved = np.concatenate([approach, -np.diff(length, prepend=length[0])])
@@ -139,18 +150,21 @@ def estimates(group: PulleyGroup, cell: Array, wound: Array, speed: Array) -> di
 
 
 def measure(
-    *, rate: float, scale: float, seconds: float, winches: int, seed: int
+    *, rate: float, scale: float, seconds: float, winches: int, seed: int, rub: Rub | None = None
 ) -> dict[str, Any]:
     """Errors of the three ideas over all winches."""
+    rub = rub or Rub()
     lengths, tensions = ropes(*rectangle(rate, scale))
     taught_lengths, taught = ropes(*learning(rate / 4, seconds))
     rng = np.random.default_rng(seed)
     found: dict[str, list[Array]] = {name: [] for name in METHODS}
     wanted, learned = [], []
     for k in range(winches):
-        winch = Winch(rng)
+        winch = Winch(rng, rub)
         cell, wound = winch.readings(taught[:, k], taught_lengths[:, k])
-        (group,) = identify_dahl([Record(cell, taught[:, k], wound)], [WRAPS], shape=SHAPE).groups
+        (group,) = identify_dahl(
+            [Record(cell, taught[:, k], wound)], [WRAPS], shape=rub.shape
+        ).groups
         learned.append(group)
         cell, wound = winch.readings(tensions[:, k], lengths[:, k])
         speed = -np.gradient(lengths[:, k]) * rate
@@ -164,7 +178,7 @@ def measure(
         "samples": len(lengths),
         "tension": float(np.mean(wanted)),
         "sliding_friction": float(
-            FRICTION * np.mean(wanted) * sum(2 * sin(wrap / 2) for wrap in WRAPS)
+            rub.friction * np.mean(wanted) * sum(2 * sin(wrap / 2) for wrap in WRAPS)
         ),
         "identified": {
             "friction": float(np.mean([group.friction for group in learned])),
@@ -244,11 +258,16 @@ def main() -> int:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--rate", type=float, default=100.0, help="Hz")
     parser.add_argument("--seconds", type=float, default=60.0, help="of the learning motion")
+    parser.add_argument("--friction", type=float, default=FRICTION, help="of the pulleys")
+    parser.add_argument("--stiffness", type=float, default=STIFFNESS, help="N/m, of presliding")
+    parser.add_argument("--shape", type=float, default=SHAPE, help="of presliding")
     parser.add_argument("--seed", type=int, default=1, help="of the first run")
     parser.add_argument("--seeds", type=int, default=6, help="how many runs")
     options = parser.parse_args()
+    rub = Rub(options.friction, options.stiffness, options.shape)
+    rate, seconds = options.rate, options.seconds
     runs = [
-        measure(rate=options.rate, scale=1.0, seconds=options.seconds, winches=8, seed=seed)
+        measure(rate=rate, scale=1.0, seconds=seconds, winches=8, seed=seed, rub=rub)
         for seed in range(options.seed, options.seed + max(1, options.seeds))
     ]
     answer = {"schema": 1, "methods": over_runs(runs), "paper": PAPER, "runs": runs}
