@@ -14,8 +14,8 @@ from robot_poses.truth import HOME, turn
 from scipy.linalg import null_space
 from scipy.optimize import brentq, minimize
 
+from winchkit.calibration import robot_next
 from winchkit.calibration.robot import calibrate, split
-from winchkit.calibration.robot_next import next_poses
 from winchkit.calibration.robot_predict import rms
 from winchkit.effects.robot_poses import Measured
 from winchkit.errors import UsageError
@@ -128,7 +128,7 @@ def test_proposed_poses_are_such_that_it_rests_there() -> None:
     fit, held = split(measured)
     found = calibrate(believed, fit, held)
     geometry = found.equations.geometry(found.values)
-    proposed = next_poses(found, 3)
+    proposed = robot_next.next_poses(found, 3)
     assert len(proposed) == 3
     for pose in proposed:
         at = np.array([*pose.position, *pose.angles])

@@ -11,18 +11,10 @@ from winchkit.calibration.robot import Calibrated
 from winchkit.calibration.robot_equations import State
 from winchkit.calibration.robot_solve import linearise
 from winchkit.effects.robot_poses import Measured
-from winchkit.model.robot import (
-    ForceLimits,
-    Pose,
-    Robot,
-    angles_of,
-    forward,
-    lengths,
-    robot_of,
-    rotation_of,
-    structure_matrix,
-    wrench_feasibility,
-)
+from winchkit.model.robot import Pose, Robot, angles_of, lengths, robot_of, rotation_of
+from winchkit.model.robot.force_distribution import ForceLimits, wrench_feasibility
+from winchkit.model.robot.forward import forward
+from winchkit.model.robot.kinematics import structure_matrix
 
 __all__ = ["NextPose", "next_poses"]
 
