@@ -28,6 +28,10 @@ def about(desk: CellDesk, name: str) -> dict[str, Any]:
     remarks = _link_remarks(desk, name, device)
     if note := desk.line_note(name):
         remarks.append(note)
+    remarks += [
+        f"its device file has no source for {what}: compare with the manual"
+        for what in device.unconfirmed
+    ]
     serial = str(int(identity[_SERIAL])) if _SERIAL in identity else ""
     if calibration and serial and calibration.serial_number not in ("", serial):
         remarks.append(

@@ -33,6 +33,8 @@ class DeviceSpec(Table):
     modbus: ModbusSpec | None = None
     stream: StreamSpec | None = None
     process: ProcessSpec | None = None
+    unconfirmed: tuple[str, ...] = ()
+    """What stands in the file without a source: to be compared with the manual."""
     description: str = ""
     path: str = dataclasses.field(default="", compare=False)
 
