@@ -17,6 +17,7 @@ from winchkit.cli.cell import command
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.schema.read import read_simbench
 from winchkit.sim.live import LiveBench
+from winchkit.sim.pace import PacedClock
 
 pytestmark = pytest.mark.realtime
 
@@ -24,15 +25,22 @@ WEIGHT = 10 * 9.80665
 
 
 @pytest.fixture
-def wiring(tmp_path: Path) -> Iterator[Path]:
+def clock() -> PacedClock:
+    """Stands still while this machine is busy elsewhere."""
+    return PacedClock()
+
+
+@pytest.fixture
+def wiring(tmp_path: Path, clock: PacedClock) -> Iterator[Path]:
     declared = read_simbench(catalog.find("sim", "spiral-bench"))
-    with LiveBench(declared, seed=3) as live:
+    with LiveBench(declared, seed=3, clock=clock.simulation) as live:
         yield live.write_bench_file(tmp_path / "bench.toml")
 
 
 @pytest.fixture
-def bench(wiring: Path) -> Iterator[Bench]:
-    with open_bench(wiring) as opened:
+def bench(wiring: Path, clock: PacedClock) -> Iterator[Bench]:
+    with open_bench(wiring, clock) as opened:
+        opened.on_cycle(clock.control)
         yield opened
 
 
@@ -63,12 +71,13 @@ def test_every_cell_command_works_at_the_owner(bench: Bench, wiring: Path) -> No
 
 
 def test_no_zero_and_no_tare_while_the_winch_moves(bench: Bench, wiring: Path) -> None:
-    bench.winch["A"].move_by(-0.5, 0.1, wait=False)
+    bench.winch["A"].move_by(-1.5, 0.1, wait=False)
     end = time.monotonic() + 10
     while abs(bench.winch["A"].snapshot.speed) < 0.02:
         assert time.monotonic() < end
         time.sleep(0.01)
     for words in (["zero"], ["tare"], ["tare", "--device"], ["store", "--yes"]):
+        assert bench.winch["A"].moving
         failed = run(*words, "-b", wiring, error=NotPermitted)
         assert "stop it first" in str(failed.exception)
     run("info", "-b", wiring)
