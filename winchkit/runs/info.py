@@ -26,9 +26,9 @@ class SourceInfo:
     channels: tuple[str, ...]
     samples: int
     rate: float
-    """From the median interval, Hz; NaN with fewer than two samples."""
+    """Over the whole log, Hz; NaN with fewer than two samples."""
     gaps: int
-    """How often the time jumps by more than 1.5 intervals."""
+    """How often the time jumps by more than 1.5 usual intervals."""
     longest_gap: float
     """Longest interval, s."""
     missing: Mapping[str, int]
@@ -81,7 +81,9 @@ def info_of(log: Log) -> LogInfo:
 def _source_info(source: Source, samples: Samples) -> SourceInfo:
     steps = np.diff(samples.times)
     steps = steps[steps > 0]
-    median = float(np.median(steps)) if len(steps) else float("nan")
+    # What was held back in an adapter comes in bursts, whose median interval says little.
+    mean = float(steps.mean()) if len(steps) else float("nan")
+    usual = max(float(np.median(steps)), mean) if len(steps) else mean
     names = [signal.column or signal.name for signal in source.signals]
     lacks = np.isnan(samples.values).sum(axis=0).tolist()
     flags = [n for n, signal in enumerate(source.signals) if signal.name == _QUALITY]
@@ -89,8 +91,8 @@ def _source_info(source: Source, samples: Samples) -> SourceInfo:
         source.topic,
         tuple(names),
         len(samples),
-        1 / median if len(steps) else float("nan"),
-        int(np.count_nonzero(steps > _GAP * median)),
+        1 / mean,
+        int(np.count_nonzero(steps > _GAP * usual)),
         float(steps.max()) if len(steps) else float("nan"),
         {name: count for name, count in zip(names, lacks, strict=True) if count},
         int(np.count_nonzero(samples.values[:, flags])),
