@@ -24,12 +24,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
-from campaign.motion import programme
 from campaign.truth import Situation, show
 from campaign.winch import Winch, turns_for, write_profile
 from numpy.typing import NDArray
+from scipy.signal import oaconvolve
 
-from winchkit.diagnosis.diagnose import diagnose, diagnose_each
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.each import diagnose_each
 from winchkit.diagnosis.result import Diagnosis
 from winchkit.effects import load_catalogue
 from winchkit.runs import read_run
@@ -68,13 +69,30 @@ def hidden(index: int) -> dict[str, dict[str, float]]:
     }
 
 
+def motion(random: np.random.Generator, seconds: float) -> tuple[Array, Array]:
+    """Time (s) and rope wound in (m): moves between random places at 0.05 to 0.5 m/s, rests."""
+    count = round(seconds * RATE)
+    speed, at, place = np.zeros(count), round(RATE), 0.0
+    while at < count:
+        goal = -float(random.uniform(0.0, 4.0))
+        fast = float(np.exp(random.uniform(np.log(0.05), np.log(0.5))))
+        length = max(1, round(abs(goal - place) / fast * RATE))
+        speed[at : at + length] = np.sign(goal - place) * fast
+        place += float(np.sign(goal - place)) * fast * length / RATE
+        at += length + round(RATE * float(random.choice([0.5, 1.0, 3.0])))
+    bell = np.hanning(round(0.4 * RATE))
+    smooth = oaconvolve(speed, bell / bell.sum(), mode="same")
+    wound = np.concatenate([[0.0], np.cumsum((smooth[1:] + smooth[:-1]) / 2)]) / RATE
+    return np.arange(count) / RATE, wound
+
+
 def recordings(minutes: float, winches: int, seed: int = 1) -> list[Run]:
     """A run of all winches, named A, B …, of half that time, and its repeat with other noise."""
     random = np.random.default_rng(seed)
     channels: tuple[dict[str, Channel], ...] = ({}, {})
     time = np.zeros(0)
     for index in range(winches):
-        time, wound = programme(random, RATE, 30 * minutes, 4.0)
+        time, wound = motion(random, 30 * minutes)
         angle = WINCH.ratio * turns_for(WINCH, 1.0) * wound
         mass = np.array(MASSES)[np.arange(len(time)) * len(MASSES) // len(time)]
         # The campaign's winches carry one weight a run; its physics takes a weight per sample too.
@@ -97,6 +115,19 @@ def written(run: Run, path: Path) -> None:
         for start in range(0, len(run), 10_000):
             block = np.column_stack([column[start : start + 10_000] for column in columns])
             np.savetxt(file, block, fmt="%.9g", delimiter=",")
+
+
+def through_files(runs: list[Run], folder: Path) -> tuple[list[Run], dict[str, float]]:
+    """Runs written and read back, and what reading costs."""
+    paths = [folder / f"{run.name}.csv" for run in runs]
+    for run, path in zip(runs, paths, strict=True):
+        written(run, path)
+    size = sum(path.stat().st_size for path in paths) / 1e6
+    before, begun = peak(), perf_counter()
+    back = [read_run(path) for path in paths]
+    seconds = perf_counter() - begun
+    cost = {"csv_mb": size, "seconds": seconds, "peak_before": before, "peak_after": peak()}
+    return back, cost
 
 
 def peak() -> float:
@@ -145,21 +176,15 @@ def main() -> int:
     folder = args.csv or Path(tempfile.mkdtemp())
     write_profile(WINCH, folder / "hour.toml")
     profile = read_winch(folder / "hour.toml")
-    runs, read = recordings(args.minutes, args.winches), {}
+    runs: list[Run] = recordings(args.minutes, args.winches)
+    read: dict[str, float] = {}
     if args.csv:
-        paths = [folder / f"{run.name}.csv" for run in runs]
-        for run, path in zip(runs, paths, strict=True):
-            written(run, path)
-        size = sum(path.stat().st_size for path in paths) / 1e6
-        before, begun = peak(), perf_counter()
-        runs = [read_run(path) for path in paths]
-        seconds = perf_counter() - begun
-        read = {"csv_mb": size, "seconds": seconds, "peak_before": before, "peak_after": peak()}
+        runs, read = through_files(runs, folder)
     begun, worked = perf_counter(), process_time()
     of_winch = {name: [run.of_winch(name) for run in runs] for name in runs[0].winches()}
-    answers = diagnose_each(of_winch, profile, load_catalogue())
+    each = diagnose_each(of_winch, profile, load_catalogue())
+    tellings = [told(answer.diagnosis, index) for index, (_, answer) in enumerate(each)]
     seconds, cpu = perf_counter() - begun, process_time() - worked
-    tellings = [told(a.diagnosis, index) for index, a in enumerate(answers.values())]
     result: dict[str, object] = {
         "schema": 1,
         "samples": [len(run) for run in runs],

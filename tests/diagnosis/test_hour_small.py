@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from winchkit.diagnosis import thin
-from winchkit.diagnosis.diagnose import Answer, diagnose_each
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.each import diagnose_each
 from winchkit.effects import load_catalogue
 from winchkit.schema.read import read_winch
 
@@ -33,13 +34,15 @@ def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, floa
     with pytest.MonkeyPatch.context() as patched:
         # As far as the signals allow, not only as far as is needed: an hour in small.
         patched.setattr(thin, "_WANTED", 1000)
-        answers = diagnose_each(
+        each = diagnose_each(
             of_winch,
             read_winch(path),
             load_catalogue(),
             told=lambda what, share: heard.append((what, share)),
         )
-    return answers["A"]
+        ((name, found),) = each
+    assert name == "A"
+    return found
 
 
 def test_it_is_thinned_and_says_so(answer: Answer) -> None:

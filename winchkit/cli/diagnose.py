@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.diagnose import Answer
     from winchkit.effects.catalogue import Catalogue
     from winchkit.schema.robot import RobotProfile
+    from winchkit.schema.winch import WinchProfile
 
 __all__ = ["command"]
 
@@ -39,35 +41,59 @@ def command(
     """Name the physical effect that the model lacks, with its size and what it would buy.
 
     Two runs of one programme and load are the measure of the noise: record everything twice.
-    Long runs are thinned out as far as their signals allow. --winch all takes every winch of the
-    runs by itself, each against the same profile.
+    Long runs are thinned out as far as their signals allow; --winch all takes each by itself.
     """
     from winchkit.catalog import find
     from winchkit.cli.robot_model import read_profile, refuse_options
-    from winchkit.diagnosis.diagnose import diagnose_each
+    from winchkit.diagnosis.diagnose import diagnose
     from winchkit.schema.robot import RobotProfile
 
     if html and winch == ALL:
         raise UsageError("--html is a page of one winch; name it with --winch")
-    declared = read_profile(find("profiles", profile))
+    declared, catalogue = read_profile(find("profiles", profile)), catalogue_of(effect_files)
     if isinstance(declared, RobotProfile):
         refuse_options(band, html, winch)
-        _tell_robot(runs, declared, catalogue_of(effect_files), as_json)
+        _tell_robot(runs, declared, catalogue, as_json)
         return
-    catalogue = catalogue_of(effect_files)
+    how = How(catalogue, band, not every_sample)
+    if winch == ALL:
+        _tell_each(runs, declared, how, as_json)
+        return
     with progress_bar() as told:
-        of_winch = read_each(runs) if winch == ALL else {winch or "": read_runs(runs, winch)}
-        answers = diagnose_each(
-            of_winch, declared, catalogue, band, thin=not every_sample, told=told
-        )
-    _tell(answers, as_json, each=winch == ALL)
+        own = read_runs(runs, winch)
+        answer = diagnose(own, declared, catalogue, band, thin=how.thin, told=told)
+    (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         from winchkit.diagnosis.report.page import report_html
 
-        (answer,) = answers.values()
-        title = page_title(declared.name, runs)
-        options = given_options(effect_files, winch, band)
+        title, options = page_title(declared.name, runs), given_options(effect_files, winch, band)
         write_page(html, report_html(answer, title, profile=profile, options=options))
+
+
+@dataclass(frozen=True)
+class How:
+    """How runs are diagnosed."""
+
+    catalogue: Catalogue
+    band: float | None
+    thin: bool
+
+
+def _tell_each(runs: Sequence[str], declared: WinchProfile, how: How, as_json: bool) -> None:
+    """What every winch of the runs lacks, each by itself."""
+    from winchkit.diagnosis.each import diagnose_each
+
+    with progress_bar() as told:
+        each = diagnose_each(
+            read_each(runs), declared, how.catalogue, how.band, thin=how.thin, told=told
+        )
+        found = {name: _said(answer, as_json) for name, answer in each}
+    if as_json:
+        echo_json({"schema": 1, "winches": found})
+        return
+    for name, text in found.items():
+        click.echo(f"winch {name}")
+        click.echo(text)
 
 
 def _tell_robot(
@@ -86,16 +112,12 @@ def _tell_robot(
         click.echo(report_text(answer))
 
 
-def _tell(answers: Mapping[str, Answer], as_json: bool, *, each: bool) -> None:
+def _said(answer: Answer, as_json: bool) -> Any:
+    """An answer as JSON data or as text: what is printed, without all that is behind it."""
     if as_json:
         from winchkit.diagnosis.report.as_json import report_json
 
-        found = {name: report_json(answer) for name, answer in answers.items()}
-        echo_json({"schema": 1, "winches": found} if each else next(iter(found.values())))
-        return
+        return report_json(answer)
     from winchkit.diagnosis.report.text import report_text
 
-    for name, answer in answers.items():
-        if each:
-            click.echo(f"winch {name}")
-        click.echo(report_text(answer))
+    return report_text(answer)

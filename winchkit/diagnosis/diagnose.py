@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from itertools import pairwise, zip_longest
 
 import numpy as np
@@ -35,18 +34,9 @@ from winchkit.effects.coordinates import Coordinates
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
-__all__ = [
-    "Answer",
-    "Told",
-    "candidates_of",
-    "diagnose",
-    "diagnose_each",
-    "inquire",
-    "steps_of",
-]
+__all__ = ["Answer", "Told", "candidates_of", "diagnose", "inquire", "silent", "steps_of"]
 
 _WHERE = 6
-_AT_A_TIME = 2
 
 
 Told = Callable[[str, float], None]
@@ -70,7 +60,7 @@ class Answer:
         self.diagnosis = diagnosis
 
 
-def _silent(what: str, share: float) -> None:
+def silent(what: str, share: float) -> None:
     """Tells nobody."""
 
 
@@ -81,7 +71,7 @@ def diagnose(
     band: float | None = None,
     *,
     thin: bool = True,
-    told: Told = _silent,
+    told: Told = silent,
 ) -> Answer:
     """Find which effect of the catalogue the profile lacks on these runs.
 
@@ -97,6 +87,11 @@ def diagnose(
     told("searching", 0.4)
     found = search(inquiry)
     told("naming", 0.8)
+    return _answer(inquiry, found)
+
+
+def _answer(inquiry: Inquiry, found: Found) -> Answer:
+    """Everything that is said of what a search found."""
     judgement = judge(inquiry, found)
     shown = judgement.shown
     added = range(inquiry.given, len(shown.final.hypothesis.terms))
@@ -118,30 +113,6 @@ def diagnose(
         ),
     )
     return Answer(inquiry, shown, diagnosis, sets)
-
-
-def diagnose_each(
-    winches: Mapping[str, Sequence[Run]],
-    profile: WinchProfile,
-    catalogue: Catalogue | None = None,
-    band: float | None = None,
-    *,
-    thin: bool = True,
-    told: Told = _silent,
-) -> dict[str, Answer]:
-    """A diagnosis of every winch by itself, two at a time: numpy leaves the second core to it."""
-    catalogue = catalogue or load_catalogue()
-    shares = dict.fromkeys(winches, 0.0)
-
-    def one(name: str) -> Answer:
-        def heard(what: str, share: float) -> None:
-            shares[name] = share
-            told(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
-
-        return diagnose(winches[name], profile, catalogue, band, thin=thin, told=heard)
-
-    with ThreadPoolExecutor(_AT_A_TIME) as pool:
-        return dict(zip(winches, pool.map(one, winches), strict=True))
 
 
 def inquire(dataset: Dataset, catalogue: Catalogue) -> Inquiry:
