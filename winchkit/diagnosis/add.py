@@ -12,9 +12,10 @@ from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.follows import variables_of
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Estimate, OutputFit
-from winchkit.diagnosis.signature import Score, missing_needs, score
+from winchkit.diagnosis.signature import Score, score
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import output_fits
 from winchkit.effects.bind import Term

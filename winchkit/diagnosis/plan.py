@@ -9,8 +9,8 @@ from typing import Any
 from winchkit.diagnosis.dataset import Dataset
 from winchkit.diagnosis.kinds import KINDS, Kind, Room, imagined, seen, usual_temperature
 from winchkit.diagnosis.next_run import power_of, separation
+from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.signature import missing_needs
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect

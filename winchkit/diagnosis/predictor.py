@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.spectrum import to_frequency
 from winchkit.effects.bind import Term, modifiers_of
-from winchkit.model.line import Line, Way
-from winchkit.model.stages import Stage
+from winchkit.model.line import Line
+from winchkit.model.stages import Stage, Way
 from winchkit.schema.winch import WinchProfile
 
 __all__ = ["Predictor", "masked"]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.points import points
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -27,7 +28,6 @@ __all__ = [
     "Score",
     "Signatures",
     "chance_level",
-    "missing_needs",
     "score",
     "signatures",
     "worthless",
@@ -36,18 +36,6 @@ __all__ = [
 Array = NDArray[np.float64]
 _NOTHING = 1e-300
 _SIMULATIONS = 400
-_PERIODS = 2
-_NEEDED = {
-    "cable": "a rope in the profile ([cable], [[pulley]] or reference.cable_length)",
-    "layers": "a drum that winds in layers (spiral or archimedean)",
-    "guide": "a [guide] in the profile",
-    "pulley": "a [[pulley]] in the profile",
-    "temperature": "a temperature channel in every run",
-    "load": "a load channel or load_mass",
-    "rope_force": "a load, load_mass or tension",
-    "gearing": "a gearbox",
-    "robot": "a robot's profile",
-}
 _UNIDENTIFIABLE = 1e-7
 _ROUNDING = 1e-9
 
@@ -92,40 +80,14 @@ class Score:
     """λ for one usual size: noncentrality of its whitened, projected signature."""
 
 
-def missing_needs(effect: Effect, problem: Problem) -> list[str]:
-    """Parts and channels that an effect needs and that are not there, in words."""
-    dataset = problem.dataset
-    if not effect.needs:
-        measured = set(effect.outputs) & set(dataset.outputs)
-        return [] if measured else ["a measured " + " or ".join(effect.outputs)]
-    profile, recordings = dataset.profile, dataset.recordings
-    cable = profile.cable
-    roped = cable.diameter or cable.dead_length or profile.pulley
-    have = {
-        "cable": bool(roped) or profile.reference.cable_length is not None,
-        "layers": profile.drum.kind in {"spiral", "archimedean"},
-        "guide": profile.guide is not None,
-        "pulley": bool(profile.pulley),
-        "temperature": all(r.signals.temperature is not None for r in recordings),
-        "load": any(r.raw.load is not None for r in recordings),
-        "rope_force": any(bool(r.raw.at.tension.any()) for r in recordings),
-        "gearing": True,
-        "robot": False,
-    }
-    lacking = [_NEEDED[need] for need in effect.needs if not have[need]]
-    if not set(effect.outputs) & set(dataset.outputs):
-        lacking.append("a measured " + " or ".join(effect.outputs))
-    return lacking
-
-
 def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect]) -> Signatures:
     """Columns and inner products of every candidate among ``effects`` beside a present model."""
     here = problem.change(present)
-    points = list(_points(problem, effects))
+    tried = list(points(problem, effects))
     atoms: list[Atom] = []
     # One column after another in memory: thousands of rows each, written and read whole.
-    columns, count = np.empty((sum(len(secants) for *_, secants in points), problem.rows)), 0
-    for effect, shape, secants in points:
+    columns, count = np.empty((sum(len(secants) for *_, secants in tried), problem.rows)), 0
+    for effect, shape, secants in tried:
         own = []
         for secant in secants:
             values = {**effect.null, **shape, **secant}
@@ -137,30 +99,6 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
             atoms.append(Atom(effect, shape, slice(count - len(own), count), tuple(own)))
     kept = columns[:count].T
     return Signatures(tuple(atoms), kept, _gram(problem, kept))
-
-
-Point = tuple[Effect, dict[str, float], list[dict[str, float]]]
-"""An effect, a point of its shape grid, and its values of a usual size there."""
-
-
-def _points(problem: Problem, effects: Iterable[Effect]) -> Iterator[Point]:
-    """What candidates are scored at, where these runs could show them at all."""
-    for effect in effects:
-        if missing_needs(effect, problem):
-            continue
-        coordinates = Coordinates(effect)
-        for shape in coordinates.grid():
-            if _turns_enough(problem, shape):
-                yield effect, shape, coordinates.secants()
-
-
-def _turns_enough(problem: Problem, shape: dict[str, float]) -> bool:
-    """Whether the motor turns through two periods of an order in some run."""
-    orders = [shape["order"]] if "order" in shape else []
-    if not orders:
-        return True
-    stroke = max(float(np.ptp(r.signals.motor_angle)) for r in problem.dataset.recordings)
-    return all(order * stroke >= _PERIODS * 2 * np.pi for order in orders)
 
 
 def _column(

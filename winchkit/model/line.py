@@ -23,10 +23,10 @@ from winchkit.model.derivatives import (
     wide_gradient,
 )
 from winchkit.model.drum import Drum, drum_of
-from winchkit.model.stages import At, Modifier, Path, Signals, Stage
+from winchkit.model.stages import At, Modifier, Path, Signals, Stage, Way
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["GRAVITY", "Line", "Motion", "Way"]
+__all__ = ["GRAVITY", "Line", "Motion"]
 
 Array = NDArray[np.float64]
 GRAVITY = 9.80665
@@ -48,17 +48,6 @@ class Motion:
     """The weight whose acceleration makes the load, kg, where no instrument measures it."""
     rounding: Array | None = None
     """Curvature of that load over the span of its differences, N: how far it may be rounded."""
-
-
-@dataclass(frozen=True)
-class Way:
-    """How the motor's angle comes to the rope; every array of shape (n,)."""
-
-    drum_angle: Array
-    free_length: Array
-    """Unstrained, from exit point to attachment, m."""
-    arm: Array
-    """Rope wound in per motor angle, m/rad."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["ROBOT_STAGES", "At", "LinePlace", "Modifier", "Path", "Signals", "Stage"]
+__all__ = ["ROBOT_STAGES", "At", "LinePlace", "Modifier", "Path", "Signals", "Stage", "Way"]
 
 Array = NDArray[np.float64]
 
@@ -75,6 +75,17 @@ class Path:
 
     value: Array
     slope: Array
+
+
+@dataclass(frozen=True)
+class Way:
+    """How the motor's angle comes to the rope; every array of shape (n,)."""
+
+    drum_angle: Array
+    free_length: Array
+    """Unstrained, from exit point to attachment, m."""
+    arm: Array
+    """Rope wound in per motor angle, m/rad."""
 
 
 @dataclass(frozen=True)

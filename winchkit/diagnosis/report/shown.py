@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from math import ceil, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.report.phrases import parameter_name, parameter_unit
 from winchkit.diagnosis.report.wording import quantity
 from winchkit.diagnosis.result import Detectable
-from winchkit.diagnosis.signature import missing_needs
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 
