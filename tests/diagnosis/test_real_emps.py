@@ -143,7 +143,7 @@ def test_what_was_found_halves_the_error_of_coulomb_friction_alone(
     """On another file, 4.3 %; train and test themselves differ by 2.0 % of what neither explains.
 
     What is left is a torque that is reported about 0.7 ms before it acts, which no effect of the
-    catalogue is; with it 3.1 %.
+    catalogue is; with it 3.2 %.
     """
     terms = found.found.final.hypothesis.terms
     assert error_on_test(Line(profile, modifiers_of(terms))) < 0.048
