@@ -86,7 +86,7 @@ def main_of(arguments: list[str]) -> None:
                 if not options.json:
                     print(_text(rows[-1]), flush=True)
     if options.json:
-        print(json.dumps(rows, indent=1))
+        print(json.dumps({"schema": 1, "cases": rows}, indent=1))
 
 
 def _row(case: Case, flow: str, seed: int, found: dict[str, Any], seconds: float) -> dict[str, Any]:

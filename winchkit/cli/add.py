@@ -14,6 +14,8 @@ from winchkit.cli.runs_option import ManyValues, catalogue_of, model_options, re
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
+    from winchkit.effects.catalogue import Catalogue
+    from winchkit.schema.robot import RobotProfile
 
 __all__ = ["command", "write_addition"]
 
@@ -41,19 +43,15 @@ def command(
     deviation, the runs and the date.
     """
     from winchkit.catalog import find
-    from winchkit.cli.robot_model import read_poses_of, read_profile, refuse_options
+    from winchkit.cli.robot_model import read_profile, refuse_options
     from winchkit.diagnosis.add import grow
     from winchkit.schema.robot import RobotProfile
 
     source = find("profiles", profile)
     declared, catalogue = read_profile(source), catalogue_of(effect_files)
     if isinstance(declared, RobotProfile):
-        from winchkit.diagnosis.robot.add import add_to_robot
-
         refuse_options(band, html)
-        name, _, place = effect.partition("/")
-        poses = read_poses_of(runs)
-        addition = add_to_robot(name, poses, declared, winch or place or None, catalogue)
+        addition = _to_robot(effect, runs, declared, winch, catalogue)
         write_addition(source, addition, [Path(run).name for run in runs], Path(output))
         click.echo(f"written: {output}", err=True)
         _tell(addition, as_json)
@@ -68,6 +66,21 @@ def command(
         title = page_title(declared.name, runs, effect)
         options = given_options(effect_files, winch, band)
         write_page(html, addition_html(grown, title, profile, output, options=options))
+
+
+def _to_robot(
+    effect: str,
+    runs: Sequence[str],
+    declared: RobotProfile,
+    line: str | None,
+    catalogue: Catalogue,
+) -> Addition:
+    """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
+    from winchkit.cli.robot_model import read_poses_of
+    from winchkit.diagnosis.robot.add import add_to_robot
+
+    name, _, place = effect.partition("/")
+    return add_to_robot(name, read_poses_of(runs), declared, line or place or None, catalogue)
 
 
 def _tell(addition: Addition, as_json: bool) -> None:

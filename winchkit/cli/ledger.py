@@ -15,10 +15,10 @@ __all__ = ["command"]
 def command(profile: str, as_json: bool) -> None:
     """Show every effect that was added to or removed from a profile and what that did."""
     from winchkit.catalog import find
+    from winchkit.cli.robot_model import read_profile
     from winchkit.diagnosis.ladder import ladder
-    from winchkit.schema.read import read_winch
 
-    declared = read_winch(find("profiles", profile))
+    declared = read_profile(find("profiles", profile))
     rungs = ladder(declared)
     if as_json:
         steps = [rung.to_json() for rung in rungs]

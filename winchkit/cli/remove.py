@@ -10,6 +10,7 @@ import click
 
 from winchkit.cli.output import echo_json
 from winchkit.cli.runs_option import ManyValues, catalogue_of, model_options, read_runs
+from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.remove import Removal
@@ -37,12 +38,15 @@ def command(
     The ledger notes the step, and 'winchkit undo' takes it back.
     """
     from winchkit.catalog import find
+    from winchkit.cli.robot_model import read_profile
     from winchkit.diagnosis.remove import remove
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.robot import RobotProfile
 
     source = find("profiles", profile)
-    declared, removal = read_winch(source), None
-    if runs:
+    declared, removal = read_profile(source), None
+    if runs and isinstance(declared, RobotProfile):
+        raise UsageError("--fit: a robot's effects are not refitted here; remove, then calibrate")
+    if runs and not isinstance(declared, RobotProfile):
         catalogue = catalogue_of(effect_files)
         removal = remove(effect, read_runs(runs, winch), declared, catalogue, band)
     _write(source, effect, removal, runs, Path(output))

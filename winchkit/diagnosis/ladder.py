@@ -10,10 +10,13 @@ from typing import Any
 from winchkit.diagnosis.admit import OUTPUT_UNITS, OUTPUTS
 from winchkit.errors import FileError
 from winchkit.schema.ledger import LedgerEntry
+from winchkit.schema.robot import RobotProfile
 from winchkit.schema.winch import WinchProfile
 from winchkit.units import dimension_of, parse
 
 __all__ = ["Rung", "ladder"]
+
+_PLATFORM = "platform_position"
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Rung:
         }
 
 
-def ladder(profile: WinchProfile) -> tuple[Rung, ...]:
+def ladder(profile: WinchProfile | RobotProfile) -> tuple[Rung, ...]:
     """Every step of a profile's ledger, oldest first. Raises FileError for a wrong quantity."""
     return tuple(_rung(entry) for entry in profile.ledger)
 
@@ -53,10 +56,11 @@ def _rung(entry: LedgerEntry) -> Rung:
 
 def _si(entry: LedgerEntry, name: str) -> dict[str, float]:
     written: Mapping[str, str] = getattr(entry, name)
-    unknown = [output for output in written if output not in OUTPUTS]
+    units = {**OUTPUT_UNITS, _PLATFORM: "m"}
+    unknown = [output for output in written if output not in units]
     if unknown:
         raise FileError(
             f"ledger, step {entry.did} {entry.effect}: {name} has '{unknown[0]}'; "
-            f"outputs are {', '.join(OUTPUTS)}"
+            f"outputs are {', '.join((*OUTPUTS, _PLATFORM))}"
         )
-    return {o: parse(text, dimension_of(OUTPUT_UNITS[o]) or "ratio") for o, text in written.items()}
+    return {o: parse(text, dimension_of(units[o]) or "ratio") for o, text in written.items()}

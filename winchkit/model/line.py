@@ -274,18 +274,8 @@ class Line:
 
     def _at_rest(self, motor_angle: float, tension: float) -> At:
         """One sample standing still, at 20 degrees Celsius."""
-        zero = np.zeros(1)
-        angle, force = np.array([motor_angle]), np.array([tension])
+        angle, force, zero = np.array([motor_angle]), np.array([tension]), np.zeros(1)
         return self.moments(zero, angle, zero, force, np.array([20.0]))
-
-    def standing(
-        self, motor_angle: Array, tension: Array | None = None, temperature: Array | None = None
-    ) -> At:
-        """Samples that each stand still, (n,); no tension and 20 degrees Celsius by default."""
-        zero = np.zeros_like(motor_angle)
-        pulled = zero if tension is None else tension
-        warm = zero + 20.0 if temperature is None else temperature
-        return self.moments(zero, motor_angle, zero, pulled, warm)
 
     def lengths_and_arms(self, at: At) -> tuple[Array, Array]:
         """Cable lengths at rest, (n,), m, and rope wound in per motor angle there, m/rad."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from winchkit.schema.ledger import LedgerEntry
 from winchkit.schema.quantity import (
     Angle,
     Length,
@@ -100,6 +101,7 @@ class RobotProfile(Table):
     prior: Mapping[PriorName, PriorSpec] = field(default_factory=dict)
     effect: tuple[EffectTable, ...] = ()
     fitted: FittedSpec | None = None
+    ledger: tuple[LedgerEntry, ...] = ()
     description: str = ""
 
     def rules(self) -> Iterator[Rule]:

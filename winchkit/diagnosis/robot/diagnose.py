@@ -77,9 +77,10 @@ class Study:
         begin = begun(terms[: len(self.own)])
         return RobotInquiry(problem, begin, self.candidates, self.noise)
 
-    def as_filed(self) -> RobotInquiry:
+    def as_filed(self, beside: tuple[Term, ...] = ()) -> RobotInquiry:
         """With the numbers of the file, as sure as its calibration left them."""
-        return self.inquiry(geometry_believed(self.dataset, self.catalogue, fitted=True))
+        believed = geometry_believed(self.dataset, self.catalogue, fitted=True)
+        return self.inquiry(believed, beside)
 
     def let_go(self) -> RobotInquiry:
         """With the geometry fitted too."""
@@ -140,6 +141,10 @@ def diagnose_robot(
     if _beyond_few(study, filed):
         return _concluded(study, study.let_go(), filed, "refitted")
     found = search(filed)
+    if added := found.final.hypothesis.terms[filed.given :]:
+        # Poses placed by ropes that contradict each other turn, and tensions there look unbalanced.
+        filed = study.as_filed(added[:1])
+        found = search(filed)
     judgement = judge(filed, found)
     if judgement.verdict in ("adequate", "explained") and not _geometry_is_off(study, filed, found):
         return _answer(study, filed, filed, (found, judgement), "file")
@@ -148,9 +153,12 @@ def diagnose_robot(
 
 def _beyond_few(study: Study, filed: RobotInquiry) -> bool:
     """Whether the whole geometry explains far more than any single effect does."""
+    gain = _gain_of_geometry(study, filed, filed.begin)
+    if not _is_real(study, gain):
+        return False
     present, noise = filed.settle(filed.begin)
     best = max((s.gain for s in filed.scores(present, noise)), default=0.0)
-    return best < _ONE_OF_FEW * _gain_of_geometry(study, filed, filed.begin)
+    return best < _ONE_OF_FEW * gain
 
 
 def _gain_of_geometry(study: Study, filed: RobotInquiry, model: Hypothesis) -> float:
@@ -169,11 +177,16 @@ def _concluded(study: Study, inquiry: RobotInquiry, filed: RobotInquiry, geometr
 
 
 def _geometry_is_off(study: Study, filed: RobotInquiry, found: Found) -> bool:
-    """Whether the geometry as a whole would explain much of what is left (F test)."""
+    """Whether the geometry as a whole would explain more of what is left than chance does."""
+    return _is_real(study, _gain_of_geometry(study, filed, found.final.hypothesis))
+
+
+def _is_real(study: Study, gain: float) -> bool:
+    """F test of the whitened squares that the geometry takes."""
     count = len(study.prior)
     freedom = study.noise.freedom.get("cable_length", 1.0)
-    level = f_distribution.isf(_GEOMETRY_LEVEL, count, max(freedom, 1.0))
-    return bool(_gain_of_geometry(study, filed, found.final.hypothesis) / count > level)
+    level = float(f_distribution.isf(_GEOMETRY_LEVEL, count, max(freedom, 1.0)))
+    return gain / count > level
 
 
 def _from(prior: Sequence[Believed], now: Sequence[Believed]) -> tuple[Believed, ...]:

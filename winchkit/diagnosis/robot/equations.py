@@ -28,6 +28,7 @@ from winchkit.model.robot import (
     swivel_angle,
     swivel_sensitivities,
 )
+from winchkit.model.robot.robot import standing
 from winchkit.model.robot.rotation import angle_rates, rotation_by, rotation_vector
 from winchkit.model.stages import Stage
 
@@ -68,7 +69,7 @@ class Equations:
         for i, line in enumerate(robot.lines):
             if any(m.stage is Stage.CELL for m in line.modifiers):
                 angle = self.dataset.measured.motor_angle[:, i]
-                at = line.standing(angle, shown[:, i], self.warm[:, i])
+                at = standing(line, angle, shown[:, i], self.warm[:, i])
                 out[:, i] = 2 * shown[:, i] - line.shown_tension(at, shown[:, i])
         return out
 
@@ -96,11 +97,11 @@ class Equations:
         for i, line in enumerate(robot.lines):
             winch = robot.profile.line[i].winch
             if line.modifiers:
-                at = line.standing(angle[:, i], force[:, i], self.warm[:, i])
+                at = standing(line, angle[:, i], force[:, i], self.warm[:, i])
                 out[:, i] = line.lengths(at)
                 continue
             if i not in self._wound or self._wound[i][0] is not winch:
-                length = line.lengths(line.standing(angle[:, i]))
+                length = line.lengths(standing(line, angle[:, i]))
                 self._wound[i] = winch, length - robot.home_length[i]
             out[:, i] = robot.home_length[i] + self._wound[i][1]
         return out

@@ -113,7 +113,7 @@ def _round(stack: Stack, kinds: Sequence[str], sigma: dict[str, float]) -> dict[
         residual = residual - (basis @ (np.swapaxes(basis, 1, 2) @ residual[..., None]))[..., 0]
         columns = columns - basis @ (np.swapaxes(basis, 1, 2) @ columns)
         used += np.sum(basis**2, axis=2)
-    flat = columns.reshape(-1, columns.shape[2])
+    flat = columns.reshape(residual.size, columns.shape[2])
     free = float(np.count_nonzero(known) - np.sum(used))
     own = _strongest(flat, int(free) // _ROWS_EACH)
     residual = residual - (own @ (own.T @ residual.reshape(-1))).reshape(residual.shape)

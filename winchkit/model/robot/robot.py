@@ -23,11 +23,11 @@ from winchkit.model.robot.kinematics import (
     structure_matrix,
 )
 from winchkit.model.robot.wrench import gravity_wrench
-from winchkit.model.stages import ROBOT_STAGES, LinePlace, Modifier, Stage
+from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
 from winchkit.schema.robot import PlatformSpec, RobotProfile
 from winchkit.schema.winch import WinchProfile
 
-__all__ = ["Robot", "robot_of", "ropes_of"]
+__all__ = ["Robot", "robot_of", "ropes_of", "standing"]
 
 Array = NDArray[np.float64]
 _TURN = 2 * np.pi
@@ -109,7 +109,7 @@ class Robot:
             turned = drum.angle(wound) - home
             out[:, i] = winch.reference.motor_angle + _ratio(winch) * turned
             for _ in range(_NEWTON_STEPS if line.modifiers else 0):
-                length, arm = line.lengths_and_arms(line.standing(out[:, i], pulled[:, i]))
+                length, arm = line.lengths_and_arms(standing(line, out[:, i], pulled[:, i]))
                 out[:, i] += (length - slack[:, i]) / arm
         return out
 
@@ -133,7 +133,7 @@ class Robot:
         pulled, warm = (np.broadcast_to(x, angles.shape) for x in (tension, temperature))
         out = np.empty_like(angles)
         for i, line in enumerate(self.lines):
-            at = line.standing(angles[:, i], pulled[:, i], warm[:, i])
+            at = standing(line, angles[:, i], pulled[:, i], warm[:, i])
             out[:, i] = line.lengths(at)
         return out
 
@@ -167,7 +167,7 @@ def robot_of(
     exits, anchors = geometry.exit_point.copy(), geometry.anchor_point.copy()
     radii, offsets = geometry.swivel_radius.copy(), np.zeros(len(own))
     # Effects of place look at no motion: one line at rest serves them all.
-    rest = Line(_winches(profile)[0]).standing(np.zeros(1))
+    rest = standing(Line(_winches(profile)[0]), np.zeros(1))
     for i, stages in enumerate(own):
         place, offset = LinePlace(exits[i], anchors[i], float(radii[i])), 0.0
         for modifier in stages:
@@ -184,6 +184,19 @@ def robot_of(
         platform = modifier.apply(platform, rest)
     lines = tuple(tuple(m for m in stages if m.stage not in ROBOT_STAGES) for stages in own)
     return Robot(profile, geometry, home, there, platform, lines)
+
+
+def standing(
+    line: Line,
+    motor_angle: Array,
+    tension: Array | None = None,
+    temperature: Array | None = None,
+) -> At:
+    """Samples of a line that each stand still, (n,); no tension and 20 degrees by default."""
+    zero = np.zeros_like(motor_angle)
+    pulled = zero if tension is None else tension
+    warm = zero + 20.0 if temperature is None else temperature
+    return line.moments(zero, motor_angle, zero, pulled, warm)
 
 
 def ropes_of(robot: Robot) -> list[RopeLine]:
