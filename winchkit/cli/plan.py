@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
+_FEW = 2
+"""Effects named in a row; --json has them all."""
+
 
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
@@ -122,7 +125,9 @@ def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> str:
     rows = [[*head, "shows besides"]]
     for offer in found:
         powers = [percent(power) for power in offer.powers]
-        shown = ", ".join(offer.shows) or "—"
+        shown = ", ".join(offer.shows[:_FEW]) or "—"
+        if len(offer.shows) > _FEW:
+            shown += f" and {len(offer.shows) - _FEW} more"
         rows.append([offer.kind.name, f"{offer.minutes:.1f}", *powers, shown])
     told = "power to tell apart" if pairs else "nothing to tell apart: what it would show besides"
     return "\n".join([f"what to run next ({told})", *aligned(rows, words=1)])
