@@ -29,6 +29,8 @@ class Bench:
     scene: Scene
     load: str
     """How the load is told: ``load`` (a channel), ``mass`` (metadata) or ``cell`` (not at all)."""
+    repeats: str
+    """``perfect``, ``imperfect`` (another clock, length and temperature) or ``none``."""
     warms: bool
     measures_temperature: bool
     noise: dict[str, float]
@@ -43,7 +45,8 @@ class Bench:
         return (
             f"{w.kind} dir {w.direction} ratio {w.ratio} pulleys {len(w.wraps)} {self.load} "
             f"{len(self.situations)} runs {len(first.time)} steps of 1/{first.every} samples "
-            f"masses {self.scene.masses} warms {self.warms} colour {self.colour}"
+            f"masses {self.scene.masses} warms {self.warms} colour {self.colour} "
+            f"repeats {self.repeats}"
         )
 
 
@@ -81,6 +84,7 @@ def draw_bench(random: Random, repeats: bool, small: bool) -> Bench:
         programmes=tuple(programmes),
         scene=Scene(seconds, stroke, masses),
         load=load,
+        repeats="none" if not repeats else "imperfect" if late else "perfect",
         warms=warms,
         measures_temperature=bool(warms or random.random() < 0.3),
         noise=_noise_of_instruments(random, 9.8 * heaviest * winch.radius / winch.ratio),

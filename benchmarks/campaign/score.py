@@ -151,8 +151,26 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
         "cases": len(scores),
         "aims": AIMS,
         "groups": {name: _figures(group) for name, group in sorted(groups.items())},
+        "right_by_repeats": _right_by_repeats(scores),
+        "coverage_by_effect": _coverage_by_effect(scores),
         "failures": [asdict(s) for s in scores if not s.ok],
     }
+
+
+def _right_by_repeats(scores: Sequence[Score]) -> dict[str, tuple[int, int]]:
+    """Answers as the truth is, and cases, by how runs were repeated."""
+    kinds: dict[str, list[bool]] = {}
+    for s in scores:
+        kinds.setdefault(s.scene.rsplit(" ", 1)[-1], []).append(s.ok)
+    return {kind: (sum(right), len(right)) for kind, right in sorted(kinds.items())}
+
+
+def _coverage_by_effect(scores: Sequence[Score]) -> dict[str, tuple[int, int]]:
+    """95 % intervals that hold the truth, and how many there were."""
+    effects: dict[str, list[bool]] = {}
+    for interval in (i for s in scores for i in s.intervals):
+        effects.setdefault(interval.effect, []).append(interval.covers)
+    return {effect: (sum(held), len(held)) for effect, held in sorted(effects.items())}
 
 
 def _figures(group: Sequence[Score]) -> dict[str, Any]:

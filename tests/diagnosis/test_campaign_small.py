@@ -49,3 +49,24 @@ def test_what_no_effect_explains_gets_no_name(kind: str, seed: int, tmp_path: Pa
     assert score is not None
     assert score.verdict in {"unknown", "partly"}
     assert score.steps == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "effects", "seed"),
+    [
+        # Its lag is so long that five terms of the wrong sign imitate it better.
+        ("single", ("torque-lag",), 2100082),
+        # The delay shows in few blocks, but in every group of runs.
+        ("pair", (), 2300010),
+        # An offset stands for both until the second is there.
+        ("pair", (), 2300004),
+    ],
+    ids=["wrong signs", "few blocks", "one for two"],
+)
+def test_what_searches_once_missed(
+    kind: str, effects: tuple[str, ...], seed: int, tmp_path: Path
+) -> None:
+    score = run_case(seed, Plan(kind, 1.0, effects, small=True), tmp_path)
+    assert score is not None
+    assert score.verdict == "explained"
+    assert score.found == len(score.truth) == len(score.steps)
