@@ -12,7 +12,8 @@ _BEGIN = """\
 # The catalogue of effects
 
 Written by `python docs/make_effects.py` from the effects themselves; do not edit it by hand.
-`winchkit effects` lists them, `winchkit effects ID` shows a card with the effect's signature drawn.
+`winchkit effects` lists them, `winchkit effects ID` shows a card with the effect's signature drawn,
+and `--html FILE` makes a page of one card, or without ID of all, with the signatures as pictures.
 
 Symbols: θ motor angle, φ drum angle since the reference, Φ total wound angle, ℓ unstrained free
 length, ℓ_s = ℓ + dead length, T tension in the rope, v its winding-in speed, s = sgn v (smooth at

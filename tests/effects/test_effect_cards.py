@@ -30,7 +30,7 @@ def test_a_card_says_everything_and_fits_a_terminal(effect: Effect) -> None:
         assert name in text
     drawn = [line for line in lines if any(bar in line for bar in "▁▂▃▄▅▆▇█")]
     assert len(drawn) == 1 + len(effect.outputs)
-    assert max(map(len, lines)) <= 116
+    assert max(map(len, lines)) <= 80
 
 
 def test_a_sparkline_runs_from_lowest_to_highest_and_keeps_gaps() -> None:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.html_option import given_options, html_option, page_title, write_page
+from winchkit.cli.html_option import html_option, page_title, write_page
 from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import ManyValues, catalogue_of, model_options, read_runs
+from winchkit.cli.runs_option import Asked, ManyValues, json_option, model_options
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
@@ -25,47 +25,37 @@ __all__ = ["command", "write_addition"]
 @click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs to fit.")
 @click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
 @model_options
+@json_option
 @html_option
 def command(
-    effect: str,
-    runs: Sequence[str],
-    output: str,
-    profile: str,
-    effect_files: Sequence[str],
-    winch: str | None,
-    band: float | None,
-    as_json: bool,
-    html: str | None,
+    effect: str, runs: Sequence[str], output: str, asked: Asked, as_json: bool, html: str | None
 ) -> None:
     """Fit EFFECT beside the effects of a profile on runs, and write the better profile.
 
     Values that the profile has already are refitted with it; every value gets its standard
     deviation, the runs and the date.
     """
-    from winchkit.catalog import find
     from winchkit.cli.robot_model import read_profile, refuse_options
     from winchkit.diagnosis.add import grow
     from winchkit.schema.robot import RobotProfile
 
-    source = find("profiles", profile)
-    declared, catalogue = read_profile(source), catalogue_of(effect_files)
+    declared, catalogue = read_profile(asked.source), asked.catalogue
+    names = [Path(run).name for run in runs]
     if isinstance(declared, RobotProfile):
-        refuse_options(band, html)
-        addition = _to_robot(effect, runs, declared, winch, catalogue)
-        write_addition(source, addition, [Path(run).name for run in runs], Path(output))
-        click.echo(f"written: {output}", err=True)
-        _tell(addition, as_json)
+        refuse_options(asked.band, html)
+        addition = _to_robot(effect, runs, declared, asked.winch, catalogue)
+        write_addition(asked.source, addition, names, Path(output))
+        _tell(addition, output, as_json)
         return
-    grown = grow(effect, read_runs(runs, winch), declared, catalogue, band)
-    write_addition(source, grown.addition, [Path(run).name for run in runs], Path(output))
-    click.echo(f"written: {output}", err=True)
-    _tell(grown.addition, as_json)
+    grown = grow(effect, asked.runs(runs), declared, catalogue, asked.band)
+    write_addition(asked.source, grown.addition, names, Path(output))
+    _tell(grown.addition, output, as_json)
     if html:
         from winchkit.diagnosis.report.page import addition_html
 
         title = page_title(declared.name, runs, effect)
-        options = given_options(effect_files, winch, band)
-        write_page(html, addition_html(grown, title, profile, output, options=options))
+        page = addition_html(grown, title, asked.profile, output, options=asked.options)
+        write_page(html, page)
 
 
 def _to_robot(
@@ -83,7 +73,8 @@ def _to_robot(
     return add_to_robot(name, read_poses_of(runs), declared, line or place or None, catalogue)
 
 
-def _tell(addition: Addition, as_json: bool) -> None:
+def _tell(addition: Addition, output: str, as_json: bool) -> None:
+    click.echo(f"written: {output}", err=True)
     if as_json:
         echo_json(addition.to_json())
         return

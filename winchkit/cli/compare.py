@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.html_option import given_options, html_option, page_title, write_page
+from winchkit.cli.html_option import html_option, page_title, write_page
 from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import catalogue_of, model_options, read_runs
+from winchkit.cli.runs_option import Asked, json_option, model_options
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.result import Comparison
@@ -20,38 +20,27 @@ __all__ = ["command"]
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
+@json_option
 @html_option
-def command(
-    runs: Sequence[str],
-    profile: str,
-    effect_files: Sequence[str],
-    winch: str | None,
-    band: float | None,
-    as_json: bool,
-    html: str | None,
-) -> None:
+def command(runs: Sequence[str], asked: Asked, as_json: bool, html: str | None) -> None:
     """Compare runs with a profile at its file values; only the length offset is fitted."""
-    from winchkit.catalog import find
     from winchkit.cli.robot_model import read_poses_of, read_profile, refuse_options
     from winchkit.diagnosis.compare import compared
+    from winchkit.diagnosis.report.page import comparison_html
     from winchkit.schema.robot import RobotProfile
 
-    declared = read_profile(find("profiles", profile))
+    declared = read_profile(asked.source)
     if isinstance(declared, RobotProfile):
         from winchkit.diagnosis.robot.compare import compare_robot
 
-        refuse_options(band, html, winch)
-        poses = read_poses_of(runs)
-        _tell(compare_robot(poses, declared, catalogue_of(effect_files)), as_json)
+        refuse_options(asked.band, html, asked.winch)
+        _tell(compare_robot(read_poses_of(runs), declared, asked.catalogue), as_json)
         return
-    answer = compared(read_runs(runs, winch), declared, catalogue_of(effect_files), band)
+    answer = compared(asked.runs(runs), declared, asked.catalogue, asked.band)
     _tell(answer.comparison, as_json)
     if html:
-        from winchkit.diagnosis.report.page import comparison_html
-
         title = page_title(declared.name, runs)
-        options = given_options(effect_files, winch, band)
-        write_page(html, comparison_html(answer, title, profile, options=options))
+        write_page(html, comparison_html(answer, title, asked.profile, options=asked.options))
 
 
 def _tell(comparison: Comparison, as_json: bool) -> None:

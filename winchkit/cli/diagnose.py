@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.html_option import given_options, html_option, page_title, write_page
+from winchkit.cli.html_option import html_option, page_title, write_page
 from winchkit.cli.output import echo_json
 from winchkit.cli.progress import progress_bar
-from winchkit.cli.runs_option import ALL, catalogue_of, model_options, read_each, read_runs
+from winchkit.cli.runs_option import Asked, json_option, model_options, read_each
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -27,65 +26,63 @@ __all__ = ["command"]
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
 @click.option("--every-sample", is_flag=True, help="Do not thin long runs out.")
+@json_option
 @html_option
 def command(
-    runs: Sequence[str],
-    profile: str,
-    effect_files: Sequence[str],
-    winch: str | None,
-    band: float | None,
-    as_json: bool,
-    every_sample: bool,
-    html: str | None,
+    runs: Sequence[str], asked: Asked, every_sample: bool, as_json: bool, html: str | None
 ) -> None:
     """Name the physical effect that the model lacks, with its size and what it would buy.
 
     Two runs of one programme and load are the measure of the noise: record everything twice.
     Long runs are thinned out as far as their signals allow; --winch all takes each by itself.
     """
-    from winchkit.catalog import find
     from winchkit.cli.robot_model import read_profile, refuse_options
-    from winchkit.diagnosis.diagnose import diagnose
     from winchkit.schema.robot import RobotProfile
 
-    if html and winch == ALL:
+    if html and asked.each:
         raise UsageError("--html is a page of one winch; name it with --winch")
-    declared, catalogue = read_profile(find("profiles", profile)), catalogue_of(effect_files)
+    declared, thin = read_profile(asked.source), not every_sample
     if isinstance(declared, RobotProfile):
-        refuse_options(band, html, winch)
-        _tell_robot(runs, declared, catalogue, as_json)
-        return
-    how = How(catalogue, band, not every_sample)
-    if winch == ALL:
-        _tell_each(runs, declared, how, as_json)
-        return
+        refuse_options(asked.band, html, asked.winch)
+        _tell_robot(runs, declared, asked.catalogue, as_json)
+    elif asked.each:
+        _tell_each(runs, declared, asked, thin, as_json)
+    else:
+        _tell_one(runs, declared, asked, thin, as_json, html)
+
+
+def _tell_one(
+    runs: Sequence[str],
+    declared: WinchProfile,
+    asked: Asked,
+    thin: bool,
+    as_json: bool,
+    html: str | None,
+) -> None:
+    """What one winch lacks, on a page besides where that is asked."""
+    from winchkit.diagnosis.diagnose import diagnose
+
     with progress_bar() as told:
-        own = read_runs(runs, winch)
-        answer = diagnose(own, declared, catalogue, band, thin=how.thin, told=told)
+        own, catalogue = asked.runs(runs), asked.catalogue
+        answer = diagnose(own, declared, catalogue, asked.band, thin=thin, told=told)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         from winchkit.diagnosis.report.page import report_html
 
-        title, options = page_title(declared.name, runs), given_options(effect_files, winch, band)
-        write_page(html, report_html(answer, title, profile=profile, options=options))
+        title = page_title(declared.name, runs)
+        page = report_html(answer, title, profile=asked.profile, options=asked.options)
+        write_page(html, page)
 
 
-@dataclass(frozen=True)
-class How:
-    """How runs are diagnosed."""
-
-    catalogue: Catalogue
-    band: float | None
-    thin: bool
-
-
-def _tell_each(runs: Sequence[str], declared: WinchProfile, how: How, as_json: bool) -> None:
+def _tell_each(
+    runs: Sequence[str], declared: WinchProfile, asked: Asked, thin: bool, as_json: bool
+) -> None:
     """What every winch of the runs lacks, each by itself."""
     from winchkit.diagnosis.each import diagnose_each
 
     with progress_bar() as told:
         each = diagnose_each(
-            read_each(runs), declared, how.catalogue, how.band, thin=how.thin, told=told
+            read_each(runs), declared, asked.catalogue, asked.band, thin=thin, told=told
         )
         found = {name: _said(answer, as_json) for name, answer in each}
     if as_json:

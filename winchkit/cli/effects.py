@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.html_option import html_option, write_page
 from winchkit.cli.lazy import At, LazyGroup
 from winchkit.cli.output import echo_json
 
@@ -53,8 +54,12 @@ def command() -> None:
     help="Python file with effects of your own; may be given several times.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, complete, in SI units.")
-def show(effect_id: str | None, files: Sequence[str], as_json: bool) -> None:
-    """List the effects that a model may lack, or show the card of one."""
+@html_option
+def show(effect_id: str | None, files: Sequence[str], as_json: bool, html: str | None) -> None:
+    """List the effects that a model may lack, or show the card of one.
+
+    The page of --html holds the card, or all cards, with the signatures drawn.
+    """
     from winchkit.effects.card import card, card_data
     from winchkit.effects.catalogue import load_catalogue
 
@@ -67,6 +72,11 @@ def show(effect_id: str | None, files: Sequence[str], as_json: bool) -> None:
         echo_json({"schema": 1, "effects": [card_data(effect) for effect in catalogue]})
     else:
         click.echo(_listing(catalogue))
+    if html:
+        from winchkit.diagnosis.report.effect_page import effects_html
+
+        shown = list(catalogue) if effect_id is None else [catalogue[effect_id]]
+        write_page(html, effects_html(shown, effect_id or "The catalogue of effects"))
 
 
 def _listing(catalogue: Catalogue) -> str:

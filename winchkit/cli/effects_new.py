@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.runs_option import ManyValues, catalogue_of, read_runs
+from winchkit.cli.runs_option import Asked, ManyValues, model_options
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.result import Diagnosis
@@ -16,46 +16,38 @@ if TYPE_CHECKING:
     from winchkit.runs.run import Run
     from winchkit.schema.winch import WinchProfile
 
+    _Data = tuple[Sequence[Run], WinchProfile, Catalogue, float | None]
+    """Runs, profile, effects and band, as a diagnosis takes them."""
+
 __all__ = ["command"]
 
 
 @click.command(cls=ManyValues)
 @click.argument("file", metavar="FILE.py")
-@click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file.")
 @click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs.")
 @click.option("--curve", metavar="ID", help="Empirical effect to begin from; else the strongest.")
 @click.option("--id", "effect_id", metavar="ID", help="Of the new effect; else the file's name.")
-@click.option("--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects.")
-@click.option("--winch", help="Which winch of runs with several.")
+@model_options
 def command(
-    file: str,
-    profile: str,
-    runs: Sequence[str],
-    curve: str | None,
-    effect_id: str | None,
-    effect_files: Sequence[str],
-    winch: str | None,
+    file: str, runs: Sequence[str], curve: str | None, effect_id: str | None, asked: Asked
 ) -> None:
     """Write FILE.py with the variable and the curve that the runs show and no effect explains.
 
     It is ready for --effects: diagnose with it, then put in the physics that you recognise.
     """
-    from winchkit.catalog import find
     from winchkit.effects.own_file import write_wave_on_drum
-    from winchkit.schema.read import read_winch
 
-    declared, catalogue = read_winch(find("profiles", profile)), catalogue_of(effect_files)
-    measured = read_runs(runs, winch)
+    data = (asked.runs(runs), asked.declared, asked.catalogue, asked.band)
     name = effect_id or Path(file).stem.replace("_", "-")
     if curve is None:
-        found = _unexplained(measured, declared, catalogue)
+        found = _unexplained(data)
         order = _order_of_drum(found)
         if order is not None:
             write_wave_on_drum(order, name, Path(file))
             _tell(file, name, f"a wave of {order} periods per drum turn")
             return
         curve = found.empirical[0]
-    _write_curve(curve, name, Path(file), (measured, declared, catalogue))
+    _write_curve(curve, name, Path(file), data)
     _tell(file, name, curve)
 
 
@@ -63,9 +55,7 @@ def _tell(file: str, name: str, start: str) -> None:
     click.echo(f"written: {file}; it holds the effect '{name}', begun from {start}", err=True)
 
 
-def _write_curve(
-    curve: str, name: str, file: Path, data: tuple[Sequence[Run], WinchProfile, Catalogue]
-) -> None:
+def _write_curve(curve: str, name: str, file: Path, data: _Data) -> None:
     from winchkit.diagnosis.add import add
     from winchkit.effects.empirical import EMPIRICAL
     from winchkit.effects.own_file import write_own
@@ -78,12 +68,12 @@ def _write_curve(
     write_own(term, name, file)
 
 
-def _unexplained(runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue) -> Diagnosis:
+def _unexplained(data: _Data) -> Diagnosis:
     """A diagnosis that leaves something, and says where."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.errors import UsageError
 
-    found = diagnose(runs, profile, catalogue).diagnosis
+    found = diagnose(*data).diagnosis
     if not found.empirical:
         raise UsageError(
             f"the verdict is '{found.verdict}' and nothing unexplained was located; name the "

@@ -9,9 +9,10 @@ import click
 
 from winchkit.errors import Fault, FileError
 
-__all__ = ["given_options", "html_option", "page_title", "save_page", "write_page"]
+__all__ = ["html_option", "page_title", "save_page", "write_page"]
 
 html_option = click.option("--html", metavar="FILE", help="Also write the answer as one page.")
+_RUNS_NAMED = 3
 _PAGE_BEGINS = b"<!DOCTYPE html>"
 
 
@@ -43,19 +44,13 @@ def save_page(path: str, page: str) -> None:
 
 
 def page_title(profile: str, runs: Sequence[str], effect: str = "") -> str:
-    """``bench-spiral: a.csv, b.csv``."""
+    """``bench-spiral: a.csv, b.csv``, or ``bench-spiral: 12 runs, a.csv to l.csv``."""
     added = f" with {effect}" if effect else ""
-    return f"{profile}{added}: {', '.join(Path(run).name for run in runs)}"
-
-
-def given_options(
-    effect_files: Sequence[str], winch: str | None, band: float | None
-) -> tuple[str, ...]:
-    """What a command was given beside runs and profile, as words to repeat it with."""
-    out = [word for path in effect_files for word in ("--effects", path)]
-    out += [] if winch is None else ["--winch", winch]
-    out += [] if band is None else ["--band", f"{band:g}"]
-    return tuple(out)
+    names = [Path(run).name for run in runs]
+    told = ", ".join(names)
+    if len(names) > _RUNS_NAMED:
+        told = f"{len(names)} runs, {names[0]} to {names[-1]}"
+    return f"{profile}{added}: {told}"
 
 
 def _may_be_replaced(target: Path) -> bool:

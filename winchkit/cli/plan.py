@@ -10,7 +10,7 @@ import click
 
 from winchkit.cli.completing import complete_bench
 from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import catalogue_of, model_options, read_runs
+from winchkit.cli.runs_option import Asked, json_option, model_options
 from winchkit.errors import UsageError
 from winchkit.units import suggest
 
@@ -37,15 +37,9 @@ _FEW = 2
     help="Wiring file whose limits say how far, how fast and how heavy; else as the RUNs were.",
 )
 @model_options
+@json_option
 def command(
-    runs: Sequence[str],
-    output: str | None,
-    bench: str | None,
-    profile: str,
-    effect_files: Sequence[str],
-    winch: str | None,
-    band: float | None,
-    as_json: bool,
+    runs: Sequence[str], output: str | None, bench: str | None, asked: Asked, as_json: bool
 ) -> None:
     """Propose what to run next, by what it tells apart and shows per minute.
 
@@ -53,17 +47,15 @@ def command(
     the effects that these runs cannot tell apart come first, else those that show what these
     could not. Run the file with 'winchkit run NEXT.toml --bench B' and diagnose again.
     """
-    from winchkit.catalog import find
     from winchkit.diagnosis.confusion import pairs_of
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.kinds import allowed, seen
     from winchkit.diagnosis.plan import offers, programme_of
     from winchkit.schema.programme_file import write_programme
-    from winchkit.schema.read import read_winch
 
-    limits = None if bench is None else _limits(bench, winch)
-    declared, catalogue = read_winch(find("profiles", profile)), catalogue_of(effect_files)
-    answer = diagnose(read_runs(runs, winch), declared, catalogue, band)
+    limits = None if bench is None else _limits(bench, asked.winch)
+    declared, catalogue = asked.declared, asked.catalogue
+    answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
     problem, pairs = answer.inquiry.problem, pairs_of(answer.sets)
     room = seen(problem.dataset) if limits is None else allowed(problem.dataset, limits)
     found = offers(problem, pairs, answer.found.noise.rms, list(catalogue), room)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import ManyValues, catalogue_of, model_options, read_runs
+from winchkit.cli.runs_option import Asked, ManyValues, json_option, model_options
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -23,33 +23,22 @@ __all__ = ["command"]
 @click.option("--fit", "runs", multiple=True, metavar="RUN...", help="Runs to refit the others on.")
 @click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
 @model_options
-def command(
-    effect: str,
-    runs: Sequence[str],
-    output: str,
-    profile: str,
-    effect_files: Sequence[str],
-    winch: str | None,
-    band: float | None,
-    as_json: bool,
-) -> None:
+@json_option
+def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json: bool) -> None:
     """Write a profile without EFFECT; with --fit the effects that stay are refitted.
 
     The ledger notes the step, and 'winchkit undo' takes it back.
     """
-    from winchkit.catalog import find
     from winchkit.cli.robot_model import read_profile
     from winchkit.diagnosis.remove import remove
     from winchkit.schema.robot import RobotProfile
 
-    source = find("profiles", profile)
-    declared, removal = read_profile(source), None
+    declared, removal = read_profile(asked.source), None
     if runs and isinstance(declared, RobotProfile):
         raise UsageError("--fit: a robot's effects are not refitted here; remove, then calibrate")
     if runs and not isinstance(declared, RobotProfile):
-        catalogue = catalogue_of(effect_files)
-        removal = remove(effect, read_runs(runs, winch), declared, catalogue, band)
-    _write(source, effect, removal, runs, Path(output))
+        removal = remove(effect, asked.runs(runs), declared, asked.catalogue, asked.band)
+    _write(asked.source, effect, removal, runs, Path(output))
     click.echo(f"written: {output}", err=True)
     _tell(effect, removal, as_json)
 

@@ -1,8 +1,11 @@
-"""What compare, diagnose and add share: reading runs, a profile and a user's own effects."""
+"""What commands that hold a model against runs are asked: runs, a profile, effects of one's own."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,11 +15,74 @@ from winchkit.errors import Fault, FileError, UsageError
 if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue
     from winchkit.runs.run import Run
+    from winchkit.schema.winch import WinchProfile
 
-__all__ = ["ALL", "ManyValues", "catalogue_of", "model_options", "read_each", "read_runs"]
+__all__ = ["ALL", "Asked", "ManyValues", "json_option", "model_options", "read_each", "read_runs"]
 
 ALL = "all"
 """Said to ``--winch``: every winch of the runs by itself."""
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+_MODEL_OPTIONS = (
+    click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
+    click.option("--winch", help="Which winch of runs with several."),
+    click.option(
+        "--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects."
+    ),
+    click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file."),
+)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A profile as the user named it, and how to hold it against runs."""
+
+    profile: str
+    effect_files: Sequence[str]
+    winch: str | None
+    band: float | None
+
+    @property
+    def source(self) -> Path:
+        """The profile's file."""
+        from winchkit.catalog import find
+
+        return find("profiles", self.profile)
+
+    @property
+    def declared(self) -> WinchProfile:
+        """The profile. Raises FileError with its faults."""
+        from winchkit.schema.read import read_winch
+
+        return read_winch(self.source)
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """All effects, a user's own included."""
+        from winchkit.effects import load_catalogue
+
+        return load_catalogue(self.effect_files)
+
+    def runs(self, paths: Sequence[str]) -> list[Run]:
+        """Runs of the one winch. Raises FileError with the faults of all files."""
+        return read_runs(paths, self.winch)
+
+    @property
+    def each(self) -> bool:
+        """Whether every winch of the runs is asked for by itself."""
+        return self.winch == ALL
+
+    def runs_of_each(self, paths: Sequence[str]) -> dict[str, list[Run]]:
+        """Runs by winch: of all of them where that is asked, else of the one."""
+        return read_each(paths) if self.each else {self.winch or "": self.runs(paths)}
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """What was given beside runs and profile, as words to repeat it with."""
+        out = [word for path in self.effect_files for word in ("--effects", path)]
+        out += [] if self.winch is None else ["--winch", self.winch]
+        out += [] if self.band is None else ["--band", f"{self.band:g}"]
+        return tuple(out)
 
 
 class ManyValues(click.Command):
@@ -40,20 +106,21 @@ class ManyValues(click.Command):
 
 
 def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Options of every command that holds a model against runs."""
-    for option in (
-        click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON."),
-        click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
-        click.option("--winch", help="Which winch of runs with several."),
-        click.option(
-            "--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects."
-        ),
-        click.option(
-            "--profile", "-p", required=True, metavar="P", help="Profile: a name or a file."
-        ),
-    ):
-        function = option(function)
-    return function
+    """Options of every command that holds a model against runs; it gets them as ``asked``."""
+
+    @wraps(function)
+    def bundled(
+        profile: str,
+        effect_files: Sequence[str],
+        winch: str | None,
+        band: float | None,
+        **others: Any,
+    ) -> Any:
+        return function(asked=Asked(profile, effect_files, winch, band), **others)
+
+    for option in _MODEL_OPTIONS:
+        bundled = option(bundled)
+    return bundled
 
 
 def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:
@@ -97,10 +164,3 @@ def _of_winch(run: Run, winch: str | None) -> Run:
     if known != [""] and winch not in known:
         raise UsageError(f"{run.path}: no winch '{winch}'; it has {', '.join(known)}")
     return run.of_winch(winch if known != [""] else "")
-
-
-def catalogue_of(effect_files: Sequence[str]) -> Catalogue:
-    """All effects, a user's own included."""
-    from winchkit.effects import load_catalogue
-
-    return load_catalogue(effect_files)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
-from textwrap import fill
+from textwrap import fill, wrap
 from typing import Any
 
 import numpy as np
@@ -17,15 +17,24 @@ from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
 from winchkit.effects.standard_robot import robot_changes
 from winchkit.model.line import Line
 
-__all__ = ["Signature", "card", "card_data", "signature", "sparkline", "usual_values"]
+__all__ = [
+    "Signature",
+    "card",
+    "card_data",
+    "in_control",
+    "parameter_kind",
+    "signature",
+    "sparkline",
+    "usual_values",
+]
 
 Array = NDArray[np.float64]
 _PLACES = {"all": "all lines alike", "one": "one line", "platform": "the platform"}
 _UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"
-_WIDTH = 64
+_WIDTH = 36
 _SAMPLES = 400
-_COLUMNS = 100
+_COLUMNS = 80
 _MARGIN = 15
 _FLAT = 1e-9
 
@@ -91,7 +100,7 @@ def sparkline(values: Array, width: int = _WIDTH) -> str:
 
 
 def card(effect: Effect) -> str:
-    """The card as text of at most 100 columns."""
+    """The card as text of at most 80 columns."""
     paragraphs = [
         ("What", effect.what),
         ("Formula", effect.formula),
@@ -104,7 +113,7 @@ def card(effect: Effect) -> str:
         ("Looks like", effect.looks_like),
         ("Confused with", ", ".join(effect.confused_with)),
         ("Told apart by", effect.told_apart),
-        ("In control", _in_control(effect)),
+        ("In control", in_control(effect)),
     ]
     lines = [effect.id, ""]
     lines += [_paragraph(title, text) for title, text in paragraphs if text]
@@ -112,7 +121,8 @@ def card(effect: Effect) -> str:
     return "\n".join(lines)
 
 
-def _in_control(effect: Effect) -> str:
+def in_control(effect: Effect) -> str:
+    """Whether a winch's length and tension use an effect, and else why not."""
     reason = effect.not_in_control
     return f"left out: {reason}" if reason else "a winch's length or tension uses it"
 
@@ -134,7 +144,7 @@ def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
         "confused_with": list(effect.confused_with),
         "told_apart": effect.told_apart,
         "not_in_control": effect.not_in_control,
-        "parameters": [_parameter_data(p, _kind(effect, p)) for p in effect.parameters],
+        "parameters": [_parameter_data(p, parameter_kind(effect, p)) for p in effect.parameters],
         "signature": {
             "values": dict(drawn.values),
             "time": _listed(drawn.time, width),
@@ -153,13 +163,14 @@ def _paragraph(title: str, text: str) -> str:
         width=_COLUMNS,
         initial_indent=f"{title:<{_MARGIN}}",
         subsequent_indent=" " * _MARGIN,
+        break_on_hyphens=False,
     )
 
 
 def _table(effect: Effect) -> list[str]:
     rows = [("name", "unit", "vanishes at", "typical", "range", "kind")]
     for p in effect.parameters:
-        kind = _kind(effect, p)
+        kind = parameter_kind(effect, p)
         gone = f"{p.null:g}" if kind == "amplitude" else f"(default {p.null:g})"
         rows.append((p.name, p.unit, gone, f"{p.typical:g}", _range(p), kind))
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
@@ -169,7 +180,8 @@ def _table(effect: Effect) -> list[str]:
     ]
 
 
-def _kind(effect: Effect, parameter: Parameter) -> str:
+def parameter_kind(effect: Effect, parameter: Parameter) -> str:
+    """What a parameter is: an amplitude, a phase, a shape, a whole order, or fixed."""
     if effect.polar and parameter.name == effect.polar[1]:
         return "phase"
     return "whole order" if parameter.whole else parameter.role
@@ -188,14 +200,14 @@ def _drawing(effect: Effect) -> list[str]:
     drawn = signature(effect)
     usual = ", ".join(f"{name} {x:g}" for name, x in drawn.values.items() if isfinite(x))
     over = [
-        f"Signature over {drawn.time[-1]:.0f} s of the standard motion"
-        " (fast and slow stroke under 15 kg, then 45 kg), with",
+        f"Signature over {drawn.time[-1]:.0f} s of the standard motion (a fast and a slow stroke",
+        *wrap(f"under 15 kg, then under 45 kg), with {usual}", _COLUMNS),
     ]
     if effect.of_robots:
-        over = [f"Signature over {len(drawn.time)} poses of the standard robot, on line 1, with"]
+        told = f"Signature over {len(drawn.time)} poses of the standard robot, on line 1, with"
+        over = wrap(f"{told} {usual}", _COLUMNS)
     lines = [
         *over,
-        f"  {usual}",
         f"  {'moves':<13}{sparkline(drawn.cable_length)}  cable_length",
     ]
     for name, change in drawn.changes.items():

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Need, Output, Parameter, Values
+from winchkit.effects.order import order_per_turn
 from winchkit.model.stages import At, Stage
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS, VARIABLES
 
@@ -71,13 +72,10 @@ def _over_turns(output: Output, variable: str) -> Effect:
         parameters=(
             Parameter("amplitude", unit, null=0.0, typical=typical, low=0.0, high=_BOUND),
             Parameter("phase", "rad", null=0.0, typical=1.0),
-            Parameter(
-                "order", "1", null=1.0, typical=1.0, low=1.0, high=1000.0,
-                role="shape", grid=_ORDERS, whole=True,
-            ),
+            order_per_turn(_ORDERS, typical=1.0),
         ),
         polar=("amplitude", "phase"),
-    )  # fmt: skip
+    )
 
 
 def _spline(output: Output, variable: str) -> Effect:

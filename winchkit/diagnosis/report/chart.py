@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import ceil, floor, log10
 
 from winchkit.diagnosis.report.markup import Markup, element
-from winchkit.diagnosis.report.wording import significant
+from winchkit.diagnosis.report.wording import plain
 
 __all__ = ["Axis", "Chart", "axis_over", "legend"]
 
@@ -118,11 +118,11 @@ class Chart:
         for tick in self.x.ticks:
             across, _ = self.at(tick, self.y.low)
             yield _rule((across, bottom), (across, top), tick, self.x)
-            yield _words(_short(tick), across, bottom + 15)
+            yield _words(plain(tick), across, bottom + 15)
         for tick in self.y.ticks:
             _, down = self.at(self.x.low, tick)
             yield _rule((left, down), (right, down), tick, self.y)
-            yield _words(_short(tick), left - 6, down + 4, "end")
+            yield _words(plain(tick), left - 6, down + 4, "end")
 
     def _frame(self) -> Iterable[Markup]:
         left, bottom = self.at(self.x.low, self.y.low)
@@ -172,12 +172,3 @@ def _powers(low: float, high: float) -> list[float]:
     digits = (1, 2, 5) if len(powers) < 4 else (1,)
     ticks = [digit * 10.0**power for power in powers for digit in digits]
     return [tick for tick in ticks if low <= tick <= high]
-
-
-def _digits(value: float) -> int:
-    """As many as a tick has, four at most."""
-    return max(1, len(f"{value:.3e}".split("e")[0].lstrip("-").rstrip("0").replace(".", "")))
-
-
-def _short(value: float) -> str:
-    return significant(float(f"{value:.4g}"), _digits(value))

@@ -40,5 +40,11 @@ def hanging(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
 
 def paragraph(text: str, first: str = "", then: str = "") -> list[str]:
     """Text in lines of at most 80 characters."""
-    lines = wrap(unbroken(text), _WIDTH, initial_indent=first, subsequent_indent=then)
+    lines = wrap(
+        unbroken(text),
+        _WIDTH,
+        initial_indent=first,
+        subsequent_indent=then,
+        break_on_hyphens=False,
+    )
     return [line.replace("\u00a0", " ") for line in lines]

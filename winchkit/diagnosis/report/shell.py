@@ -20,18 +20,23 @@ def page(title: str, plots: Sequence[OutputPlots], *content: Markup) -> str:
     head = element(
         "header", element("h1", title), element("p", f"winchkit, {date.today()}", class_="quiet")
     )
+    drawing = _drawing(plots) if plots else []
     noscript = element("noscript", element("p", "The plots need JavaScript; all else is here."))
-    body = element(
-        "body",
-        element("main", head, noscript, *content),
+    within = [head, noscript, *content] if plots else [head, *content]
+    body = element("body", element("main", *within), *drawing)
+    return f'<!DOCTYPE html>\n<html lang="en">{_head(title, drawn=bool(plots))}{body}</html>\n'
+
+
+def _drawing(plots: Sequence[OutputPlots]) -> list[Markup]:
+    """What draws plots; a page without any goes without script."""
+    return [
         Markup(f'<script type="application/json" id="plots">{inline(_data(plots))}</script>'),
         _script("uPlot.iife.min.js"),
         _script("report.js"),
-    )
-    return f'<!DOCTYPE html>\n<html lang="en">{_head(title)}{body}</html>\n'
+    ]
 
 
-def _head(title: str) -> Markup:
+def _head(title: str, *, drawn: bool) -> Markup:
     policy = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
     return element(
         "head",
@@ -40,9 +45,18 @@ def _head(title: str) -> Markup:
         Markup('<meta name="viewport" content="width=device-width, initial-scale=1">'),
         Markup('<meta name="color-scheme" content="light dark">'),
         element("title", title),
-        Markup(f"<!-- The plots are drawn by uPlot:\n{_asset('uPlot.LICENSE')}-->"),
-        Markup(f"<style>{_asset('uPlot.min.css')}{_asset('report.css')}</style>"),
+        Markup(
+            f"<!-- The plots are drawn by uPlot:\n{_asset('uPlot.LICENSE')}-->" if drawn else ""
+        ),
+        Markup(f"<style>{_asset('uPlot.min.css') if drawn else ''}{_asset('report.css')}</style>"),
     )
+
+
+def _plot_styles() -> list[Markup]:
+    return [
+        Markup(f"<!-- The plots are drawn by uPlot:\n{_asset('uPlot.LICENSE')}-->"),
+        Markup(f"<style>{_asset('uPlot.min.css')}</style>"),
+    ]
 
 
 def _script(name: str) -> Markup:

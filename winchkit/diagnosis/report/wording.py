@@ -14,6 +14,7 @@ __all__ = [
     "Scale",
     "grouped",
     "percent",
+    "plain",
     "quantity",
     "scale_for",
     "significant",
@@ -122,6 +123,12 @@ def significant(value: float, digits: int = 3) -> str:
     if not -6 <= exponent < 9:
         return f"{value:.{digits - 1}e}".translate(_SIGNS)
     return _fixed(value, digits - 1 - exponent)
+
+
+def plain(value: float, digits: int = 4) -> str:
+    """A number to the digits that it has, four at most: ``0.02``, not ``0.0200``."""
+    shown = f"{value:.{digits - 1}e}".partition("e")[0].lstrip("-").rstrip("0").replace(".", "")
+    return significant(value, max(1, len(shown))) if isfinite(value) else significant(value)
 
 
 def grouped(value: float) -> str:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.order import MOTOR_ORDERS, order_per_turn
 from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
@@ -20,17 +21,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("amplitude", "N m", null=0.0, typical=0.01, low=0.0, high=1e6),
         Parameter("phase", "rad", null=0.0, typical=1.0),
-        Parameter(
-            "order",
-            "1",
-            null=1.0,
-            typical=2.0,
-            low=1.0,
-            high=1000.0,
-            role="shape",
-            grid=(1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 18, 24, 36),
-            whole=True,
-        ),
+        order_per_turn(MOTOR_ORDERS, typical=2.0),
     ),
     apply=apply,
     outputs=("motor_torque",),
