@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from html import escape
-from math import degrees, floor, isfinite, log10
+from math import degrees, isfinite
 from typing import TYPE_CHECKING
 
 from winchkit.calibration.robot_result import candidate_lines, in_words, noise_words
+from winchkit.diagnosis.report.chart import Axis, Chart, axis_over, legend
 from winchkit.diagnosis.report.markup import Markup, element, section, table
 from winchkit.diagnosis.report.parts import bullets, lead
 from winchkit.diagnosis.report.shell import page
@@ -20,11 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["calibration_html"]
 
-_WIDTH, _HEIGHT = 720.0, 284.0
-_LEFT, _RIGHT, _ABOVE, _BELOW = 64.0, 10.0, 16.0, 52.0
-_BEFORE, _AFTER = "#b45309", "#0f766e"
 _MM = 1e3
-_DECADE = 0.1
 
 
 def calibration_html(found: Calibrated, following: Sequence[NextPose], title: str) -> str:
@@ -98,83 +93,28 @@ def _figures(found: Calibrated) -> Iterator[Markup]:
     ]
     if not sizes:
         return
-    scale = _Scale(log10(min(sizes)) - _DECADE, log10(max(sizes)) + _DECADE)
-    for name, before, after in pairs:
-        if any(isfinite(value) for value in after.distance):
-            yield _figure(name, scale, before, after)
+    up = axis_over("position error [mm]", sizes, logarithmic=True)
+    drawn = [
+        _figure(name, up, before, after)
+        for name, before, after in pairs
+        if any(isfinite(value) for value in after.distance)
+    ]
+    yield element("div", *drawn, class_="pair maps")
 
 
-@dataclass(frozen=True)
-class _Scale:
-    """Millimetres as heights, the same for both figures, by their logarithms."""
-
-    low: float
-    high: float
-
-    def __call__(self, value: float) -> float:
-        share = (log10(value) - self.low) / (self.high - self.low)
-        return _ABOVE + (_HEIGHT - _ABOVE - _BELOW) * (1 - share)
-
-    @property
-    def ticks(self) -> list[float]:
-        """1, 2 and 5 of every decade, of many decades the ones alone."""
-        digits = (1, 2, 5) if self.high - self.low < 3 else (1,)
-        steps = [
-            digit * 10.0**power
-            for power in range(floor(self.low) - 1, floor(self.high) + 2)
-            for digit in digits
-        ]
-        return [step for step in steps if self.low <= log10(step) <= self.high]
-
-
-def _figure(name: str, scale: _Scale, before: PoseErrors, after: PoseErrors) -> Markup:
-    """Dots over the poses on a logarithmic scale; each tells its pose when pointed at."""
+def _figure(name: str, up: Axis, before: PoseErrors, after: PoseErrors) -> Markup:
+    """Dots over the poses, the same scale for every figure; each tells its pose when pointed at."""
     places = after.place.tolist()
-    step = (_WIDTH - _LEFT - _RIGHT) / len(places)
+    caption = f"{name}: distance of the predicted from the measured position, before and after."
+    chart = Chart(axis_over("number of the pose", [1.0, float(len(places))]), up, caption)
     dots = [
-        f'<circle cx="{_LEFT + step * (n + 0.5):.1f}" cy="{scale(v * _MM):.1f}" r="3" '
-        f'fill="{colour}"><title>{escape(place)}: {v * _MM:.3g} mm {word}</title></circle>'
-        for word, colour, values in (
-            ("before", _BEFORE, before.distance),
-            ("after", _AFTER, after.distance),
-        )
-        for n, (place, v) in enumerate(zip(places, values.tolist(), strict=True))
+        chart.dot(number, v * _MM, word, f"{place}: {v * _MM:.3g} mm {word}")
+        for word, values in (("before", before.distance), ("after", after.distance))
+        for number, (place, v) in enumerate(zip(places, values.tolist(), strict=True), start=1)
         if isfinite(v) and v > 0
     ]
-    caption = f"{name}: distance of the predicted from the measured position, before and after."
-    drawing = Markup(
-        f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" width="100%" role="img" '
-        f'aria-label="{escape(caption)}">{_axes(scale, len(places), step)}{"".join(dots)}</svg>'
-    )
-    return element("figure", drawing, element("figcaption", caption))
-
-
-def _axes(scale: _Scale, count: int, step: float) -> str:
-    lines = "".join(
-        f'<line x1="{_LEFT:g}" x2="{_WIDTH:g}" y1="{scale(t):.1f}" y2="{scale(t):.1f}" '
-        f'stroke="currentColor" stroke-opacity="0.15"/>'
-        + _label(_LEFT - 6, scale(t) + 4, f"{t:g}", "end")
-        for t in scale.ticks
-    )
-    every = next(n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500, 10**6) if count <= 12 * n)
-    numbers = "".join(
-        _label(_LEFT + step * (n - 0.5), _HEIGHT - _BELOW + 16, str(n), "middle")
-        for n in range(every, count + 1, every)
-    )
-    base = _HEIGHT - 8
-    legend = "".join(
-        f'<circle cx="{_LEFT + at:g}" cy="{base - 4:g}" r="4" fill="{colour}"/>'
-        + _label(_LEFT + at + 10, base, text, "start")
-        for at, colour, text in ((10, _BEFORE, "before [mm]"), (130, _AFTER, "after [mm]"))
-    )
-    return lines + numbers + legend + _label(_WIDTH, base, "number of the pose", "end")
-
-
-def _label(x: float, y: float, text: str, anchor: str) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="12" '
-        f'fill="currentColor">{text}</text>'
-    )
+    colours = legend([("before", "before calibration"), ("after", "after calibration")])
+    return element("figure", chart.draw(*dots), colours, element("figcaption", caption))
 
 
 def _next(following: Sequence[NextPose]) -> Markup:

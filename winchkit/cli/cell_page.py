@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from winchkit.cli.cell_report import NAMES, figures
+from winchkit.diagnosis.report.chart import Chart, axis_over, legend
 from winchkit.diagnosis.report.markup import Markup, element, join, section, table
 from winchkit.diagnosis.report.shell import page
 
@@ -15,8 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["report_page"]
 
-_WIDTH, _HEIGHT, _LEFT, _LOW = 640, 300, 60, 30
-_COLOURS = {"up": "#1f77b4", "down": "#d62728"}
+_FORMULA = "True force = c0 + c1 x + c2 x², x the indicated force in N; a line has no c2."
+_SPAN = "How well it fits; the span is from the least to the largest load."
+_TONES = {"up": "above", "down": "below"}
 
 
 def report_page(calibration: CellCalibration, fit: CellFit) -> str:
@@ -32,8 +34,12 @@ def report_page(calibration: CellCalibration, fit: CellFit) -> str:
         section(
             "fit",
             "Fit",
-            table("True force of the indicated one", ("coefficient", "value", "std"), coefficients),
-            table("Figures", ("figure", "value"), figures(fit)),
+            table(_FORMULA, ("coefficient", "value", "one standard deviation"), coefficients),
+            table(
+                "How well it fits; span is from the least to the largest load.",
+                ("figure", "value"),
+                figures(fit),
+            ),
             join(element("p", warning) for warning in fit.warnings),
         ),
         section("residuals", "Residuals", _drawing(fit, calibration.point)),
@@ -48,9 +54,10 @@ def _about(calibration: CellCalibration) -> Markup:
         ("serial number", calibration.serial_number or "not told"),
         ("date", calibration.date.isoformat()),
         ("direction", calibration.direction),
-        ("temperature", "not told" if warm is None else f"{warm:g} degC"),
+        ("temperature", "not told" if warm is None else f"{warm:g} °C"),
     ]
-    return table("About", ("what", ""), rows, 2)
+    pairs = [part for name, said in rows for part in (element("dt", name), element("dd", said))]
+    return element("dl", *pairs, class_="facts")
 
 
 def _points(points: Sequence[CalibrationPoint], fit: CellFit) -> Markup:
@@ -66,57 +73,25 @@ def _points(points: Sequence[CalibrationPoint], fit: CellFit) -> Markup:
         for point, residual in zip(points, fit.residuals, strict=True)
     ]
     head = ("series", "going", "load [N]", "indicated [N]", "std [N]", "residual [N]")
-    return table("Loads in the order in which they were hung", head, rows, 2)
+    return table("Loads in the order in which they were hung; std is the reading's.", head, rows, 2)
 
 
 def _drawing(fit: CellFit, points: Sequence[CalibrationPoint]) -> Markup:
     """Residuals over the load."""
-    largest = max(abs(residual) for residual in fit.residuals) or 1.0
-    first = min(point.load for point in points)
+    caption = "True less fitted force over the load; a loop between up and down is hysteresis."
+    chart = Chart(
+        axis_over("load [N]", [point.load for point in points]),
+        axis_over("residual [N]", fit.residuals, zero=True),
+        caption,
+    )
     marks = [
-        _mark(point, residual, (point.load - first) / fit.span, residual / largest)
+        chart.dot(
+            point.load,
+            residual,
+            _TONES[point.going],
+            f"{point.load:.4g} N going {point.going}: {residual:+.3g} N",
+        )
         for point, residual in zip(points, fit.residuals, strict=True)
     ]
-    middle, right, bottom = _HEIGHT / 2, _WIDTH - _LEFT, _HEIGHT - 6
-    axis = element(
-        "line",
-        x1=str(_LEFT),
-        x2=str(right),
-        y1=str(middle),
-        y2=str(middle),
-        stroke="currentColor",
-    )
-    words = [
-        _label(f"{largest:+.2g} N", _LEFT - 6, _LOW, "end"),
-        _label(f"{-largest:+.2g} N", _LEFT - 6, _HEIGHT - _LOW, "end"),
-        _label(f"{first:.4g} N", _LEFT, bottom),
-        _label(f"{first + fit.span:.4g} N", right, bottom),
-        _label("blue going up, red going down", _WIDTH / 2, bottom),
-    ]
-    box = f"0 0 {_WIDTH} {_HEIGHT}"
-    inside = (axis, *marks, *words)
-    return element("svg", *inside, viewBox=box, role="img", aria_label="Residuals over the load")
-
-
-def _mark(point: CalibrationPoint, residual: float, across: float, up: float) -> Markup:
-    """One point; ``across`` from 0 to 1, ``up`` from -1 to 1."""
-    return element(
-        "circle",
-        element("title", f"{point.load:.4g} N going {point.going}: {residual:+.3g} N"),
-        cx=f"{_LEFT + across * (_WIDTH - 2 * _LEFT):.1f}",
-        cy=f"{_HEIGHT / 2 - up * (_HEIGHT / 2 - _LOW):.1f}",
-        r="4",
-        fill=_COLOURS[point.going],
-    )
-
-
-def _label(text: str, x: float, y: float, anchor: str = "middle") -> Markup:
-    return element(
-        "text",
-        text,
-        x=f"{x:.0f}",
-        y=f"{y:.0f}",
-        text_anchor=anchor,
-        font_size="12",
-        fill="currentColor",
-    )
+    colours = legend([(tone, f"load going {going}") for going, tone in _TONES.items()])
+    return element("figure", chart.draw(*marks), colours, element("figcaption", caption))

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from winchkit.diagnosis.report.wording import with_std
+from math import isfinite
+
+from winchkit.diagnosis.report.wording import (
+    digits_apart,
+    scale_for,
+    significant,
+    with_std,
+)
 from winchkit.diagnosis.result import Estimate
 
 __all__ = [
@@ -11,6 +18,7 @@ __all__ = [
     "VERDICT_NAMES",
     "clause",
     "estimate_text",
+    "interval_text",
     "kind",
     "listed",
     "meaning",
@@ -133,6 +141,17 @@ def estimate_text(parameter: str, estimate: Estimate) -> str:
     if parameter == "order":
         return f"order {estimate.value:.0f}"
     return f"{parameter_name(parameter)} = {with_std(estimate.value, estimate.std, unit)}"
+
+
+def interval_text(parameter: str, estimate: Estimate) -> str:
+    """``95 %: 236 to 259 kN``; empty where it was not worked out."""
+    if estimate.interval is None or not all(isfinite(end) for end in estimate.interval):
+        return ""
+    unit = parameter_unit(parameter, estimate.unit)
+    low, high = estimate.interval
+    scale = scale_for((low, high), unit)
+    digits = digits_apart(low, high)
+    return f"95 %: {significant(low / scale.worth, digits)} to {scale.text(high, digits)}"
 
 
 def listed(words: list[str], last: str = "and") -> str:

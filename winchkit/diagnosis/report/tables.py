@@ -12,6 +12,7 @@ from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
     clause,
     estimate_text,
+    interval_text,
     listed,
     parameter_name,
 )
@@ -65,12 +66,18 @@ def named(
     """What every named effect is, with its values, formula and source; one unknown has no words."""
     entries: list[Markup] = []
     for effect, effect_id, estimates in found:
-        values = [estimate_text(name, estimate) for name, estimate in estimates.items()]
+        values = [_sure(name, estimate) for name, estimate in estimates.items()]
         entries.append(element("dt", element("code", effect_id), " ", unbroken(", ".join(values))))
         if effect is not None:
             words = join([effect.what, " ", element("span", effect.formula, class_="formula")])
             entries.append(element("dd", words, element("small", f"Source: {effect.source}")))
     return element("dl", *entries, class_="named") if entries else Markup("")
+
+
+def _sure(name: str, estimate: Estimate) -> str:
+    """A value with its deviation and, where it is known, its interval."""
+    interval = interval_text(name, estimate)
+    return estimate_text(name, estimate) + (f" ({interval})" if interval else "")
 
 
 def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:

@@ -22,6 +22,8 @@ from winchkit.diagnosis.report.phrases import (
     VERDICT_NAMES,
     clause,
     estimate_text,
+    interval_text,
+    parameter_name,
 )
 from winchkit.diagnosis.report.sentence import changes_text, sentence, telling, where_text
 from winchkit.diagnosis.report.shown import unseen, visible
@@ -88,6 +90,8 @@ def addition_text(addition: Addition | Removal) -> str:
     for term, values in addition.terms:
         told = ", ".join(estimate_text(name, value) for name, value in values.items())
         fitted.append([term.label, told])
+        sure = {n: interval_text(n, v) for n, v in values.items()}
+        fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
     blocks = [
         ["fitted", *aligned(fitted, words=2)] if fitted else [],
         _errors(addition.outputs, grown=True),

@@ -12,6 +12,7 @@ from re import compile as pattern
 
 __all__ = [
     "Scale",
+    "digits_apart",
     "grouped",
     "percent",
     "plain",
@@ -123,6 +124,13 @@ def significant(value: float, digits: int = 3) -> str:
     if not -6 <= exponent < 9:
         return f"{value:.{digits - 1}e}".translate(_SIGNS)
     return _fixed(value, digits - 1 - exponent)
+
+
+def digits_apart(low: float, high: float) -> int:
+    """Significant digits that tell two numbers apart with two to spare, eight at most."""
+    apart = abs(high - low)
+    size = max(abs(low), abs(high))
+    return min(8, max(2, 2 + floor(log10(size / apart)))) if apart > 0 else 3
 
 
 def plain(value: float, digits: int = 4) -> str:

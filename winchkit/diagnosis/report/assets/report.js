@@ -37,6 +37,19 @@
     u.ctx.restore();
   }
 
+  function zeroLine(u) {
+    const y = u.valToPos(0, "y", true);
+    if (y < u.bbox.top || y > u.bbox.top + u.bbox.height) return;
+    u.ctx.save();
+    u.ctx.strokeStyle = colour("quiet");
+    u.ctx.lineWidth = devicePixelRatio;
+    u.ctx.beginPath();
+    u.ctx.moveTo(u.bbox.left, y);
+    u.ctx.lineTo(u.bbox.left + u.bbox.width, y);
+    u.ctx.stroke();
+    u.ctx.restore();
+  }
+
   function span(columns, margin) {
     let low = Infinity, high = -Infinity;
     for (const column of columns) for (const value of column) {
@@ -170,8 +183,8 @@
       cursor: { dataIdx: nearest, y: false, points: { size: 6 } },
       hooks: {
         drawClear: [u => noiseBand(u, plot.noise)],
+        drawAxes: [zeroLine, u => plot.marks && runMarks(u, plot.marks)],
         draw: [u => noiseLines(u, plot.noise)],
-        drawAxes: [u => plot.marks && runMarks(u, plot.marks)],
       },
       plugins: [tooltip(plot)],
     };
