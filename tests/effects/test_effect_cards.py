@@ -55,7 +55,9 @@ def test_the_signature_of_an_elastic_rope_is_hookes() -> None:
 def test_the_command_lists_every_effect_once() -> None:
     result = CliRunner().invoke(command, [])
     assert result.exit_code == 0
-    listed = [line.split()[0] for line in result.output.splitlines() if line.startswith("  ")]
+    lines = result.output.splitlines()
+    assert max(map(len, lines)) <= 80
+    listed = [line.split()[0] for line in lines if line[:2] == "  " != line[2:4]]
     assert sorted(listed) == sorted(ALL_IDS)
 
 

@@ -95,7 +95,7 @@ class _Story:
         """Tell only: to stdout, or to stderr where JSON goes to stdout."""
         import textwrap
 
-        click.echo(textwrap.fill(text, 88, subsequent_indent="  "), err=self._quiet)
+        click.echo(textwrap.fill(text, 80, subsequent_indent="  "), err=self._quiet)
 
 
 def _tell_findings(story: _Story, comparison: Comparison, findings: Findings) -> None:

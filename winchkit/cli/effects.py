@@ -81,14 +81,14 @@ def show(effect_id: str | None, files: Sequence[str], as_json: bool, html: str |
 
 def _listing(catalogue: Catalogue) -> str:
     """Effects by the first output that they change; those that only a robot has by themselves."""
-    width = max(len(effect.id) for effect in catalogue)
+    from winchkit.diagnosis.report.columns import hanging
+
     lines: list[str] = []
     for place in (*_OUTPUTS, ""):
-        lines.append(f"On the way to {place}" if place else "On a robot")
-        lines += [
-            f"  {effect.id:<{width}}  {effect.what}"
+        own = [
+            [effect.id, effect.what]
             for effect in catalogue
             if ("" if effect.of_robots else effect.outputs[0]) == place
         ]
-        lines.append("")
+        lines += [f"On the way to {place}" if place else "On a robot", *hanging(own), ""]
     return "\n".join([*lines, f"{len(catalogue)} effects; 'winchkit effects ID' shows one."])

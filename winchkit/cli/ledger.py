@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from winchkit.cli.html_option import html_option, write_page
 from winchkit.cli.output import echo_json
 
 __all__ = ["command"]
@@ -12,7 +13,8 @@ __all__ = ["command"]
 @click.command()
 @click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file.")
 @click.option("--json", "as_json", is_flag=True, help="Print the ledger as JSON.")
-def command(profile: str, as_json: bool) -> None:
+@html_option
+def command(profile: str, as_json: bool, html: str | None) -> None:
     """Show every effect that was added to or removed from a profile and what that did."""
     from winchkit.catalog import find
     from winchkit.cli.robot_model import read_profile
@@ -23,7 +25,11 @@ def command(profile: str, as_json: bool) -> None:
     if as_json:
         steps = [rung.to_json() for rung in rungs]
         echo_json({"schema": 1, "profile": declared.name, "steps": steps})
-        return
-    from winchkit.diagnosis.report.ladder_text import ladder_text
+    else:
+        from winchkit.diagnosis.report.ladder_text import ladder_text
 
-    click.echo(ladder_text(declared.name, rungs))
+        click.echo(ladder_text(declared.name, rungs))
+    if html:
+        from winchkit.diagnosis.report.ladder_page import ladder_html
+
+        write_page(html, ladder_html(declared.name, rungs))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 import click
@@ -108,18 +109,24 @@ def _silent(
 
 
 def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> str:
-    """A line a kind, the best first."""
-    from winchkit.diagnosis.report.columns import aligned
+    """A line a kind, the best first; pairs of effects by letters."""
+    from winchkit.diagnosis.report.columns import hanging
     from winchkit.diagnosis.report.wording import percent
 
-    head = ["programme", "minutes"]
-    head += [f"{a.effect.id} / {b.effect.id}" for a, b in pairs]
-    rows = [[*head, "shows besides"]]
+    letters = ascii_uppercase[: len(pairs)]
+    rows = [["programme", "minutes", *letters, "shows besides"]]
     for offer in found:
-        powers = [percent(power) for power in offer.powers]
+        powers = [percent(power) for power in offer.powers[: len(letters)]]
         shown = ", ".join(offer.shows[:_FEW]) or "—"
         if len(offer.shows) > _FEW:
             shown += f" and {len(offer.shows) - _FEW} more"
         rows.append([offer.kind.name, f"{offer.minutes:.1f}", *powers, shown])
-    told = "power to tell apart" if pairs else "nothing to tell apart: what it would show besides"
-    return "\n".join([f"what to run next ({told})", *aligned(rows, words=1)])
+    if not pairs:
+        head = ["what to run next (nothing to tell apart: what it would show besides)"]
+    else:
+        head = ["what to run next, with the chance (power) that it tells apart"]
+        head += [
+            f"  {letter}: {a.effect.id} / {b.effect.id}"
+            for letter, (a, b) in zip(letters, pairs, strict=False)
+        ]
+    return "\n".join([*head, *hanging(rows)])

@@ -72,10 +72,6 @@ class Asked:
         """Whether every winch of the runs is asked for by itself."""
         return self.winch == ALL
 
-    def runs_of_each(self, paths: Sequence[str]) -> dict[str, list[Run]]:
-        """Runs by winch: of all of them where that is asked, else of the one."""
-        return read_each(paths) if self.each else {self.winch or "": self.runs(paths)}
-
     @property
     def options(self) -> tuple[str, ...]:
         """What was given beside runs and profile, as words to repeat it with."""

@@ -8,7 +8,7 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.diagnosis.admit import OUTPUT_UNITS
+from winchkit.diagnosis.admit import OUTPUT_UNITS, OUTPUTS
 from winchkit.diagnosis.report.chart import Chart, axis_over
 from winchkit.diagnosis.report.markup import Markup, element, section, table
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, listed, meaning, parameter_name
@@ -39,14 +39,15 @@ def effects_html(effects: Sequence[Effect], title: str) -> str:
 def _contents(effects: Sequence[Effect]) -> Markup:
     """Effects by the first output that they change, each a link to its card."""
     lists = []
-    for output, name in OUTPUT_NAMES.items():
+    for output in (*OUTPUTS, ""):
         items = [
             element("li", element("a", e.id, href=f"#{e.id}"), f" {meaning(e.id) or e.what}")
             for e in effects
-            if e.outputs[0] == output
+            if ("" if e.of_robots else e.outputs[0]) == output
         ]
+        place = f"On the way to {OUTPUT_NAMES[output]}" if output else "On a robot"
         if items:
-            lists += [element("h3", f"On the way to {name}"), element("ul", *items)]
+            lists += [element("h3", place), element("ul", *items)]
     return section("contents", f"{len(effects)} effects", *lists)
 
 
@@ -106,7 +107,8 @@ def _drawing(effect: Effect) -> list[Markup]:
     drawn = signature(effect)
     if not drawn.changes:
         return [element("p", "It changes nothing on the standard motion.", class_="quiet")]
-    figures = [_moves(drawn), *(_change(drawn, name) for name in drawn.changes)]
+    over = "pose of the standard robot, line 1" if effect.of_robots else "time [s]"
+    figures = [_moves(drawn, over), *(_change(drawn, name, over) for name in drawn.changes)]
     sizes = ", ".join(
         f"{parameter_name(p.name)} {_size(drawn.values[p.name], p.unit)}"
         for p in effect.parameters
@@ -114,32 +116,33 @@ def _drawing(effect: Effect) -> list[Markup]:
     )
     return [
         element("div", *figures, class_="pair maps"),
-        element("p", f"{_MOTION} Drawn with {sizes}.", class_="quiet"),
+        element("p", f"{'' if effect.of_robots else _MOTION} Drawn with {sizes}.", class_="quiet"),
     ]
 
 
-def _moves(drawn: Signature) -> Markup:
-    said = "Free length of the bare line over time, for orientation."
-    return _figure(drawn.time, drawn.cable_length, ("free length", "m"), "residual", said)
+def _moves(drawn: Signature, over: str) -> Markup:
+    said = "Free length of the bare line, for orientation."
+    return _figure((drawn.time, over), drawn.cable_length, ("free length", "m"), "residual", said)
 
 
-def _change(drawn: Signature, output: str) -> Markup:
-    name = OUTPUT_NAMES.get(output, output)
-    said = f"Change of the {name} over time."
+def _change(drawn: Signature, output: str, over: str) -> Markup:
+    said = f"Change of the {OUTPUT_NAMES.get(output, output)}."
     shown = ("change", OUTPUT_UNITS[output])
-    return _figure(drawn.time, drawn.changes[output], shown, "before", said)
+    return _figure((drawn.time, over), drawn.changes[output], shown, "before", said)
 
 
-def _figure(time: Array, values: Array, shown: tuple[str, str], tone: str, said: str) -> Markup:
-    """One curve over time, its extremes kept."""
-    name, unit = shown
+def _figure(
+    along: tuple[Array, str], values: Array, shown: tuple[str, str], tone: str, said: str
+) -> Markup:
+    """One curve, its extremes kept."""
+    (time, over), (name, unit) = along, shown
     scale = scale_for(float(np.nanmax(np.abs(values))), unit)
     x, (y,) = thin(time, [values / scale.worth], _POINTS)
     points = [(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True) if isfinite(b)]
     chart = Chart(
-        axis_over("time [s]", x.tolist()),
+        axis_over(over, x.tolist()),
         axis_over(f"{name} [{scale.label}]", [b for _, b in points], zero=tone == "before"),
-        capital(said),
+        said,
         height=_HEIGHT,
     )
     drawn = chart.draw(chart.line(points, tone))

@@ -29,7 +29,16 @@ from winchkit.diagnosis.report.wording import (
 from winchkit.diagnosis.result import Candidate, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect
 
-__all__ = ["candidates", "confusion", "detectable", "figures", "named", "output_scale", "waterfall"]
+__all__ = [
+    "bar",
+    "candidates",
+    "confusion",
+    "detectable",
+    "figures",
+    "named",
+    "output_scale",
+    "waterfall",
+]
 
 _TOP = 10
 
@@ -88,7 +97,10 @@ def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
     longest = {name: 1.05 * _longest(ladder, name, output) for name, output in outputs.items()}
 
     def row(label: str, errors: Mapping[str, float]) -> list[str]:
-        return [label, *(_bar(errors[n], longest[n], outputs[n]) for n in outputs)]
+        return [
+            label,
+            *(bar(errors[n], longest[n], o.noise_rms, output_scale(o)) for n, o in outputs.items()),
+        ]
 
     head = ["model", *(OUTPUT_NAMES.get(name, name) for name in outputs)]
     caption = "Held-out error, rms, as the model grew. The upright mark is the noise."
@@ -107,14 +119,14 @@ def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
     return max([output.noise_rms or 0.0, *(e for e in errors if isfinite(e))])
 
 
-def _bar(error: float, longest: float, output: OutputFit) -> Markup:
-    """A bar as a share of the longest, the noise marked on it."""
+def bar(error: float, longest: float, noise: float | None, scale: Scale) -> Markup:
+    """A bar as a share of the longest, the noise marked on it, and the figure below."""
     inside = [element("span", class_="fill", style=f"width:{_part(error, longest)}%")]
-    if output.noise_rms:
-        floor = f"left:{_part(output.noise_rms, longest)}%"
+    if noise:
+        floor = f"left:{_part(noise, longest)}%"
         inside.append(element("span", class_="floor", style=floor))
     track = element("span", *inside, class_="track", aria_hidden="true")
-    return join([track, element("span", output_scale(output).text(error), class_="value")])
+    return join([track, element("span", scale.text(error), class_="value")])
 
 
 def _part(value: float, full: float) -> str:

@@ -1,0 +1,69 @@
+"""A profile's ledger as a page: what every step left of the held-out error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from winchkit.diagnosis.admit import OUTPUT_UNITS, OUTPUTS
+from winchkit.diagnosis.ladder import Rung
+from winchkit.diagnosis.report.markup import Markup, element, join, section, table
+from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, meaning
+from winchkit.diagnosis.report.shell import page
+from winchkit.diagnosis.report.tables import bar
+from winchkit.diagnosis.report.wording import scale_for
+
+__all__ = ["ladder_html"]
+
+_SIGN = {"add": "+", "remove": "−"}
+_ROOM = 1.05
+
+
+def ladder_html(name: str, rungs: Sequence[Rung]) -> str:
+    """The page; a step on other runs than the one before begins anew."""
+    title = f"{name}: how it grew"
+    if not rungs:
+        return page(title, (), element("p", "Nothing was added to it or removed from it."))
+    caption = (
+        "Held-out error, rms, after each step, each group of runs predicted with values fitted "
+        "without it. The upright mark is the noise at that step; bars compare within a column."
+    )
+    shown = [o for o in OUTPUTS if any(o in rung.after for rung in rungs)]
+    head = ["step", "what it means", *(OUTPUT_NAMES[o] for o in shown)]
+    steps = table(caption, head, _rows(rungs, shown), words=2)
+    return page(title, (), section("waterfall", "Held-out error per step", steps))
+
+
+def _rows(rungs: Sequence[Rung], shown: Sequence[str]) -> list[list[str]]:
+    longest = {o: _longest(rungs, o) for o in shown}
+    rows: list[list[str]] = []
+    runs: tuple[str, ...] = ()
+    for rung in rungs:
+        if rung.runs and rung.runs != runs:
+            runs = rung.runs
+            bars = _bars(rung.before, rung.noise, shown, longest)
+            rows.append(["before", f"on {len(runs)} runs", *bars])
+        step = element("code", f"{_SIGN[rung.did]} {rung.effect}")
+        bars = _bars(rung.after, rung.noise, shown, longest)
+        day = element("small", rung.date.isoformat())
+        rows.append([step, join([meaning(rung.effect), day]), *bars])
+    return rows
+
+
+def _bars(
+    errors: Mapping[str, float],
+    noise: Mapping[str, float],
+    shown: Sequence[str],
+    longest: Mapping[str, float],
+) -> list[Markup]:
+    """A bar per output; a dash where a step was not judged."""
+    return [
+        bar(errors[o], longest[o], noise.get(o), scale_for(errors[o], OUTPUT_UNITS[o]))
+        if o in errors
+        else Markup("–")
+        for o in shown
+    ]
+
+
+def _longest(rungs: Sequence[Rung], output: str) -> float:
+    sizes = [m[output] for rung in rungs for m in (rung.before, rung.after) if output in m]
+    return _ROOM * max(sizes)
