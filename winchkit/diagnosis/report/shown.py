@@ -55,7 +55,7 @@ def smallest_shown(answer: Answer) -> list[str]:
 
 def unseen(answer: Answer) -> list[tuple[str, list[str]]]:
     """Effects of the catalogue that no run could show, each with what it lacks."""
-    problem, tried = answer.inquiry.problem, effects_of(answer)
+    problem, tried = answer.inquiry.problem, {e.partition("/")[0] for e in effects_of(answer)}
     out = []
     for effect in load_catalogue():
         lacking = missing_needs(effect, problem) if effect.id not in tried else []

@@ -115,7 +115,7 @@ def _errors(outputs: Mapping[str, OutputFit], *, grown: bool) -> list[str]:
 
 def _ladder(answer: Answer) -> list[str]:
     """What each of several effects buys: added first alone, and dropped last."""
-    ladder = waterfall_of(answer)
+    ladder = waterfall_of(answer) if _sampled(answer) else None
     if ladder is None or len(ladder.first) < 2:
         return []
     outputs = answer.diagnosis.outputs
@@ -169,11 +169,11 @@ def _places(answer: Answer) -> list[str]:
     diagnosis, lines = answer.diagnosis, []
     for where in telling(diagnosis.where)[:_FEW]:
         lines += paragraph(where_text(where), "  ", "    ")
-        if diagnosis.verdict in {"partly", "unknown"} and where.frequency is None:
+        if not where.frequency and _sampled(answer) and diagnosis.verdict in {"partly", "unknown"}:
             lines.append(f"    {_shape(answer, where)}")
     if not lines:
         return []
-    if diagnosis.empirical:
+    if diagnosis.empirical and _sampled(answer):
         name = diagnosis.empirical[0]
         lines += paragraph(
             f"'winchkit add {name}' adds it as a curve, marked as not understood; "
@@ -182,6 +182,11 @@ def _places(answer: Answer) -> list[str]:
             "  ",
         )
     return ["where the rest lives", *lines]
+
+
+def _sampled(answer: Answer) -> bool:
+    """Whether there is time between rows: a robot's poses are no recordings."""
+    return bool(answer.inquiry.problem.dataset.recordings)
 
 
 def _shape(answer: Answer, where: Where) -> str:
