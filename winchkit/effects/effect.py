@@ -91,6 +91,8 @@ class Effect:
         """Why a winch's length and tension do not use it, in words; empty where they do."""
         if self.left_out:
             return self.left_out
+        if self.of_robots:
+            return "a winch by itself has no such part"
         if self.stage is Stage.LENGTH_INSTRUMENT:
             return "it is in the instrument, not in the rope"
         if self.stage > Stage.CELL:

@@ -19,6 +19,8 @@ __all__ = ["maps_drawn"]
 
 _FAINTEST = 0.04
 _MOST = 2
+_ABOVE_NOISE = 2.0
+"""Full colour is at least so many times the noise: what is near it stays pale."""
 
 
 def maps_drawn(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, list[Markup]]:
@@ -30,7 +32,8 @@ def maps_drawn(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, l
         ]
         if not found:
             continue
-        peak = float(np.nanmax(np.abs(found[0].mean)))
+        noise = residuals.noise.get(output) or 0.0
+        peak = max(float(np.nanmax(np.abs(found[0].mean))), _ABOVE_NOISE * noise)
         after = residuals.after
         changed = None if after is None else same_cells(residuals.problem, after, found[0])
         if changed is None:

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from winchkit.diagnosis.report.wording import (
-    digits_apart,
-    scale_for,
-    significant,
-    with_std,
-)
+from winchkit.diagnosis.report.wording import between, with_std
 from winchkit.diagnosis.result import Estimate
 
 __all__ = [
@@ -148,10 +143,7 @@ def interval_text(parameter: str, estimate: Estimate) -> str:
     if estimate.interval is None or not all(isfinite(end) for end in estimate.interval):
         return ""
     unit = parameter_unit(parameter, estimate.unit)
-    low, high = estimate.interval
-    scale = scale_for((low, high), unit)
-    digits = digits_apart(low, high)
-    return f"95 %: {significant(low / scale.worth, digits)} to {scale.text(high, digits)}"
+    return f"95 %: {between(*estimate.interval, unit)}"
 
 
 def listed(words: list[str], last: str = "and") -> str:

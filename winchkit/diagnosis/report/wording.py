@@ -12,7 +12,7 @@ from re import compile as pattern
 
 __all__ = [
     "Scale",
-    "digits_apart",
+    "between",
     "grouped",
     "percent",
     "plain",
@@ -126,11 +126,12 @@ def significant(value: float, digits: int = 3) -> str:
     return _fixed(value, digits - 1 - exponent)
 
 
-def digits_apart(low: float, high: float) -> int:
-    """Significant digits that tell two numbers apart with two to spare, eight at most."""
-    apart = abs(high - low)
-    size = max(abs(low), abs(high))
-    return min(8, max(2, 2 + floor(log10(size / apart)))) if apart > 0 else 3
+def between(low: float, high: float, unit: str) -> str:
+    """Two SI ends with two digits of their distance: ``236 to 259 kN``."""
+    scale = scale_for((low, high), unit)
+    ends, apart = (low / scale.worth, high / scale.worth), abs(high - low) / scale.worth
+    decimals = 1 - floor(log10(apart)) if apart > 0 else 2
+    return f"{_fixed(ends[0], decimals)} to {scale.labelled(_fixed(ends[1], decimals))}"
 
 
 def plain(value: float, digits: int = 4) -> str:
