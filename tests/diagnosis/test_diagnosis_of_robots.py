@@ -90,7 +90,9 @@ def test_calibrate_then_diagnose_names_the_elasticity_that_calibrating_hid(tmp_p
     assert abs(stiffness["value"] - 2e5) < 4 * stiffness["std"]
     output = found["outputs"]["platform_position"]
     assert output["heldout_rms_after"] < 0.7 * output["heldout_rms_before"]
-    assert output["heldout_rms_after"] < 1.2 * output["noise_rms"]
+    # The tracker that the poses were made with; a dozen repeats alone know it to a quarter.
+    assert output["heldout_rms_after"] < 1.2 * 2e-5 * 3**0.5
+    assert output["noise_rms"] == pytest.approx(2e-5 * 3**0.5, rel=0.3)
 
 
 def test_an_effect_is_added_on_its_line_and_taken_back(tmp_path: Path) -> None:
