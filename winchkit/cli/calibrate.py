@@ -75,6 +75,8 @@ def command(
     source = find("profiles", robot)
     found = _calibrated(source, runs, validate, _options(effects, noise, loss, middle_force))
     ahead = next_poses(found, following) if following else []
+    if len(ahead) < following:
+        click.echo(f"only {len(ahead)} of {following} poses can be held by the ropes", err=True)
     _write(source, found, Path(output), runs)
     _tell(found, ahead, as_json)
     if html:
