@@ -30,7 +30,7 @@ TENSION = (
 )  # fmt: skip
 TORQUE = (
     "torque-constant", "gear-efficiency", "motor-coulomb", "motor-coulomb-asymmetry",
-    "motor-viscous", "motor-viscous-asymmetry", "motor-stribeck", "motor-cogging",
+    "motor-viscous", "motor-stribeck", "motor-cogging",
     "rotor-inertia", "torque-lag",
 )  # fmt: skip
 CATALOGUE = LENGTH + TENSION + TORQUE
@@ -110,7 +110,6 @@ _ONE = {
     "motor-coulomb": ("torque", 0.02, False),
     "motor-coulomb-asymmetry": ("offset", 0.01, True),
     "motor-viscous": ("viscosity", 1e-3, False),
-    "motor-viscous-asymmetry": ("viscosity_difference", 3e-4, True),
     "rotor-inertia": ("inertia", 1e-4, False),
     "torque-lag": ("time_constant", 0.02, False),
     "outside-crosstalk": ("size", 0.02, True),

@@ -230,8 +230,6 @@ class _Line:
         torque = torque + (self.get("motor-coulomb") or {}).get("torque", 0.0) * way
         torque = torque + (self.get("motor-coulomb-asymmetry") or {}).get("offset", 0.0)
         torque = torque + (self.get("motor-viscous") or {}).get("viscosity", 0.0) * rate
-        drag = (self.get("motor-viscous-asymmetry") or {}).get("viscosity_difference", 0.0)
-        torque = torque + drag * np.abs(rate)
         if p := self.get("motor-stribeck"):
             torque = torque + way * p["torque"] * np.exp(-((rate / p["stribeck_speed"]) ** 2))
         if p := self.get("motor-cogging"):

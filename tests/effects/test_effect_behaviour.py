@@ -46,7 +46,6 @@ LINEAR = {
     "motor-coulomb",
     "motor-coulomb-asymmetry",
     "motor-viscous",
-    "motor-viscous-asymmetry",
     "motor-stribeck",
     "motor-cogging",
     "rotor-inertia",

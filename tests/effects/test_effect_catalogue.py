@@ -68,7 +68,6 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "motor-coulomb": {"torque": ("N m", 0)},
     "motor-coulomb-asymmetry": {"offset": ("N m", 0)},
     "motor-viscous": {"viscosity": ("N m s", 0)},
-    "motor-viscous-asymmetry": {"viscosity_difference": ("N m s", 0)},
     "motor-stribeck": {"torque": ("N m", 0), "stribeck_speed": ("rad/s", SHAPE)},
     "motor-cogging": {
         "amplitude": ("N m", 0),

@@ -268,10 +268,6 @@ CASES: dict[str, Case] = {
     "motor-coulomb": ({"torque": 0.03}, lambda: _torque(0.03 * X.sm)),
     "motor-coulomb-asymmetry": ({"offset": 0.01}, lambda: _torque(np.full_like(X.t, 0.01))),
     "motor-viscous": ({"viscosity": 2e-3}, lambda: _torque(2e-3 * X.rate)),
-    "motor-viscous-asymmetry": (
-        {"viscosity_difference": -4e-4},
-        lambda: _torque(-4e-4 * np.abs(X.rate)),
-    ),
     "motor-stribeck": (
         {"torque": 0.03, "stribeck_speed": 20},
         lambda: _torque(0.03 * X.sm * np.exp(-(X.rate**2) / 400)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -10,6 +11,7 @@ from winchkit.bench.cell_desk import CellDesk
 from winchkit.bench.instruments import calibration_of
 from winchkit.drivers.modbus.timing import exchange
 from winchkit.drivers.reading import Counters
+from winchkit.schema.calibration import CellCalibration
 from winchkit.schema.device import DeviceSpec
 
 __all__ = ["about", "rate_report"]
@@ -25,19 +27,6 @@ def about(desk: CellDesk, name: str) -> dict[str, Any]:
     identity = desk.identify(name)
     calibration = calibration_of(desk.spec, ref)
     sensor, scale = desk.sensors[name], desk.publisher(name).scale
-    remarks = _link_remarks(desk, name, device)
-    if note := desk.line_note(name):
-        remarks.append(note)
-    remarks += [
-        f"its device file has no source for {what}: compare with the manual"
-        for what in device.unconfirmed
-    ]
-    serial = str(int(identity[_SERIAL])) if _SERIAL in identity else ""
-    if calibration and serial and calibration.serial_number not in ("", serial):
-        remarks.append(
-            f"the calibration is of serial number {calibration.serial_number}, this device "
-            f"says {serial}: calibrate it, or name its own file"
-        )
     return {
         "cell": name,
         "device": {
@@ -60,7 +49,7 @@ def about(desk: CellDesk, name: str) -> dict[str, Any]:
             "latency": reading.t_receive - reading.t_request,
         },
         "counters": counters_told(sensor.counters),
-        "remarks": remarks,
+        "remarks": [*_link_remarks(desk, name, device), *_doubts(device, identity, calibration)],
     }
 
 
@@ -145,14 +134,33 @@ def _filter_delay(device: DeviceSpec) -> float:
 
 
 def _link_remarks(desk: CellDesk, name: str, device: DeviceSpec) -> list[str]:
-    """Where the wiring differs from the device's factory setting: the first thing to look at."""
+    """What the line does to its readings, and where it differs from the factory's setting."""
+    note = desk.line_note(name)
+    told = [note] if note else []
     bus = desk.spec.bus[desk.line(name)]
     if device.modbus is None or device.modbus.link is None or bus.kind != "modbus-rtu":
-        return []
+        return told
     link = device.modbus.link
-    return [
+    return told + [
         f"the line is set to {key} {getattr(bus, key)}, the device leaves its factory with "
         f"{getattr(link, key)}"
         for key in ("baudrate", "parity", "stopbits")
         if getattr(bus, key) != getattr(link, key)
     ]
+
+
+def _doubts(
+    device: DeviceSpec, identity: Mapping[str, float], calibration: CellCalibration | None
+) -> list[str]:
+    """What has no source, and a calibration that is of another device."""
+    told = [
+        f"its device file has no source for {what}: compare with the manual"
+        for what in device.unconfirmed
+    ]
+    serial = str(int(identity[_SERIAL])) if _SERIAL in identity else ""
+    if calibration and serial and calibration.serial_number not in ("", serial):
+        told.append(
+            f"the calibration is of serial number {calibration.serial_number}, this device "
+            f"says {serial}: calibrate it, or name its own file"
+        )
+    return told

@@ -87,7 +87,6 @@ _CLAUSES = {
     "motor-coulomb-asymmetry": "your torque signal has an offset",
     "motor-stribeck": "your motor side rubs more at creep speed",
     "motor-viscous": "your motor side drags with speed",
-    "motor-viscous-asymmetry": "your motor side drags more one way than the other",
     "pulley-capstan": "your rope drags around a stuck pulley",
     "pulley-coulomb": "your pulleys rub",
     "pulley-dahl": "your pulleys give before they slide",

@@ -24,7 +24,7 @@ EFFECT = Effect(
     formula="τ + o, o = (c₊ − c₋)/2",
     source="Coulomb friction, one value a direction",
     looks_like="A constant torque error.",
-    confused_with=("torque-constant", "motor-coulomb", "motor-viscous-asymmetry"),
-    told_apart="Two loads: a wrong torque constant grows with them. Two speeds: a drag grows.",
+    confused_with=("torque-constant", "motor-coulomb"),
+    told_apart="Two loads: a wrong torque constant grows with them.",
     family="motor friction",
 )
