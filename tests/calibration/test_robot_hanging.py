@@ -84,6 +84,8 @@ def hanging() -> tuple[Robot, Measured]:
         swivel=nothing,
         cable_length=nothing,
         tension=nothing,
+        temperature=nothing,
+        run=np.zeros(COUNT, dtype=np.intp),
         place=np.array([f"row {n + 1}" for n in range(COUNT)]),
     )
     return believed(home), measured

@@ -13,7 +13,15 @@ from winchkit.cli import jog
 from winchkit.errors import ConnectionLost, NotPermitted
 
 STATUS = {
-    "winch": {"A": {"cable_length": 4.0, "speed": None, "tension": 98.1, "phase": "disabled"}}
+    "winch": {
+        "A": {
+            "cable_length": 4.0,
+            "speed": None,
+            "rope_tension": 98.1,
+            "length": None,
+            "phase": "disabled",
+        }
+    }
 }
 
 
