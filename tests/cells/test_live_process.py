@@ -16,7 +16,7 @@ pytestmark = pytest.mark.realtime
 
 def test_a_bench_with_its_cell_on_the_can_bus(tmp_path: Path) -> None:
     text = (catalog.folder("sim") / "spiral-bench.toml").read_text()
-    cell = 'cell = { device = "laumas-tlb", bus = "instruments", unit = 1 }'
+    cell = 'cell = { device = "laumas-tlb", bus = "instruments", unit = 1, rate = "100 Hz" }'
     assert cell in text
     declared = tmp_path / "can-cell.toml"
     on_can = 'cell = { device = "generic-cia404", bus = "can", node = 9 }'
