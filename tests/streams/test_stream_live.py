@@ -87,7 +87,7 @@ def test_two_cells_share_a_line_by_their_addresses(tmp_path: Path) -> None:
             assert load.latest is not None
             assert load.latest.value == pytest.approx(10 * 9.80665, abs=0.5)
             running.inject("A.cell", "silence")
-            assert comes(lambda: math.isnan(winch.tension))
+            assert comes(lambda: math.isnan(winch.snapshot.tension))
             before = load.counters.readings
             assert comes(lambda: load.counters.readings > before)
 
