@@ -10,7 +10,7 @@ import click
 
 from winchkit.cli.html_option import html_option, page_title, write_page
 from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import Asked, ManyValues, json_option, model_options
+from winchkit.cli.runs_option import Asked, ManyValues, json_option, model_options, read_all
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
@@ -66,11 +66,10 @@ def _to_robot(
     catalogue: Catalogue,
 ) -> Addition:
     """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
-    from winchkit.cli.robot_model import read_poses_of
     from winchkit.diagnosis.robot.add import add_to_robot
 
     name, _, place = effect.partition("/")
-    return add_to_robot(name, read_poses_of(runs), declared, line or place or None, catalogue)
+    return add_to_robot(name, read_all(runs), declared, line or place or None, catalogue)
 
 
 def _tell(addition: Addition, output: str, as_json: bool) -> None:

@@ -10,13 +10,12 @@ import click
 
 from winchkit.cli.html_option import html_option, page_title, write_page
 from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import ManyValues
-from winchkit.errors import Fault, FileError, UsageError, suggest
+from winchkit.cli.runs_option import ManyValues, read_all
+from winchkit.errors import UsageError, suggest
 
 if TYPE_CHECKING:
     from winchkit.calibration.robot import Calibrated, Options
     from winchkit.calibration.robot_next import NextPose
-    from winchkit.runs.run import Run
 
 __all__ = ["command"]
 
@@ -106,10 +105,10 @@ def _calibrated(
     from winchkit.schema.read import read_robot
 
     profile = read_robot(source)
-    measured = read_poses(_read(runs), profile)
+    measured = read_poses(read_all(runs), profile)
     fit, held = split(measured)
     if validate:
-        fit, held = measured, read_poses(_read(validate), profile)
+        fit, held = measured, read_poses(read_all(validate), profile)
     return calibrate(robot_of(profile), fit, held, options, lambda t: click.echo(t, err=True))
 
 
@@ -122,21 +121,6 @@ def _tell(found: Calibrated, ahead: Sequence[NextPose], as_json: bool) -> None:
     for warning in found.warnings:
         click.echo(f"{warning} (warning)", err=True)
     echo_json(calibration_json(found, ahead))
-
-
-def _read(paths: Sequence[str]) -> list[Run]:
-    """Runs with the faults of all files told at once."""
-    from winchkit.runs import read_run
-
-    runs, faults = [], list[Fault]()
-    for path in paths:
-        try:
-            runs.append(read_run(path))
-        except FileError as error:
-            faults += error.faults
-    if faults:
-        raise FileError(faults)
-    return runs
 
 
 def _loss(name: str) -> Loss:

@@ -9,7 +9,7 @@ import click
 
 from winchkit.cli.html_option import html_option, page_title, write_page
 from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import Asked, json_option, model_options
+from winchkit.cli.runs_option import Asked, json_option, model_options, read_all
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.result import Comparison
@@ -24,7 +24,7 @@ __all__ = ["command"]
 @html_option
 def command(runs: Sequence[str], asked: Asked, as_json: bool, html: str | None) -> None:
     """Compare runs with a profile at its file values; only the length offset is fitted."""
-    from winchkit.cli.robot_model import read_poses_of, read_profile, refuse_options
+    from winchkit.cli.robot_model import read_profile, refuse_options
     from winchkit.diagnosis.compare import compared
     from winchkit.diagnosis.report.page import comparison_html
     from winchkit.schema.robot import RobotProfile
@@ -34,7 +34,7 @@ def command(runs: Sequence[str], asked: Asked, as_json: bool, html: str | None) 
         from winchkit.diagnosis.robot.compare import compare_robot
 
         refuse_options(asked.band, html, asked.winch)
-        _tell(compare_robot(read_poses_of(runs), declared, asked.catalogue), as_json)
+        _tell(compare_robot(read_all(runs), declared, asked.catalogue), as_json)
         return
     answer = compared(asked.runs(runs), declared, asked.catalogue, asked.band)
     _tell(answer.comparison, as_json)

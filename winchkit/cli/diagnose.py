@@ -10,7 +10,7 @@ import click
 from winchkit.cli.html_option import html_option, page_title, write_page
 from winchkit.cli.output import echo_json
 from winchkit.cli.progress import progress_bar
-from winchkit.cli.runs_option import Asked, json_option, model_options, read_each
+from winchkit.cli.runs_option import Asked, json_option, model_options, read_all, read_each
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -97,12 +97,11 @@ def _tell_robot(
     runs: Sequence[str], declared: RobotProfile, catalogue: Catalogue, as_json: bool
 ) -> None:
     """What a robot's model lacks, from poses."""
-    from winchkit.cli.robot_model import read_poses_of
     from winchkit.diagnosis.report.sentence import sentence
     from winchkit.diagnosis.report.text import report_text
     from winchkit.diagnosis.robot.diagnose import diagnose_robot
 
-    answer = diagnose_robot(read_poses_of(runs), declared, catalogue)
+    answer = diagnose_robot(read_all(runs), declared, catalogue)
     if as_json:
         echo_json({**answer.diagnosis.to_json(), "sentence": sentence(answer.diagnosis)})
     else:

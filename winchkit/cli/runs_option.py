@@ -17,7 +17,16 @@ if TYPE_CHECKING:
     from winchkit.runs.run import Run
     from winchkit.schema.winch import WinchProfile
 
-__all__ = ["ALL", "Asked", "ManyValues", "json_option", "model_options", "read_each", "read_runs"]
+__all__ = [
+    "ALL",
+    "Asked",
+    "ManyValues",
+    "json_option",
+    "model_options",
+    "read_all",
+    "read_each",
+    "read_runs",
+]
 
 ALL = "all"
 """Said to ``--winch``: every winch of the runs by itself."""
@@ -121,12 +130,12 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:
     """Runs of one winch. Raises FileError with the faults of all files."""
-    return [_of_winch(run, winch) for run in _read(paths)]
+    return [_of_winch(run, winch) for run in read_all(paths)]
 
 
 def read_each(paths: Sequence[str]) -> dict[str, list[Run]]:
     """Runs of every winch that is in all of them, each file read once. Raises FileError."""
-    runs = _read(paths)
+    runs = read_all(paths)
     names = [name for name in runs[0].winches() if all(name in run.winches() for run in runs)]
     if not names:
         listed = "; ".join(f"{run.path}: {', '.join(run.winches())}" for run in runs)
@@ -134,7 +143,8 @@ def read_each(paths: Sequence[str]) -> dict[str, list[Run]]:
     return {name: [run.of_winch(name) for run in runs] for name in names}
 
 
-def _read(paths: Sequence[str]) -> list[Run]:
+def read_all(paths: Sequence[str]) -> list[Run]:
+    """Runs with all that they hold. Raises FileError with the faults of all files."""
     from winchkit.runs import read_run
 
     runs: list[Run] = []
