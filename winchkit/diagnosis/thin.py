@@ -28,7 +28,7 @@ _MANY = 200_000
 _WANTED = 90_000
 """Samples to which it thins, where the signals allow."""
 _PASSED = 0.25
-"""Cut-off over the new sampling rate: what folds back lies beyond three times the cut-off."""
+"""Cut-off over the new sampling rate: what folds back below it comes from three times as high."""
 _SLOWEST = 20.0
 """Least sampling rate that is left, Hz: reversals and lags live within a tenth of a second."""
 _LOST = 0.01
@@ -48,18 +48,19 @@ _CHANNELS = ("motor_angle", "motor_torque", "tension", "load", "cable_length")
 
 @dataclass(frozen=True)
 class Thinning:
-    """Every ``factor``-th sample of what lies below a cut-off."""
+    """Every ``factor``-th sample of a low-passed run, whole below a cut-off."""
 
     factor: int
     cut_off: float
-    """Hz; half of the amplitude is left there, nothing to speak of beyond."""
+    """Hz; below it all stays, at twice it half of the amplitude is left, at three times nothing."""
 
     @property
     def words(self) -> str:
         """For the notes of a diagnosis."""
         return (
-            f"every {_ordinal(self.factor)} sample of the runs, low-passed at {self.cut_off:.3g} "
-            f"Hz, is compared: above that lies less than {_LOST:.0%} of what any channel does"
+            f"every {_ordinal(self.factor)} sample of the runs, whole up to {self.cut_off:.3g} Hz "
+            f"and low-passed beyond, is compared: beyond lies less than {_LOST:.0%} of what any "
+            "channel does"
         )
 
     def run(self, run: Run) -> Run:
