@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from diagnosis_runs import GROOVED, SPIRAL, Ride, made, term
+from diagnosis_runs import CATALOGUE, GROOVED, SPIRAL, Ride, made, term
 
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.result import Diagnosis
@@ -19,6 +19,9 @@ HIDDEN = {
     "drag": term("motor-coulomb", torque=0.02),
     "rope": term("cable-elongation-linear", axial_stiffness=2e5),
 }
+
+BENDS = (3000.0, 6000.0, 12000.0)
+"""Force scales of ropes that are nearly straight under 50 to 400 N, N."""
 
 
 @cache
@@ -97,3 +100,37 @@ def test_the_parsimonious_one_comes_first_and_values_are_of_all(
         own = step.parameters[HIDDEN[hidden].effect.id]
         assert all(estimate.std > 0 for estimate in own.values())
         assert 0 < step.heldout_gain < 1
+
+
+@cache
+def rope(force_scale: float) -> Diagnosis:
+    """Of a rope that is stiffer when tight: the less so, the larger its ``force_scale``."""
+    law = term(
+        "cable-elongation-exponential", strain_scale=force_scale / 2e5, force_scale=force_scale
+    )
+    runs = [
+        made(int(10 * mass) + seed, SPIRAL, (law,), load_mass=mass, ride=Ride(stroke=800.0))
+        for mass in (5.0, 12.0, 25.0, 40.0)
+        for seed in range(2)
+    ]
+    return diagnose(runs, SPIRAL).diagnosis
+
+
+@pytest.mark.parametrize("force_scale", [100.0, 200.0, 400.0])
+def test_laws_of_a_curved_rope_are_told_together(force_scale: float) -> None:
+    """Four loads show that it is curved, not by which formula; a straight one is out."""
+    (step,) = rope(force_scale).steps
+    assert set(step.effects) == {"cable-elongation-exponential", "cable-elongation-quartic"}
+    for law, parameters in step.parameters.items():
+        for name, estimate in parameters.items():
+            ends = CATALOGUE[law].parameter(name)
+            assert ends.low < estimate.value < ends.high, (law, name)
+
+
+def test_a_bend_that_the_data_lean_to_is_not_denied() -> None:
+    """Between a bend that is plain and one that is lost in noise, straight and curved are told."""
+    sets = [set(rope(scale).steps[0].effects) for scale in (400.0, *BENDS, 1e6)]
+    straight = "cable-elongation-linear"
+    assert straight not in sets[0]
+    assert sets[-1] == {straight}
+    assert any(straight in between and len(between) > 1 for between in sets)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
@@ -11,6 +13,7 @@ from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.fit import fit
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.effects.bind import Term
+from winchkit.schema.winch import GuideSpec
 
 RIDE = Ride(samples=400)
 TRUE = {
@@ -37,6 +40,21 @@ def problem_of(terms: tuple[Term, ...]) -> tuple[Problem, np.ndarray]:
     for segment in problem.segments:
         weight[segment.rows] = 1 / NOISE[segment.output]
     return problem, weight
+
+
+def test_a_fit_walks_along_a_bent_valley() -> None:
+    """A guide's offset times its mismatch is seen at once, each of them only by the bend."""
+    profile = replace(GROOVED, guide=GuideSpec(0.005))
+    aside = term("guide-offset", offset=-0.09, mismatch=0.005)
+    runs = [made(seed, profile, (aside,), ride=Ride(samples=800)) for seed in range(4)]
+    problem = Problem(prepare(runs, profile))
+    weight = np.concatenate(
+        [np.full(s.rows.stop - s.rows.start, 1 / NOISE[s.output]) for s in problem.segments]
+    )
+    best = fit(problem, Hypothesis().with_term(aside, problem.runs), weight)
+    begun = [Term(aside.effect, aside.effect.null | probe) for probe in aside.effect.probes]
+    found = [fit(problem, Hypothesis().with_term(b, problem.runs), weight) for b in begun]
+    assert min(f.cost for f in found) == pytest.approx(best.cost, abs=1.0)
 
 
 def from_usual(terms: tuple[Term, ...], problem: Problem) -> Hypothesis:

@@ -89,6 +89,14 @@ def test_a_slow_machine_has_directions_too() -> None:
     assert np.allclose(still.direction, 0.0, atol=1e-6)
 
 
+def test_a_creeping_run_of_a_fast_machine_has_the_directions_of_its_fast_runs() -> None:
+    line = Line(profile_with("grooved"))
+    time = np.linspace(0, 20, 2001)
+    at = line.motion(Signals(time, 0.02 * np.sin(time), fastest=30.0)).at
+    assert np.allclose(at.motor_direction, np.tanh(at.motor_rate / 0.5))
+    assert np.allclose(at.direction, np.tanh(at.speed / 1e-3))
+
+
 def test_a_measured_load_comes_before_a_known_mass() -> None:
     line = Line(profile_with("grooved"))
     time, angle = swing()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import held_out
@@ -50,9 +51,7 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
     rivals = [
         s
         for s in scores
-        if s.atom.effect.id != own.effect.id
-        and (Coordinates(s.atom.effect).freedom <= freedom or _kindred(s.atom.effect, own.effect))
-        and s.gain > mine - max(_NEAR, 0.1 * mine)
+        if s.atom.effect.id != own.effect.id and s.gain > mine - max(_NEAR, 0.1 * mine)
     ][:_RIVALS]
     blocks = inquiry.blocks
     ours = held_out(inquiry.problem, final, noise, blocks)
@@ -62,13 +61,18 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
         fitted = trial.fit
         if not np.isfinite(trial.criterion):
             continue
-        theirs = held_out(inquiry.problem, fitted, noise, blocks)
         if base.cost - fitted.cost < _SHARE * (base.cost - final.cost):
             continue
-        alike = fitted.cost < final.cost + _ALIKE
-        if alike or _flip_chance(theirs - ours) > _LEVEL:
-            size = Coordinates(rival.atom.effect).freedom
-            members.append((size, fitted.cost, fitted.hypothesis.terms[-1]))
+        term = fitted.hypothesis.terms[-1]
+        size = Coordinates(term.effect).freedom
+        if size > freedom and not _kindred(term.effect, own.effect):
+            counted = _leant_to(final, fitted, size - freedom)
+        else:
+            theirs = held_out(inquiry.problem, fitted, noise, blocks)
+            alike = fitted.cost < final.cost + _ALIKE
+            counted = alike or _flip_chance(theirs - ours) > _LEVEL
+        if counted:
+            members.append((size, fitted.cost, term))
     ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
     projected = inquiry.projected(base, noise)
     angles = {
@@ -83,6 +87,17 @@ def _kindred(rival: Effect, own: Effect) -> bool:
     """Whether one law of a family may stand for the other, neither being a case of the other."""
     nested = own.id in rival.contains or rival.id in own.contains
     return bool(own.family) and rival.family == own.family and not nested
+
+
+def _leant_to(simple: Fit, rich: Fit, more: int) -> bool:
+    """Whether the data lean to a law with more unknowns, though not enough to ask for it.
+
+    Such a law is worth its price only far beyond chance. Between the two the simple name alone
+    would claim what the data rather deny.
+    """
+    states = [sum(len(start) for start in f.hypothesis.starts) for f in (simple, rich)]
+    unknowns = max(1, more + states[1] - states[0])
+    return bool(chi2.sf(simple.cost - rich.cost, unknowns) < _LEVEL)
 
 
 def _flip_chance(worse: Array) -> float:

@@ -121,12 +121,13 @@ def assemble(
 ) -> Dataset:
     """Build a dataset of runs that are known to fit the profile."""
     line, filtering = Line(profile), filtering or Filtering()
-    raw = [line.motion(_signals(run)) for run in runs]
+    fastest = max((_fastest(run) for run in runs), default=0.0)
+    raw = [line.motion(_signals(run, fastest)) for run in runs]
     thinning = filtering.thinning
     if thinning is not None:
         raw = [thinning.motion(motion) for motion in raw]
         runs = [thinning.run(run) for run in runs]
-    signals = [_signals(run) for run in runs]
+    signals = [_signals(run, fastest) for run in runs]
     repeats = find_repeats(signals)
     smooth = calm_motions(line, signals, raw, repeats)
     recordings = tuple(
@@ -145,7 +146,13 @@ def _bridged(values: Array) -> Array:
     return np.interp(index, index[good], values[good])
 
 
-def _signals(run: Run) -> Signals:
+def _fastest(run: Run) -> float:
+    """Fastest motor rate of a run, rad/s."""
+    rate = np.gradient(_bridged(run["motor_angle"]), run.time)
+    return float(np.max(np.abs(rate)))
+
+
+def _signals(run: Run, fastest: float) -> Signals:
     def channel(name: str) -> Array | None:
         return _bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
 
@@ -157,6 +164,7 @@ def _signals(run: Run) -> Signals:
         tension=channel("tension"),
         temperature=channel("temperature"),
         motor_velocity=channel("motor_velocity"),
+        fastest=fastest,
     )
 
 

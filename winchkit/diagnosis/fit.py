@@ -17,6 +17,7 @@ __all__ = ["Fit", "fit"]
 
 Array = NDArray[np.float64]
 _ITERATIONS = 15
+_PATIENT = 40
 _ENOUGH = 0.02
 _FORGET = 1e-9
 
@@ -50,7 +51,7 @@ def fit(problem: Problem, start: Hypothesis, weight: Array) -> Fit:
     cost = _cost(residual, weight)
     damping = 1e-6
     jacobian = problem.jacobian(x, start)
-    for _ in range(_ITERATIONS if len(x) else 0):
+    for _ in range(_iterations(start) if len(x) else 0):
         step, promised = _step(
             jacobian * weight[:, None], residual * weight, damping, x, (low, high)
         )
@@ -71,6 +72,15 @@ def fit(problem: Problem, start: Hypothesis, weight: Array) -> Fit:
                 break
     fitted = problem.hypothesis(x, start)
     return Fit(fitted, x, residual, jacobian, cost, len(x))
+
+
+def _iterations(start: Hypothesis) -> int:
+    """How many steps a fit may take: more where the last term's unknowns act by their product.
+
+    Such a term has probes, since none of its unknowns does anything alone, and its squares lie
+    in a bent valley: walked slowly, worth walking when it is the one that is tried.
+    """
+    return _PATIENT if start.terms and start.terms[-1].effect.probes else _ITERATIONS
 
 
 def _cost(residual: Array, weight: Array) -> float:

@@ -20,6 +20,7 @@ from winchkit.diagnosis.noise import (
 )
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.resolution import without_rounding
+from winchkit.diagnosis.shapes import gap, in_disguise, starting_values, with_fewer_coefficients
 from winchkit.diagnosis.signature import Projected, Score, Signatures, score, signatures, worthless
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -171,8 +172,14 @@ class Inquiry:
             for values in self._placed(hypothesis, present, item, weight)
         ]
         fitted = min((fit(self.problem, start, weight) for start in begun), key=lambda f: f.cost)
+        disguised = in_disguise(fitted.hypothesis.terms[-1])
+        simpler = with_fewer_coefficients(effect) if disguised else None
+        if simpler is not None:
+            return self.trial(
+                present, replace(item, atom=replace(item.atom, effect=simpler)), noise
+            )
         price = self.criterion(fitted)
-        if _in_disguise(fitted.hypothesis.terms[-1]) or (
+        if disguised or (
             price < self.criterion(present) and self._rests_on_states(hypothesis, fitted, noise)
         ):
             price = np.inf
@@ -185,7 +192,7 @@ class Inquiry:
 
         A step far from its moment has no gradient towards it, but its gain rises all the way.
         """
-        begun = _starting_values(item)
+        begun = starting_values(item)
         places = [p for p in Coordinates(item.atom.effect).shapes if p.grid and p.low == 0.0]
         if not places or len(begun) > 1:
             return begun
@@ -201,7 +208,7 @@ class Inquiry:
             size = float(column @ column)
             return float((column @ residual) ** 2) / size if size else 0.0
 
-        at, step = values[place.name], _gap(place.grid, values[place.name])
+        at, step = values[place.name], gap(place.grid, values[place.name])
         best = gain(at)
         for _ in range(_HALVINGS):
             step /= 2
@@ -255,38 +262,5 @@ def _possible(item: Score) -> bool:
         return True
     base = {**item.atom.effect.null, **item.atom.shape}
     amplitudes = slice(len(coordinates.amplitudes))
-    begun = coordinates.vector(_starting_values(item)[0])[amplitudes]
+    begun = coordinates.vector(starting_values(item)[0])[amplitudes]
     return bool(np.any(begun != coordinates.vector(base)[amplitudes]))
-
-
-def _in_disguise(term: Term) -> bool:
-    """Whether a shape ran to its bound: there the term has become another effect."""
-    coordinates = Coordinates(term.effect)
-    at = coordinates.vector(term.values)
-    low, high = coordinates.bounds()
-    shapes = slice(len(coordinates.amplitudes), None)
-    ends = (at <= low + 1e-6) | (at >= high - 1e-6)
-    return bool(np.any(ends[shapes]))
-
-
-def _gap(grid: tuple[float, ...], at: float) -> float:
-    """Distance from a point of a grid to its farther neighbour."""
-    index = grid.index(at)
-    return max(abs(grid[i] - at) for i in (index - 1, index + 1) if 0 <= i < len(grid))
-
-
-def _starting_values(item: Score) -> list[dict[str, float]]:
-    """Values at which fits of an atom begin: its linear amplitudes within bounds, or its probes."""
-    atom = item.atom
-    coordinates = Coordinates(atom.effect)
-    base = {**atom.effect.null, **atom.shape}
-    usual = [{**base, **secant} for secant in atom.secants]
-    if atom.effect.probes:
-        return usual
-    null = coordinates.vector(base)
-    vector = null + sum(
-        amplitude * (coordinates.vector(values) - null)
-        for amplitude, values in zip(item.amplitudes, usual, strict=True)
-    )
-    low, high = coordinates.bounds()
-    return [coordinates.values(np.clip(vector, low, high), base)]

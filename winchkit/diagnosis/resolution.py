@@ -102,7 +102,7 @@ def _finer(recording: Recording, line: Line) -> Motion | None:
 
     time, angle = np.interp(there, here, signals.time), between(signals.motor_angle)
     at = replace(
-        line.motion(Signals(time, angle)).at,
+        line.motion(Signals(time, angle, fastest=signals.fastest)).at,
         tension=between(smooth.at.tension + _sharper(recording, line)),
         temperature=np.interp(there, here, smooth.at.temperature),
     )

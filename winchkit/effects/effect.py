@@ -82,6 +82,8 @@ class Effect:
     """May stand several times, with other orders."""
     probes: tuple[Mapping[str, float], ...] = field(default=())
     """Values whose secants make the signature where single parameters have no gradient."""
+    possible: Callable[[Values], bool] | None = None
+    """Whether values make sense together, where the bounds of each cannot say it."""
     on_robot: frozenset[Placement] = frozenset()
     """How it acts on a robot that stands: on ``one`` line, on ``all`` lines alike, on either, or on
     the ``platform``; empty where it takes a motion to show."""

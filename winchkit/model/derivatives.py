@@ -16,7 +16,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-_LEAVES_BEHIND = 4.0
+_LEAVES_BEHIND = 2.0
 _CREEP_SHARE = 0.02
 _CREEP_LEAST = 1e-3
 _LOAD_SPAN = 0.02
@@ -24,14 +24,13 @@ _AGREES = 0.1
 _CALMER = 0.5
 
 
-def smooth_sign(rate: Array, creep: float) -> Array:
+def smooth_sign(rate: Array, creep: float, fastest: float) -> Array:
     """Sign of a rate, smooth below ``creep``; narrower on a machine that is slow altogether.
 
     A drive that never turns faster than the smoothing would have no direction at all; one that
-    stands still has none, whatever the rounding of its derivative. A run that is fast enough to
-    leave the smoothing behind keeps to ``creep``.
+    stands still has none, whatever the rounding of its derivative. A machine that is ever fast
+    enough to leave the smoothing behind keeps to ``creep``; ``fastest`` says how fast it gets.
     """
-    fastest = float(np.max(np.abs(rate), initial=0.0))
     if fastest >= _LEAVES_BEHIND * creep:
         return np.asarray(np.tanh(rate / creep))
     width = np.clip(_CREEP_SHARE * fastest, _CREEP_LEAST * creep, creep)

@@ -110,17 +110,19 @@ class Line:
             rounding = span_of(time) ** 2 * second_derivative(load, time)
         tension = load if load is not None else signals.tension
         missing = np.full_like(time, np.nan)
+        fastest = signals.fastest or float(np.max(np.abs(rate), initial=0.0))
+        reeled = fastest * float(np.max(np.abs(self._pace(angle)), initial=0.0))
         at = At(
             profile=self.profile,
             time=time - time[0],
             motor_angle=angle,
             motor_rate=rate,
             motor_acceleration=np.gradient(rate, time),
-            motor_direction=smooth_sign(rate, _CREEP_RATE),
+            motor_direction=smooth_sign(rate, _CREEP_RATE, fastest),
             drum_angle=drum_angle,
             wound_angle=self._reference_wound + drum_angle,
             speed=speed,
-            direction=smooth_sign(speed, _CREEP_SPEED),
+            direction=smooth_sign(speed, _CREEP_SPEED, reeled),
             free_length=length,
             tension=np.zeros_like(time) if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,

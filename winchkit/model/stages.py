@@ -99,6 +99,8 @@ class Signals:
     tension: Array | None = None
     temperature: Array | None = None
     motor_velocity: Array | None = None
+    fastest: float | None = None
+    """How fast the motor gets in all runs of this machine, rad/s; None: as fast as in this one."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,11 @@ def apply(tension: Array, at: At, values: Values) -> Array:
     return tension * coulomb_ratio(at.direction * friction, at.wrap)
 
 
+def _sticks(values: Values) -> bool:
+    """Friction falls as a film of grease builds up: it is no less at creep speed."""
+    return values["static"] >= values["coulomb"]
+
+
 EFFECT = Effect(
     id="pulley-stribeck",
     stage=Stage.PULLEY,
@@ -44,4 +49,5 @@ EFFECT = Effect(
     family="pulley friction",
     contains=("pulley-coulomb", "pulley-capstan"),
     needs=("pulley", "load"),
+    possible=_sticks,
 )

@@ -1,0 +1,40 @@
+"""Shapes that a fit drives to their ends, and values that cannot be."""
+
+from __future__ import annotations
+
+import pytest
+from diagnosis_runs import CATALOGUE, term
+
+from winchkit.diagnosis.shapes import in_disguise, with_fewer_coefficients
+from winchkit.effects.effect import Effect
+
+
+def test_coefficients_are_given_up_from_the_last() -> None:
+    law: Effect | None = CATALOGUE["cable-elongation-quartic"]
+    fitted = []
+    while law is not None:
+        fitted.append([p.name for p in law.parameters if p.role != "fixed"])
+        assert all(name in fitted[-1] for probe in law.probes for name in probe)
+        law = with_fewer_coefficients(law)
+    assert fitted == [["k1", "b2", "b3", "b4"], ["k1", "b2", "b3"], ["k1", "b2"]]
+
+
+def test_what_is_no_series_keeps_its_shapes() -> None:
+    for effect in CATALOGUE:
+        if effect.id != "cable-elongation-quartic":
+            assert with_fewer_coefficients(effect) is None, effect.id
+
+
+@pytest.mark.parametrize(("static", "disguised"), [(0.03, False), (0.01, True)])
+def test_rubbing_less_at_creep_speed_is_no_stribeck_friction(
+    static: float, disguised: bool
+) -> None:
+    curve = term("pulley-stribeck", coulomb=0.02, static=static, stribeck_speed=0.03)
+    assert in_disguise(curve) is disguised
+
+
+def test_a_shape_at_its_end_is_another_effect() -> None:
+    ends = CATALOGUE["motor-stribeck"].parameter("stribeck_speed")
+    inside = term("motor-stribeck", torque=0.02, stribeck_speed=ends.typical)
+    assert not in_disguise(inside)
+    assert in_disguise(term("motor-stribeck", torque=0.02, stribeck_speed=ends.high))

@@ -1,0 +1,66 @@
+"""Where fits of a candidate begin, and what becomes of shapes that a fit drives to their ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from winchkit.diagnosis.signature import Score
+from winchkit.effects.bind import Term
+from winchkit.effects.coordinates import Coordinates
+from winchkit.effects.effect import Effect
+
+__all__ = ["gap", "in_disguise", "starting_values", "with_fewer_coefficients"]
+
+
+def in_disguise(term: Term) -> bool:
+    """Whether a term has become another effect: a shape at its bound, values that cannot be."""
+    effect = term.effect
+    if effect.possible is not None and not effect.possible(term.values):
+        return True
+    coordinates = Coordinates(effect)
+    at = coordinates.vector(term.values)
+    low, high = coordinates.bounds()
+    shapes = slice(len(coordinates.amplitudes), None)
+    ends = (at <= low + 1e-6) | (at >= high - 1e-6)
+    return bool(np.any(ends[shapes]))
+
+
+def with_fewer_coefficients(effect: Effect) -> Effect | None:
+    """The effect with its last coefficient of a series held at zero; None where it has none.
+
+    A few loads show a law's first curvature, not its third: coefficients beyond what the data
+    can show run to their bounds, and the law without them is still that law.
+    """
+    series = [p for p in effect.parameters if p.role == "shape" and p.low < p.null == 0.0 < p.high]
+    if len(series) < 2:
+        return None
+    last = series[-1]
+    held = replace(last, role="fixed")
+    parameters = tuple(held if p is last else p for p in effect.parameters)
+    probes = tuple(probe for probe in effect.probes if last.name not in probe)
+    return replace(effect, parameters=parameters, probes=probes)
+
+
+def gap(grid: tuple[float, ...], at: float) -> float:
+    """Distance from a point of a grid to its farther neighbour."""
+    index = grid.index(at)
+    return max(abs(grid[i] - at) for i in (index - 1, index + 1) if 0 <= i < len(grid))
+
+
+def starting_values(item: Score) -> list[dict[str, float]]:
+    """Values at which fits of an atom begin: its linear amplitudes within bounds, or its probes."""
+    atom = item.atom
+    coordinates = Coordinates(atom.effect)
+    base = {**atom.effect.null, **atom.shape}
+    usual = [{**base, **secant} for secant in atom.secants]
+    if atom.effect.probes:
+        return usual
+    null = coordinates.vector(base)
+    vector = null + sum(
+        amplitude * (coordinates.vector(values) - null)
+        for amplitude, values in zip(item.amplitudes, usual, strict=True)
+    )
+    low, high = coordinates.bounds()
+    return [coordinates.values(np.clip(vector, low, high), base)]
