@@ -146,7 +146,14 @@ class FakeCell:
 class Rig:
     """Winches with fake axes under a real loop, stepped by hand."""
 
-    def __init__(self, limits: LimitSpec, names: str = "A", *, cell: bool = True) -> None:
+    def __init__(
+        self,
+        limits: LimitSpec,
+        names: str = "A",
+        *,
+        cell: bool = True,
+        rope: RopeMap | None = None,
+    ) -> None:
         self.now = 100.0
         self.bus = FakeBus()
         self.axes = {name: FakeAxis() for name in names}
@@ -154,9 +161,9 @@ class Rig:
         self.limits = limits
         parts = {}
         for name, axis in self.axes.items():
-            rope = RopeMap(StraightLine())
+            own = rope or RopeMap(StraightLine())
             sensors = {"cell": self.cells[name]} if cell else {}
-            parts[name] = WinchParts(axis, rope, Controller(axis, rope, limits), sensors)
+            parts[name] = WinchParts(axis, own, Controller(axis, own, limits), sensors)
         self.supervisor = Supervisor(dict.fromkeys(names, limits), 0.05)
         self.loop = ControlLoop([(self.bus, 127, 0.05)], parts, self.supervisor, self, CYCLE)
         self.tension: dict[str, float | None] = dict.fromkeys(names, 100.0)

@@ -76,8 +76,7 @@ class Bench:
             stack.callback(self.loop.close)
             self.loop.start()
             await_feedback(self.loop, self.axes, clock)
-            every = (item for one in self.winch.values() for item in one.sensors.values())
-            await_sensors(every, clock)
+            await_sensors((s for one in self.winch.values() for s in one.sensors.values()), clock)
             self._server = StationServer(self)
             self._stack = stack.pop_all()
 
@@ -285,14 +284,17 @@ class Bench:
             await_cycles(self.loop, self.clock, 50)
 
 
-def open_bench(bench: str | Path | BenchSpec, clock: Clock | None = None) -> Bench:
+def open_bench(
+    bench: str | Path | BenchSpec, clock: Clock | None = None, effects: Iterable[str | Path] = ()
+) -> Bench:
     """Open a bench by its wiring file: buses, drives commissioned and disabled, sensors polled.
 
-    Use it in a ``with`` block: leaving it, by any exception, stops the winches in a controlled
-    way. Raises FileError, ConnectionLost (NoReply, DeviceRefused) and NotPermitted.
+    ``effects``: Python files with effects of your own that its profiles have, besides those that
+    the file names. Use it in a ``with`` block: leaving it, by any exception, stops the winches.
+    Raises FileError, ConnectionLost (NoReply, DeviceRefused), NotPermitted.
     """
-    if isinstance(bench, BenchSpec):
-        return Bench(bench, clock or MonotonicClock())
-    from winchkit.schema.read import read_bench
+    if not isinstance(bench, BenchSpec):
+        from winchkit.schema.read import read_bench
 
-    return Bench(read_bench(bench), clock or MonotonicClock())
+        bench = read_bench(bench)
+    return Bench(bench.with_effects(effects), clock or MonotonicClock())

@@ -61,7 +61,7 @@ class ControlLoop:
         self.on_jog: Callable[[str, float], None] = lambda _name, _speed: None
         self.samplers: list[Callable[[BenchSnapshot], None]] = []
         self.failure: BaseException | None = None
-        """What a callback or the loop itself raised."""
+        """What a callback, an effect of a profile or the loop itself raised."""
         self.snapshot: BenchSnapshot | None = None
         self.overruns = 0
         self.ordering = threading.Lock()
@@ -105,6 +105,7 @@ class ControlLoop:
         self._listen_for_stops(now)
         self._send_sync(now)
         inputs = {name: known(parts, now, self._count) for name, parts in self.winches.items()}
+        self._note_failed_ropes()
         blocked = self.supervisor.check(now, inputs)
         # Before anything is stopped: whoever sees a motion ended must see the trip that ended it.
         self.snapshot = snapshot = self._picture(now, inputs, blocked)
@@ -128,6 +129,11 @@ class ControlLoop:
             if parts.controller.unheeded(now):
                 self.beating = False
                 self.supervisor.latch(Trip("deaf", name, _DEAF, latches=True))
+
+    def _note_failed_ropes(self) -> None:
+        """A rope whose effects fail is known no better than it was: everything stops."""
+        for parts in self.winches.values():
+            self.failure = self.failure or parts.rope.failure
 
     def _failing(self) -> str:
         """Which winch must go down because its drive could not go on, and why, in words."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import isfinite, nan
 from typing import NamedTuple, Protocol
 
+from winchkit.errors import FileError
 from winchkit.estimation.rope_now import RopeNow, Sample
 
 __all__ = ["LineModel", "RopeMap"]
@@ -58,6 +59,8 @@ class RopeMap:
         self._line, self._now = line, now
         self._here = _Here()
         self._felt = _Felt()
+        self.failure: FileError | None = None
+        """Why an effect of the profile, perhaps a user's own, could not be used any more."""
 
     @classmethod
     def of(cls, now: RopeNow) -> RopeMap:
@@ -82,7 +85,17 @@ class RopeMap:
         moved = abs((sample.motor_angle - felt.angle) * self._here.arm)
         if sample.time - felt.time < _SOON and moved < _FAR:
             return
-        state = self._now.update(sample)
+        try:
+            state = self._now.update(sample)
+        except FileError as error:
+            self.failure = error
+            return
+        if not isfinite(state.length):
+            self.failure = FileError(
+                "the effects of the profile give no cable length (NaN) at motor angle "
+                f"{sample.motor_angle:g} rad, {sample.cell:g} N; mend them or leave them out"
+            )
+            return
         arm = self._here.arm
         if not moved < _FAR:
             arm = self._line.arm(sample.motor_angle)

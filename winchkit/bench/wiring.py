@@ -66,12 +66,13 @@ class Wired:
 
 def wire(spec: BenchSpec, clock: Clock, stack: ExitStack) -> Wired:
     """Open everything; what is open is closed by ``stack``."""
-    from winchkit.effects.bind import terms_of
+    from winchkit.effects import load_catalogue, terms_of
     from winchkit.estimation.rope_now import RopeNow
 
     profiles = {name: _profile(spec, winch) for name, winch in spec.winch.items()}
+    catalogue = load_catalogue(spec.effect_files)
     ropes = {
-        name: RopeMap.of(RopeNow(profile, terms_of(profile), _weight(spec.winch[name])))
+        name: RopeMap.of(RopeNow(profile, terms_of(profile, catalogue), _weight(spec.winch[name])))
         for name, profile in profiles.items()
     }
     buses = _open_buses(spec, clock, stack)

@@ -14,7 +14,14 @@ from winchkit.errors import UsageError
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
 
-__all__ = ["BusChoice", "bench_option", "bus_options", "dry_run_option", "winch_argument"]
+__all__ = [
+    "BusChoice",
+    "bench_option",
+    "bus_options",
+    "dry_run_option",
+    "effects_option",
+    "winch_argument",
+]
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -25,6 +32,13 @@ bench_option: Decorator = click.option(
     metavar="FILE",
     shell_complete=complete_bench,
     help="Wiring file of the bench.",
+)
+effects_option: Decorator = click.option(
+    "--effects",
+    "effects",
+    multiple=True,
+    metavar="FILE",
+    help="Python file with effects of your own that a profile has; may be given several times.",
 )
 winch_argument: Decorator = click.argument("winch", required=False, shell_complete=complete_winch)
 dry_run_option: Decorator = click.option(

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.bench_option import effects_option
 from winchkit.cli.output import echo_json
 from winchkit.errors import Fault, FileError
 
 if TYPE_CHECKING:
+    from winchkit.schema.bench import BenchSpec
     from winchkit.schema.read import Declared
     from winchkit.schema.winch import WinchProfile
 
@@ -40,14 +43,17 @@ class Verdict:
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@effects_option
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
 @click.pass_context
-def command(ctx: click.Context, files: tuple[str, ...], as_json: bool) -> None:
+def command(
+    ctx: click.Context, files: tuple[str, ...], effects: Sequence[str], as_json: bool
+) -> None:
     """Check files of any kind: profiles, benches, programmes, devices (.toml), runs (.csv, .mcap).
 
     Every fault of a file is told with its line. Exits with 3 when a file has one.
     """
-    verdicts = [_verdict(file) for file in files]
+    verdicts = [_verdict(file, effects) for file in files]
     for verdict in verdicts:
         for warning in verdict.warnings:
             click.echo(f"{warning} (warning)", err=True)
@@ -59,13 +65,13 @@ def command(ctx: click.Context, files: tuple[str, ...], as_json: bool) -> None:
     ctx.exit(0 if all(verdict.ok for verdict in verdicts) else FileError.exit_code)
 
 
-def _verdict(file: str) -> Verdict:
+def _verdict(file: str, effects: Sequence[str]) -> Verdict:
     try:
         suffix = Path(file).suffix.lower()
         if suffix in RUNS:
             return _run(file)
         if suffix == ".toml" or not Path(file).is_file():
-            return _declaration(file)
+            return _declaration(file, effects)
         known = ", ".join((".toml", *RUNS))
         return Verdict(file, "", faults=(Fault(f"'{suffix}' is none of {known}", file),))
     except FileError as error:
@@ -81,7 +87,7 @@ def _run(file: str) -> Verdict:
     return Verdict(file, "run", run.name, summary_of(run).text, warnings=notes)
 
 
-def _declaration(file: str) -> Verdict:
+def _declaration(file: str, effects: Sequence[str]) -> Verdict:
     from winchkit.cli.check_drives import faults_and_warnings
     from winchkit.cli.check_drums import stroke_of, warnings_of_drums
     from winchkit.cli.check_robots import faults_and_warnings as of_robots
@@ -90,9 +96,7 @@ def _declaration(file: str) -> Verdict:
     declaration = load(file)
     drive_faults, drive_warnings = faults_and_warnings(declaration.value)
     robot_faults, robot_warnings = of_robots(file, declaration.value)
-    effect_faults = dict.fromkeys(
-        (*_effect_faults(_profiles(declaration.value)), *_of_robot(declaration.value))
-    )
+    effect_faults = dict.fromkeys(_effect_faults(declaration.value, effects))
     faults = (*effect_faults, *drive_faults, *robot_faults)
     warnings = (
         *declaration.warnings,
@@ -107,41 +111,45 @@ def _declaration(file: str) -> Verdict:
 def _profiles(value: Declared) -> list[WinchProfile]:
     """The winch profiles of a declaration; those that a bench names are read as well."""
     from winchkit.catalog import find
-    from winchkit.schema.bench import BenchSpec
     from winchkit.schema.read import read_winch
     from winchkit.schema.robot import RobotProfile
-    from winchkit.schema.simbench import SimBench
     from winchkit.schema.winch import WinchProfile
 
     if isinstance(value, WinchProfile):
         return [value]
     if isinstance(value, RobotProfile):
         return [line.winch for line in value.line if isinstance(line.winch, WinchProfile)]
-    bench = value.bench if isinstance(value, SimBench) else value
-    if not isinstance(bench, BenchSpec):
+    bench = _bench(value)
+    if bench is None:
         return []
     named = dict.fromkeys(wiring.profile for wiring in bench.winch.values())
     return [read_winch(find("profiles", name, beside=bench.path)) for name in named]
 
 
-def _effect_faults(profiles: list[WinchProfile]) -> list[Fault]:
-    """What is wrong with the effects that profiles declare."""
-    if not any(profile.effect for profile in profiles):
-        return []
-    from winchkit.effects import check_profile
+def _bench(value: Declared) -> BenchSpec | None:
+    """The bench that a declaration is, if it is one."""
+    from winchkit.schema.bench import BenchSpec
+    from winchkit.schema.simbench import SimBench
 
-    return [fault for profile in profiles for fault in check_profile(profile)]
+    bench = value.bench if isinstance(value, SimBench) else value
+    return bench if isinstance(bench, BenchSpec) else None
 
 
-def _of_robot(value: Declared) -> list[Fault]:
-    """What is wrong with the effects that a robot declares itself."""
+def _effect_faults(value: Declared, effects: Sequence[str]) -> list[Fault]:
+    """What is wrong with the effects that profiles declare, a robot's own among them."""
     from winchkit.schema.robot import RobotProfile
 
-    if not isinstance(value, RobotProfile) or not value.effect:
+    profiles, bench = _profiles(value), _bench(value)
+    files: list[str | Path] = [*effects, *(bench.effect_files if bench is not None else ())]
+    robot = value if isinstance(value, RobotProfile) and value.effect else None
+    if not (files or robot or any(profile.effect for profile in profiles)):
         return []
+    from winchkit.effects import check_profile, load_catalogue
     from winchkit.effects.bind_robot import check_robot
 
-    return check_robot(value)
+    catalogue = load_catalogue(files)
+    faults = [fault for profile in profiles for fault in check_profile(profile, catalogue)]
+    return faults if robot is None else [*faults, *check_robot(robot, catalogue)]
 
 
 def _show(verdict: Verdict) -> None:

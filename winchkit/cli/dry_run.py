@@ -39,17 +39,19 @@ class Frame:
 
 
 @contextmanager
-def station_for(bench: str, *, dry_run: bool, as_json: bool = False) -> Iterator[Station]:
+def station_for(
+    bench: str, *, dry_run: bool, as_json: bool = False, effects: Sequence[str] = ()
+) -> Iterator[Station]:
     """A station at the bench or, for a dry run, at a rehearsal whose frames are then shown."""
     from winchkit.bench.session import at_station
 
     if not dry_run:
-        with at_station(bench) as station:
+        with at_station(bench, effects) as station:
             yield station
         return
     from winchkit.schema.read import read_bench
 
-    spec = read_bench(bench)
+    spec = read_bench(bench).with_effects(effects)
     frames: list[Frame] = []
     with _rehearsal(spec, frames) as station:
         yield station

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
 import click
 
-from winchkit.cli.bench_option import bench_option, dry_run_option, winch_argument
+from winchkit.cli.bench_option import (
+    bench_option,
+    dry_run_option,
+    effects_option,
+    winch_argument,
+)
 from winchkit.cli.output import echo_json
 from winchkit.cli.status_line import status_line
 from winchkit.errors import UsageError
@@ -29,6 +35,7 @@ _POLL = 0.02
 @click.option(
     "--speed", metavar="SPEED", help="Of the rope.  [default: a tenth of the winch's limit]"
 )
+@effects_option
 @dry_run_option
 @click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
 def command(
@@ -39,6 +46,7 @@ def command(
     method: int | None,
     at: str | None,
     speed: str | None,
+    effects: Sequence[str],
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -56,7 +64,7 @@ def command(
     if at is not None and here is not None:
         raise UsageError("--at belongs to --method; --here names the length already")
     length = optional(here if here is not None else at, "length")
-    with station_for(bench, dry_run=dry_run, as_json=as_json) as station:
+    with station_for(bench, dry_run=dry_run, as_json=as_json, effects=effects) as station:
         station.home(winch, method, length, optional(speed, "speed"))
         while station.homing():
             time.sleep(_POLL)

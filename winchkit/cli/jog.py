@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.bench_option import bench_option, dry_run_option, winch_argument
+from winchkit.cli.bench_option import (
+    bench_option,
+    dry_run_option,
+    effects_option,
+    winch_argument,
+)
 from winchkit.cli.output import echo_json
 from winchkit.cli.status_line import status_line
 from winchkit.errors import ConnectionLost, UsageError, WinchkitError
@@ -42,6 +48,7 @@ _HELP = "hold up: wind in, down: pay out · space: stop · + −: speed · r: re
     "--step", metavar="LENGTH", help="Without keys: wind in so much rope (negative pays out)."
 )
 @click.option("--reset", is_flag=True, help="First clear trips and drive faults.")
+@effects_option
 @dry_run_option
 @click.option(
     "--json", "as_json", is_flag=True, help="Without keys: print where it stands as JSON."
@@ -54,6 +61,7 @@ def command(
     duration: str | None,
     step: str | None,
     reset: bool,
+    effects: Sequence[str],
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -70,7 +78,7 @@ def command(
     velocity, limit = quantity(speed, "speed"), seconds(duration)
     if limit is None and step is None and (dry_run or not sys.stdin.isatty()):
         raise UsageError("there is no terminal to hold a key on; use --for TIME or --step LENGTH")
-    with station_for(bench, dry_run=dry_run, as_json=as_json) as station:
+    with station_for(bench, dry_run=dry_run, as_json=as_json, effects=effects) as station:
         if reset:
             station.reset()
         if step is not None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.bench_option import effects_option
 from winchkit.cli.completing import complete_bench
 from winchkit.cli.lazy import At, LazyGroup
 from winchkit.cli.output import echo_json
@@ -45,6 +46,7 @@ _SHOW_PERIOD = 0.5
 @click.option("--jsonl", is_flag=True, help="Print live pictures to stdout, one JSON a line.")
 @click.option("--udp", metavar="HOST:PORT", help="Send live pictures as JSON, e.g. to PlotJuggler.")
 @click.option("--period", default="0.02 s", show_default=True, help="Between two live pictures.")
+@effects_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.pass_context
 def command(
@@ -57,6 +59,7 @@ def command(
     jsonl: bool,
     udp: str | None,
     period: str,
+    effects: Sequence[str],
     as_json: bool,
 ) -> None:
     """Log every winch of a bench until Ctrl-C, or for a time.
@@ -75,7 +78,7 @@ def command(
     from winchkit.cli.live_output import live_sinks
 
     limit, pause = seconds(duration), quantity(period, "time")
-    with live_sinks(jsonl=jsonl, udp=udp) as sinks, at_station(bench) as station:
+    with live_sinks(jsonl=jsonl, udp=udp) as sinks, at_station(bench, effects) as station:
         if output:
             station.start_log(str(Path(output).absolute()), rotate)
         with _counter_row(station) as show:

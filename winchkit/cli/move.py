@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.bench_option import bench_option, dry_run_option, winch_argument
+from winchkit.cli.bench_option import (
+    bench_option,
+    dry_run_option,
+    effects_option,
+    winch_argument,
+)
 from winchkit.cli.output import echo_json
 from winchkit.cli.status_line import status_line
 from winchkit.errors import UsageError
@@ -27,6 +33,7 @@ _POLL = 0.05
 @click.option("--by", metavar="LENGTH", help="Change of cable length; positive pays out.")
 @click.option("--speed", metavar="SPEED", help="Of the rope.  [default: the winch's limit]")
 @click.option("--acceleration", metavar="ACCELERATION", help="[default: the winch's limit]")
+@effects_option
 @dry_run_option
 @click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
 def command(
@@ -37,6 +44,7 @@ def command(
     by: str | None,
     speed: str | None,
     acceleration: str | None,
+    effects: Sequence[str],
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -53,7 +61,7 @@ def command(
         raise UsageError("where to? give either --to LENGTH or --by LENGTH")
     target, change = optional(to, "length"), optional(by, "length")
     fastest, ramp = optional(speed, "speed"), optional(acceleration, "acceleration")
-    with station_for(bench, dry_run=dry_run, as_json=as_json) as station:
+    with station_for(bench, dry_run=dry_run, as_json=as_json, effects=effects) as station:
         station.move(winch, target, change, fastest, ramp)
         _wait(station, winch)
         status = station.status()

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.bench_option import bench_option, dry_run_option
+from winchkit.cli.bench_option import bench_option, dry_run_option, effects_option
 from winchkit.cli.completing import complete_programme
 from winchkit.cli.output import echo_json
 
@@ -42,6 +42,7 @@ _POLL = 0.05
     is_flag=True,
     help="Answer every question with yes; a simulated bench does what is asked.",
 )
+@effects_option
 @dry_run_option
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def command(
@@ -51,6 +52,7 @@ def command(
     out: Path,
     suffix: str,
     yes: bool,
+    effects: Sequence[str],
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -63,9 +65,10 @@ def command(
 
     declared = read_programme(programme_path(programme))
     if dry_run:
-        _rehearse(bench, declared, as_json=as_json)
+        _rehearse(bench, declared, effects, as_json=as_json)
         return
-    written = _execute(bench, declared, out, f".{suffix}", partial(_agree, bench) if yes else _ask)
+    ask = partial(_agree, bench) if yes else _ask
+    written = _execute(bench, effects, declared, out, f".{suffix}", ask)
     if as_json:
         echo_json({"schema": 1, "programme": declared.name, "runs": written})
     else:
@@ -74,7 +77,12 @@ def command(
 
 
 def _execute(
-    bench: str, programme: Programme, out: Path, suffix: str, ask: Callable[[Step], None]
+    bench: str,
+    effects: Sequence[str],
+    programme: Programme,
+    out: Path,
+    suffix: str,
+    ask: Callable[[Step], None],
 ) -> list[Path]:
     """Run it as the bench's owner; other commands may attach meanwhile."""
     from winchkit.bench.bench import open_bench
@@ -84,15 +92,15 @@ def _execute(
         place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
         click.echo(f"{place}: {_words(step)}", err=True)
 
-    with open_bench(bench) as opened:
+    with open_bench(bench, effects=effects) as opened:
         return run_programme(opened, programme, out, ask, suffix=suffix, progress=tell)
 
 
-def _rehearse(bench: str, programme: Programme, *, as_json: bool) -> None:
+def _rehearse(bench: str, programme: Programme, effects: Sequence[str], *, as_json: bool) -> None:
     """Make the moves of one repeat on simulated drives, leaving out holds and questions."""
     from winchkit.cli.dry_run import station_for
 
-    with station_for(bench, dry_run=True, as_json=as_json) as station:
+    with station_for(bench, dry_run=True, as_json=as_json, effects=effects) as station:
         for step in programme.step:
             if step.to is None and step.by is None:
                 continue

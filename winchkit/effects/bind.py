@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
+from winchkit.effects.acting import act
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.model.line import Line
-from winchkit.model.stages import At, Modifier
+from winchkit.model.stages import Modifier
 from winchkit.schema.winch import EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse, suggest
 
-__all__ = ["Term", "check_profile", "line_of", "modifiers_of", "terms_of", "values_of"]
+__all__ = ["Term", "check_profile", "line_of", "modifiers_of", "not_in", "terms_of", "values_of"]
 
 _BESIDE_PARAMETERS = {"id", "fitted"}
 
@@ -35,12 +35,8 @@ class Term:
 
     def modifier(self) -> Modifier:
         """The term ready to act on a line."""
-        apply = partial(_act, self.effect, self.values)
+        apply = partial(act, self.effect, self.values)
         return Modifier(self.effect.stage, apply, self.effect.order)
-
-
-def _act(effect: Effect, values: Mapping[str, float], value: Any, at: At) -> Any:
-    return effect.apply(value, at, values)
 
 
 def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:
@@ -71,8 +67,7 @@ def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list
     faults: list[Fault] = []
     for table in profile.effect:
         if table.id not in catalogue:
-            known = [effect.id for effect in catalogue]
-            message = f"no effect '{table.id}'{suggest(table.id, known)}"
+            message = not_in(catalogue, table.id)
             faults.append(Fault(message, table.path, table.line, "effect.id"))
             continue
         effect = catalogue[table.id]
@@ -87,6 +82,13 @@ def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list
         faults.extend(wrong)
         terms.append(Term(effect, values))
     return terms, faults
+
+
+def not_in(catalogue: Catalogue, effect_id: str) -> str:
+    """That there is no such effect, in words, and what to do."""
+    near = suggest(effect_id, [effect.id for effect in catalogue])
+    own = 'one of your own needs its file: --effects FILE.py, or effects = ["FILE.py"] in a bench'
+    return f"no effect '{effect_id}'{near}; {own}"
 
 
 def _short(profile: WinchProfile) -> list[tuple[str, dict[str, float]]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from winchkit.effects.bind import Term, terms_of, values_of
+from winchkit.effects.bind import Term, not_in, terms_of, values_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.placed import HOME, at_line, line_of_effect
@@ -98,8 +98,7 @@ def _bind(profile: RobotProfile, catalogue: Catalogue) -> tuple[list[Term], list
     names = [line.name for line in profile.line]
     for table in _single(profile.effect):
         if table.id not in catalogue:
-            hint = suggest(table.id, [effect.id for effect in catalogue])
-            faults.append(_fault(table, f"no effect '{table.id}'{hint}", "effect.id"))
+            faults.append(_fault(table, not_in(catalogue, table.id), "effect.id"))
             continue
         effect = catalogue[table.id]
         given = {key: value for key, value in table.values.items() if key != "line"}

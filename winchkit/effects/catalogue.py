@@ -9,10 +9,10 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from pkgutil import iter_modules
 
-from winchkit.effects.effect import Effect
+from winchkit.effects.effect import Effect, Parameter
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.errors import Fault, FileError, UsageError
-from winchkit.units import dimension_of, suggest
+from winchkit.units import UNITS, dimension_of, suggest
 
 __all__ = ["Catalogue", "load_catalogue"]
 
@@ -61,8 +61,6 @@ def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:
         found.extend(_effects_in(point.load(), point.name))
     for file in files:
         found.extend(_from_file(Path(file)))
-    for effect in found:
-        _check(effect)
     return Catalogue(sorted(found, key=lambda effect: (len(effect.parameters), effect.id)))
 
 
@@ -85,22 +83,33 @@ def _from_file(path: Path) -> list[Effect]:
 def _effects_in(thing: object, where: str) -> list[Effect]:
     """Effects in a module, or the effect itself."""
     if isinstance(thing, Effect):
-        return [thing]
-    effects = [value for value in vars(thing).values() if isinstance(value, Effect)]
+        effects = [thing]
+    else:
+        effects = [value for value in vars(thing).values() if isinstance(value, Effect)]
     if not effects:
         raise FileError(Fault("holds no winchkit.effects.effect.Effect", where))
+    faults = [
+        Fault(f"effect '{effect.id}': {parameter.name}: {wrong}", where)
+        for effect in effects
+        for parameter in effect.parameters
+        if (wrong := _wrong_with(parameter))
+    ]
+    if faults:
+        raise FileError(faults)
     return effects
 
 
-def _check(effect: Effect) -> None:
-    """Refuse an effect whose declaration contradicts itself."""
-    for parameter in effect.parameters:
-        if dimension_of(parameter.unit) is None:
-            raise FileError(
-                f"effect '{effect.id}': {parameter.name}: unknown unit '{parameter.unit}'"
-            )
-        if not parameter.low <= parameter.null <= parameter.high:
-            raise FileError(
-                f"effect '{effect.id}': {parameter.name}: null {parameter.null:g} lies outside "
-                f"[{parameter.low:g}, {parameter.high:g}]"
-            )
+def _wrong_with(parameter: Parameter) -> str:
+    """What its declaration contradicts, in words; empty where nothing."""
+    if dimension_of(parameter.unit) is None:
+        known = ", ".join(dict.fromkeys(next(iter(table)) for table in UNITS.values()))
+        return (
+            f"unknown unit '{parameter.unit}'; the SI ones are {known}; a compliance is a "
+            "stiffness with null=inf and reciprocal=True"
+        )
+    if not parameter.low <= parameter.null <= parameter.high:
+        return (
+            f"null {parameter.null:g} lies outside [{parameter.low:g}, {parameter.high:g}]; "
+            "the bounds must hold the value at which the effect vanishes"
+        )
+    return ""

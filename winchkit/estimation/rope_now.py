@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from winchkit.effects.acting import act
 from winchkit.effects.bind import Term, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import At, Modifier, Stage
@@ -73,10 +74,10 @@ class _Carried:
     def _apply(self, value: Any, at: At) -> Any:
         effect, values = self.term.effect, self.term.values
         if effect.carry is None:
-            return effect.apply(value, at, values)
+            return act(effect, values, value, at)
         begun = self.start.get(at.pulley, effect.rested)
         values = {**values, "start": begun}
-        after = effect.apply(value, at, values)
+        after = act(effect, values, value, at)
         self.end[at.pulley] = effect.carry(after, value, at, values)
         return after
 

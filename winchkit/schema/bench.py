@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Annotated, Literal
 
 from winchkit.schema.device_servo import OptionSpec
@@ -143,6 +144,17 @@ class BenchSpec(Table):
     cycle: PositiveDuration = 0.004
     stop_together: Flag = True
     """Whether a stop of one winch stops all. Trips stop all in any case."""
+    effects: tuple[str, ...] = ()
+    """Python files with effects of the user's own, which profiles of its winches may have."""
     description: str = ""
     path: str = field(default="", compare=False)
-    """The file it was read from; profiles by path are found beside it."""
+    """The file it was read from; profiles and effects by path are found beside it."""
+
+    @property
+    def effect_files(self) -> tuple[Path, ...]:
+        """The files of ``effects``, those with a relative path beside the bench's own."""
+        return tuple(Path(self.path).parent / file for file in self.effects)
+
+    def with_effects(self, files: Iterable[str | Path]) -> BenchSpec:
+        """The bench with more files of effects, their paths as seen from here."""
+        return replace(self, effects=(*self.effects, *(str(Path(f).absolute()) for f in files)))

@@ -37,6 +37,10 @@ def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> 
     _check_references(reading, tree, read_device)
     named = {"name": reading.stem, **tree, "path": reading.source.path}
     spec = reading.table(BenchSpec, named)
+    for index, file in enumerate(spec.effect_files if spec is not None else ()):
+        if not file.is_file():
+            at: Key = ("effects", index)
+            reading.fault(at, f"no such file of effects: {file}; a path is as seen from this file")
     if spec is not None and not spec.winch:
         reading.fault(("winch",), "a bench has at least one winch, in a table [winch.NAME]")
     return spec

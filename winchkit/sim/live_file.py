@@ -63,6 +63,8 @@ def _items(table: Any, beside: str) -> Iterator[tuple[str, Any, str | None]]:
 
 def _located(key: str, value: Any, beside: str) -> Any:
     """What stands beside the declaration, by a path that holds elsewhere."""
+    if key == "effects" and beside:
+        return tuple(str((Path(beside).parent / file).resolve()) for file in value)
     if key == "calibration" and beside:
         return str((Path(beside).parent / value).resolve())
     kinds: dict[str, Kind] = {"profile": "profiles", "device": "devices"}
@@ -75,7 +77,8 @@ def _located(key: str, value: Any, beside: str) -> Any:
 def _text(value: Any, hint: Any) -> str:
     if isinstance(value, tuple):
         inner = next((arg for arg in get_args(hint) if arg is not type(None)), hint)
-        return "[" + ", ".join(_text(one, get_args(inner)[0]) for one in value) + "]"
+        item = next(iter(get_args(inner)), inner)
+        return "[" + ", ".join(_text(one, item) for one in value) + "]"
     marker = _marker(hint)
     if isinstance(value, float) and marker is not None:
         unit = next(iter(UNITS[marker.dimension]))
