@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -52,10 +51,14 @@ def test_every_verdict_tells_what_these_runs_could_show_and_what_not(bench: str)
     answer = answer_of(bench)
     text = report_text(answer)
     rows = visible(answer)
-    able = sum(not math.isnan(row.share) for row in rows)
+    able = sum(row.share <= 1 for row in rows)
     blind = [effect for effect, _ in unseen(answer)]
-    assert f"would have shown {able} of {len(rows) + len(blind)} effects" in text
-    assert all(effect in text for effect in blind)
+    head = f"would have shown {able} of {len(rows) + len(blind)} effects in their usual size"
+    assert head in text
+    faint = [row.effect for row in rows if not row.share <= 1]
+    assert faint
+    assert all(effect in text for effect in (*blind, *faint))
+    assert "'winchkit plan' proposes the run" in text
     assert " ".join(changes_text(answer.diagnosis).split()) in " ".join(text.split())
 
 

@@ -48,7 +48,6 @@ def command(
     the effects that these runs cannot tell apart come first, else those that show what these
     could not. Run the file with 'winchkit run NEXT.toml --bench B' and diagnose again.
     """
-    from winchkit.diagnosis.confusion import pairs_of
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.kinds import allowed, seen
     from winchkit.diagnosis.plan import offers, programme_of
@@ -57,7 +56,7 @@ def command(
     limits = None if bench is None else _limits(bench, asked.winch)
     declared, catalogue = asked.declared, asked.catalogue
     answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
-    problem, pairs = answer.inquiry.problem, pairs_of(answer.sets)
+    problem, pairs = answer.inquiry.problem, answer.pairs
     room = seen(problem.dataset) if limits is None else allowed(problem.dataset, limits)
     found = offers(problem, pairs, answer.found.noise.rms, list(catalogue), room)
     if output:
@@ -68,7 +67,7 @@ def command(
         listed = [offer.to_json(pairs) for offer in found]
         echo_json({"schema": 1, "offers": listed, "programme": output})
     else:
-        click.echo(_text(found, pairs))
+        click.echo(_text(found, pairs, named=bool(answer.sets)))
         for line in _silent(found, pairs, room, widened=limits is not None):
             click.echo(line)
 
@@ -108,25 +107,33 @@ def _silent(
     return lines
 
 
-def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> str:
+def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], *, named: bool) -> str:
     """A line a kind, the best first; pairs of effects by letters."""
-    from winchkit.diagnosis.report.columns import hanging
+    from winchkit.diagnosis.report.columns import aligned, hanging, paragraph
     from winchkit.diagnosis.report.wording import percent
 
+    if not pairs:
+        rows = [["programme", "minutes", "shows besides"]]
+        rows += [[o.kind.name, f"{o.minutes:.1f}", _shown(o, _FEW)] for o in found]
+        said = "what to run next (nothing to tell apart: what it would show besides)"
+        return "\n".join([said, *hanging(rows)])
     letters = ascii_uppercase[: len(pairs)]
-    rows = [["programme", "minutes", *letters, "shows besides"]]
+    table = [["programme", "minutes", *letters]]
     for offer in found:
         powers = [percent(power) for power in offer.powers[: len(letters)]]
-        shown = ", ".join(offer.shows[:_FEW]) or "—"
-        if len(offer.shows) > _FEW:
-            shown += f" and {len(offer.shows) - _FEW} more"
-        rows.append([offer.kind.name, f"{offer.minutes:.1f}", *powers, shown])
-    if not pairs:
-        head = ["what to run next (nothing to tell apart: what it would show besides)"]
-    else:
-        head = ["what to run next, with the chance (power) that it tells apart"]
-        head += [
-            f"  {letter}: {a.effect.id} / {b.effect.id}"
-            for letter, (a, b) in zip(letters, pairs, strict=False)
-        ]
-    return "\n".join([*head, *hanging(rows)])
+        table.append([offer.kind.name, f"{offer.minutes:.1f}", *powers])
+    what = "" if named else " what came closest (none is named yet)"
+    head = [f"what to run next, with the chance (power) that it tells apart{what}"]
+    head += [
+        f"  {letter}: {a.effect.id} / {b.effect.id}"
+        for letter, (a, b) in zip(letters, pairs, strict=False)
+    ]
+    besides = paragraph(f"the first shows besides: {_shown(found[0])}", "  ", "    ")
+    return "\n".join([*head, *aligned(table), *besides])
+
+
+def _shown(offer: Offer, most: int | None = None) -> str:
+    """Effects that a programme would show and the runs so far do not."""
+    told = ", ".join(offer.shows[:most]) or "—"
+    left = len(offer.shows) - len(offer.shows[:most])
+    return f"{told} and {left} more" if left else told

@@ -28,7 +28,8 @@ from winchkit.diagnosis.result import (
 )
 from winchkit.diagnosis.search import Found, search
 from winchkit.diagnosis.uncertainty import estimates, spread_of
-from winchkit.diagnosis.verdict import judge
+from winchkit.diagnosis.verdict import Judgement, judge
+from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.coordinates import Coordinates
 from winchkit.runs.run import Run
@@ -52,11 +53,14 @@ class Answer:
         found: Found,
         diagnosis: Diagnosis,
         sets: Sequence[Confusion] = (),
+        pairs: Sequence[tuple[Term, Term]] = (),
     ) -> None:
         self.inquiry = inquiry
         self.found = found
         self.sets = tuple(sets)
         """What cannot be told apart, a set for each effect that was found."""
+        self.pairs = tuple(pairs)
+        """Effects to be told apart by a next run, of these sets or of what came closest."""
         self.diagnosis = diagnosis
 
 
@@ -96,7 +100,7 @@ def _answer(inquiry: Inquiry, found: Found) -> Answer:
     shown = judgement.shown
     added = range(inquiry.given, len(shown.final.hypothesis.terms))
     sets = [confusion_of(inquiry, shown.final, shown.noise, index) for index in added]
-    pairs = pairs_of(sets)
+    pairs = pairs_of(sets or _closest(inquiry, found, judgement))
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,
@@ -105,14 +109,25 @@ def _answer(inquiry: Inquiry, found: Found) -> Answer:
         detectable=detectable(found.scores, inquiry.price, found.threshold),
         unexplained_share=judgement.share,
         where=_where(inquiry, found, shown.final) if found.still else (),
-        next_runs=next_runs(inquiry.problem.dataset, pairs, shown.noise.rms),
+        next_runs=next_runs(inquiry.problem.dataset, pairs, found.noise.rms),
         notes=(
             *inquiry.problem.dataset.notes,
             *what_runs_cannot_show(inquiry.problem),
             *judgement.notes,
         ),
     )
-    return Answer(inquiry, shown, diagnosis, sets)
+    return Answer(inquiry, shown, diagnosis, sets, pairs)
+
+
+def _closest(inquiry: Inquiry, found: Found, judgement: Judgement) -> list[Confusion]:
+    """What came closest and may not be named yet, with its rivals: a next run can begin there.
+
+    Not for an unknown: what resembles something outside the catalogue leads astray.
+    """
+    if judgement.verdict != "partly":
+        return []
+    added = range(inquiry.given, len(found.final.hypothesis.terms))
+    return [confusion_of(inquiry, found.final, found.noise, index) for index in added]
 
 
 def inquire(dataset: Dataset, catalogue: Catalogue) -> Inquiry:

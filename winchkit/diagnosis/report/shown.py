@@ -28,6 +28,11 @@ class Visible:
     share: float
     """Of the usual size; NaN where no size within the bounds would have been seen."""
 
+    @property
+    def usual(self) -> bool:
+        """Whether its usual size would have been seen."""
+        return self.share <= 1.0
+
 
 def effects_of(answer: Answer) -> dict[str, Effect]:
     """Every effect that a diagnosis tried or has, by id."""

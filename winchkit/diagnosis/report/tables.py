@@ -164,6 +164,11 @@ def _shortened(
     return join([top, details(f"{len(rows) - _TOP} {rest}", others)])
 
 
+def _times(share: float) -> str:
+    """A size in units of the usual one."""
+    return f"{significant(share, 2)} ×" if isfinite(share) else "–"
+
+
 def _candidate(candidate: Candidate, scales: Mapping[str, Scale]) -> list[str]:
     errors = [
         significant(candidate.heldout_rms[name] / scale.worth)
@@ -201,13 +206,13 @@ def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
 def detectable(answer: Answer) -> Markup:
     """What these runs could have shown at all, and how small."""
     rows = [
-        [element("code", row.effect), parameter_name(row.parameter), row.text]
+        [element("code", row.effect), parameter_name(row.parameter), row.text, _times(row.share)]
         for row in visible(answer)
     ]
     if not rows:
         return Markup("")
     caption = "The smallest size of each effect that these runs would have shown in 9 of 10 cases."
-    head = ["effect", "parameter", "would have been seen"]
+    head = ["effect", "parameter", "would have been seen", "of its usual size"]
     seen = _shortened(caption, head, rows, "more, seen less easily")
     blind = [
         element("li", element("code", effect), f" needs {listed(needs)}")

@@ -141,13 +141,21 @@ def _shown(answer: Answer) -> list[str]:
     rows, blind = visible(answer), [effect for effect, _ in unseen(answer)]
     if not rows:
         return []
-    able = [row for row in rows if not isnan(row.share)]
-    head = f"these runs would have shown {len(able)} of {len(rows) + len(blind)} effects, soonest"
+    able, count = [row for row in rows if row.usual], len(rows) + len(blind)
+    head = (
+        f"these runs would have shown {len(able)} of {count} effects in their usual size, soonest"
+    )
     soonest = [[row.effect, f"{row.parameter} {row.text}"] for row in able[:_SOONEST]]
     lines = [head, *aligned(soonest, words=2)]
+    large = [f"{r.effect} ({significant(r.share, 2)} ×)" for r in rows if r.share > 1.0]
+    if large:
+        told = f"only where larger than usual: {', '.join(large)}"
+        lines += paragraph(told, "  ", "    ")
     never = [row.effect for row in rows if isnan(row.share)]
     if never:
-        lines += paragraph(f"too small to be seen at any size: {', '.join(never)}", "  ", "    ")
+        lines += paragraph(f"at no size that can be: {', '.join(never)}", "  ", "    ")
+    if (large or never) and _sampled(answer):
+        lines.append("  'winchkit plan' proposes the run that shows most of them")
     if blind:
         lines += paragraph(
             f"not looked for, a part or channel lacks: {', '.join(blind)}", "  ", "    "
