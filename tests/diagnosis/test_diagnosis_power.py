@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import pytest
-from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term, with_channel
+from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Array, Ride, made, term, with_channel
 from scipy.stats import norm
 
 from winchkit.cli.plan import _silent
 from winchkit.diagnosis.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.kinds import KINDS, seen
-from winchkit.diagnosis.next_run import next_runs
+from winchkit.diagnosis.next_run import next_runs, power_of, separation, so_far
 from winchkit.diagnosis.plan import hopeless
 from winchkit.diagnosis.plan import offers as plan_offers
 from winchkit.diagnosis.power import detectable
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Detectable, NextRun
 from winchkit.diagnosis.signature import chance_level
 
@@ -43,7 +45,7 @@ def offers(first: str, second: str, noise: float = 1.0, warm: bool = False) -> t
     terms = {"cable-elongation-linear": ROPE, "frame-compliance": FRAME}
     pair = tuple(terms.get(name) or _usual(name) for name in (first, second))
     sizes = {output: noise * size for output, size in NOISE.items()}
-    return next_runs(dataset(warm=warm), [(pair[0], pair[1])], sizes)
+    return next_runs(Problem(dataset(warm=warm)), [(pair[0], pair[1])], sizes)
 
 
 def _usual(effect_id: str) -> object:
@@ -52,7 +54,7 @@ def _usual(effect_id: str) -> object:
 
 
 def test_nothing_to_separate_needs_no_run() -> None:
-    assert next_runs(dataset(), [], NOISE) == ()
+    assert next_runs(Problem(dataset()), [], NOISE) == ()
 
 
 def test_rope_and_frame_are_told_apart_by_loads_over_the_stroke() -> None:
@@ -69,17 +71,62 @@ def test_rope_and_frame_are_told_apart_by_loads_over_the_stroke() -> None:
 def test_less_noise_is_more_power() -> None:
     best = [
         max(o.power for o in offers("cable-elongation-linear", "frame-compliance", noise))
-        for noise in (0.3, 1.0, 2.0, 4.0)
+        for noise in (0.3, 1.0, 3.0, 9.0)
     ]
     assert best[0] == pytest.approx(1.0)
     assert best == sorted(best, reverse=True)
     assert best[-1] < 0.9
 
 
-def test_warmth_is_told_apart_by_warming_up() -> None:
-    found = offers("cable-thermal", "cable-creep", noise=0.05, warm=True)
-    assert "warmed" in found[0].programme
-    assert found[0].power > 0.9
+def test_warmth_is_told_apart_by_warming_up_and_by_waiting() -> None:
+    sizes = {output: 0.05 * size for output, size in NOISE.items()}
+    pair = _usual("cable-thermal"), _usual("cable-creep")
+    problem = Problem(dataset(warm=True))
+    power = {o.kind.name: o.powers[0] for o in plan_offers(problem, [pair], sizes, [])}
+    assert power["full stroke, warmed up by 15 K"] > 0.9
+    assert power["one load at five lengths, with holds"] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("drum-radius", "length-time-offset"), ("cable-elongation-linear", "frame-compliance")],
+)
+def test_runs_so_far_and_runs_to_come_say_what_both_say_at_once(first: str, second: str) -> None:
+    """λ of all runs is that of the first ones and what the others add: nothing else is shared."""
+    pair = [{"cable-elongation-linear": ROPE, "frame-compliance": FRAME}.get(e) or _usual(e)
+            for e in (first, second)]  # fmt: skip
+    sizes = {"cable_length": NOISE["cable_length"]}
+    runs = [made(int(m), noise=sizes, load_mass=m, ride=RIDE) for m in (10.0, 20.0, 35.0)]
+    past, coming, both = (Problem(prepare(part, GROOVED)) for part in (runs[:1], runs[1:], runs))
+    known = so_far(past, *pair, sizes)
+    assert known is not None
+    assert known.left == pytest.approx(separation(past, *pair, sizes))
+    grown = separation(coming, *pair, sizes, known=known)
+    assert known.left + grown == pytest.approx(separation(both, *pair, sizes), rel=1e-3)
+    assert known.left + grown >= known.left + separation(coming, *pair, sizes) - 1e-6
+
+
+def test_a_run_that_shows_nothing_of_a_rival_tells_it_apart_too() -> None:
+    """What was taken for creep must creep again: by itself such a run could be without it."""
+    time = np.arange(0.0, 60.0, 0.1)
+    drift = np.linspace(20.0, 26.0, len(time))
+
+    @dataclass(frozen=True)
+    class Wait(Ride):
+        @property
+        def angle(self) -> Array:
+            return np.asarray(np.clip(self.time, 0.0, 2.0) * 20.0)
+
+    ride = Wait(samples=len(time), rate=10.0)
+    thermal = term("cable-thermal", expansion=2e-5)
+    creep = term("cable-creep", creep_stiffness=2e5, time_constant=60.0)
+    warming = with_channel(made(ride=ride), "temperature", drift, "degC")
+    steady = with_channel(made(ride=ride), "temperature", 20.0 + 0 * drift, "degC")
+    past, coming = (Problem(prepare([run], GROOVED)) for run in (warming, steady))
+    alone = power_of(separation(coming, thermal, creep, NOISE))
+    known = so_far(past, thermal, creep, NOISE)
+    assert alone < 0.1
+    assert power_of(separation(coming, thermal, creep, NOISE, known=known)) > 0.9
 
 
 def test_what_no_motion_separates_is_left_to_the_card() -> None:

@@ -53,6 +53,7 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
         for s in scores
         if s.atom.effect.id != own.effect.id and s.gain > mine - max(_NEAR, 0.1 * mine)
     ][:_RIVALS]
+    rivals += [s for s in scores if _drifts_alike(s.atom.effect, own.effect) and s not in rivals]
     blocks = inquiry.blocks
     ours = held_out(inquiry.problem, final, noise, blocks)
     members: list[tuple[int, float, Term]] = [(freedom, final.cost, own)]
@@ -65,7 +66,9 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
             continue
         term = fitted.hypothesis.terms[-1]
         size = Coordinates(term.effect).freedom
-        if size > freedom and not _kindred(term.effect, own.effect):
+        if size > freedom and _drifts_alike(term.effect, own.effect):
+            counted = fitted.cost < final.cost
+        elif size > freedom and not _kindred(term.effect, own.effect):
             counted = _leant_to(final, fitted, size - freedom)
         else:
             theirs = held_out(inquiry.problem, fitted, noise, blocks)
@@ -98,6 +101,17 @@ def _leant_to(simple: Fit, rich: Fit, more: int) -> bool:
     states = [sum(len(start) for start in f.hypothesis.starts) for f in (simple, rich)]
     unknowns = max(1, more + states[1] - states[0])
     return bool(chi2.sf(simple.cost - rich.cost, unknowns) < _LEVEL)
+
+
+def _drifts_alike(rival: Effect, own: Effect) -> bool:
+    """Whether a rival that creeps is, by the cards, easily taken for this effect.
+
+    Creep needs more numbers than a drift with temperature; where it explains as much, only the
+    prior belief in few numbers would tell them apart, and no run yet.
+    """
+    carded = own.id in rival.confused_with or rival.id in own.confused_with
+    creeps = rival.memory and any(p.role == "shape" and p.unit == "s" for p in rival.parameters)
+    return creeps and carded
 
 
 def _flip_chance(worse: Array) -> float:

@@ -109,7 +109,7 @@ def _answer(inquiry: Inquiry, found: Found) -> Answer:
         detectable=detectable(found.scores, inquiry.price, found.threshold),
         unexplained_share=judgement.share,
         where=_where(inquiry, found, shown.final) if found.still else (),
-        next_runs=next_runs(inquiry.problem.dataset, pairs, found.noise.rms),
+        next_runs=next_runs(inquiry.problem, pairs, found.noise.rms),
         notes=(
             *inquiry.problem.dataset.notes,
             *what_runs_cannot_show(inquiry.problem),

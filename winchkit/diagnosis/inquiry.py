@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.diagnosis.begun import rests_on_states
 from winchkit.diagnosis.fit import Fit, fit
 from winchkit.diagnosis.gate import Folds, blocks_of, extrapolation, five_blocks, groups_of
 from winchkit.diagnosis.noise import (
@@ -30,7 +31,6 @@ __all__ = ["Inquiry", "Trial"]
 
 Array = NDArray[np.float64]
 _UNSURE = 0.2
-_BY_ITSELF = 0.5
 _HALVINGS = 7
 
 
@@ -219,22 +219,11 @@ class Inquiry:
         return [{**values, place.name: at}]
 
     def _rests_on_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
-        """Whether the last term explains mainly by the states in which the runs began.
-
-        A free state per run is a free level per load: creep far slower than the runs would
-        explain whatever depends on the load. What remembers must show by how it changes.
-        """
-        hypothesis = fitted.hypothesis
-        if not hypothesis.starts[-1]:
+        """Whether the last term explains mainly by the states in which the runs began."""
+        if not fitted.hypothesis.starts[-1]:
             return False
-        weight, last = noise.weight(self.problem), len(hypothesis.terms) - 1
-        base = self.refit(without, noise)
-        at_rest = replace(hypothesis, starts=(*hypothesis.starts[:-1], ()))
-        column = self.problem.change(at_rest) - self.problem.change(hypothesis.without(last))
-        present, column = base.jacobian * weight[:, None], column * weight
-        column = column - present @ np.linalg.lstsq(present, column)[0]
-        alone = (column @ (base.residual * weight)) ** 2 / max(float(column @ column), 1e-300)
-        return bool(alone < _BY_ITSELF * (base.cost - fitted.cost))
+        weight = noise.weight(self.problem)
+        return rests_on_states(self.problem, self.refit(without, noise), fitted, weight, self.price)
 
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """Fit a hypothesis under a given noise."""

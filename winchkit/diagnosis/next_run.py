@@ -1,25 +1,26 @@
 """Which run would tell two effects apart: programmes tried on the model before they are run.
 
 For each of a few kinds of programme the line is predicted with one effect; what no size of the
-other can imitate, in units of the noise, is the noncentrality λ (Hunter and Reiner, 1965).
+other can imitate there and in the runs so far, in units of the noise, is the noncentrality λ
+(Hunter and Reiner, 1965).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ncx2
 
-from winchkit.diagnosis.dataset import Dataset
 from winchkit.diagnosis.kinds import KINDS, imagined
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.result import NextRun
 from winchkit.effects.bind import Term
 from winchkit.effects.effect import told_apart
 
-__all__ = ["next_runs", "power_of", "separation"]
+__all__ = ["SoFar", "next_runs", "power_of", "separation", "so_far"]
 
 Array = NDArray[np.float64]
 _CHI2 = 3.841
@@ -27,19 +28,31 @@ _OFFERED = 2
 _WORTHWHILE = 0.2
 
 
+@dataclass(frozen=True)
+class SoFar:
+    """What the runs so far know of two effects, in as few rows as say the same."""
+
+    shared: Array
+    """Columns of what runs to come share with them: offset and the second effect's numbers."""
+    shown: Array
+    """The first effect there."""
+    left: float
+    """λ of the runs so far alone."""
+
+
 def next_runs(
-    dataset: Dataset, pairs: Sequence[tuple[Term, Term]], noise: dict[str, float]
+    problem: Problem, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
 ) -> tuple[NextRun, ...]:
     """The programmes that separate each pair best per minute, with the power they would have."""
     if not pairs:
         return ()
     out: list[NextRun] = []
-    tried = [(kind, imagined(dataset, kind)) for kind in KINDS]
+    tried = [(kind, imagined(problem.dataset, kind)) for kind in KINDS]
     for first, second in pairs:
-        offers = []
-        for kind, problem in tried:
-            minutes = sum(r.signals.time[-1] for r in problem.dataset.recordings) / 60
-            strength = separation(problem, first, second, noise)
+        offers, known = [], so_far(problem, first, second, noise)
+        for kind, programme in tried:
+            minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
+            strength = separation(programme, first, second, noise, known=known)
             offers.append((strength / minutes, power_of(strength), kind.name))
         # Any programme sure to separate them will do: of those the quickest per minute.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
@@ -58,11 +71,50 @@ def power_of(strength: float) -> float:
 
 
 def separation(
-    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+    problem: Problem,
+    first: Term,
+    second: Term | None,
+    noise: Mapping[str, float],
+    *,
+    known: SoFar | None = None,
+    repeats: int = 1,
 ) -> float:
     """Noncentrality λ of the first effect where the second may take any size.
 
-    Without a second one, of the first beside the nuisances alone.
+    Without a second one, of the first beside the nuisances alone. Where it is ``known`` what runs
+    so far say, by how much λ grows: the second must be one size there and here, so that a run
+    which shows nothing of it tells as much as one that does.
+    """
+    rows = _rows(problem, first, second, noise)
+    if rows is None:
+        return 0.0
+    own, shared, shown = (np.asarray(np.sqrt(repeats) * part) for part in rows)
+    if known is None:
+        return _left(np.column_stack([own, shared]), shown)
+    above = np.zeros((len(known.shown), own.shape[1]))
+    columns = np.block([[above, known.shared], [own, shared]])
+    return max(0.0, _left(columns, np.concatenate([known.shown, shown])) - known.left)
+
+
+def so_far(
+    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+) -> SoFar | None:
+    """What the runs of a problem know of two effects; None where that is no number."""
+    rows = _rows(problem, first, second, noise)
+    if rows is None:
+        return None
+    own, shared, shown = rows
+    triangle = np.asarray(np.linalg.qr(np.column_stack([own, shared, shown]), mode="r"))
+    kept = triangle[own.shape[1] :, own.shape[1] :]
+    return SoFar(kept[:, :-1], kept[:, -1], _left(kept[:, :-1], kept[:, -1]))
+
+
+def _rows(
+    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+) -> tuple[Array, Array, Array] | None:
+    """Columns that are a run's own (states), those that all runs share, and the first effect.
+
+    All in units of the noise; None where an effect is no number somewhere.
     """
     weight = np.empty(problem.rows)
     for segment in problem.segments:
@@ -72,8 +124,18 @@ def separation(
     if second is not None:
         rival = rival.with_term(second, problem.runs)
     imitation = problem.jacobian(problem.vector(rival), rival) * weight[:, None]
-    whole = np.column_stack([imitation, problem.change(rival) * weight])
-    if not np.isfinite(whole).all() or not np.isfinite(shown).all():
-        return 0.0
-    left = shown - whole @ np.linalg.lstsq(whole, shown, rcond=1e-10)[0]
+    if not (np.isfinite(imitation).all() and np.isfinite(shown).all()):
+        return None
+    states = sum(len(start) for start in rival.starts)
+    nuisances, offset = problem.nuisance_columns.shape[1], int(problem.fits_offset)
+    own = [*range(offset, nuisances), *range(imitation.shape[1] - states, imitation.shape[1])]
+    numbers = imitation[:, nuisances : imitation.shape[1] - states]
+    level = imitation[:, :1] if offset else np.zeros((problem.rows, 1))
+    shared = np.column_stack([level, numbers, problem.change(rival) * weight])
+    return imitation[:, own], shared, shown
+
+
+def _left(columns: Array, shown: Array) -> float:
+    """Squares that columns leave of what is shown."""
+    left = shown - columns @ np.linalg.lstsq(columns, shown, rcond=1e-10)[0]
     return float(left @ left)

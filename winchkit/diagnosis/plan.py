@@ -8,7 +8,7 @@ from typing import Any
 
 from winchkit.diagnosis.dataset import Dataset
 from winchkit.diagnosis.kinds import KINDS, Kind, Room, imagined, seen, usual_temperature
-from winchkit.diagnosis.next_run import power_of, separation
+from winchkit.diagnosis.next_run import power_of, separation, so_far
 from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Problem
 from winchkit.effects.bind import Term
@@ -75,21 +75,25 @@ def offers(
     """Every kind of programme within a room, else within what was seen; the most telling first."""
     dataset = problem.dataset
     room = room or seen(dataset)
-    hidden = [
-        term
-        for term in _usual(effects, problem)
-        if power_of(separation(problem, term, None, noise)) < _SURE
-    ]
+    usual = [(term, so_far(problem, term, None, noise)) for term in _usual(effects, problem)]
+    hidden = [(t, known) for t, known in usual if known and power_of(known.left) < _SURE]
+    known_pairs = [(a, b, so_far(problem, a, b, noise)) for a, b in pairs]
     out = []
     for kind in KINDS:
         tried = imagined(dataset, kind, room)
         motion = sum(r.signals.time[-1] for r in tried.dataset.recordings) / 60
         minutes = _REPEATS * (motion + _work(kind, dataset))
-        powers = tuple(power_of(_twice(separation(tried, a, b, noise))) for a, b in pairs)
+        powers = tuple(
+            power_of(separation(tried, a, b, noise, known=known, repeats=_REPEATS))
+            for a, b, known in known_pairs
+        )
         shows = tuple(
             term.effect.id
-            for term in hidden
-            if power_of(_twice(separation(tried, term, None, noise))) >= _SURE
+            for term, known in hidden
+            if power_of(
+                known.left + separation(tried, term, None, noise, known=known, repeats=_REPEATS)
+            )
+            >= _SURE
         )
         out.append(Offer(kind, minutes, powers, shows))
     return sorted(out, key=lambda offer: offer.worth, reverse=True)
@@ -150,11 +154,6 @@ def _work(kind: Kind, dataset: Dataset) -> float:
 
 def _move(length: float, speed: float) -> Step:
     return Step(to=round(length, 3), speed=float(f"{max(speed, 1e-3):.2g}"))
-
-
-def _twice(strength: float) -> float:
-    """Every programme runs twice: twice the evidence of one run."""
-    return _REPEATS * strength
 
 
 def _warm(dataset: Dataset) -> bool:
