@@ -66,11 +66,8 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
             continue
         term = fitted.hypothesis.terms[-1]
         size = Coordinates(term.effect).freedom
-        if size > freedom and _drifts_alike(term.effect, own.effect):
-            counted = fitted.cost < final.cost
-        elif size > freedom and not _kindred(term.effect, own.effect):
-            counted = _leant_to(final, fitted, size - freedom)
-        else:
+        counted = _richer(own.effect, final, fitted)
+        if counted is None:
             theirs = held_out(inquiry.problem, fitted, noise, blocks)
             alike = fitted.cost < final.cost + _ALIKE
             counted = alike or _flip_chance(theirs - ours) > _LEVEL
@@ -84,6 +81,17 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
         if term.effect.id != own.effect.id
     }
     return Confusion(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
+
+
+def _richer(own: Effect, final: Fit, fitted: Fit) -> bool | None:
+    """Whether a rival with more numbers counts; None where it has no more, or is kindred."""
+    rival = fitted.hypothesis.terms[-1].effect
+    more = Coordinates(rival).freedom - Coordinates(own).freedom
+    if more > 0 and _drifts_alike(rival, own):
+        return fitted.cost < final.cost
+    if more > 0 and not _kindred(rival, own):
+        return _leant_to(final, fitted, more)
+    return None
 
 
 def _kindred(rival: Effect, own: Effect) -> bool:
