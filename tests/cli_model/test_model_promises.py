@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -255,23 +256,79 @@ def test_one_winch_of_several(runs: list[Path], tmp_path: Path) -> None:
     assert "no winch 'C'; it has A, B" in wrong.stderr
 
 
-def test_all_winches_of_a_recording_each_by_itself(runs: list[Path], tmp_path: Path) -> None:
-    both = [tmp_path / "both-1.csv", tmp_path / "both-2.csv"]
-    for path, (first, second) in zip(both, ((0, 2), (1, 3)), strict=True):
+@pytest.fixture(scope="module")
+def both(runs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Two winches in one recording, and its repeat."""
+    folder = tmp_path_factory.mktemp("winches")
+    out = [folder / "both-1.csv", folder / "both-2.csv"]
+    for path, (first, second) in zip(out, ((0, 2), (1, 3)), strict=True):
         write_csv(side_by_side(read_run(runs[first]), read_run(runs[second])), path)
+    return out
+
+
+def test_all_winches_of_a_recording_each_by_itself(both: list[Path]) -> None:
     each = answer("diagnose", *both, "-p", "bench-spiral", "--winch", "all")
     assert each["schema"] == 1
     assert list(each["winches"]) == ["A", "B"]
     for name, found in each["winches"].items():
         assert found == answer("diagnose", *both, "-p", "bench-spiral", "--winch", name)
-    told = invoke("diagnose", *both, "-p", "bench-spiral", "--winch", "all")
-    assert [line for line in told.stdout.splitlines() if line.startswith("winch ")] == [
-        "winch A",
-        "winch B",
-    ]
-    assert told.stderr == ""
-    page = invoke(
-        "diagnose", *both, "-p", "bench-spiral", "--winch", "all", "--html", tmp_path / "p.html"
-    )
-    assert page.exit_code == 2
-    assert "a page of one winch" in page.stderr
+    for one in each["shared"]["effects"]:
+        told = [*one["winches"], *one["without"], *one["unsure"]]
+        assert sorted(told) == ["A", "B"]
+        for name in one["winches"]:
+            steps = each["winches"][name]["steps"]
+            assert any(one["effects"][0] in step["effects"] for step in steps)
+
+
+def test_all_winches_in_text_and_on_pages(both: list[Path], tmp_path: Path) -> None:
+    page = tmp_path / "p.html"
+    told = invoke("diagnose", *both, "-p", "bench-spiral", "--winch", "all", "--html", page)
+    assert told.exit_code == 0
+    lines = told.stdout.splitlines()
+    assert [line for line in lines if line.startswith("winch ")] == ["winch A", "winch B"]
+    assert lines.index("all 2 winches") > lines.index("winch B")
+    assert told.stderr == f"report: {page}\n"
+    written = page.read_text(encoding="utf-8")
+    for name in "AB":
+        assert f'<a href="p-{name}.html">{name}</a>' in written
+        own = (tmp_path / f"p-{name}.html").read_text(encoding="utf-8")
+        # Its commands repeat that winch alone.
+        assert f"--winch {name} " in own
+        assert "--winch all" not in own
+
+
+def test_errors_of_all_winches(both: list[Path], tmp_path: Path) -> None:
+    asked = ("compare", *both, "-p", "bench-spiral", "--winch", "all")
+    each = answer(*asked)
+    assert list(each["winches"]) == ["A", "B"]
+    for name, found in each["winches"].items():
+        assert found == answer("compare", *both, "-p", "bench-spiral", "--winch", name)
+    assert set(each["shared"]["outputs"]) == set(UNITS)
+    for output, error in each["shared"]["outputs"].items():
+        own = [found["outputs"][output]["rms"] for found in each["winches"].values()]
+        assert error["rms"] ** 2 == pytest.approx(sum(x**2 for x in own) / 2)
+        assert error["winches"]["A"] == pytest.approx(own[0] ** 2 / sum(x**2 for x in own))
+        for follow in error["follows"]:
+            assert set(follow) == {"variable", "share", "common", "apart"}
+            assert 0 <= follow["common"] <= follow["share"] <= 1
+    # The motor's drag is the same in both, whatever each of them carries.
+    torque = {f["variable"]: f for f in each["shared"]["outputs"]["motor_torque"]["follows"]}
+    assert torque["direction"]["common"] > 0.9 * torque["direction"]["share"]
+    page = tmp_path / "c.html"
+    told = invoke(*asked, "--html", page)
+    assert told.exit_code == 0
+    assert "what the errors of all follow" in told.stdout
+    assert '<a href="c-B.html">B</a>' in page.read_text(encoding="utf-8")
+    assert (tmp_path / "c-B.html").is_file()
+
+
+def test_winches_whose_pages_would_be_one(runs: list[Path], tmp_path: Path) -> None:
+    run = side_by_side(read_run(runs[0]), read_run(runs[2]))
+    odd = {name.replace("A.", "x y.").replace("B.", "x-y."): c for name, c in run.channels.items()}
+    path = tmp_path / "odd.csv"
+    write_csv(replace(run, channels=odd), path)
+    asked = ("compare", path, "-p", "bench-spiral", "--winch", "all")
+    refused = invoke(*asked, "--html", tmp_path / "o.html")
+    assert refused.exit_code == 2
+    assert "no page for each of the winches" in refused.stderr
+    assert list(answer(*asked)["winches"]) == ["x y", "x-y"]

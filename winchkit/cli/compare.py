@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.html_option import html_option, page_title, write_page
-from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import Asked, json_option, model_options, read_all
+from winchkit.cli.html_option import html_option, page_title, pages_beside, save_page, write_page
+from winchkit.cli.output import echo_each, echo_json
+from winchkit.cli.runs_option import Asked, json_option, model_options, read_all, read_each
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.result import Comparison
+    from winchkit.schema.winch import WinchProfile
 
 __all__ = ["command"]
 
@@ -36,11 +39,48 @@ def command(runs: Sequence[str], asked: Asked, as_json: bool, html: str | None) 
         refuse_options(asked.band, html, asked.winch)
         _tell(compare_robot(read_all(runs), declared, asked.catalogue), as_json)
         return
+    if asked.each:
+        _tell_each(runs, declared, asked, as_json, html)
+        return
     answer = compared(asked.runs(runs), declared, asked.catalogue, asked.band)
     _tell(answer.comparison, as_json)
     if html:
         title = page_title(declared.name, runs)
         write_page(html, comparison_html(answer, title, asked.profile, options=asked.options))
+
+
+def _tell_each(
+    runs: Sequence[str], declared: WinchProfile, asked: Asked, as_json: bool, html: str | None
+) -> None:
+    """Every winch of the runs by itself, and what their errors follow alike or not."""
+    from winchkit.diagnosis.compare import compared
+    from winchkit.diagnosis.report.page import comparison_html
+    from winchkit.diagnosis.report.shared_text import shared_errors_text
+    from winchkit.diagnosis.report.text import compare_text
+    from winchkit.diagnosis.shared_errors import errors_of, shared_errors
+
+    found, errors = {}, {}
+    title, catalogue, winches = page_title(declared.name, runs), asked.catalogue, read_each(runs)
+    pages = pages_beside(html, list(winches)) if html else {}
+    for name, own in winches.items():
+        answer = compared(own, declared, catalogue, asked.band)
+        found[name], errors[name] = answer.comparison, errors_of(answer)
+        if html:
+            options = replace(asked, winch=name).options
+            page = comparison_html(answer, f"{title}, {name}", asked.profile, options=options)
+            save_page(str(Path(html).with_name(pages[name])), page)
+    shared = shared_errors(errors)
+    if as_json:
+        said = {name: one.to_json() for name, one in found.items()}
+        outputs = {name: one.to_json() for name, one in shared.items()}
+        echo_json({"schema": 1, "winches": said, "shared": {"outputs": outputs}})
+    else:
+        texts = {name: compare_text(one) for name, one in found.items()}
+        echo_each(texts, shared_errors_text(found, shared))
+    if html:
+        from winchkit.diagnosis.report.shared_page import shared_errors_html
+
+        write_page(html, shared_errors_html(found, shared, title, pages))
 
 
 def _tell(comparison: Comparison, as_json: bool) -> None:

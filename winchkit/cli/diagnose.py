@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.html_option import html_option, page_title, write_page
-from winchkit.cli.output import echo_json
+from winchkit.cli.html_option import html_option, page_title, pages_beside, save_page, write_page
+from winchkit.cli.output import echo_each, echo_json
 from winchkit.cli.progress import progress_bar
 from winchkit.cli.runs_option import Asked, json_option, model_options, read_all, read_each
-from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.diagnose import Answer
+    from winchkit.diagnosis.result import Diagnosis
     from winchkit.effects.catalogue import Catalogue
     from winchkit.schema.robot import RobotProfile
     from winchkit.schema.winch import WinchProfile
@@ -34,19 +36,18 @@ def command(
     """Name the physical effect that the model lacks, with its size and what it would buy.
 
     Two runs of one programme and load are the measure of the noise: record everything twice.
-    Long runs are thinned out as far as their signals allow; --winch all takes each by itself.
+    Long runs are thinned out as far as their signals allow; --winch all takes each by itself
+    and tells what they have in common.
     """
     from winchkit.cli.robot_model import read_profile, refuse_options
     from winchkit.schema.robot import RobotProfile
 
-    if html and asked.each:
-        raise UsageError("--html is a page of one winch; name it with --winch")
     declared, thin = read_profile(asked.source), not every_sample
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band, html, asked.winch)
         _tell_robot(runs, declared, asked.catalogue, as_json)
     elif asked.each:
-        _tell_each(runs, declared, asked, thin, as_json)
+        _tell_each(runs, declared, asked, thin, as_json, html)
     else:
         _tell_one(runs, declared, asked, thin, as_json, html)
 
@@ -75,22 +76,45 @@ def _tell_one(
 
 
 def _tell_each(
-    runs: Sequence[str], declared: WinchProfile, asked: Asked, thin: bool, as_json: bool
+    runs: Sequence[str],
+    declared: WinchProfile,
+    asked: Asked,
+    thin: bool,
+    as_json: bool,
+    html: str | None,
 ) -> None:
-    """What every winch of the runs lacks, each by itself."""
+    """What every winch of the runs lacks, each by itself, and what they have in common."""
     from winchkit.diagnosis.each import diagnose_each
+    from winchkit.diagnosis.report.page import report_html
+    from winchkit.diagnosis.report.shared_text import shared_effects_text
+    from winchkit.diagnosis.shared_effects import shared_effects
 
+    said: dict[str, Any] = {}
+    found: dict[str, Diagnosis] = {}
+    title, catalogue = page_title(declared.name, runs), asked.catalogue
     with progress_bar() as told:
-        each = diagnose_each(
-            read_each(runs), declared, asked.catalogue, asked.band, thin=thin, told=told
-        )
-        found = {name: _said(answer, as_json) for name, answer in each}
+        winches = read_each(runs)
+        pages = pages_beside(html, list(winches)) if html else {}
+        each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, told=told)
+        for name, answer in each:
+            found[name], said[name] = answer.diagnosis, _said(answer, as_json)
+            if html:
+                options = replace(asked, winch=name).options
+                own = report_html(
+                    answer, f"{title}, {name}", profile=asked.profile, options=options
+                )
+                save_page(str(Path(html).with_name(pages[name])), own)
+            del answer  # hundreds of megabytes after long runs
+    shared = shared_effects(found, catalogue)
     if as_json:
-        echo_json({"schema": 1, "winches": found})
-        return
-    for name, text in found.items():
-        click.echo(f"winch {name}")
-        click.echo(text)
+        effects = [one.to_json() for one in shared]
+        echo_json({"schema": 1, "winches": said, "shared": {"effects": effects}})
+    else:
+        echo_each(said, shared_effects_text(found, shared))
+    if html:
+        from winchkit.diagnosis.report.shared_page import shared_effects_html
+
+        write_page(html, shared_effects_html(found, shared, title, pages))
 
 
 def _tell_robot(

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from re import compile as pattern
 
 import click
 
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, UsageError
 
-__all__ = ["html_option", "page_title", "save_page", "write_page"]
+__all__ = ["html_option", "page_title", "pages_beside", "save_page", "write_page"]
 
 html_option = click.option("--html", metavar="FILE", help="Also write the answer as one page.")
 _RUNS_NAMED = 3
+_NO_FILE = pattern(r"[^\w.-]")
 _PAGE_BEGINS = b"<!DOCTYPE html>"
 
 
@@ -41,6 +43,18 @@ def save_page(path: str, page: str) -> None:
         raise FileError(
             Fault(f"the page cannot be written: {reason}; name another file for --html", path)
         ) from error
+
+
+def pages_beside(path: str, winches: Sequence[str]) -> dict[str, str]:
+    """Names of the winches' own pages beside the page of all: ``report-A.html``.
+
+    Raises UsageError where two winches would get one page.
+    """
+    page = Path(path)
+    names = {w: f"{page.stem}-{_NO_FILE.sub('-', w)}{page.suffix}" for w in winches}
+    if len(set(names.values())) < len(names):
+        raise UsageError(f"--html: no page for each of the winches {', '.join(winches)}")
+    return names
 
 
 def page_title(profile: str, runs: Sequence[str], effect: str = "") -> str:

@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-__all__ = ["echo_json", "plain", "to_json"]
+__all__ = ["echo_each", "echo_json", "plain", "to_json"]
 
 
 def to_json(value: object) -> str:
@@ -25,6 +25,13 @@ def to_json(value: object) -> str:
 def echo_json(value: object) -> None:
     """Print a result as one line of JSON to stdout."""
     click.echo(to_json(value))
+
+
+def echo_each(texts: Mapping[str, str], overview: str) -> None:
+    """Print a text for every winch under its name, and last, where one looks, all at a glance."""
+    for name, text in texts.items():
+        click.echo(f"winch {name}\n{text}\n")
+    click.echo(overview)
 
 
 @singledispatch

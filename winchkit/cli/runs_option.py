@@ -34,7 +34,7 @@ ALL = "all"
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 _MODEL_OPTIONS = (
     click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
-    click.option("--winch", help="Which winch of runs with several."),
+    click.option("--winch", help="Which winch of runs with several; 'all' where each is told."),
     click.option(
         "--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects."
     ),
@@ -164,7 +164,8 @@ def _of_winch(run: Run, winch: str | None) -> Run:
     if winch is None:
         if len(known) > 1:
             raise UsageError(
-                f"{run.path}: has the winches {', '.join(known)}; choose one with --winch"
+                f"{run.path}: has the winches {', '.join(known)}; choose one with --winch, "
+                "or have each told by compare and diagnose with --winch all"
             )
         return run.of_winch(known[0])
     if known != [""] and winch not in known:

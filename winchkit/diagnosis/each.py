@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from threading import Thread
 
 from winchkit.diagnosis.diagnose import Answer, Told, diagnose, silent
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -41,5 +43,33 @@ def diagnose_each(
         heard("done", 1.0)
         return answer
 
-    with ThreadPoolExecutor(_AT_A_TIME) as pool:
-        yield from zip(winches, pool.map(one, winches), strict=True)
+    begun: deque[tuple[str, Future[Answer]]] = deque()
+    for name in winches:
+        begun.append((name, _begun(one, name)))
+        if len(begun) == _AT_A_TIME:
+            yield _taken(begun)
+    while begun:
+        yield _taken(begun)
+
+
+def _taken(begun: deque[tuple[str, Future[Answer]]]) -> tuple[str, Answer]:
+    """The oldest, waited for; nothing here keeps its answer."""
+    name, future = begun.popleft()
+    return name, future.result()
+
+
+def _begun(work: Callable[[str], Answer], name: str) -> Future[Answer]:
+    """An answer being worked on, by a thread that an interrupted command leaves behind.
+
+    A pool's threads would be waited for: seconds after Ctrl-C.
+    """
+    future: Future[Answer] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(work(name))
+        except BaseException as error:  # noqa: BLE001 - handed to whoever waits for the answer
+            future.set_exception(error)
+
+    Thread(target=run, name=f"diagnose {name}", daemon=True).start()
+    return future

@@ -12,17 +12,20 @@ from winchkit.diagnosis.problem import Problem
 from winchkit.model.variables import ANGLES, VARIABLES
 
 __all__ = [
+    "BINS",
     "Followed",
     "binned_share",
     "by_chance",
     "follows",
     "harmonics",
     "kept_rows",
+    "quantile_bins",
     "variables_of",
 ]
 
 Array = NDArray[np.float64]
-_BINS = 16
+BINS = 16
+"""Over a variable."""
 _ORDERS = 40
 _WORTH = 0.02
 
@@ -67,7 +70,7 @@ def follows(problem: Problem, residual: Array) -> list[Followed]:
                 continue
             values = [known[s.run][name][v] for (s, _), v in zip(own, valid, strict=True)]
             share = binned_share(np.concatenate(values), error, kept)
-            if share > by_chance(_BINS, kept):
+            if share > by_chance(BINS, kept):
                 found.append(Followed(output, name, share))
         out += sorted(found, key=lambda f: -f.share)
     return out
@@ -109,14 +112,19 @@ def binned_share(variable: Array, error: Array, kept: int) -> float:
     total = float(error @ error)
     if total == 0.0 or np.ptp(variable) == 0.0:
         return 0.0
-    edges = np.unique(np.quantile(variable, np.linspace(0, 1, _BINS + 1)[1:-1]))
-    bins = np.searchsorted(edges, variable, side="right")
+    bins = quantile_bins(variable)
     count = np.bincount(bins)
     sums = np.bincount(bins, weights=error)
     used = count > 0
     between = float(np.sum(sums[used] ** 2 / count[used]))
     chance = total * np.count_nonzero(used) / kept
     return max(0.0, (between - chance) / total)
+
+
+def quantile_bins(variable: Array) -> NDArray[np.intp]:
+    """The bin of every sample, each of as many samples as repeated values allow."""
+    edges = np.unique(np.quantile(variable, np.linspace(0, 1, BINS + 1)[1:-1]))
+    return np.searchsorted(edges, variable, side="right")
 
 
 def _harmonic_share(angle: Array, error: Array) -> float:
