@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from campaign.sizes import Scene
 from campaign.truth import Situation
 from campaign.winch import Winch, draw_winch, turns_for
 
-__all__ = ["Bench", "draw_bench"]
+__all__ = ["Bench", "draw_bench", "draw_beside"]
 
 Array = NDArray[np.float64]
 Random = np.random.Generator
@@ -90,6 +90,23 @@ def draw_bench(random: Random, repeats: bool, small: bool) -> Bench:
         noise=_noise_of_instruments(random, 9.8 * heaviest * winch.radius / winch.ratio),
         colour=float(random.choice([0.0, 0.3, 0.6])),
     )
+
+
+def draw_beside(random: Random, bench: Bench) -> Bench:
+    """Another winch of the same make in the same recordings, which moves in its own way."""
+    winch, whole = bench.winch, max(len(s.time) for s in bench.situations)
+    first = bench.situations[0]
+    rate = 1 / float(first.time[1] - first.time[0])
+    moves = {
+        number: programme(random, rate, whole / rate, bench.scene.stroke)[1]
+        for number in dict.fromkeys(bench.programmes)
+    }
+    turns = winch.direction * winch.ratio * turns_for(winch, 1.0)
+    situations = [
+        replace(s, motor_angle=winch.motor_reference + turns * moves[number][: len(s.time)])
+        for s, number in zip(bench.situations, bench.programmes, strict=True)
+    ]
+    return replace(bench, situations=tuple(situations))
 
 
 def _one_run(random: Random, whole: Situation, rate: float, warms: bool, late: bool) -> Situation:

@@ -14,7 +14,7 @@ from campaign.sizes import CATALOGUE, OUTSIDE, Sized, allowed, draw
 from campaign.truth import OUTPUTS, Hidden, Shown, show
 from campaign.winch import write_profile
 
-__all__ = ["Case", "Plan", "make_case"]
+__all__ = ["ATTEMPTS", "Case", "Plan", "draw_effects", "make_case", "size_effects"]
 
 Array = NDArray[np.float64]
 Random = np.random.Generator
@@ -55,10 +55,10 @@ def make_case(seed: int, plan: Plan, folder: Path) -> Case | None:
     for attempt in range(ATTEMPTS):
         random = np.random.default_rng([seed, attempt])
         bench = draw_bench(random, plan.kind != "norepeat", plan.small)
-        names = _draw_effects(random, plan, bench)
+        names = draw_effects(random, plan, bench)
         if names is None:
             continue
-        hidden = _sized(random, plan, bench, names)
+        hidden = size_effects(random, plan, bench, names)
         if hidden is not None:
             folder.mkdir(parents=True, exist_ok=True)
             profile = folder / "winch.toml"
@@ -68,7 +68,8 @@ def make_case(seed: int, plan: Plan, folder: Path) -> Case | None:
     return None
 
 
-def _draw_effects(random: Random, plan: Plan, bench: Bench) -> tuple[str, ...] | None:
+def draw_effects(random: Random, plan: Plan, bench: Bench) -> tuple[str, ...] | None:
+    """What a bench is to hide; None where it cannot."""
     known, loads = bench.load != "cell", len(bench.scene.masses)
     if plan.effects:
         ok = all(allowed(e, bench.winch, known, bench.warms, loads) for e in plan.effects)
@@ -79,7 +80,7 @@ def _draw_effects(random: Random, plan: Plan, bench: Bench) -> tuple[str, ...] |
     return tuple(str(e) for e in chosen)
 
 
-def _sized(
+def size_effects(
     random: Random, plan: Plan, bench: Bench, names: tuple[str, ...]
 ) -> dict[str, dict[str, float]] | None:
     """Every effect at the size that gives the wanted SNR; None where no sane size does."""

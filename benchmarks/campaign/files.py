@@ -23,9 +23,9 @@ UNITS = {
 
 
 def write_run(path: Path, channels: Mapping[str, Array], metadata: Mapping[str, str]) -> None:
-    """Write one CSV: metadata lines, a header, rows."""
+    """Write one CSV: metadata lines, a header, rows; columns of a winch named ``A.tension``."""
     head = [f"# {key}: {value}" for key, value in metadata.items()]
-    head.append(",".join(f"{name} [{UNITS[name]}]" for name in channels))
+    head.append(",".join(f"{name} [{UNITS[name.rpartition('.')[2]]}]" for name in channels))
     table = np.column_stack(list(channels.values()))
     with path.open("w", encoding="utf-8") as out:
         out.write("\n".join(head) + "\n")

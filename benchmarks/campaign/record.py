@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from campaign.bench import Bench
 from campaign.files import write_run
 from campaign.truth import OUTPUTS, Hidden, show
 
-__all__ = ["record"]
+__all__ = ["record", "record_several"]
 
 Array = NDArray[np.float64]
 Random = np.random.Generator
@@ -20,30 +21,51 @@ _EDGE = 2
 
 def record(random: Random, bench: Bench, hidden: Hidden, folder: Path) -> tuple[Path, ...]:
     """Write every run of a bench that hides something; paths in the order of the runs."""
-    offset = random.normal(0, 0.02)
+    return record_several(random, {"": bench}, {"": hidden}, folder)
+
+
+def record_several(
+    random: Random, benches: Mapping[str, Bench], hidden: Mapping[str, Hidden], folder: Path
+) -> tuple[Path, ...]:
+    """Write every run of several winches, each by its name, into files that hold all of them."""
+    offsets = {name: random.normal(0, 0.02) for name in benches}
+    first = next(iter(benches.values()))
     paths = []
-    for index, (run, number) in enumerate(zip(bench.situations, bench.programmes, strict=True)):
-        ideal = show(bench.winch, run, hidden)
-        time = run.time[:: run.every]
-        channels = {"time": time, "motor_angle": run.motor_angle[:: run.every]}
-        for output in OUTPUTS:
-            noise = _noise(random, len(time), bench.noise[output], bench.colour)
-            channels[output] = getattr(ideal, output) + noise
-        channels["cable_length"] = channels["cable_length"] + offset
-        if bench.load == "load":
-            channels["load"] = ideal.load + random.normal(0, bench.noise["load"], len(time))
-        if bench.measures_temperature:
+    for index, (run, number) in enumerate(zip(first.situations, first.programmes, strict=True)):
+        channels = {"time": run.time[:: run.every]}
+        for name, bench in benches.items():
+            shown = _shown(random, bench, index, hidden[name], offsets[name])
+            channels |= {
+                f"{name}.{channel}" if name else channel: x for channel, x in shown.items()
+            }
+        if first.measures_temperature:
             channels["temperature"] = run.temperature[:: run.every] + random.normal(
-                0, 0.02, len(time)
+                0, 0.02, len(channels["time"])
             )
         metadata = {"programme": f"moves-{number}"}
-        if bench.load == "mass":
+        if first.load == "mass":
             metadata["load_mass"] = f"{run.mass} kg"
         path = folder / f"run-{index}.csv"
         # At the last samples the physics' own differences are one-sided: no winch does that.
         write_run(path, {name: x[:-_EDGE] for name, x in channels.items()}, metadata)
         paths.append(path)
     return tuple(paths)
+
+
+def _shown(
+    random: Random, bench: Bench, index: int, hidden: Hidden, offset: float
+) -> dict[str, Array]:
+    """What one winch's instruments tell of a run."""
+    run = bench.situations[index]
+    ideal, channels = show(bench.winch, run, hidden), {"motor_angle": run.motor_angle[:: run.every]}
+    count = len(channels["motor_angle"])
+    for output in OUTPUTS:
+        noise = _noise(random, count, bench.noise[output], bench.colour)
+        channels[output] = getattr(ideal, output) + noise
+    channels["cable_length"] = channels["cable_length"] + offset
+    if bench.load == "load":
+        channels["load"] = ideal.load + random.normal(0, bench.noise["load"], count)
+    return channels
 
 
 def _noise(random: Random, count: int, rms: float, colour: float) -> Array:

@@ -1,0 +1,183 @@
+"""Cases of several winches, diagnosed and scored: named where it is and nowhere else."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaign.case import Plan
+from campaign.several import EXTENTS, Several, make_several
+
+__all__ = ["SeveralScore", "answer_several", "run_several", "several_summary"]
+
+
+@dataclass(frozen=True)
+class SeveralScore:
+    """The answers to one recording of several winches."""
+
+    seed: int
+    extent: str
+    snr: float
+    truth: dict[str, tuple[str, ...]]
+    """What every winch hides."""
+    verdicts: dict[str, str]
+    steps: dict[str, tuple[tuple[str, ...], ...]]
+    shared: tuple[dict[str, Any], ...]
+    seconds: float
+    scene: str
+
+    @property
+    def there(self) -> list[str]:
+        """Winches that hide something."""
+        return [w for w, effects in self.truth.items() if effects]
+
+    @property
+    def found(self) -> list[str]:
+        """Winches that hide something and whose only step holds it."""
+        return [
+            w
+            for w in self.there
+            if len(self.steps[w]) == 1 and self.truth[w][0] in self.steps[w][0]
+        ]
+
+    @property
+    def elsewhere(self) -> list[str]:
+        """Winches that hide nothing."""
+        return [w for w, effects in self.truth.items() if not effects]
+
+    @property
+    def alarms(self) -> list[str]:
+        """Winches that hide nothing and were not called adequate."""
+        return [w for w in self.elsewhere if self.verdicts[w] != "adequate"]
+
+    @property
+    def wrong(self) -> list[str]:
+        """Winches in which something is named that they do not hide."""
+        return [
+            w
+            for w, steps in self.steps.items()
+            if any(len(s) == 1 and s[0] not in self.truth[w] for s in steps)
+        ]
+
+    @property
+    def shared_right(self) -> bool:
+        """Whether what is told of all together is what is true: who has it, and that alike."""
+        own = [
+            s for s in self.shared if any(t in s["effects"] for t in self.truth[s["winches"][0]])
+        ]
+        if not self.there or len(self.shared) != len(own):
+            return not self.shared and not self.there
+        return [s["winches"] for s in own] == [self.there] and self.alike
+
+    @property
+    def alike(self) -> bool:
+        """Whether no winch's size was said to differ from the others', which it does not."""
+        chances = [p["p_value"] for s in self.shared for p in s["parameters"].values()]
+        return not any(chance < 0.01 for chance in chances)
+
+    @property
+    def ok(self) -> bool:
+        """Whether every winch's answer is as the truth is."""
+        return not self.alarms and not self.wrong and self.found == self.there
+
+
+def answer_several(case: Several) -> SeveralScore:
+    """Diagnose every winch of a case from its files."""
+    from winchkit.diagnosis.each import diagnose_each
+    from winchkit.diagnosis.shared_effects import shared_effects
+    from winchkit.effects import load_catalogue
+    from winchkit.runs.read import read_run
+    from winchkit.schema.read import read_winch
+
+    runs, catalogue = [read_run(path) for path in case.runs], load_catalogue()
+    winches = {name: [run.of_winch(name) for run in runs] for name in case.hidden}
+    begun = time.perf_counter()
+    each = diagnose_each(winches, read_winch(case.profile), catalogue)
+    found = {name: answer.diagnosis for name, answer in each}
+    shared = tuple(one.to_json() for one in shared_effects(found, catalogue))
+    return SeveralScore(
+        case.seed,
+        case.extent,
+        case.snr,
+        {name: tuple(hidden) for name, hidden in case.hidden.items()},
+        {name: one.verdict for name, one in found.items()},
+        {name: tuple(step.effects for step in one.steps) for name, one in found.items()},
+        shared,
+        time.perf_counter() - begun,
+        case.scene,
+    )
+
+
+def run_several(
+    seed: int,
+    plans: Sequence[tuple[str, Plan]],
+    winches: int,
+    keep: Path | None = None,
+    log: Path | None = None,
+) -> list[SeveralScore]:
+    """Scores in the order of the plans (extent and size); progress on stderr, lines into a log."""
+    out = []
+    for index, (extent, plan) in enumerate(plans):
+        number = seed * 100_000 + index
+        with tempfile.TemporaryDirectory() as folder:
+            place = keep / f"case-{number}" if keep else Path(folder)
+            case = make_several(number, extent, plan, winches, place)
+            if case is None:
+                print(f"none {number} cannot be made: {plan}", file=sys.stderr)
+                continue
+            got = answer_several(case)
+        out.append(got)
+        if log is not None:
+            with log.open("a", encoding="utf-8") as lines:
+                lines.write(json.dumps(asdict(got)) + "\n")
+        print(_line(got), file=sys.stderr, flush=True)
+    return out
+
+
+def several_summary(scores: Sequence[SeveralScore]) -> dict[str, Any]:
+    """Figures by extent and SNR, and every failure."""
+    groups: dict[str, list[SeveralScore]] = {}
+    for s in scores:
+        name = s.extent if s.extent == "none" else f"{s.extent} snr {s.snr:g}"
+        groups.setdefault(name, []).append(s)
+    ordered = sorted(groups.items(), key=lambda group: EXTENTS.index(group[1][0].extent))
+    return {
+        "cases": len(scores),
+        "groups": {name: _figures(group) for name, group in ordered},
+        "failures": [asdict(s) for s in scores if not (s.ok and s.shared_right)],
+    }
+
+
+def _figures(group: Sequence[SeveralScore]) -> dict[str, Any]:
+    there = sum(len(s.there) for s in group)
+    elsewhere = sum(len(s.elsewhere) for s in group)
+    return {
+        "cases": len(group),
+        "right": sum(s.ok for s in group) / len(group),
+        "shared_right": sum(s.shared_right for s in group) / len(group),
+        "found_there": sum(len(s.found) for s in group) / there if there else None,
+        "alarm_elsewhere": sum(len(s.alarms) for s in group) / elsewhere if elsewhere else None,
+        "wrong_single_name": sum(len(s.wrong) for s in group) / (there + elsewhere),
+        "alike": sum(s.alike for s in group) / len(group),
+        "seconds": float(np.mean([s.seconds for s in group])),
+    }
+
+
+def _line(got: SeveralScore) -> str:
+    told = "ok  " if got.ok and got.shared_right else "FAIL"
+    truth = sorted({effect for effects in got.truth.values() for effect in effects})
+    steps = {w: [list(s) for s in steps] for w, steps in got.steps.items() if steps}
+    other = {w: v for w, v in got.verdicts.items() if v in {"partly", "unknown"}}
+    shared = [(s["effects"], "".join(s["winches"])) for s in got.shared]
+    return (
+        f"{told} {got.seed} {got.extent} {got.snr:g} {','.join(truth)} in {''.join(got.there)} -> "
+        f"{steps} {other} shared {shared} alike {got.alike} {got.seconds:.1f} s | {got.scene}"
+    )
