@@ -87,10 +87,10 @@ def harmonics(problem: Problem, residual: Array) -> list[Followed]:
             angle = np.concatenate(
                 [VARIABLES[name](problem.dataset.recordings[s.run].raw.at) for s, _ in own]
             )
-            shares = [_harmonic_share(angle * order, error) for order in range(1, _ORDERS + 1)]
+            shares = _harmonic_shares(angle, error)
             best = int(np.argmax(shares))
             if shares[best] > _WORTH:
-                out.append(Followed(output, name, shares[best], order=best + 1))
+                out.append(Followed(output, name, float(shares[best]), order=best + 1))
     return sorted(out, key=lambda f: -f.share)
 
 
@@ -127,13 +127,30 @@ def quantile_bins(variable: Array) -> NDArray[np.intp]:
     return np.searchsorted(edges, variable, side="right")
 
 
-def _harmonic_share(angle: Array, error: Array) -> float:
+def _harmonic_shares(angle: Array, error: Array) -> Array:
+    """Share of the error's power that a sine of each order takes, (orders,).
+
+    Sines of one order are powers of those of the first, and their products sines of twice it.
+    """
     total = float(error @ error)
     if total == 0.0:
-        return 0.0
-    columns = np.column_stack([np.cos(angle), np.sin(angle)])
-    gradient = columns.T @ error
-    normal = columns.T @ columns
-    if np.linalg.cond(normal) > 1e6:
-        return 0.0
-    return float(gradient @ np.linalg.solve(normal, gradient)) / total
+        return np.zeros(_ORDERS)
+    first = np.exp(1j * angle)
+    power, own = first.copy(), error.astype(complex)
+    gradient, sums = np.empty(_ORDERS, dtype=complex), np.empty(2 * _ORDERS, dtype=complex)
+    for order in range(2 * _ORDERS):
+        sums[order] = power.sum()
+        if order < _ORDERS:
+            gradient[order] = power @ own
+        power *= first
+    twice, count = sums[1::2], len(angle)
+    normal = np.empty((_ORDERS, 2, 2))
+    normal[:, 0, 0], normal[:, 1, 1] = (count + twice.real) / 2, (count - twice.real) / 2
+    normal[:, 0, 1] = normal[:, 1, 0] = twice.imag / 2
+    # An angle that hardly moves has no orders.
+    turned = np.linalg.cond(normal) <= 1e6
+    toward = np.stack([gradient.real, gradient.imag], axis=1)[turned]
+    out = np.zeros(_ORDERS)
+    solved = np.linalg.solve(normal[turned], toward[:, :, None])[:, :, 0]
+    out[turned] = np.sum(toward * solved, axis=1) / total
+    return out

@@ -97,7 +97,7 @@ def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> flo
         for name, rms in noise.rms.items():
             rows = plain[own & (output == name)]
             if len(rows):
-                variance = float(np.mean(np.einsum("ij,jk,ik->i", rows, covariance, rows)))
+                variance = float(np.sum(covariance * (rows.T @ rows))) / len(rows)
                 worst = max(worst, variance / rms**2)
     return worst
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import detrend, firwin, upfirdn, welch
+from scipy.signal import firwin, upfirdn, welch
 
 from winchkit.model.line import Motion
 from winchkit.model.stages import At
@@ -156,11 +156,18 @@ def _quickest(values: Array, rate: float) -> float:
     bridged = values if known.all() else np.interp(index, index[known], values[known])
     # A ramp of many turns would leak over all frequencies through a common window.
     window = ("general_cosine", (3 / 8, 1 / 2, 1 / 8))
-    frequency, power = welch(bridged, fs=rate, window=window, nperseg=length, detrend=detrend)
+    frequency, power = welch(bridged, fs=rate, window=window, nperseg=length, detrend=_levelled)
     noise = float(np.median(power[frequency > rate / 4]))
     clear = np.where(power > _CLEAR * noise, power - noise, 0.0)
     beyond = np.cumsum(clear[::-1])[::-1]
     return float(frequency[np.flatnonzero(beyond >= _LOST * beyond[0])[-1]]) if beyond[0] else 0.0
+
+
+def _levelled(values: Array) -> Array:
+    """Without mean and slope along the last axis."""
+    x = np.arange(values.shape[-1]) - (values.shape[-1] - 1) / 2
+    slope = (values @ x / (x @ x))[..., None]
+    return np.asarray(values - values.mean(axis=-1, keepdims=True) - slope * x)
 
 
 def _pieces(time: Array) -> list[slice]:
