@@ -272,6 +272,7 @@ def test_all_winches_of_a_recording_each_by_itself(both: list[Path]) -> None:
     assert list(each["winches"]) == ["A", "B"]
     for name, found in each["winches"].items():
         assert found == answer("diagnose", *both, "-p", "bench-spiral", "--winch", name)
+    assert set(each["shared"]) == {"effects", "alarms"}
     for one in each["shared"]["effects"]:
         told = [*one["winches"], *one["without"], *one["unsure"]]
         assert sorted(told) == ["A", "B"]

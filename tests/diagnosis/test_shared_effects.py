@@ -13,7 +13,7 @@ from scipy.stats import kstest
 
 from winchkit.diagnosis.report.shared_text import effect_text, shared_effects_text
 from winchkit.diagnosis.result import Detectable, Diagnosis, Estimate, Step
-from winchkit.diagnosis.shared_effects import Pooled, pooled, shared_effects
+from winchkit.diagnosis.shared_effects import Pooled, alarms, pooled, shared_effects
 
 NAMES = "ABCDEFGH"
 RUBS = "motor-coulomb"
@@ -185,7 +185,7 @@ def test_cogging_of_two_orders_is_two_effects() -> None:
 
 def test_text_tells_each_winch_in_a_line_and_then_what_is_common() -> None:
     found = {name: said(step([RUBS], torque=(0.08 + 0.02 * (name == "H"), 1e-4))) for name in NAMES}
-    text = shared_effects_text(found, shared_effects(found, CATALOGUE))
+    text = shared_effects_text(found, shared_effects(found, CATALOGUE), {})
     lines = text.splitlines()
     assert lines[0] == "all 8 winches"
     assert [line.split()[0] for line in lines[1:9]] == list(NAMES)
@@ -196,7 +196,7 @@ def test_text_tells_each_winch_in_a_line_and_then_what_is_common() -> None:
 def test_nothing_is_shared_where_nothing_was_found() -> None:
     found = {name: said() for name in NAMES}
     assert shared_effects(found, CATALOGUE) == ()
-    assert "nothing above the noise" in shared_effects_text(found, ())
+    assert "nothing above the noise" in shared_effects_text(found, (), {})
 
 
 def test_as_json() -> None:
@@ -205,3 +205,17 @@ def test_as_json() -> None:
     assert set(told) == {"effects", "winches", "without", "unsure", "parameters"}
     assert set(told["parameters"]["torque"]) == set(vars(one.parameters["torque"]))
     assert isinstance(one.parameters["torque"], Pooled)
+
+
+def test_an_alarm_of_one_of_eight_is_eight_times_as_likely() -> None:
+    found = {name: said() for name in NAMES} | {"E": said(verdict="unknown")}
+    random = np.random.default_rng(5)
+    chances = dict.fromkeys(NAMES, 0.5) | {"E": 0.01}
+    told = alarms(found, chances)
+    noise = random.uniform(size=(20_000, len(NAMES))).min(axis=1)
+    assert told == {"E": pytest.approx(np.mean(noise < 0.01), abs=0.006)}
+    lines = shared_effects_text(found, (), told).splitlines()
+    assert "by chance in one of 8 winches: 7.7 % of recordings" in " ".join(" ".join(lines).split())
+    # What was named is no mere alarm, and without repeats there is no chance to tell.
+    named = said(step([RUBS], torque=(0.08, 0.001)), verdict="partly")
+    assert alarms({"A": named, "B": said(verdict="unknown")}, {"A": 0.01, "B": np.nan}) == {}

@@ -68,11 +68,7 @@ def _tell_one(
         answer = diagnose(own, declared, catalogue, asked.band, thin=thin, told=told)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
-        from winchkit.diagnosis.report.page import report_html
-
-        title = page_title(declared.name, runs)
-        page = report_html(answer, title, profile=asked.profile, options=asked.options)
-        write_page(html, page)
+        write_page(html, _page(answer, page_title(declared.name, runs), asked))
 
 
 def _tell_each(
@@ -85,12 +81,12 @@ def _tell_each(
 ) -> None:
     """What every winch of the runs lacks, each by itself, and what they have in common."""
     from winchkit.diagnosis.each import diagnose_each
-    from winchkit.diagnosis.report.page import report_html
     from winchkit.diagnosis.report.shared_text import shared_effects_text
-    from winchkit.diagnosis.shared_effects import shared_effects
+    from winchkit.diagnosis.shared_effects import alarms, shared_effects
 
     said: dict[str, Any] = {}
     found: dict[str, Diagnosis] = {}
+    present: dict[str, float] = {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
     with progress_bar() as told:
         winches = read_each(runs)
@@ -98,23 +94,21 @@ def _tell_each(
         each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, told=told)
         for name, answer in each:
             found[name], said[name] = answer.diagnosis, _said(answer, as_json)
+            present[name] = answer.found.presence.p_value
             if html:
-                options = replace(asked, winch=name).options
-                own = report_html(
-                    answer, f"{title}, {name}", profile=asked.profile, options=options
-                )
+                own = _page(answer, f"{title}, {name}", replace(asked, winch=name))
                 save_page(str(Path(html).with_name(pages[name])), own)
             del answer  # hundreds of megabytes after long runs
-    shared = shared_effects(found, catalogue)
+    shared, chances = shared_effects(found, catalogue), alarms(found, present)
     if as_json:
-        effects = [one.to_json() for one in shared]
-        echo_json({"schema": 1, "winches": said, "shared": {"effects": effects}})
+        together = {"effects": [one.to_json() for one in shared], "alarms": chances}
+        echo_json({"schema": 1, "winches": said, "shared": together})
     else:
-        echo_each(said, shared_effects_text(found, shared))
+        echo_each(said, shared_effects_text(found, shared, chances))
     if html:
         from winchkit.diagnosis.report.shared_page import shared_effects_html
 
-        write_page(html, shared_effects_html(found, shared, title, pages))
+        write_page(html, shared_effects_html(found, shared, chances, title, pages))
 
 
 def _tell_robot(
@@ -130,6 +124,13 @@ def _tell_robot(
         echo_json({**answer.diagnosis.to_json(), "sentence": sentence(answer.diagnosis)})
     else:
         click.echo(report_text(answer))
+
+
+def _page(answer: Answer, title: str, asked: Asked) -> str:
+    """An answer as a page, with the commands that repeat it."""
+    from winchkit.diagnosis.report.page import report_html
+
+    return report_html(answer, title, profile=asked.profile, options=asked.options)
 
 
 def _said(answer: Answer, as_json: bool) -> Any:

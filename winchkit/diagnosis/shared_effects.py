@@ -21,7 +21,7 @@ from winchkit.diagnosis.result import Diagnosis, Step
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Parameter
 
-__all__ = ["Pooled", "SharedEffect", "pooled", "shared_effects"]
+__all__ = ["Pooled", "SharedEffect", "alarms", "pooled", "shared_effects"]
 
 Array = NDArray[np.float64]
 _ALIKE = 0.01
@@ -95,6 +95,19 @@ def shared_effects(
     named = [(winch, step) for winch, answer in found.items() for step in answer.steps]
     out = [_shared(members, steps, found, catalogue) for members, steps in _together(named)]
     return tuple(sorted(out, key=lambda shared: -len(shared.winches)))
+
+
+def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict[str, float]:
+    """How likely noise makes one of so many winches alarm as much as each that has no name.
+
+    ``chances`` is how likely it makes that one winch (NaN where no repeat tells): of eight winches
+    of which nothing is missing, one alarms eight times as often as one alone.
+    """
+    return {
+        winch: 1 - (1 - min(chances[winch], 1.0)) ** len(found)
+        for winch, one in found.items()
+        if one.verdict in {"partly", "unknown"} and not one.steps and np.isfinite(chances[winch])
+    }
 
 
 def pooled(values: Mapping[str, tuple[float, float]], unit: str, *, reciprocal: bool) -> Pooled:

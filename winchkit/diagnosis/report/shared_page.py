@@ -20,18 +20,20 @@ __all__ = ["shared_effects_html", "shared_errors_html"]
 def shared_effects_html(
     found: Mapping[str, Diagnosis],
     shared: Sequence[SharedEffect],
+    chances: Mapping[str, float],
     title: str,
     pages: Mapping[str, str],
 ) -> str:
     """The page over the diagnoses of all winches; ``pages`` are the names of each one's own."""
-    rows = [[_link(name, pages), verdict, text] for name, verdict, text in winch_rows(found)]
+    told_of = winch_rows(found, chances)
+    rows = [[_link(name, pages), verdict, unbroken(text)] for name, verdict, text in told_of]
     told = [unbroken(effect_text(one)) for one in shared]
     return page(
         title,
         (),
         section("winches", "Every winch", _table(["winch", "verdict", "what was found"], rows, 3)),
         section("shared", "What they have in common, and what not", bullets(told)),
-        _as_json({"effects": [one.to_json() for one in shared]}),
+        _as_json({"effects": [one.to_json() for one in shared], "alarms": dict(chances)}),
     )
 
 

@@ -29,13 +29,20 @@ __all__ = [
 ]
 
 _FOLLOWED = 3
+_BY_CHANCE = 0.01
+"""From here on an alarm of one of many winches may be chance."""
 _ALL = 0.9
 """Part of a share that makes it alike in all winches, and the rest not worth a word."""
 
 
-def shared_effects_text(found: Mapping[str, Diagnosis], shared: Sequence[SharedEffect]) -> str:
-    """A diagnosis of every winch in a line each, and which effects they share."""
-    lines = [f"all {len(found)} winches", *hanging(winch_rows(found), words=2)]
+def shared_effects_text(
+    found: Mapping[str, Diagnosis], shared: Sequence[SharedEffect], chances: Mapping[str, float]
+) -> str:
+    """A diagnosis of every winch in a line each, and which effects they share.
+
+    ``chances`` are those of :func:`winchkit.diagnosis.shared_effects.alarms`.
+    """
+    lines = [f"all {len(found)} winches", *hanging(winch_rows(found, chances), words=2)]
     if shared:
         lines += ["", "what they have in common, and what not"]
         lines += [line for one in shared for line in paragraph(effect_text(one), "  ", "    ")]
@@ -50,9 +57,15 @@ def shared_errors_text(found: Mapping[str, Comparison], shared: Mapping[str, Sha
     return "\n".join(lines)
 
 
-def winch_rows(found: Mapping[str, Diagnosis]) -> list[list[str]]:
+def winch_rows(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> list[list[str]]:
     """Per winch its name, its verdict, and what was found."""
-    return [[name, VERDICT_NAMES[one.verdict], _found(one)] for name, one in found.items()]
+    rows = []
+    for name, one in found.items():
+        told, chance = _found(one), chances.get(name, 0.0)
+        if chance > _BY_CHANCE:
+            told += f"; by chance in one of {len(found)} winches: {percent(chance)} of recordings"
+        rows.append([name, VERDICT_NAMES[one.verdict], told])
+    return rows
 
 
 def effect_text(shared: SharedEffect) -> str:
