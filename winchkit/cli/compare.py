@@ -11,6 +11,7 @@ import click
 
 from winchkit.cli.html_option import html_option, page_title, pages_beside, save_page, write_page
 from winchkit.cli.output import echo_each, echo_json
+from winchkit.cli.progress import progress_bar
 from winchkit.cli.runs_option import Asked, json_option, model_options, read_all, read_each
 
 if TYPE_CHECKING:
@@ -60,15 +61,19 @@ def _tell_each(
     from winchkit.diagnosis.shared_errors import errors_of, shared_errors
 
     found, errors = {}, {}
-    title, catalogue, winches = page_title(declared.name, runs), asked.catalogue, read_each(runs)
-    pages = pages_beside(html, list(winches)) if html else {}
-    for name, own in winches.items():
-        answer = compared(own, declared, catalogue, asked.band)
-        found[name], errors[name] = answer.comparison, errors_of(answer)
-        if html:
-            options = replace(asked, winch=name).options
-            page = comparison_html(answer, f"{title}, {name}", asked.profile, options=options)
-            save_page(str(Path(html).with_name(pages[name])), page)
+    title, catalogue = page_title(declared.name, runs), asked.catalogue
+    with progress_bar() as told:
+        winches = read_each(runs)
+        pages = pages_beside(html, list(winches)) if html else {}
+        for index, (name, own) in enumerate(winches.items()):
+            told(f"winch {name}", index / len(winches))
+            answer = compared(own, declared, catalogue, asked.band)
+            found[name], errors[name] = answer.comparison, errors_of(answer)
+            if html:
+                options = replace(asked, winch=name).options
+                page = comparison_html(answer, f"{title}, {name}", asked.profile, options=options)
+                save_page(str(Path(html).with_name(pages[name])), page)
+            del answer  # gigabytes after long runs
     shared = shared_errors(errors)
     if as_json:
         said = {name: one.to_json() for name, one in found.items()}
