@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.html_option import html_option, page_title, pages_beside, save_page, write_page
+from winchkit.cli.outcome import threads_abandoned
 from winchkit.cli.output import echo_each, echo_json
 from winchkit.cli.progress import progress_bar
 from winchkit.cli.runs_option import Asked, json_option, model_options, read_all, read_each
@@ -88,7 +89,7 @@ def _tell_each(
     found: dict[str, Diagnosis] = {}
     present: dict[str, float] = {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
-    with progress_bar() as told:
+    with threads_abandoned(), progress_bar() as told:
         winches = read_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
         each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, told=told)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import NoReturn
 
 import click
 
 from winchkit.errors import FileError, WinchkitError
 
-__all__ = ["INTERNAL", "INTERRUPTED", "finish"]
+__all__ = ["INTERNAL", "INTERRUPTED", "finish", "threads_abandoned"]
 
 INTERRUPTED = 130
 INTERNAL = 70
@@ -45,6 +46,21 @@ def finish(call: Callable[[], object]) -> NoReturn:
         )
         sys.exit(INTERNAL)
     sys.exit(result if type(result) is int else 0)
+
+
+@contextmanager
+def threads_abandoned() -> Iterator[None]:
+    """Around what computes in threads and holds nothing open: Ctrl-C ends the process at once.
+
+    Python would wait for the threads, for seconds.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        _tell("winchkit: interrupted")
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(INTERRUPTED)
 
 
 def _tell(message: str) -> None:

@@ -59,9 +59,10 @@ def _taken(begun: deque[tuple[str, Future[Answer]]]) -> tuple[str, Answer]:
 
 
 def _begun(work: Callable[[str], Answer], name: str) -> Future[Answer]:
-    """An answer being worked on, by a thread that an interrupted command leaves behind.
+    """An answer being worked on.
 
-    A pool's threads would be waited for: seconds after Ctrl-C.
+    Whoever is interrupted while waiting gets away at once; a pool would first wait for its
+    threads, for seconds.
     """
     future: Future[Answer] = Future()
 
@@ -71,5 +72,5 @@ def _begun(work: Callable[[str], Answer], name: str) -> Future[Answer]:
         except BaseException as error:  # noqa: BLE001 - handed to whoever waits for the answer
             future.set_exception(error)
 
-    Thread(target=run, name=f"diagnose {name}", daemon=True).start()
+    Thread(target=run, name=f"diagnose {name}").start()
     return future
