@@ -154,6 +154,19 @@ def test_a_weaker_stiffness_is_the_larger_effect() -> None:
     assert one.unsure == ("C",)
 
 
+def test_who_has_it_by_another_law_is_not_without_it() -> None:
+    shown = (Detectable(STRETCHES, "axial_stiffness", 1e6, "N"),)
+    bends = step(["cable-elongation-exponential"], strain_scale=(1e-3, 1e-5))
+    found = {
+        "A": said(step([STRETCHES], axial_stiffness=(1e5, 1e3))),
+        "B": Diagnosis("explained", {}, (bends,), (), shown, 0.0, (), ()),
+        "C": Diagnosis("adequate", {}, (), (), shown, 0.0, (), ()),
+    }
+    one = next(e for e in shared_effects(found, CATALOGUE) if e.effects == (STRETCHES,))
+    assert one.without == ("C",)
+    assert one.unsure == ("B",)
+
+
 def test_what_all_have_narrows_what_each_cannot_tell() -> None:
     found = {
         "A": said(step(["drum-radius", "gear-ratio"], radius_error=(1e-3, 1e-5))),

@@ -19,7 +19,7 @@ from scipy.stats import chi2
 
 from winchkit.diagnosis.result import Diagnosis, Step
 from winchkit.effects.catalogue import Catalogue
-from winchkit.effects.effect import Parameter
+from winchkit.effects.effect import Effect, Parameter
 
 __all__ = ["Pooled", "SharedEffect", "alarms", "pooled", "shared_effects"]
 
@@ -177,8 +177,10 @@ def _shared(
     unsure: list[str] = []
     for winch, diagnosis in found.items():
         if winch not in steps:
-            seen = _would_show(diagnosis, effect.id, parameters, effect.parameters)
-            (without if seen else unsure).append(winch)
+            lacks = _would_show(diagnosis, effect, parameters) and not _kin(
+                diagnosis, effect, catalogue
+            )
+            (without if lacks else unsure).append(winch)
     ids = tuple(name for name, _ in members)
     return SharedEffect(ids, tuple(steps), tuple(without), tuple(unsure), parameters)
 
@@ -189,21 +191,27 @@ def _told(steps: Mapping[str, Step], effect: str, name: str) -> dict[str, tuple[
     return {w: (e.value, e.std) for w, e in known.items() if e is not None and np.isfinite(e.std)}
 
 
-def _would_show(
-    diagnosis: Diagnosis,
-    effect: str,
-    size: Mapping[str, Pooled],
-    parameters: Sequence[Parameter],
-) -> bool:
-    """Whether a winch that was not found to have an effect of this size can be said to lack it."""
+def _would_show(diagnosis: Diagnosis, effect: Effect, size: Mapping[str, Pooled]) -> bool:
+    """Whether a winch that was not found to have an effect of this size would have shown it."""
     if diagnosis.verdict in {"partly", "unknown"}:
         return False
     for shown in diagnosis.detectable:
-        if shown.effect == effect and shown.parameter in size:
-            parameter = next(p for p in parameters if p.name == shown.parameter)
+        if shown.effect == effect.id and shown.parameter in size:
+            parameter = effect.parameter(shown.parameter)
             there = _from_null(size[shown.parameter].value, parameter)
             return bool(there >= _from_null(shown.smallest, parameter))
     return False
+
+
+def _kin(diagnosis: Diagnosis, effect: Effect, catalogue: Catalogue) -> bool:
+    """Whether something was found that may be this effect by another law or name."""
+    named = [catalogue[name] for step in diagnosis.steps for name in step.effects]
+    return any(
+        (effect.family and other.family == effect.family)
+        or other.id in effect.confused_with
+        or effect.id in other.confused_with
+        for other in named
+    )
 
 
 def _from_null(value: float, parameter: Parameter) -> float:
