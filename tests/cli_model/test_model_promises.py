@@ -333,3 +333,10 @@ def test_winches_whose_pages_would_be_one(runs: list[Path], tmp_path: Path) -> N
     assert refused.exit_code == 2
     assert "no page for each of the winches" in refused.stderr
     assert list(answer(*asked)["winches"]) == ["x y", "x-y"]
+
+
+def test_all_winches_of_a_run_that_names_none(runs: list[Path]) -> None:
+    alone = invoke("compare", *runs[:2], "-p", "bench-spiral")
+    each = invoke("compare", *runs[:2], "-p", "bench-spiral", "--winch", "all")
+    assert each.exit_code == 0
+    assert each.stdout == alone.stdout

@@ -51,7 +51,7 @@ def pages_beside(path: str, winches: Sequence[str]) -> dict[str, str]:
     Raises UsageError where two winches would get one page.
     """
     page = Path(path)
-    names = {w: f"{page.stem}-{_NO_FILE.sub('-', w)}{page.suffix}" for w in winches}
+    names = {w: f"{page.stem}-{_NO_FILE.sub('-', w) or 'winch'}{page.suffix}" for w in winches}
     if len(set(names.values())) < len(names):
         raise UsageError(f"--html: no page for each of the winches {', '.join(winches)}")
     return names

@@ -30,8 +30,9 @@ def echo_json(value: object) -> None:
 def echo_each(texts: Mapping[str, str], overview: str) -> None:
     """Print a text for every winch under its name, and last, where one looks, all at a glance."""
     for name, text in texts.items():
-        click.echo(f"winch {name}\n{text}\n")
-    click.echo(overview)
+        click.echo(f"winch {name}\n{text}\n" if name else text)
+    if len(texts) > 1:
+        click.echo(overview)
 
 
 @singledispatch

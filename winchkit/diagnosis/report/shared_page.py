@@ -61,7 +61,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], words: int) -> Ma
 
 
 def _link(name: str, pages: Mapping[str, str]) -> Markup:
-    return element("a", name, href=pages[name])
+    return element("a", name or "the winch", href=pages[name])
 
 
 def _as_json(shared: Mapping[str, object]) -> Markup:
