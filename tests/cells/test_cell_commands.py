@@ -112,6 +112,10 @@ def test_the_device_tares_and_zeroes_itself(cell: Served, tmp_path: Path) -> Non
     result = told("tare", "--device", "-b", bench, "--for", "0.2s")
     assert result["before"] == pytest.approx(60.0, abs=1)
     assert told("info", "-b", bench)["tare"]["device"] is True
+    result = told("tare", "--device", "--clear", "-b", bench, "--for", "0.2s")
+    assert result["after"] == pytest.approx(60.0, abs=1)
+    assert told("info", "-b", bench)["tare"]["device"] is False
+    assert cell.cell.stored == 0
 
 
 def test_a_zero_of_the_device_leaves_the_hosts_tare_and_says_so(
@@ -182,6 +186,31 @@ def test_a_calibration_that_is_not_accepted_writes_nothing(cell: Served, tmp_pat
     assert not list(tmp_path.glob("A*.toml"))
     run("calibrate", "A", "-b", bench, "--points", points, "--yes")
     assert read_calibration(tmp_path / "A-cell.toml").device == "laumas-tlb"
+
+
+def test_a_serial_number_can_be_told_and_weights_need_no_points(
+    cell: Served, tmp_path: Path
+) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text("load [kg],indicated [N]\n0,0\n1,9.8\n2,19.6\n5,49.1\n10,98.0\n")
+    bench = cell.bench(tmp_path)
+    asked = ("calibrate", "A", "-b", bench, "--points", points, "--yes")
+    run(*asked, "--serial", "K-17")
+    assert read_calibration(tmp_path / "A-cell.toml").serial_number == "K-17"
+    assert run(*asked, "--weights", "1 kg").exit_code == 2
+
+
+def test_only_what_measures_a_force_is_calibrated(tmp_path: Path) -> None:
+    with Served("laumas-tlb") as served:
+        bench = served.bench(tmp_path)
+    text = bench.read_text().replace("cell = {", "length = {")
+    bench.write_text(text.replace('"laumas-tlb"', '"generic-length"'))
+    points = tmp_path / "points.csv"
+    points.write_text("load [kg],indicated [N]\n0,0\n1,9.8\n2,19.6\n")
+    result = run("calibrate", "A.length", "-b", bench, "--points", points, "--yes")
+    assert result.exit_code == 2
+    assert "A.length measures no force" in result.output
+    assert not list(tmp_path.glob("A*.toml"))
 
 
 def test_an_unknown_cell_is_named_with_those_there_are(cell: Served, tmp_path: Path) -> None:

@@ -75,6 +75,13 @@ def test_points_in_kilograms_go_up_and_down_by_themselves(tmp_path: Path) -> Non
     assert [point.series for point in points] == [1, 1, 1, 1]
 
 
+def test_a_series_begins_upwards(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    rows = [f"{load},{load},{series}" for series in (1, 2) for load in (0, 5, 10, 5, 0)]
+    path.write_text("load [N],indicated [N],series\n" + "\n".join(rows) + "\n")
+    assert [point.going for point in read_points(path)] == ["up", "up", "up", "down", "down"] * 2
+
+
 def test_points_say_their_own_direction_series_and_unit(tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     path.write_text("load [kN],indicated [N],going,series,std [mN]\n0.1,99,down,3,20\n")
@@ -88,7 +95,12 @@ def test_points_say_their_own_direction_series_and_unit(tmp_path: Path) -> None:
         ("load [kg]\n1\n", "lacks the column indicated"),
         ("load [kg],weight\n1,2\n", "unknown column 'weight'"),
         ("load [m],indicated [N]\n1,2\n", "unknown force unit 'm'.*or kg"),
-        ("# x\nload [kg],indicated [N]\n1,2\n2,two\n", r"points.csv:4: cannot be read"),
+        (
+            "# x\nload [kg],indicated [N]\n1,2\n2,two\n",
+            r"points.csv:4: .*indicated 'two' is no number",
+        ),
+        ("load [kg],indicated [N]\n1,2\nnan,3\n", r"points.csv:3: .*load 'nan' is no number"),
+        ("load [kg],indicatd [N]\n1,2\n", "did you mean 'indicated'"),
         ("load [kg],indicated [N],going\n1,2,left\n", "neither up nor down"),
     ],
 )

@@ -85,6 +85,26 @@ def test_parts_are_exported_as_one(tmp_path: Path) -> None:
     assert ".parquet" in result.stderr
 
 
+def test_a_log_is_not_exported_onto_itself(log: Path) -> None:
+    whole = log.read_bytes()
+    assert "name another" in run("export", log, "-o", log, code=2).stderr
+    assert log.read_bytes() == whole
+
+
+def test_an_earlier_log_is_not_written_over_unasked(log: Path) -> None:
+    bench = log.with_name("bench.toml")
+    told = run("-b", bench, "-o", log, "--for", "1s", code=2).stderr
+    assert "holds a log already" in told
+    log.rename(log.with_suffix(".003.mcap"))
+    told = run("-b", bench, "-o", log, "--rotate", "1s", "--for", "1s", code=2).stderr
+    assert "lift.003.mcap holds a log already" in told, "a part would be read as one of the new log"
+    run("-b", bench, "-o", log, "--replace", "--for", "1s", code=3)
+    assert log.with_suffix(".003.mcap").exists(), "without a bench there is nothing to replace it"
+    log.touch()
+    log.with_suffix(".003.mcap").unlink()
+    run("-b", bench, "-o", log, "--for", "1s", code=3)
+
+
 def test_parquet_holds_the_rows_with_units(log: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
     output = log.with_suffix(".parquet")
@@ -121,7 +141,9 @@ def test_replay_prints_what_the_bench_would(log: Path) -> None:
     assert len(lines) == 500
     assert json.loads(lines[-1])["winch"]["A"]["motor_torque"] == 2.0
     assert "500 pictures" in result.stderr
-    assert "moving" in run("replay", log, "--fast").stderr, "without a sink it is a table"
+    table = run("replay", log, "--fast").stderr
+    assert "moving" in table, "without a sink it is a table"
+    assert "cycle 500" in table, "whose last picture is the log's"
     run("replay", log.with_name("none.csv"), code=3)
     run("replay", log, "--udp", "nowhere", code=2)
 

@@ -12,7 +12,7 @@ from winchkit.calibration.cell_file import tares_toml, write_text
 from winchkit.errors import UsageError
 from winchkit.schema.calibration import HostTare, TareBook, tare_book_path
 
-__all__ = ["clear_tare", "device_tare", "device_zero", "host_tare"]
+__all__ = ["clear_device_tare", "clear_tare", "device_tare", "device_zero", "host_tare"]
 
 _CHECK = 0.3
 
@@ -55,6 +55,11 @@ def clear_tare(desk: CellDesk, name: str) -> dict[str, Any]:
 def device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
     """Send the device its own tare; raises NotPermitted, NoReply, DeviceRefused."""
     return _by_device(desk, name, "tare", duration)
+
+
+def clear_device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Let the device count gross again; raises NotPermitted, NoReply, DeviceRefused."""
+    return _by_device(desk, name, "gross", duration)
 
 
 def device_zero(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:

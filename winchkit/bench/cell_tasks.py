@@ -8,7 +8,13 @@ from typing import Any, Protocol
 
 from winchkit.bench.cell_desk import CellDesk, full_name, indicated
 from winchkit.bench.cell_report import about, counters_told, rate_report
-from winchkit.bench.cell_tares import clear_tare, device_tare, device_zero, host_tare
+from winchkit.bench.cell_tares import (
+    clear_device_tare,
+    clear_tare,
+    device_tare,
+    device_zero,
+    host_tare,
+)
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
@@ -77,6 +83,7 @@ def _store(desk: CellDesk, name: str, command: str) -> dict[str, Any]:
 
 TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
     "about": about,
+    "clear device tare": clear_device_tare,
     "clear tare": clear_tare,
     "device tare": device_tare,
     "host tare": host_tare,

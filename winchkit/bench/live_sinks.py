@@ -37,8 +37,11 @@ class JsonLines:
 class UdpJson:
     """One datagram a picture: JSON with ``timestamp`` (UTC, s) and the winches' numbers.
 
-    This is what PlotJuggler's UDP server reads with the protocol JSON. Nobody needs to listen; a
-    picture that does not get out is counted in ``dropped``.
+    This is what PlotJuggler's UDP server reads with the protocol JSON: it names a number after the
+    keys that lead to it (``/A/tension``), and leaves the time stamps of a stream for good once one
+    datagram has none. The time is that of the picture, not of its sending: the bench's clock,
+    brought to UTC by the first picture. Nobody needs to listen; a picture that does not get out is
+    counted in ``dropped``.
     """
 
     def __init__(self, target: str, utc: Callable[[], float]) -> None:
@@ -50,17 +53,21 @@ class UdpJson:
             found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_DGRAM)
         except OSError as error:
             raise ConnectionLost(f"'{target}' cannot be reached: {error}") from None
-        family, kind, protocol, _, address = found[0]
+        # localhost is ::1 first on many machines, and PlotJuggler listens at 127.0.0.1.
+        family, kind, protocol, _, address = min(found, key=_version_six)
         self._address: tuple[Any, ...] = address
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)
-        self._utc = utc
+        self._utc, self._offset = utc, math.nan
         self.dropped = 0
 
     def __call__(self, status: Mapping[str, Any]) -> None:
         """Send one picture; never waits."""
+        if math.isnan(self._offset):
+            self._offset = self._utc() - status["time"]
         winches = {name: _numbers(winch) for name, winch in status["winch"].items()}
-        picture = {"timestamp": self._utc(), "cycle": status["cycle"], **winches}
+        stamp = status["time"] + self._offset
+        picture = {**winches, "cycle": status["cycle"], "timestamp": stamp}
         data = json.dumps(picture, separators=(",", ":")).encode()
         try:
             if len(data) > _LARGEST:
@@ -72,6 +79,10 @@ class UdpJson:
     def close(self) -> None:
         """Let the socket go."""
         self._socket.close()
+
+
+def _version_six(found: tuple[Any, ...]) -> bool:
+    return bool(found[0] == socket.AF_INET6)
 
 
 def _numbers(winch: Mapping[str, Any]) -> dict[str, float]:

@@ -14,7 +14,7 @@ from typing import Any
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.runs.whole_file import write_whole
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
-from winchkit.units import convert, format_quantity
+from winchkit.units import convert, format_quantity, suggest
 
 __all__ = ["GRAVITY", "calibration_toml", "read_points", "tares_toml", "write_text"]
 
@@ -103,7 +103,12 @@ def _columns(header: list[str], path: str) -> dict[str, tuple[int, str]]:
         key = name.strip()
         if key not in _COLUMNS:
             raise FileError(
-                Fault(f"unknown column '{key}'; known are {', '.join(_COLUMNS)}", path, 1)
+                Fault(
+                    f"unknown column '{key}'; known are {', '.join(_COLUMNS)}"
+                    f"{suggest(key, list(_COLUMNS))}",
+                    path,
+                    1,
+                )
             )
         found[key] = (place, unit.strip(" ]"))
     missing = [key for key in ("load", "indicated") if key not in found]
@@ -120,18 +125,24 @@ def _read_point(
 ) -> CalibrationPoint:
     def number(key: str) -> float:
         place, unit = columns[key]
-        return _force(float(row[place]), unit, "")
+        try:
+            value = float(row[place])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise ValueError(f"{key} '{row[place]}' is no number")
+        return _force(value, unit, "")
 
     load = number("load")
+    series = int(row[columns["series"][0]]) if "series" in columns else 1
     going: Any = "up"
     if "going" in columns:
         going = row[columns["going"][0]].strip()
         if going not in ("up", "down"):
             raise ValueError(f"'{going}' is neither up nor down")
-    elif before:
+    elif before and before[-1].series == series:
         last = before[-1]
         going = last.going if load == last.load else ("up" if load > last.load else "down")
-    series = int(row[columns["series"][0]]) if "series" in columns else 1
     std = number("std") if "std" in columns else 0.0
     return CalibrationPoint(load, number("indicated"), std, going, series)
 

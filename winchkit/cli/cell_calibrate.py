@@ -33,6 +33,7 @@ _AT_REST = 4.0
 @click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
 @click.option("--for", "duration", default="3 s", show_default=True, help="Averaged per weight.")
 @click.option("--settle", default="2 s", show_default=True, help="Waited after a weight is hung.")
+@click.option("--serial", help="Serial number of the cell; else what the device says.")
 @click.option("--temperature", help='At the cell, e.g. "21 degC".')
 @click.option(
     "--direction",
@@ -51,6 +52,7 @@ def command(
     bench: str,
     points: str | None,
     order: Literal["linear", "quadratic"],
+    serial: str | None,
     temperature: str | None,
     direction: LoadDirection,
     output: str | None,
@@ -70,7 +72,7 @@ def command(
     from winchkit.cli.duration import optional
 
     degrees = optional(temperature, "temperature")
-    found = _from_file(cell, bench, points) if points else _measure(cell, bench, **guided)
+    found = _found(_force_cell(cell, bench), bench, points, serial, guided)
     fit = fit_cell(found.points, order)
     target = Path(output or Path(bench).parent / f"{found.name.replace('.', '-')}.toml")
     calibration = _calibration(target.stem, fit, found, degrees, direction)
@@ -94,6 +96,16 @@ class _Measured:
     device: str
     serial: str
     points: tuple[CalibrationPoint, ...]
+
+
+def _found(
+    name: str, bench: str, points: str | None, serial: str | None, guided: dict[str, Any]
+) -> _Measured:
+    """Points from a file or from the bench."""
+    if points and guided["weights"]:
+        raise click.UsageError("'--points' measures nothing, so '--weights' has no place there.")
+    found = _from_file(name, bench, points) if points else _measure(name, bench, **guided)
+    return found if serial is None else replace(found, serial=serial)
 
 
 def _write_page(path: str, calibration: CellCalibration, fit: CellFit) -> None:
@@ -131,22 +143,32 @@ def _calibration(
     )
 
 
-def _from_file(cell: str | None, bench: str, points: str) -> _Measured:
-    """Points of a CSV file for a cell of the wiring file; nothing is opened."""
+def _force_cell(cell: str | None, bench: str) -> str:
+    """Full name of what is to be calibrated; raises UsageError for what measures no force."""
     from winchkit.bench.cell_desk import full_name
+    from winchkit.cli.cell_option import unit_of
+    from winchkit.schema.read import read_bench
+
+    name = full_name(read_bench(bench), cell)
+    if unit_of(name) != "N":
+        raise click.UsageError(f"{name} measures no force; weights calibrate a load cell.")
+    return name
+
+
+def _from_file(name: str, bench: str, points: str) -> _Measured:
+    """Points of a CSV file for a cell of the wiring file; nothing is opened."""
     from winchkit.bench.instruments import device_of, refs_of
     from winchkit.calibration.cell_file import read_points
     from winchkit.schema.read import read_bench
 
     spec = read_bench(bench)
-    name = full_name(spec, cell)
     winch, _, role = name.rpartition(".")
     device = device_of(spec, refs_of(spec)[winch, role]).name
     return _Measured(name, device, "", read_points(points))
 
 
 def _measure(
-    cell: str | None, bench: str, *, weights: str | None, series: int, duration: str, settle: str
+    cell: str, bench: str, *, weights: str | None, series: int, duration: str, settle: str
 ) -> _Measured:
     """Lead through the weights."""
     from winchkit.calibration.cell_plan import plan

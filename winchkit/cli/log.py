@@ -42,6 +42,7 @@ _SHOW_PERIOD = 0.5
 )
 @click.option("-o", "--output", metavar="FILE", help="Where to: a .csv or .mcap file.")
 @click.option("--rotate", metavar="LIMIT", help="Go on in a new file, e.g. after 100MB or 10min.")
+@click.option("--replace", is_flag=True, help="Write over an earlier log of that name.")
 @click.option("--for", "duration", metavar="TIME", help="End after this time, e.g. 10s or '2 min'.")
 @click.option("--jsonl", is_flag=True, help="Print live pictures to stdout, one JSON a line.")
 @click.option("--udp", metavar="HOST:PORT", help="Send live pictures as JSON, e.g. to PlotJuggler.")
@@ -55,6 +56,7 @@ def command(
     bench: str | None,
     output: str | None,
     rotate: str | None,
+    replace: bool,
     duration: str | None,
     jsonl: bool,
     udp: str | None,
@@ -65,22 +67,21 @@ def command(
     """Log every winch of a bench until Ctrl-C, or for a time.
 
     MCAP holds every channel with its own time stamps. In CSV a row stands for each reading of the
-    load cell (else of the length instrument). Attaches to the process that owns the bench where
-    there is one; logging never moves anything.
+    load cell (else of the length instrument). Attaches to whoever owns the bench; moves nothing.
     """
     if context.invoked_subcommand is not None:
         return
     if bench is None:
         raise click.UsageError("Missing option '-b' / '--bench'.")
     _refuse(output, rotate, jsonl=jsonl, udp=udp, as_json=as_json)
+    _refuse_to_lose(None if replace else output)
     from winchkit.bench.session import at_station
     from winchkit.cli.duration import quantity, seconds
     from winchkit.cli.live_output import live_sinks
 
     limit, pause = seconds(duration), quantity(period, "time")
     with live_sinks(jsonl=jsonl, udp=udp) as sinks, at_station(bench, effects) as station:
-        if output:
-            station.start_log(str(Path(output).absolute()), rotate)
+        _begin(station, output, rotate)
         with _counter_row(station) as show:
             _follow(station, limit, pause if sinks else _CHECK_PERIOD, sinks, show)
         counted = station.counters()
@@ -89,6 +90,39 @@ def command(
         echo_json({"schema": 1, "output": output, "rows": rows, "counters": counted})
     elif output and not jsonl:
         click.echo(f"{output}: {rows} rows")
+
+
+def _begin(station: Station, output: str | None, rotate: str | None) -> None:
+    """Start the log that was asked for, in the place of an earlier one."""
+    if output:
+        _let_go(output)
+        station.start_log(str(Path(output).absolute()), rotate)
+
+
+def _earlier(output: str) -> list[Path]:
+    """What is there of an earlier log of that name, its parts included."""
+    from winchkit.runs.rotation import parts_beside
+
+    path = Path(output)
+    return [item for item in (path, *parts_beside(path)) if item.is_file()]
+
+
+def _refuse_to_lose(output: str | None) -> None:
+    """Raise UsageError where an earlier log would be written over."""
+    held = [item for item in _earlier(output) if item.stat().st_size] if output else []
+    if held:
+        raise click.UsageError(f"{held[0]} holds a log already; name another file, or --replace.")
+
+
+def _let_go(output: str) -> None:
+    """Take an earlier log away: parts of it would be read as parts of the new one."""
+    from winchkit.errors import Fault, FileError
+
+    for item in _earlier(output):
+        try:
+            item.unlink()
+        except OSError as error:
+            raise FileError(Fault(f"cannot be replaced: {error.strerror}", str(item))) from None
 
 
 def _refuse(

@@ -55,13 +55,16 @@ def _table_unless(asked: list[LiveSink]) -> Iterator[list[LiveSink]]:
 
     from winchkit.cli.monitor import status_table
 
-    shown = 0.0
+    shown, last = 0.0, None
     with Live(console=Console(stderr=True), auto_refresh=False) as live:
 
         def show(status: Mapping[str, Any]) -> None:
-            nonlocal shown
+            nonlocal shown, last
+            last = status
             if time.monotonic() - shown >= _SHOW_PERIOD:
                 shown = time.monotonic()
                 live.update(status_table(status), refresh=True)
 
         yield [show]
+        if last is not None:
+            live.update(status_table(last), refresh=True)

@@ -25,6 +25,8 @@ def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> 
     suffix = Path(output).suffix.lower()
     if suffix not in FORMATS:
         raise UsageError(f"{output}: '{suffix}' is no format of a run; use {', '.join(FORMATS)}")
+    if any(Path(path).resolve() == Path(output).resolve() for path in paths):
+        raise UsageError(f"{output}: would replace the file that is exported; name another")
     log = None if len(paths) == 1 and suffix != ".mf4" else read_log(paths)
     run = (read_run(paths[0]) if log is None else aligned(log)).of_winch(winch)
     if log is not None and suffix == ".mf4":
