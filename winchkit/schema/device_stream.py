@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, suggest
 from winchkit.schema.quantity import (
     Duration,
     Number,
@@ -254,7 +254,8 @@ class StreamSpec(Table):
 
     def _broken_fields(self, parts: tuple[Part, ...], names: set[str]) -> Iterator[str]:
         for name in sorted(names - {"", *_OWN, *self.letter}):
-            yield f"{{{name}}} is unknown; use {', '.join(_OWN)} or a table letter.{name}"
+            near = suggest(name, [*_OWN, *self.letter])
+            yield f"{{{name}}} is unknown; use {', '.join(_OWN)} or a table letter.{name}{near}"
         if ("checksum" in names) != (self.checksum is not None) and "value" in names:
             yield "a field {checksum:2} and the table 'checksum' go together"
         if "unit" in names and not self.units:

@@ -66,8 +66,8 @@ def _faults(kind: type, details: ErrorDetails) -> list[tuple[Key, str]]:
     if details["type"] == "value_error":
         return [(place, str(error))]
     if place and place[-1] == "[key]":
-        names = get_args(get_args(type_at(kind, place[:-2]))[0])
-        return [(place[:-1], f"unknown key; use one of {', '.join(names)}")]
+        names = list(get_args(get_args(type_at(kind, place[:-2]))[0]))
+        return [(place[:-1], _unknown_key(str(place[-2]), names))]
     if place and _is_branch(kind, place):
         place = place[:-1]
     return [(place, _message(kind, details["type"], place, details))]
@@ -84,13 +84,15 @@ def _is_branch(kind: type, place: Key) -> bool:
     return place[-1] in {"str", "int"} and type_at(kind, place) is None
 
 
+def _unknown_key(name: str, known: list[str]) -> str:
+    return f"unknown key{suggest(name, known) or '; use one of ' + ', '.join(known)}"
+
+
 def _message(kind: type, error: str, place: Key, details: ErrorDetails) -> str:
     name = place[-1] if place else ""
     if error == "unexpected_keyword_argument":
         table = type_at(kind, place[:-1])
-        known = _keys(table)
-        near = suggest(str(name), known)
-        return f"unknown key{near or '; use one of ' + ', '.join(known)}"
+        return _unknown_key(str(name), _keys(table))
     wanted = _wanted(type_at(kind, place))
     if error == "missing" and isinstance(name, int):
         owner = _wanted(type_at(kind, place[:-1]))
