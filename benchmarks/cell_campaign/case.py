@@ -57,6 +57,8 @@ class Plan:
     seconds: float = 3.0
     swapped: bool = False
     """The device file has the words in the wrong order."""
+    largest: int = 0
+    """Counts that the device shows at most, where not 0."""
 
 
 @dataclass
@@ -105,7 +107,7 @@ async def _play(plan: Plan, loop: WarpLoop) -> Outcome:
     random, declared = Random(plan.seed), spec_of(plan.device)
     assert declared.modbus is not None
     devices = {
-        unit: Device(declared.modbus, Random(f"{plan.seed}/{unit}"))
+        unit: Device(declared.modbus, Random(f"{plan.seed}/{unit}"), largest=plan.largest)
         for unit in (_SUBJECT, _BYSTANDER)
     }
     faults = _fitting(plan, devices[_SUBJECT])

@@ -26,6 +26,8 @@ class Device:
     overload_until: float = 0.0
     not_a_number: bool = False
     frozen: bool = False
+    largest: int = 0
+    """Counts it shows at most, repeated at will, where not 0: a cell with nothing on it."""
     _counts: float | None = None
 
     def words(self, now: float) -> dict[int, int]:
@@ -53,6 +55,10 @@ class Device:
 
     def _fresh(self, now: float) -> float:
         """Counts that were never shown before, unless it hangs."""
+        if self.largest:
+            counts = float(self.random.randrange(self.largest + 1))
+            self.shown[counts] = now
+            return counts
         if self.frozen and self._counts is not None:
             self.shown[self._counts] = now
             return self._counts

@@ -12,6 +12,7 @@ from winchkit.drivers.status_word import StatusWord
 from winchkit.errors import Fault, FileError
 from winchkit.schema.device import DeviceSpec
 from winchkit.schema.device_modbus import FieldSpec, ModbusSpec, ReadBlock
+from winchkit.schema.modbus_parts import Order
 from winchkit.units import convert, dimension_of
 
 __all__ = ["Decoded", "Decoder"]
@@ -20,6 +21,8 @@ _TINIEST = 1e-30
 """A float below it, but not zero, is no measurement: its bytes stand in another order."""
 _TINIEST_SHARE = 1e-12
 """The same where the device's largest number is known; no converter resolves that."""
+_TURNED: Mapping[Order, Order] = {"ABCD": "CDAB", "CDAB": "ABCD", "BADC": "DCBA", "DCBA": "BADC"}
+"""The same bytes with the words the other way round."""
 _NEAR_ZERO = 1.0
 """Counts; where the status says that the gross value is within a quarter of a count of zero."""
 
@@ -73,6 +76,20 @@ class Decoder:
             quality,
             status,
         )
+
+    def order_told(self, registers: Sequence[int]) -> bool | None:
+        """Whether the words stand in the right order, as far as these tell; see ``Consistency``."""
+        words, told = _placed(self.spec.read, registers), list[bool | None]()
+        for item in (self.field, self._gross):
+            other, limit = _TURNED.get(item.order), item.limit
+            if other is None or limit is None or item.type not in ("u32", "i32"):
+                continue
+            number, turned = (
+                abs(number_of(item.type, order, words, item.register))
+                for order in (item.order, other)
+            )
+            told.append(True if turned > limit else False if number > turned else None)
+        return None if not told else False if False in told else True if True in told else None
 
     def _doubt(self, counts: float, gross: float, status: int) -> Quality:
         """What the numbers say against themselves, or against a status that finds them good."""

@@ -229,7 +229,10 @@ class Instrument(Publishing):
             max(t_receive - back, t_request) - spec.filter_delay,
         )
         self.problem, self._failures, self.status = None, 0, decoded.status
-        believed = self._consistency.take(not quality & Quality.MISMATCH)
+        told = True if self._consistency.order_known else None
+        if told is None and decoded.quality.usable:
+            told = self.decoder.order_told(registers)
+        believed = self._consistency.take(not quality & Quality.MISMATCH, told)
         if believed is None:
             return
         if not believed:
