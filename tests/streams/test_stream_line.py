@@ -71,6 +71,14 @@ def test_silence_is_a_problem_and_ends_by_itself(name: str) -> None:
     assert rig.instrument.problem is None
 
 
+def test_damage_on_the_line_is_told_apart_from_silence() -> None:
+    rig = Rig(device("laumas-tlb-ascii"))
+    rig.run(1.0)
+    rig.sim.inject("bad checksum")
+    assert rig.run(4.0) == []
+    assert "answers with a wrong check sum" in str(rig.instrument.problem)
+
+
 @pytest.mark.parametrize("name", POLLED)
 def test_a_late_answer_is_never_taken_for_the_next(name: str) -> None:
     """Twice the longest reply is later than the time-out here, so every answer comes late."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from winchkit.drivers.clock import Clock
+from winchkit.drivers.counters import Counters
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.decoder import Heard, Meaning
 from winchkit.drivers.stream.instrument import StreamInstrument
@@ -129,7 +130,8 @@ class Conversation:
         waited = spec.timeout if instrument.spec.poll else instrument.max_age
         return NoReply(
             f"{self._where}: nothing that {instrument.name} can say came within {waited:g} s at "
-            f"{ours}{theirs}; check power, wiring, baud rate and address"
+            f"{ours}{theirs}{_instead(instrument.counters)}; check power, wiring, baud rate "
+            "and address"
         )
 
     async def _is_fresh(self, instrument: StreamInstrument) -> bool:
@@ -236,6 +238,17 @@ def exchange_time(instrument: StreamInstrument, bus: BusSpec) -> float:
     answer = len(spec.example) // 2 if spec.binary else len(spec.example)
     size = len(instrument.text(spec.poll)) + answer + len(spec.terminator)
     return size * _byte_time(bus) + _TURNAROUND
+
+
+def _instead(seen: Counters) -> str:
+    """What came although nothing that could be taken did."""
+    came = {
+        "answers with a wrong check sum": seen.crc,
+        "answers of another form": seen.malformed,
+        "bytes that begin no frame": seen.resynchronised,
+    }
+    told = [f"{count} {what}" for what, count in came.items() if count]
+    return f"; there were {', '.join(told)}" if told else ""
 
 
 def _byte_time(bus: BusSpec) -> float:
