@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -20,6 +21,7 @@ from winchkit.bench.programme import run_programme
 from winchkit.bench.snapshot import Phase
 from winchkit.errors import (
     DriveFault,
+    FileError,
     LimitTripped,
     MotionError,
     NotPermitted,
@@ -199,6 +201,27 @@ def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None
         other.close()
     bench.close()
     assert attach(bench.spec) is None
+
+
+def test_a_log_of_a_station_that_cannot_go_on_troubles_nobody_else(
+    bench: Bench, tmp_path: Path
+) -> None:
+    """The folder vanishes, the next part cannot be begun; a thread that raises fails this test."""
+    station = attach(bench.spec)
+    assert station is not None
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    station.start_log(str(folder / "lift.csv"), "1s")
+    until(lambda: station.log_rows() > 10)
+    shutil.rmtree(folder)
+    with pytest.raises(FileError, match="cannot be written"):
+        until(lambda: station.log_rows() < 0)
+    station.close()
+    other = attach(bench.spec)
+    assert other is not None
+    cycle = other.status()["cycle"]
+    until(lambda: other.status()["cycle"] > cycle)
+    other.close()
 
 
 def test_a_station_that_goes_away_lets_go(bench: Bench) -> None:

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+import logging
 import socket
 import threading
 from typing import TYPE_CHECKING, Any
 
 from winchkit.bench.owner import listen
 from winchkit.bench.station import LocalStation
-from winchkit.errors import UsageError, WinchkitError
+from winchkit.errors import FileError, UsageError, WinchkitError
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
 
 __all__ = ["OPERATIONS", "StationServer"]
+
+_LOGGER = logging.getLogger(__name__)
 
 OPERATIONS = (
     "names",
@@ -82,7 +85,17 @@ class StationServer:
             pass
         finally:
             self._clients.discard(client)
-            station.close()
+            _end(station)
+
+
+def _end(station: LocalStation) -> None:
+    """Close a station that nobody listens to any more; what goes wrong there goes to the log."""
+    try:
+        station.close()
+    except FileError:
+        pass  # the recorder has said why the log ended, and its client has gone
+    except WinchkitError as error:
+        _LOGGER.error("a station did not end as it should: %s", error)  # noqa: TRY400
 
 
 def _answer(station: LocalStation, line: bytes) -> dict[str, Any]:

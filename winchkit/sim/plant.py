@@ -138,7 +138,9 @@ class WinchPlant:
     def hang(self, mass: float) -> None:
         """Hang another load, which comes to rest at once; UsageError unless positive."""
         if not mass > 0:
-            raise UsageError(f"a load of {mass:g} kg cannot hang; it must be above 0 kg")
+            raise UsageError(
+                f"a load of {mass:g} kg cannot hang; an empty hook has some grams, 0.01 kg"
+            )
         self._load.mass = mass
         self._settle()
 
