@@ -208,7 +208,7 @@ def check_permanent(spec: BenchSpec, name: str, wanted: str) -> None:
         listed = ", ".join(lasting) or "none"
         raise NotPermitted(
             f"{name}: '{device.name}' has no command '{wanted}' that writes its EEPROM; "
-            f"it has {listed}"
+            f"it has {listed}" + (f": --command {lasting[0]}" if lasting else "")
         )
 
 

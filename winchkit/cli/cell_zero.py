@@ -16,7 +16,8 @@ __all__ = ["command"]
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Send the device of CELL its zero command: what hangs on it now becomes its gross zero.
 
-    Only a volatile zero is sent; a device that keeps it in its EEPROM needs `cell store zero`.
+    Only a volatile zero is sent; a device that keeps it in its EEPROM needs
+    `winchkit cell store --command zero`.
     """
     from winchkit.cli.duration import quantity
 

@@ -113,7 +113,7 @@ class ProcessInstrument(Publishing):
         if command.permanent and not self.may_store:
             raise NotPermitted(
                 f"{self.name}: '{name}' writes the device's EEPROM, which wears out; "
-                "`winchkit cell store` does it on purpose"
+                f"`winchkit cell store --command {name}` does it on purpose"
             )
         self._node.write(*parse_object(command.object), command.value)
 

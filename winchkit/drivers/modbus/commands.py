@@ -26,7 +26,7 @@ def command_of(instrument: Instrument, name: str) -> CommandSpec:
     if command.permanent and not instrument.may_store:
         raise NotPermitted(
             f"{instrument.name}: '{name}' writes the device's EEPROM, which wears out; "
-            "`winchkit cell store` does it on purpose"
+            f"`winchkit cell store --command {name}` does it on purpose"
         )
     return command
 
