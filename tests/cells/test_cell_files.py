@@ -43,8 +43,22 @@ def test_a_calibration_is_read_back_as_it_was_written(tmp_path: Path) -> None:
 
 def test_tares_are_read_back_as_they_were_written(tmp_path: Path) -> None:
     taken = datetime(2026, 11, 21, 10, 51, 7, tzinfo=UTC)
-    book = TareBook("bench", {"A.cell": HostTare(97.8798, 0.0925, taken)})
-    assert read_tares(write_text(tmp_path / "bench.tares.toml", tares_toml(book))) == book
+    tares = {
+        "A.cell": HostTare(97.8798, 0.0925, taken),
+        "A.length": HostTare(4.4985, 5e-5, taken),
+    }
+    book = TareBook("bench", tares)
+    path = write_text(tmp_path / "bench.tares.toml", tares_toml(book))
+    assert read_tares(path) == book
+    assert 'value = "4.4985 m"' in path.read_text(), "a length is none in newtons"
+
+
+def test_a_tare_in_kilograms_is_refused_at_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "b.tares.toml"
+    head = 'schema = 1\nkind = "tares"\nname = "b"\n[tare."A.cell"]\n'
+    path.write_text(head + 'value = "3 kg"\n')
+    with pytest.raises(FileError, match=r"toml:5: tare\.A\.cell\.value: unknown force unit 'kg'"):
+        read_tares(path)
 
 
 def test_tares_stand_beside_the_wiring_file() -> None:

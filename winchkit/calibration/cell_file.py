@@ -57,7 +57,8 @@ def tares_toml(book: TareBook) -> str:
     """The file of a bench's tares."""
     lines = ["schema = 1", 'kind = "tares"', f"name = {json.dumps(book.name)}"]
     for name, tare in book.tare.items():
-        lines += ["", f"[tare.{json.dumps(name)}]", *_tare(tare)]
+        unit = "m" if name.endswith(".length") else "N"
+        lines += ["", f"[tare.{json.dumps(name)}]", *_tare(tare, unit)]
     return "\n".join(lines) + "\n"
 
 
@@ -165,9 +166,9 @@ def _point(point: CalibrationPoint) -> Iterator[str]:
         )
 
 
-def _tare(tare: HostTare) -> Iterator[str]:
-    yield f"value = {_quantity(tare.value, 'N')}"
-    yield f"std = {_quantity(tare.std, 'N')}"
+def _tare(tare: HostTare, unit: str) -> Iterator[str]:
+    yield f"value = {_quantity(tare.value, unit)}"
+    yield f"std = {_quantity(tare.std, unit)}"
     if isinstance(tare.taken, datetime):
         yield f"taken = {tare.taken.isoformat(timespec='seconds')}"
 

@@ -7,7 +7,15 @@ from dataclasses import dataclass, field
 from datetime import date, datetime
 from typing import Literal
 
-from winchkit.schema.quantity import Count, Force, Number, PositiveForce, Temperature, WholeNumber
+from winchkit.schema.quantity import (
+    Count,
+    Force,
+    Length,
+    Number,
+    PositiveForce,
+    Temperature,
+    WholeNumber,
+)
 from winchkit.schema.table import Rule, Table
 
 __all__ = ["CalibrationPoint", "CellCalibration", "HostTare", "TareBook", "tare_book_path"]
@@ -66,8 +74,9 @@ class CellCalibration(Table):
 class HostTare(Table):
     """A tare of the host: subtracted from the calibrated value, unknown to the device."""
 
-    value: Force
-    std: Force = 0.0
+    value: Force | Length
+    """Of a length instrument a length."""
+    std: Force | Length = 0.0
     """Of the mean that it was taken from."""
     taken: datetime | None = None
 

@@ -60,6 +60,8 @@ def _without(raw: Any, place: Key) -> Any:
 def _faults(kind: type, details: ErrorDetails) -> list[tuple[Key, str]]:
     """One error of pydantic as places and messages."""
     place: Key = tuple(details["loc"])
+    if place and str(place[-1]).startswith("function-plain["):  # of a quantity of two dimensions
+        place = place[:-1]
     error = details.get("ctx", {}).get("error")
     if isinstance(error, BrokenRules):
         return [((*place, *_parts(key)), message) for key, message in error.rules]
