@@ -4,7 +4,8 @@
 
 Poses are made by robot_poses, which shares no code with winchkit. The profile has the true
 geometry; "calibrated" cases give the CABTIVE robot's nominal numbers to ``winchkit calibrate``
-first, as a user would, with the elasticity hidden from it.
+first, as a user would, with the elasticity hidden from it. At the end: how often the answer was
+right, how often a single wrong effect was named, and how often 95 % intervals held the truth.
 """
 
 from __future__ import annotations
@@ -20,11 +21,14 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 
 from click.testing import CliRunner
-from robot_poses.hidden import CASES, Case, profile_text, record
+from robot_poses.cases import CASES
+from robot_poses.hidden import Case, profile_text, record
 
 from winchkit.cli import main
 
-__all__ = ["answer", "calibrated"]
+__all__ = ["answer", "calibrated", "covered", "named", "summary", "wrong"]
+
+CALIBRATED = ("elastic ropes", "none")
 
 
 def answer(case: Case, seed: int, folder: Path) -> dict[str, Any]:
@@ -56,48 +60,108 @@ def _called(arguments: list[str]) -> str:
 
 def named(found: dict[str, Any]) -> list[str]:
     """Effects with their lines, a set of them that the data cannot tell apart joined by |."""
+    return ["|".join(_members(step)) for step in found["steps"]]
+
+
+def _members(step: dict[str, Any]) -> list[str]:
     return [
-        "|".join(
-            effect + (f"/{line}" if line else "")
-            for effect, lines in step["lines"].items()
-            for line in lines
-        )
-        for step in found["steps"]
+        effect + (f"/{line}" if line else "")
+        for effect, lines in step["lines"].items()
+        for line in lines
     ]
+
+
+def wrong(case: Case, found: dict[str, Any]) -> list[str]:
+    """Effects named alone that are not hidden."""
+    sets = [_members(step) for step in found["steps"]]
+    return [own[0] for own in sets if len(own) == 1 and own[0] not in case.answers]
+
+
+def right(case: Case, found: dict[str, Any]) -> bool:
+    """Whether all that is hidden is in a set, nothing else is named, and what is not known is
+    called so."""
+    sets = [_members(step) for step in found["steps"]]
+    if case.outside:
+        return found["verdict"] in ("unknown", "partly") and not sets
+    if not case.answers:
+        return found["verdict"] == "adequate"
+    hit = {answer for own in sets for answer in own if answer in case.answers}
+    spare = [own for own in sets if not set(own) & set(case.answers)]
+    alike = "drum-radius" in case.answers[0]
+    return not spare and (bool(hit) if alike else hit == set(case.answers))
+
+
+def covered(case: Case, found: dict[str, Any]) -> dict[str, bool]:
+    """For every hidden number that was fitted whether its 95 % interval holds it."""
+    out = {}
+    for step in found["steps"]:
+        members = _members(step)
+        for effect, values in step["parameters"].items():
+            placed = next((m for m in members if m.partition("/")[0] == effect), effect)
+            for name, estimate in values.items():
+                truth, ends = case.values.get(f"{placed}.{name}"), estimate["interval"]
+                if truth is not None and ends is not None:
+                    out[f"{placed}.{name}"] = ends[0] <= truth <= ends[1]
+    return out
 
 
 def main_of(arguments: list[str]) -> None:
     """Run the cases and print a line each."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--case", action="append")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args(arguments)
     rows = []
     for case in CASES:
-        for flow in (answer, calibrated) if case.name == "elastic ropes" else (answer,):
+        for flow in (answer, calibrated) if case.name in CALIBRATED else (answer,):
             if options.case and case.name not in options.case:
                 continue
-            for seed in range(1, options.seeds + 1):
+            for seed in range(options.first, options.first + options.seeds):
                 with TemporaryDirectory() as folder:
                     start = process_time()
                     found = flow(case, seed, Path(folder))
                 rows.append(_row(case, flow.__name__, seed, found, process_time() - start))
                 if not options.json:
                     print(_text(rows[-1]), flush=True)
+    told = summary(rows)
     if options.json:
-        print(json.dumps({"schema": 1, "cases": rows}, indent=1))
+        print(json.dumps({"schema": 1, "summary": told, "cases": rows}, indent=1))
+    else:
+        print("\n".join(f"{name}: {value}" for name, value in told.items()))
+
+
+def summary(rows: list[dict[str, Any]]) -> dict[str, str]:
+    """Counts over all cases."""
+    kinds = {
+        "adequate where nothing is hidden": [r for r in rows if r["kind"] == "none"],
+        "named rightly": [r for r in rows if r["kind"] == "catalogue"],
+        "unknown or partly, no name, outside the catalogue": [
+            r for r in rows if r["kind"] == "outside"
+        ],
+    }
+    out = {k: f"{sum(r['right'] for r in v)} of {len(v)}" for k, v in kinds.items()}
+    out["a wrong effect named alone"] = f"{sum(bool(r['wrong']) for r in rows)} of {len(rows)}"
+    held = [inside for r in rows for inside in r["covered"].values()]
+    share = f", {100 * sum(held) / len(held):.1f} %" if held else ""
+    out["95 % intervals that hold the truth"] = f"{sum(held)} of {len(held)}{share}"
+    return out
 
 
 def _row(case: Case, flow: str, seed: int, found: dict[str, Any], seconds: float) -> dict[str, Any]:
     place = found["outputs"]["platform_position"]
     return {
         "case": case.name,
+        "kind": "outside" if case.outside else "catalogue" if case.answers else "none",
         "flow": flow,
         "seed": seed,
         "hidden": list(case.answers),
         "verdict": found["verdict"],
         "named": named(found),
+        "right": right(case, found),
+        "wrong": wrong(case, found),
+        "covered": covered(case, found),
         "held_out_mm": [place[f"heldout_rms_{when}"] * 1e3 for when in ("before", "after")],
         "noise_mm": place["noise_rms"] * 1e3,
         "cpu_seconds": seconds,
@@ -106,10 +170,13 @@ def _row(case: Case, flow: str, seed: int, found: dict[str, Any], seconds: float
 
 def _text(row: dict[str, Any]) -> str:
     before, after = row["held_out_mm"]
+    missed = [name for name, inside in row["covered"].items() if not inside]
     return (
-        f"{row['case']:22} {row['flow']:10} {row['seed']:2}  {row['verdict']:9} "
-        f"{' + '.join(row['named']) or '-':60} {before:.3f} -> {after:.3f} mm "
+        f"{'' if row['right'] else '! '}{row['case']:28} {row['flow']:10} {row['seed']:2}  "
+        f"{row['verdict']:9} "
+        f"{' + '.join(row['named']) or '-':48} {before:.3f} -> {after:.3f} mm "
         f"(noise {row['noise_mm']:.3f})  {row['cpu_seconds']:.0f} s"
+        + (f"  95 % missed: {', '.join(missed)}" if missed else "")
     )
 
 

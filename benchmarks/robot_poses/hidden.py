@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -17,12 +17,16 @@ from numpy.typing import NDArray
 
 from robot_poses.truth import GRAVITY, HOME, Noise, Row, Truth, Vector, csv, poses, turn
 
-__all__ = ["CASES", "Case", "profile_text", "record"]
+__all__ = ["BASE", "MASS", "Beyond", "Case", "Seen", "profile_text", "record"]
 
 Array = NDArray[np.float64]
 Beyond = Callable[[int, Row], float]
+Seen = Callable[[Row], Row]
+BASE = Truth()
 MASS = 3.0
 _STEP = 1e-6
+_STAYS = 0.9
+"""Of a tracker's wander, from one row to the next."""
 
 
 @dataclass(frozen=True)
@@ -32,65 +36,41 @@ class Case:
     name: str
     answers: tuple[str, ...] = ()
     """Effects that may be named, with the line: ``exit-point/3``; none where nothing is hidden."""
-    truth: Truth = field(default_factory=Truth)
+    truth: Truth = BASE
     home: tuple[float, ...] = (0.0,) * 8
     """Rope more than the profile asks for at home, m."""
     mass: float = MASS
     centre: Vector = (0.0, 0.0, 0.0)
     beyond: Beyond | None = None
-    """Rope length error of a line at a pose that no effect of the catalogue has, m."""
-
-
-def _shifted(points: tuple[Vector, ...], line: int, by: Vector) -> tuple[Vector, ...]:
-    x, y, z = (a + b for a, b in zip(points[line], by, strict=True))
-    return (*points[:line], (x, y, z), *points[line + 1 :])
-
-
-def _changed(values: tuple[float, ...], line: int, by: float) -> tuple[float, ...]:
-    return (*values[:line], values[line] + by, *values[line + 1 :])
-
-
-BASE = Truth()
-SOFT = replace(BASE, stiffness=2e5, home_tension=40.0)
-MOVED = replace(BASE, exit=_shifted(BASE.exit, 2, (1e-3, -2e-3, 1e-3)))
-WIDER = replace(BASE, swivel=_changed(BASE.swivel, 5, 1.5e-3))
-LARGER = replace(BASE, winding=_changed(BASE.winding, 1, 0.2e-3))
-STILL = (0.0,) * 8
-ELASTIC = "cable-elongation-linear"
-
-
-def _waves(line: int, row: Row) -> float:
-    return 3e-4 * math.sin(row.position[0] * 130 + line)
-
-
-CASES: tuple[Case, ...] = (
-    Case("none"),
-    Case("elastic ropes", (ELASTIC,), SOFT),
-    Case("home length", ("home-length/4",), home=_changed(STILL, 3, 0.5e-3)),
-    Case("payload mass", ("payload-mass",), mass=MASS + 0.25),
-    Case("payload centre", ("payload-centre",), centre=(0.02, -0.01, 0.0)),
-    Case("exit point", ("exit-point/3",), MOVED),
-    Case("swivel radius", ("swivel-radius/6",), WIDER),
-    Case("drum radius", ("drum-radius/2", "gear-ratio/2"), LARGER),
-    Case(
-        "two at once", (ELASTIC, "exit-point/3"), replace(MOVED, stiffness=2e5, home_tension=40.0)
-    ),
-    Case("outside the catalogue", beyond=_waves),
-)
+    """Rope more than the profile asks for on a line at a pose, its tension known, m."""
+    seen: Seen | None = None
+    """What instruments make of a row, before their noise."""
+    values: Mapping[str, float] = field(default_factory=dict)
+    """Numbers that a fit should find, SI: ``exit-point/3.x``."""
+    warm: float = 0.0
+    """How far temperatures range about 20 degrees Celsius; zero where they are not recorded."""
+    wander: float = 0.0
+    """Of the tracker, m."""
+    repeats: int = 15
+    outside: bool = False
+    """Whether no effect of the catalogue is to be named."""
 
 
 def record(
-    case: Case, folder: Path, name: str, *, count: int = 60, repeats: int = 15, seed: int = 1,
-    noise: Noise | None = None,
+    case: Case, folder: Path, name: str, *, count: int = 60, repeats: int | None = None,
+    seed: int = 1, noise: Noise | None = None, box: float = 0.075, tilt: float = math.radians(7.5),
 ) -> Path:  # fmt: skip
     """Write a run: ``count`` distinct poses, the first ``repeats`` of them driven to twice."""
-    noise = noise or Noise(tension=0.3)
-    rng = np.random.default_rng(seed)
-    made = poses(case.truth, count, seed, noise=Noise(0, 0, 0, 0, 0, 0, 0))
+    noise = noise or Noise(tension=0.3, wander=case.wander)
+    again = case.repeats if repeats is None else repeats
+    rng, silent = np.random.default_rng(seed), Noise(0, 0, 0, 0, 0, 0, 0)
+    made = poses(case.truth, count, seed, box=box, tilt=tilt, noise=silent)
     rows = [_pulled(case, row, random.Random(seed * 1000 + n)) for n, row in enumerate(made)]
-    seen = [_seen(row, noise, rng) for row in (*rows, *rows[:repeats])]
+    shown = [case.seen(row) if case.seen else row for row in (*rows, *rows[:again])]
+    astray = _wander(len(shown), noise.wander, rng)
+    seen = [_seen(row, noise, rng, off) for row, off in zip(shown, astray, strict=True)]
     path = folder / name
-    path.write_text(csv(seen, angles=True, tension=True))
+    path.write_text(csv(seen, angles=True, tension=True, temperature=bool(case.warm)))
     return path
 
 
@@ -127,11 +107,13 @@ def _pulled(case: Case, row: Row, rng: random.Random) -> Row:
     # Virtual work: a rope that gets longer by L' as the platform moves pulls back with T L'.
     pull = start + np.linalg.pinv(slope) @ (weight - slope @ start)
     angles = []
+    warm = 20.0 + (rng.uniform(-case.warm, case.warm) if case.warm else 0.0)
+    row = replace(row, tension=tuple(pull.tolist()), temperature=warm)
     for i in range(8):
         angle = case.truth.motor_angle(i, row.position, turn(*row.angles), float(pull[i]))
         extra = case.home[i] + (case.beyond(i, row) if case.beyond else 0.0)
         angles.append(angle + extra / _arm(case.truth, i, angle))
-    return replace(row, motor_angle=tuple(angles), tension=tuple(pull.tolist()))
+    return replace(row, motor_angle=tuple(angles))
 
 
 def _arm(truth: Truth, line: int, angle: float) -> float:
@@ -156,13 +138,25 @@ def _slope(truth: Truth, row: Row) -> Array:
     return out
 
 
-def _seen(row: Row, noise: Noise, rng: np.random.Generator) -> Row:
+def _wander(count: int, sigma: float, rng: np.random.Generator) -> Array:
+    """A tracker's zero that strays and comes back, (count, 3), m: an AR(1) process."""
+    if not sigma:
+        return np.zeros((count, 3))
+    out = np.empty((count, 3))
+    out[0] = rng.normal(0.0, sigma, 3)
+    for n in range(1, count):
+        out[n] = _STAYS * out[n - 1] + rng.normal(0.0, sigma * math.sqrt(1 - _STAYS**2), 3)
+    return out
+
+
+def _seen(row: Row, noise: Noise, rng: np.random.Generator, astray: Array) -> Row:
     """What instruments say of a row."""
 
     def off(values: Sequence[float], sigma: float) -> tuple[float, ...]:
         return tuple((np.array(values) + rng.normal(0.0, sigma, len(values))).tolist())
 
-    x, y, z = off(row.position, noise.tracker)
+    x, y, z = off(row.seen_position, noise.tracker)
+    x, y, z = (seen + stray for seen, stray in zip((x, y, z), astray.tolist(), strict=True))
     a, b, c = off(row.angles, noise.angle)
     return replace(
         row,

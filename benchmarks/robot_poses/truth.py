@@ -99,6 +99,8 @@ class Noise:
     swivel: float = 1e-3
     length: float = 1e-4
     tension: float = 0.0
+    wander: float = 0.0
+    """Of the tracker from row to row, m: slow beside a pose, so that neighbours share it."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +115,7 @@ class Row:
     swivel: tuple[float, ...]
     length: tuple[float, ...]
     tension: tuple[float, ...]
+    temperature: float = 20.0
 
 
 def poses(
@@ -203,6 +206,7 @@ def csv(
     swivel: bool = False,
     length: bool = False,
     tension: bool = False,
+    temperature: bool = False,
 ) -> str:
     """A robot's run with the columns wanted."""
     header = ["time [s]", *(f"{i + 1}.motor_angle [rad]" for i in range(8))]
@@ -212,6 +216,7 @@ def csv(
     header += [f"{i + 1}.swivel [rad]" for i in range(8)] if swivel else []
     header += [f"{i + 1}.cable_length [m]" for i in range(8)] if length else []
     header += [f"{i + 1}.tension [N]" for i in range(8)] if tension else []
+    header += ["temperature [degC]"] if temperature else []
     lines = [",".join(header)]
     for number, row in enumerate(rows):
         cells = [float(number), *row.motor_angle]
@@ -220,6 +225,7 @@ def csv(
         cells += row.swivel if swivel else ()
         cells += row.length if length else ()
         cells += row.tension if tension else ()
+        cells += (row.temperature,) if temperature else ()
         lines.append(",".join(repr(cell) for cell in cells))
     return "\n".join(lines) + "\n"
 

@@ -12,7 +12,8 @@ from click.testing import CliRunner, Result
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
-from robot_poses.hidden import CASES, Case, profile_text, record
+from robot_poses.cases import CASES
+from robot_poses.hidden import Case, profile_text, record
 
 from winchkit.cli import main
 from winchkit.schema.read import read_robot
@@ -71,7 +72,7 @@ def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
 
 
 def test_what_no_effect_explains_is_unknown(tmp_path: Path) -> None:
-    profile, run = files(tmp_path, "outside the catalogue")
+    profile, run = files(tmp_path, "outside: waves")
     found = answered("diagnose", run, "--profile", profile)
     assert found["verdict"] in ("unknown", "partly")
     assert found["steps"] == []

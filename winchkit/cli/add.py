@@ -14,7 +14,6 @@ from winchkit.cli.runs_option import Asked, ManyValues, json_option, model_optio
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
-    from winchkit.effects.catalogue import Catalogue
     from winchkit.schema.robot import RobotProfile
 
 __all__ = ["command", "write_addition"]
@@ -42,10 +41,8 @@ def command(
     declared, catalogue = read_profile(asked.source), asked.catalogue
     names = [Path(run).name for run in runs]
     if isinstance(declared, RobotProfile):
-        refuse_options(asked.band, html)
-        addition = _to_robot(effect, runs, declared, asked.winch, catalogue)
-        write_addition(asked.source, addition, names, Path(output))
-        _tell(addition, output, as_json)
+        refuse_options(asked.band)
+        _to_robot(effect, runs, declared, asked, output, as_json, html)
         return
     grown = grow(effect, asked.runs(runs), declared, catalogue, asked.band)
     write_addition(asked.source, grown.addition, names, Path(output))
@@ -62,14 +59,26 @@ def _to_robot(
     effect: str,
     runs: Sequence[str],
     declared: RobotProfile,
-    line: str | None,
-    catalogue: Catalogue,
-) -> Addition:
+    asked: Asked,
+    output: str,
+    as_json: bool,
+    html: str | None,
+) -> None:
     """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
-    from winchkit.diagnosis.robot.add import add_to_robot
+    from winchkit.diagnosis.robot.add import grow_robot
 
     name, _, place = effect.partition("/")
-    return add_to_robot(name, read_all(runs), declared, line or place or None, catalogue)
+    line = asked.winch or place or None
+    grown = grow_robot(name, read_all(runs), declared, line, asked.catalogue)
+    write_addition(asked.source, grown.addition, [Path(r).name for r in runs], Path(output))
+    _tell(grown.addition, output, as_json)
+    if html:
+        from winchkit.diagnosis.report.pose_page import robot_addition_html
+
+        title = page_title(declared.name, runs, effect)
+        options = asked.options
+        page = robot_addition_html(grown, title, asked.profile, output, options=options)
+        write_page(html, page)
 
 
 def _tell(addition: Addition, output: str, as_json: bool) -> None:

@@ -16,6 +16,7 @@ from winchkit.cli.runs_option import Asked, json_option, model_options, read_all
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.result import Comparison
+    from winchkit.schema.robot import RobotProfile
     from winchkit.schema.winch import WinchProfile
 
 __all__ = ["command"]
@@ -35,10 +36,8 @@ def command(runs: Sequence[str], asked: Asked, as_json: bool, html: str | None) 
 
     declared = read_profile(asked.source)
     if isinstance(declared, RobotProfile):
-        from winchkit.diagnosis.robot.compare import compare_robot
-
-        refuse_options(asked.band, html, asked.winch)
-        _tell(compare_robot(read_all(runs), declared, asked.catalogue), as_json)
+        refuse_options(asked.band, asked.winch)
+        _tell_robot(runs, declared, asked, as_json, html)
         return
     if asked.each:
         _tell_each(runs, declared, asked, as_json, html)
@@ -86,6 +85,21 @@ def _tell_each(
         from winchkit.diagnosis.report.shared_page import shared_errors_html
 
         write_page(html, shared_errors_html(found, shared, title, pages))
+
+
+def _tell_robot(
+    runs: Sequence[str], declared: RobotProfile, asked: Asked, as_json: bool, html: str | None
+) -> None:
+    """Poses with a robot's profile."""
+    from winchkit.diagnosis.robot.compare import compared_robot
+
+    answer = compared_robot(read_all(runs), declared, asked.catalogue)
+    _tell(answer.comparison, as_json)
+    if html:
+        from winchkit.diagnosis.report.pose_page import robot_comparison_html
+
+        title = page_title(declared.name, runs)
+        write_page(html, robot_comparison_html(answer, title, asked.profile, options=asked.options))
 
 
 def _tell(comparison: Comparison, as_json: bool) -> None:

@@ -18,7 +18,6 @@ from winchkit.cli.runs_option import Asked, json_option, model_options, read_all
 if TYPE_CHECKING:
     from winchkit.diagnosis.diagnose import Answer
     from winchkit.diagnosis.result import Diagnosis
-    from winchkit.effects.catalogue import Catalogue
     from winchkit.schema.robot import RobotProfile
     from winchkit.schema.winch import WinchProfile
 
@@ -45,8 +44,8 @@ def command(
 
     declared, thin = read_profile(asked.source), not every_sample
     if isinstance(declared, RobotProfile):
-        refuse_options(asked.band, html, asked.winch)
-        _tell_robot(runs, declared, asked.catalogue, as_json)
+        refuse_options(asked.band, asked.winch)
+        _tell_robot(runs, declared, asked, as_json, html)
     elif asked.each:
         _tell_each(runs, declared, asked, thin, as_json, html)
     else:
@@ -113,18 +112,18 @@ def _tell_each(
 
 
 def _tell_robot(
-    runs: Sequence[str], declared: RobotProfile, catalogue: Catalogue, as_json: bool
+    runs: Sequence[str], declared: RobotProfile, asked: Asked, as_json: bool, html: str | None
 ) -> None:
     """What a robot's model lacks, from poses."""
-    from winchkit.diagnosis.report.sentence import sentence
-    from winchkit.diagnosis.report.text import report_text
     from winchkit.diagnosis.robot.diagnose import diagnose_robot
 
-    answer = diagnose_robot(read_all(runs), declared, catalogue)
-    if as_json:
-        echo_json({**answer.diagnosis.to_json(), "sentence": sentence(answer.diagnosis)})
-    else:
-        click.echo(report_text(answer))
+    answer = diagnose_robot(read_all(runs), declared, asked.catalogue)
+    (echo_json if as_json else click.echo)(_said(answer, as_json))
+    if html:
+        from winchkit.diagnosis.report.pose_page import robot_report_html
+
+        title = page_title(declared.name, runs)
+        write_page(html, robot_report_html(answer, title, asked.profile, options=asked.options))
 
 
 def _page(answer: Answer, title: str, asked: Asked) -> str:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.plan import Offer
     from winchkit.effects.bind import Term
     from winchkit.schema.bench import LimitSpec
+    from winchkit.schema.winch import WinchProfile
 
 __all__ = ["command"]
 
@@ -29,7 +30,7 @@ _FEW = 2
 
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
-@click.option("-o", "--output", metavar="NEXT.toml", help="Programme to write.")
+@click.option("-o", "--output", metavar="NEXT", help="Programme or poses to write.")
 @click.option(
     "-b",
     "--bench",
@@ -47,14 +48,36 @@ def command(
     Kinds of programmes are tried on the model with the noise of the RUNs: those that separate
     the effects that these runs cannot tell apart come first, else those that show what these
     could not. Run the file with 'winchkit run NEXT.toml --bench B' and diagnose again.
+    For a robot's profile the plan is a list of poses, and NEXT.csv a run of them to measure at.
     """
+    from winchkit.cli.robot_model import read_profile
+    from winchkit.schema.robot import RobotProfile
+
+    declared = read_profile(asked.source)
+    if isinstance(declared, RobotProfile):
+        from winchkit.cli.plan_poses import tell_poses
+
+        tell_poses(runs, declared, asked, output, bench, as_json)
+    else:
+        _plan_winch(runs, declared, asked, output, bench, as_json)
+
+
+def _plan_winch(
+    runs: Sequence[str],
+    declared: WinchProfile,
+    asked: Asked,
+    output: str | None,
+    bench: str | None,
+    as_json: bool,
+) -> None:
+    """The next programme of one winch."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.kinds import allowed, seen
     from winchkit.diagnosis.plan import offers, programme_of
     from winchkit.schema.programme_file import write_programme
 
     limits = None if bench is None else _limits(bench, asked.winch)
-    declared, catalogue = asked.declared, asked.catalogue
+    catalogue = asked.catalogue
     answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
     problem, pairs = answer.inquiry.problem, answer.pairs
     room = seen(problem.dataset) if limits is None else allowed(problem.dataset, limits)

@@ -25,11 +25,9 @@ def read_profile(path: Path) -> WinchProfile | RobotProfile:
     return value if isinstance(value, (WinchProfile, RobotProfile)) else read_winch(path)
 
 
-def refuse_options(band: float | None, html: str | None, winch: str | None = None) -> None:
+def refuse_options(band: float | None, winch: str | None = None) -> None:
     """Raise UsageError for options that mean nothing for a robot's poses."""
     if band is not None:
         raise UsageError("--band: a robot's poses stand still and have no torque to filter")
-    if html is not None:
-        raise UsageError("--html: there is no page for robots yet; use --json or the text")
     if winch is not None:
         raise UsageError("--winch: a robot's lines are judged together; leave it out")

@@ -12,7 +12,7 @@ from winchkit.diagnosis.confusion import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.dataset import Dataset, prepare
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.follows import follows, harmonics
-from winchkit.diagnosis.gate import held_out, held_out_rms
+from winchkit.diagnosis.gate import held_out
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.limits import what_runs_cannot_show
 from winchkit.diagnosis.next_run import next_runs
@@ -62,6 +62,11 @@ class Answer:
         self.pairs = tuple(pairs)
         """Effects to be told apart by a next run, of these sets or of what came closest."""
         self.diagnosis = diagnosis
+
+    @property
+    def filed(self) -> Inquiry:
+        """The inquiry into the profile as it was filed; a robot's geometry may have been let go."""
+        return self.inquiry
 
 
 def silent(what: str, share: float) -> None:
@@ -188,7 +193,7 @@ def candidates_of(inquiry: Inquiry, found: Found) -> tuple[Candidate, ...]:
     for item, fitted in zip_longest(found.scores, found.tried):
         rms: dict[str, float] = {}
         if fitted is not None:
-            rms = held_out_rms(inquiry.problem, fitted, found.begin_noise, folds)
+            rms = inquiry.held_out_errors(fitted, found.begin_noise, folds)
         out.append(Candidate(item.atom.effect.id, item.value, rms))
     return tuple(out)
 

@@ -40,6 +40,8 @@ class Followed:
     order: int | None = None
     """Periods per turn of the variable, where it is an angle."""
     frequency: float | None = None
+    line: str | None = None
+    """Of a robot, or the axis of its platform's position, where one alone has most of it."""
 
 
 def variables_of(recording: Recording) -> dict[str, Array]:

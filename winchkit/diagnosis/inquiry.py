@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from winchkit.diagnosis.begun import rests_on_states
 from winchkit.diagnosis.fit import Fit, fit
-from winchkit.diagnosis.gate import Folds, blocks_of, extrapolation, five_blocks, groups_of
+from winchkit.diagnosis.gate import (
+    Folds,
+    blocks_of,
+    extrapolation,
+    five_blocks,
+    groups_of,
+    held_out_rms,
+)
 from winchkit.diagnosis.noise import (
     Noise,
     Presence,
@@ -19,6 +26,7 @@ from winchkit.diagnosis.noise import (
     noise_saturated,
     presence,
 )
+from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.resolution import without_rounding
 from winchkit.diagnosis.shapes import gap, in_disguise, starting_values, with_fewer_coefficients
@@ -87,6 +95,14 @@ class Inquiry:
         """
         unsure = extrapolation(self.problem, fitted, noise, self.groups) > _UNSURE
         return self._five_blocks if unsure else self.groups
+
+    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+        """Held-out error of every output that a user reads, rms in SI."""
+        return held_out_rms(self.problem, fitted, noise, folds)
+
+    def lacking(self, effect: Effect) -> list[str]:
+        """Parts and channels without which these data cannot show an effect, in words."""
+        return missing_needs(effect, self.problem)
 
     def grouped(self, folds: Folds) -> bool:
         """Whether folds are whole groups of programme and load, two at least."""

@@ -7,16 +7,17 @@ from dataclasses import dataclass, field
 from datetime import date
 from typing import Any
 
-from winchkit.diagnosis.admit import OUTPUT_UNITS, OUTPUTS
+from winchkit.diagnosis.admit import OUTPUT_UNITS
 from winchkit.errors import FileError
 from winchkit.schema.ledger import LedgerEntry
 from winchkit.schema.robot import RobotProfile
 from winchkit.schema.winch import WinchProfile
 from winchkit.units import dimension_of, parse
 
-__all__ = ["Rung", "ladder"]
+__all__ = ["LADDER_UNITS", "Rung", "ladder"]
 
-_PLATFORM = "platform_position"
+LADDER_UNITS: Mapping[str, str] = {**OUTPUT_UNITS, "platform_position": "m"}
+"""Outputs of winches and robots, in the order in which they are told, with their SI units."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +57,10 @@ def _rung(entry: LedgerEntry) -> Rung:
 
 def _si(entry: LedgerEntry, name: str) -> dict[str, float]:
     written: Mapping[str, str] = getattr(entry, name)
-    units = {**OUTPUT_UNITS, _PLATFORM: "m"}
-    unknown = [output for output in written if output not in units]
+    unknown = [output for output in written if output not in LADDER_UNITS]
     if unknown:
         raise FileError(
             f"ledger, step {entry.did} {entry.effect}: {name} has '{unknown[0]}'; "
-            f"outputs are {', '.join((*OUTPUTS, _PLATFORM))}"
+            f"outputs are {', '.join(LADDER_UNITS)}"
         )
-    return {o: parse(text, dimension_of(units[o]) or "ratio") for o, text in written.items()}
+    return {o: parse(text, dimension_of(LADDER_UNITS[o]) or "ratio") for o, text in written.items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from winchkit.diagnosis.maps import ResidualMap
 from winchkit.effects.empirical import empirical_id
@@ -109,6 +109,8 @@ class Step:
     heldout_gain: float
     angles: Mapping[str, float] = field(default_factory=dict)
     """Between the first effect's signature and the others', rad."""
+    whole: bool = False
+    """All of the effects at once, as a robot's whole geometry; not one of them."""
 
     def to_json(self) -> dict[str, Any]:
         """As the command prints it."""
@@ -154,9 +156,11 @@ class Where:
     share: float
     order: int | None = None
     frequency: float | None = None
+    line: str | None = None
+    """Of a robot, or axis of its platform's position, where one alone has most of it."""
 
     def to_json(self) -> dict[str, Any]:
-        """As the command prints it: order or frequency only where it has one."""
+        """As the command prints it: order, frequency or line only where it has one."""
         return {key: value for key, value in vars(self).items() if value is not None}
 
 
@@ -172,6 +176,9 @@ class NextRun:
 @dataclass(frozen=True)
 class Diagnosis:
     """The answer: what is missing, how sure that is, and what these runs cannot show."""
+
+    data: ClassVar[str] = "runs"
+    """What it was made from, in a word."""
 
     verdict: Verdict
     outputs: Mapping[str, OutputFit]

@@ -15,7 +15,7 @@ from winchkit.runs.run import Run
 from winchkit.schema.robot import RobotProfile
 from winchkit.units import suggest
 
-__all__ = ["Measured", "read_poses"]
+__all__ = ["Measured", "joined", "read_poses"]
 
 Array = NDArray[np.float64]
 _POSITION = ("platform_x", "platform_y", "platform_z")
@@ -77,11 +77,16 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
             parts.append(_of_run(run, profile, len(parts)))
     if faults:
         raise RunError(faults)
-    joined: dict[str, Any] = {
+    return joined(parts)
+
+
+def joined(parts: Sequence[Measured]) -> Measured:
+    """Poses of several parts, one after another."""
+    arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
     }
     notes = tuple(note for part in parts for note in part.notes)
-    return Measured(**joined, length_zeroed=all(part.length_zeroed for part in parts), notes=notes)
+    return Measured(**arrays, length_zeroed=all(part.length_zeroed for part in parts), notes=notes)
 
 
 def _faults(run: Run, profile: RobotProfile) -> list[Fault]:

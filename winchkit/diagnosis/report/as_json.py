@@ -12,9 +12,11 @@ from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.maps import residual_maps
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.report.curves import curve_of, strongest
+from winchkit.diagnosis.report.pose_traces import traces
 from winchkit.diagnosis.report.sentence import changes_text, sentence
 from winchkit.diagnosis.report.shown import unseen
 from winchkit.diagnosis.report.waterfall import Waterfall, waterfall_of
+from winchkit.diagnosis.robot.answer import RobotAnswer
 
 __all__ = ["report_json"]
 
@@ -24,6 +26,7 @@ Array = NDArray[np.float64]
 def report_json(answer: Answer) -> dict[str, Any]:
     """As ``winchkit diagnose --json`` prints it; figures in SI."""
     diagnosis, ladder = answer.diagnosis, waterfall_of(answer)
+    drawn = _of_poses(answer) if isinstance(answer, RobotAnswer) else _of_runs(answer)
     return {
         **diagnosis.to_json(),
         "sentence": sentence(diagnosis),
@@ -31,9 +34,21 @@ def report_json(answer: Answer) -> dict[str, Any]:
         "not_looked_for": [{"effect": e, "needs": list(needs)} for e, needs in unseen(answer)],
         "evidence_of_noise": max(answer.found.threshold, 0.0),
         "waterfall": None if ladder is None else _waterfall(ladder),
-        "residuals": _states(answer, _curves),
-        "maps": _states(answer, _maps),
+        **drawn,
     }
+
+
+def _of_runs(answer: Answer) -> dict[str, Any]:
+    return {"residuals": _states(answer, _curves), "maps": _states(answer, _maps)}
+
+
+def _of_poses(answer: RobotAnswer) -> dict[str, Any]:
+    """Errors over what they followed before, beside those that are left."""
+    seen = answer.seen
+    drawn = traces(seen.final.problem, *seen.errors)
+    after = [t.to_json(t.after) for t in drawn if t.after is not None]
+    before = [t.to_json(t.before) for t in drawn]
+    return {"residuals": {"before": before, "after": after if answer.diagnosis.steps else None}}
 
 
 def _states(answer: Answer, drawn: Callable[[Problem, Array], list[Any]]) -> dict[str, Any]:

@@ -16,6 +16,9 @@ __all__ = ["Reading", "reading"]
 _Value = TypeVar("_Value", float, NDArray[np.float64])
 _TURN = 2 * np.pi
 _DEGREES = 360.0
+_OF_PLATFORM = {f"platform_{axis}": ("m", 1.0) for axis in "xyz"} | {
+    f"platform_{angle}": ("°", _TURN / _DEGREES) for angle in ("roll", "pitch", "yaw")
+}
 
 
 @dataclass(frozen=True)
@@ -46,5 +49,8 @@ def reading(variable: str, *, within_turn: bool = False) -> Reading:
         return Reading(f"{name} [m]", "m", logarithmic=True)
     if variable == "direction":
         return Reading("direction (1 winds in, −1 pays out)", "")
+    if variable in _OF_PLATFORM:
+        unit, worth = _OF_PLATFORM[variable]
+        return Reading(f"{name} [{unit}]", unit, worth)
     unit = {"degC": "°C", "1": ""}.get(own := VARIABLE_UNITS.get(variable, ""), own)
     return Reading(f"{name} [{unit}]" if unit else name, unit)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.follows import Followed
 from winchkit.diagnosis.report.comparison_rows import HEAD, followed, offset_text, size_rows
 from winchkit.diagnosis.report.markup import Markup, element, join, section, table
 from winchkit.diagnosis.report.parts import bullets, lead
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, VARIABLE_NAMES
-from winchkit.diagnosis.report.plots import AT_NOISE, OutputPlots
+from winchkit.diagnosis.report.plots import AT_NOISE
 from winchkit.diagnosis.report.repeat import Command, repeat
 from winchkit.diagnosis.report.sentence import capital, often_per_turn
 from winchkit.diagnosis.report.wording import percent, quantity, significant, unbroken
@@ -25,15 +25,15 @@ _NEXT = (
 
 def comparison_sections(
     comparison: Comparison,
-    plots: Sequence[OutputPlots],
+    over: Mapping[str, Followed],
     figures: Sequence[Markup],
     command: Command,
 ) -> Markup:
-    """Everything below the title."""
+    """Everything below the title; ``over`` is what each output's error follows most."""
     profile = command.profile
     return join(
         [
-            _lead(comparison, plots),
+            _lead(comparison, over),
             section("residuals", "Where the model fails", *figures),
             section("notes", "Notes", bullets(comparison.notes)),
             repeat(
@@ -68,8 +68,7 @@ def _following(over: Followed | None) -> str:
     return f"it follows the {VARIABLE_NAMES.get(over.variable, over.variable)} {share}"
 
 
-def _lead(comparison: Comparison, plots: Sequence[OutputPlots]) -> Markup:
-    over = {own.output: own.followed for own in plots}
+def _lead(comparison: Comparison, over: Mapping[str, Followed]) -> Markup:
     outputs = comparison.outputs
     told = [distance_text(name, error, over.get(name)) for name, error in outputs.items()]
     rows = [

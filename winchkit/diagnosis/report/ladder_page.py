@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.diagnosis.admit import OUTPUT_UNITS, OUTPUTS
-from winchkit.diagnosis.ladder import Rung
+from winchkit.diagnosis.ladder import LADDER_UNITS, Rung
 from winchkit.diagnosis.report.markup import Markup, element, join, section, table
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES, meaning
 from winchkit.diagnosis.report.shell import page
@@ -27,7 +26,7 @@ def ladder_html(name: str, rungs: Sequence[Rung]) -> str:
         "Held-out error, rms, after each step, each group of runs predicted with values fitted "
         "without it. The upright mark is the noise at that step; bars compare within a column."
     )
-    shown = [o for o in OUTPUTS if any(o in rung.after for rung in rungs)]
+    shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]
     head = ["step", "what it means", *(OUTPUT_NAMES[o] for o in shown)]
     steps = table(caption, head, _rows(rungs, shown), words=2)
     return page(title, (), section("waterfall", "Held-out error per step", steps))
@@ -57,7 +56,7 @@ def _bars(
 ) -> list[Markup]:
     """A bar per output; a dash where a step was not judged."""
     return [
-        bar(errors[o], longest[o], noise.get(o), scale_for(errors[o], OUTPUT_UNITS[o]))
+        bar(errors[o], longest[o], noise.get(o), scale_for(errors[o], LADDER_UNITS[o]))
         if o in errors
         else Markup("–")
         for o in shown

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.diagnosis.admit import OUTPUT_UNITS, OUTPUTS
-from winchkit.diagnosis.ladder import Rung
+from winchkit.diagnosis.ladder import LADDER_UNITS, Rung
 from winchkit.diagnosis.report.columns import aligned
 from winchkit.diagnosis.report.phrases import OUTPUT_NAMES
 from winchkit.diagnosis.report.wording import scale_for
@@ -19,7 +18,7 @@ def ladder_text(name: str, rungs: Sequence[Rung]) -> str:
     """Held-out error per step; a step on other runs than the one before begins anew."""
     if not rungs:
         return f"{name}: nothing was added to it or removed from it"
-    shown = [o for o in OUTPUTS if any(o in rung.after for rung in rungs)]
+    shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]
     rows = [["held-out error, rms", "", *(OUTPUT_NAMES[o] for o in shown)]]
     runs: tuple[str, ...] = ()
     for rung in rungs:
@@ -35,5 +34,5 @@ def ladder_text(name: str, rungs: Sequence[Rung]) -> str:
 def _cells(values: Mapping[str, float], shown: Sequence[str]) -> list[str]:
     """Values of the shown outputs, a dash where a step was not judged."""
     return [
-        scale_for(values[o], OUTPUT_UNITS[o]).text(values[o]) if o in values else "—" for o in shown
+        scale_for(values[o], LADDER_UNITS[o]).text(values[o]) if o in values else "—" for o in shown
     ]

@@ -64,7 +64,8 @@ def comparison_html(
     plots = plots_of(residuals)
     figures = _figures(residuals, plots)
     command = Command(compared.problem.dataset, profile, options)
-    return page(title, plots, comparison_sections(compared.comparison, plots, figures, command))
+    over = {own.output: own.followed for own in plots if own.followed}
+    return page(title, plots, comparison_sections(compared.comparison, over, figures, command))
 
 
 def addition_html(

@@ -46,6 +46,13 @@ VARIABLE_NAMES = {
     "reversal_distance": "distance since reversal",
     "winch": "line",
     "pose": "pose",
+    "number": "number of the pose",
+    "platform_x": "platform's x",
+    "platform_y": "platform's y",
+    "platform_z": "platform's z",
+    "platform_roll": "platform's roll",
+    "platform_pitch": "platform's pitch",
+    "platform_yaw": "platform's yaw",
 }
 _CLAUSES = {
     "anchor-point": "your rope meets the platform elsewhere",

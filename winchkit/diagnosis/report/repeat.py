@@ -9,9 +9,12 @@ from importlib.metadata import version
 from platform import python_version
 from typing import Any
 
+import numpy as np
+
 from winchkit.diagnosis.dataset import Dataset
 from winchkit.diagnosis.report.embed import compact
 from winchkit.diagnosis.report.markup import Markup, details, element, section, table
+from winchkit.diagnosis.robot.dataset import RobotDataset
 
 __all__ = ["Command", "repeat"]
 
@@ -28,6 +31,8 @@ class Command:
     @property
     def profile(self) -> str:
         """The profile to write into commands."""
+        if isinstance(self.dataset, RobotDataset):
+            return self.named or self.dataset.robot.name
         return self.named or self.dataset.profile.name
 
     def compare(self, profile: str) -> str:
@@ -44,6 +49,10 @@ class Command:
         named = f"{_quoted(effect)} --profile {_quoted(profile)}"
         return f"winchkit add {named} --fit {self._runs} -o {_quoted(better)}{self._options}"
 
+    def calibrate(self, profile: str, better: str) -> str:
+        """Fit a robot's geometry anew."""
+        return f"winchkit calibrate {_quoted(profile)} {self._runs} -o {_quoted(better)}"
+
     def begin_effect(self, profile: str, file: str) -> str:
         """Begin an effect of one's own from what is left."""
         named = f"{_quoted(file)} --profile {_quoted(profile)}"
@@ -51,6 +60,8 @@ class Command:
 
     @property
     def _runs(self) -> str:
+        if isinstance(self.dataset, RobotDataset):
+            return " ".join(map(_quoted, self.dataset.runs))
         return " ".join(_quoted(r.path or r.name) for r in self.dataset.recordings)
 
     @property
@@ -73,6 +84,8 @@ def repeat(command: Command, commands: Sequence[str], what: str, raw: Mapping[st
 
 
 def _runs(dataset: Dataset) -> Markup:
+    if isinstance(dataset, RobotDataset):
+        return _poses(dataset)
     sets = {run: n for n, group in enumerate(dataset.repeated, 1) for run in group.runs}
     rows = []
     for index, recording in enumerate(dataset.recordings):
@@ -90,6 +103,18 @@ def _runs(dataset: Dataset) -> Markup:
         )
     head = ["run", "programme", "repeats", "samples", "length", "left out"]
     return table("Runs used; runs of one set repeat each other.", head, rows, words=3)
+
+
+def _poses(dataset: RobotDataset) -> Markup:
+    """Runs of a robot: a row is a pose."""
+    often = np.bincount(dataset.pose)
+    rows = []
+    for number, name in enumerate(dataset.runs):
+        own = dataset.pose[dataset.measured.run == number]
+        again = int(np.count_nonzero(often[own] > 1))
+        rows.append([name, f"{len(own)}", f"{len(np.unique(own))}", f"{again}"])
+    head = ["run", "poses", "distinct", "taken more than once"]
+    return table("Runs used; a row of a run is a pose.", head, rows)
 
 
 def _quoted(text: str) -> str:

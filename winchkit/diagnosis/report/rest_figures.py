@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from math import isfinite
 
-from winchkit.diagnosis.admit import OUTPUT_UNITS
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.follows import Followed
+from winchkit.diagnosis.ladder import LADDER_UNITS
 from winchkit.diagnosis.report.axes import reading
 from winchkit.diagnosis.report.chart import Chart, axis_over
-from winchkit.diagnosis.report.curves import curve_of
 from winchkit.diagnosis.report.markup import Markup, element
+from winchkit.diagnosis.report.rest import rest_of
 from winchkit.diagnosis.report.sentence import capital, telling, where_text
 from winchkit.diagnosis.report.wording import scale_for, unbroken
 from winchkit.diagnosis.result import Where
@@ -28,12 +27,11 @@ def rest_figures(answer: Answer) -> list[Markup]:
 
 
 def _figure(answer: Answer, where: Where) -> Markup:
-    over = Followed(where.output, where.variable, where.share, where.order)
-    curve = curve_of(answer.inquiry.problem, answer.found.final.residual, over)
+    at, residual = rest_of(answer, where)
     how = reading(where.variable, within_turn=where.order is not None)
-    x = [float(v) for v in how.shown(curve.x)]
-    scale = scale_for(3 * float(abs(curve.mean).max()), OUTPUT_UNITS[where.output])
-    mean = [float(v) / scale.worth for v in curve.mean]
+    x = [float(v) for v in how.shown(at)]
+    scale = scale_for(3 * float(abs(residual).max()), LADDER_UNITS[where.output])
+    mean = [float(v) / scale.worth for v in residual]
     points = [(a, b) for a, b in zip(x, mean, strict=True) if isfinite(a) and isfinite(b)]
     caption = f"Mean residual: {where_text(where)}."
     chart = Chart(

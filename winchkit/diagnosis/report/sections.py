@@ -47,10 +47,14 @@ def sections(
             section("candidates", "What else was considered", tables.candidates(answer)),
             section(
                 "confusion",
-                "What these runs cannot tell apart",
+                f"What these {diagnosis.data} cannot tell apart",
                 tables.confusion(diagnosis, effects),
             ),
-            section("detectable", "What these runs could show", tables.detectable(answer)),
+            section(
+                "detectable",
+                f"What these {diagnosis.data} could show",
+                tables.detectable(answer),
+            ),
             section("unexplained", "What is left unexplained", _unexplained(answer)),
             section("next", "What to run next", _next(diagnosis)),
             section("notes", "Notes", bullets(diagnosis.notes)),
@@ -63,7 +67,9 @@ def sections(
 def _verdict(answer: Answer) -> Markup:
     diagnosis = answer.diagnosis
     seen = smallest_shown(answer) if diagnosis.verdict == "adequate" else []
-    shown = element("p", "These runs would have shown, among others, ", listed(seen), ".")
+    shown = element(
+        "p", f"These {diagnosis.data} would have shown, among others, ", listed(seen), "."
+    )
     return lead(
         VERDICT_NAMES[diagnosis.verdict],
         diagnosis.verdict,
@@ -80,6 +86,7 @@ def _named(answer: Answer) -> Markup:
     return tables.named(
         (effects.get(name), name, step.parameters.get(name, {}))
         for step in answer.diagnosis.steps
+        if not step.whole
         for name in step.effects
     )
 
@@ -145,7 +152,8 @@ def _commands(diagnosis: Diagnosis, command: Command) -> list[str]:
     commands = [command.compare(profile), command.diagnose(profile)]
     for number, step in enumerate(diagnosis.steps, start=1):
         better = f"better-{number}.toml"
-        commands.append(command.add(step.effects[0], profile, better))
+        more = command.calibrate(profile, better)
+        commands.append(more if step.whole else command.add(step.effects[0], profile, better))
         profile = better
     if diagnosis.empirical and diagnosis.verdict in {"partly", "unknown"}:
         commands.append(command.add(diagnosis.empirical[0], profile, "with-curve.toml"))

@@ -33,7 +33,24 @@ _MOVED = 1.05
 CLEAR_ORDER = 0.2
 """From which share on an order within a turn says more than a trend."""
 _ABOVE = 1.5
+_WHOLE = (
+    "your robot's geometry is off as a whole: no few effects explain these poses as all of its "
+    "points and radii together do"
+)
 _NO_GAIN = "Adding it leaves the held-out errors as they are."
+_CHANGES = {
+    "runs": {
+        "more": "runs with other loads, strokes, speeds or temperatures",
+        "one": "a run",
+        "other": "a run with another load, stroke or speed",
+    },
+    "poses": {
+        "more": "poses farther out, turned more, with other tensions, payloads or temperatures,",
+        "one": "a set of poses",
+        "other": "poses elsewhere, or under other tensions,",
+    },
+}
+"""Other data, by what a diagnosis was made from."""
 _COUNTS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
 
 
@@ -43,8 +60,8 @@ def sentence(diagnosis: Diagnosis) -> str:
         return _adequate(diagnosis)
     if diagnosis.steps:
         steps, outputs = diagnosis.steps, diagnosis.outputs
-        gain = gain_text(outputs, f"Add {_them(steps)} and") or _NO_GAIN
-        parts = [_named(steps), gain, still_text(outputs)]
+        gain = gain_text(outputs, f"{_do(steps)} and") or _NO_GAIN
+        parts = [_named(steps, diagnosis.data), gain, still_text(outputs)]
         if diagnosis.verdict == "partly":
             parts.append(_rest(diagnosis, "Something else is still missing"))
         return " ".join(part for part in parts if part)
@@ -55,31 +72,36 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 def changes_text(diagnosis: Diagnosis) -> str:
     """What would change the verdict, in a sentence."""
+    words = _CHANGES[diagnosis.data]
     if diagnosis.verdict == "adequate":
-        return (
-            "What would change this: runs with other loads, strokes, speeds or temperatures in "
-            "which the error rises above the noise."
-        )
+        return f"What would change this: {words['more']} in which the error rises above the noise."
     if not diagnosis.steps:
         return (
             "No name is given, because with so much left it would be a guess. What would change "
-            "this: an effect of your own that explains the rest where it lives, or a run that "
-            "isolates it."
+            "this: an effect of your own that explains the rest where it lives, or "
+            f"{words['one']} that isolates it."
         )
-    if any(len(step.effects) > 1 for step in diagnosis.steps):
+    if any(len(step.effects) > 1 and not step.whole for step in diagnosis.steps):
         return (
-            "What would change this: a run in which the effects differ that these runs cannot "
-            "tell apart."
+            f"What would change this: {words['one']} in which the effects differ that these "
+            f"{diagnosis.data} cannot tell apart."
         )
     return (
-        "What would change this: a run with another load, stroke or speed that the fitted values "
-        "do not predict down to the noise."
+        f"What would change this: {words['other']} that the fitted values do not predict down "
+        "to the noise."
     )
 
 
 def where_text(where: Where) -> str:
     """Where a rest lives: ``cable length, 5 times per drum turn (46 % of its error)``."""
     output = OUTPUT_NAMES.get(where.output, where.output)
+    if where.line is not None:
+        on = "along" if where.output == "platform_position" else "of line"
+        output = f"{output} {on} {where.line}"
+    if where.variable == "winch":
+        return f"{output}, the same at every pose ({percent(where.share)} of all lines' error)"
+    if where.variable == "pose":
+        return f"{output}, alike on all lines of a pose ({percent(where.share)} of its error)"
     variable = VARIABLE_NAMES.get(where.variable, where.variable)
     if where.order is not None:
         often = often_per_turn(where.variable, where.order)
@@ -173,18 +195,21 @@ def _adequate(diagnosis: Diagnosis) -> str:
     ).strip()
 
 
-def _named(steps: tuple[Step, ...]) -> str:
+def _named(steps: tuple[Step, ...], data: str) -> str:
     if len(steps) == 1:
-        return capital(_step(steps[0])) + "."
+        return capital(_step(steps[0], data)) + "."
     count = _COUNTS.get(len(steps), str(len(steps)))
-    numbered = [f"({n}) {_step(step, ' ({})')}" for n, step in enumerate(steps, start=1)]
+    numbered = [f"({n}) {_step(step, data, ' ({})')}" for n, step in enumerate(steps, start=1)]
     return f"{count} effects are missing: {'; '.join(numbered)}."
 
 
-def _them(steps: Sequence[Step]) -> str:
+def _do(steps: Sequence[Step]) -> str:
+    """What to do about what is missing."""
+    if steps[0].whole:
+        return "Calibrate" if len(steps) == 1 else "Calibrate, add the rest"
     if len(steps) > 1:
-        return "them"
-    return "one of them" if len(_kinds(steps[0])) > 1 else "it"
+        return "Add them"
+    return "Add one of them" if len(_kinds(steps[0])) > 1 else "Add it"
 
 
 def _kinds(step: Step) -> list[list[str]]:
@@ -195,17 +220,19 @@ def _kinds(step: Step) -> list[list[str]]:
     return list(kinds.values())
 
 
-def _step(step: Step, form: str = ": {}") -> str:
+def _step(step: Step, data: str, form: str = ": {}") -> str:
+    if step.whole:
+        return _WHOLE
     kinds = _kinds(step)
     if len(kinds) == 1:
         ((first, *others),) = kinds
-        beside = f"these runs cannot tell it from {listed(others)}" if others else ""
+        beside = f"these {data} cannot tell it from {listed(others)}" if others else ""
         return _with_values(step, first, form, beside, "; ")
     either = [
         _with_values(step, first, " ({})", f"or as {listed(others, 'or')}" if others else "", ", ")
         for first, *others in kinds
     ]
-    return f"{listed(either, 'or')} – these runs cannot tell which"
+    return f"{listed(either, 'or')} – these {data} cannot tell which"
 
 
 def _with_values(step: Step, effect: str, form: str, beside: str, link: str) -> str:

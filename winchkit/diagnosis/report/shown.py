@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import ceil, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.report.phrases import parameter_name, parameter_unit
 from winchkit.diagnosis.report.wording import quantity
 from winchkit.diagnosis.result import Detectable
@@ -44,12 +44,30 @@ def effects_of(answer: Answer) -> dict[str, Effect]:
 def visible(answer: Answer) -> list[Visible]:
     """All effects of a diagnosis, those that would have been seen soonest first."""
     effects = effects_of(answer)
+    placed: dict[tuple[str, bool, str], list[Visible]] = {}
+    for item in answer.diagnosis.detectable:
+        if item.effect in effects:
+            name, _, line = item.effect.partition("/")
+            row = _row(item, effects[item.effect].parameter(item.parameter))
+            placed.setdefault((name, bool(line), item.parameter), []).append(row)
     rows = [
-        _row(item, effects[item.effect].parameter(item.parameter))
-        for item in answer.diagnosis.detectable
-        if item.effect in effects
+        _on_any_line(own, (name, not line, parameter) in placed)
+        for (name, line, parameter), own in placed.items()
     ]
     return sorted(rows, key=lambda row: (isnan(row.share), row.share))
+
+
+def _on_any_line(rows: Sequence[Visible], elsewhere: bool) -> Visible:
+    """The line of a robot on which an effect must be largest to be seen, for all its lines.
+
+    ``elsewhere`` says whether the same effect may be on one line and on all of them alike.
+    """
+    worst = max(rows, key=lambda row: (isnan(row.share), row.share))
+    name, _, line = worst.effect.partition("/")
+    if not line:
+        return replace(worst, text=f"{worst.text} on all lines alike") if elsewhere else worst
+    of = "on any line" if len(rows) > 1 else f"on line {line}"
+    return replace(worst, effect=name, text=f"{worst.text} {of}")
 
 
 def smallest_shown(answer: Answer) -> list[str]:
@@ -60,10 +78,10 @@ def smallest_shown(answer: Answer) -> list[str]:
 
 def unseen(answer: Answer) -> list[tuple[str, list[str]]]:
     """Effects of the catalogue that no run could show, each with what it lacks."""
-    problem, tried = answer.inquiry.problem, {e.partition("/")[0] for e in effects_of(answer)}
+    tried = {e.partition("/")[0] for e in effects_of(answer)}
     out = []
     for effect in load_catalogue():
-        lacking = missing_needs(effect, problem) if effect.id not in tried else []
+        lacking = answer.inquiry.lacking(effect) if effect.id not in tried else []
         if lacking:
             out.append((effect.id, list(lacking)))
     return out

@@ -65,7 +65,10 @@ def figures(diagnosis: Diagnosis) -> Markup:
         cells.append("unknown" if noise is None else scale.text(noise))
         cells.append(f"{last / noise:.2f}" if noise else "–")
         rows.append(cells)
-    caption = "Held-out error, rms: each group of runs predicted with values fitted without it."
+    caption = (
+        f"Held-out error, rms: each group of {diagnosis.data} predicted with values fitted "
+        "without it."
+    )
     return table(caption, [*head, "noise", "error / noise"], rows)
 
 
@@ -119,9 +122,13 @@ def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
     return max([output.noise_rms or 0.0, *(e for e in errors if isfinite(e))])
 
 
-def bar(error: float, longest: float, noise: float | None, scale: Scale) -> Markup:
-    """A bar as a share of the longest, the noise marked on it, and the figure below."""
-    inside = [element("span", class_="fill", style=f"width:{_part(error, longest)}%")]
+def bar(error: float, longest: float, noise: float | None, scale: Scale, tone: str = "") -> Markup:
+    """A bar as a share of the longest, the noise marked on it, and the figure below.
+
+    ``tone`` is a colour of the page, else the table's own.
+    """
+    colour = f";background:var(--{tone})" if tone else ""
+    inside = [element("span", class_="fill", style=f"width:{_part(error, longest)}%{colour}")]
     if noise:
         floor = f"left:{_part(noise, longest)}%"
         inside.append(element("span", class_="floor", style=floor))
@@ -184,7 +191,7 @@ def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
     """Sets that these runs cannot tell apart, with the angles between their signatures."""
     out: list[Markup] = []
     for step in diagnosis.steps:
-        if len(step.effects) < 2:
+        if len(step.effects) < 2 or step.whole:
             continue
         rows = []
         for effect_id in step.effects:
@@ -196,8 +203,9 @@ def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
             rows.append([element("code", effect_id), ", ".join(values), tell, shown])
         head = ["effect", "fitted values", "told apart by", "angle"]
         caption = (
-            f"These runs cannot tell {listed(list(step.effects))} apart. The angle is that between "
-            "the signatures of a rival and of the effect that the search took (–): 0° look alike."
+            f"These {diagnosis.data} cannot tell {listed(list(step.effects))} apart. The angle is "
+            "that between the signatures of a rival and of the effect that the search took (–): "
+            "0° look alike."
         )
         out.append(table(caption, head, rows, words=3))
     return join(out)
@@ -211,7 +219,10 @@ def detectable(answer: Answer) -> Markup:
     ]
     if not rows:
         return Markup("")
-    caption = "The smallest size of each effect that these runs would have shown in 9 of 10 cases."
+    data = answer.diagnosis.data
+    caption = (
+        f"The smallest size of each effect that these {data} would have shown in 9 of 10 cases."
+    )
     head = ["effect", "parameter", "would have been seen", "of its usual size"]
     seen = _shortened(caption, head, rows, "more, seen less easily")
     blind = [

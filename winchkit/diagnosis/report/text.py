@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
-from winchkit.diagnosis.admit import OUTPUT_UNITS
-from winchkit.diagnosis.follows import Followed
+from winchkit.diagnosis.ladder import LADDER_UNITS
 from winchkit.diagnosis.report.columns import aligned, hanging, paragraph
 from winchkit.diagnosis.report.comparison_rows import (
     HEAD,
@@ -16,7 +15,6 @@ from winchkit.diagnosis.report.comparison_rows import (
     offset_text,
     size_rows,
 )
-from winchkit.diagnosis.report.curves import curve_of
 from winchkit.diagnosis.report.phrases import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -25,6 +23,7 @@ from winchkit.diagnosis.report.phrases import (
     interval_text,
     parameter_name,
 )
+from winchkit.diagnosis.report.rest import rest_of
 from winchkit.diagnosis.report.sentence import changes_text, sentence, telling, where_text
 from winchkit.diagnosis.report.shown import unseen, visible
 from winchkit.diagnosis.report.waterfall import waterfall_of
@@ -50,7 +49,7 @@ def report_text(answer: Answer) -> str:
     diagnosis = answer.diagnosis
     blocks = [
         [VERDICT_NAMES[diagnosis.verdict].upper(), *paragraph(sentence(diagnosis))],
-        _errors(diagnosis.outputs, grown=bool(diagnosis.steps)),
+        _errors(diagnosis.outputs, grown=bool(diagnosis.steps), data=diagnosis.data),
         _ladder(answer),
         _confusion(diagnosis),
         _places(answer),
@@ -100,7 +99,7 @@ def addition_text(addition: Addition | Removal) -> str:
     return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
 
 
-def _errors(outputs: Mapping[str, OutputFit], *, grown: bool) -> list[str]:
+def _errors(outputs: Mapping[str, OutputFit], *, grown: bool, data: str = "runs") -> list[str]:
     head = ["held-out error, rms", "before", "after", "noise"]
     rows = [head if grown else [head[0], "error", "noise"]]
     for name, output in outputs.items():
@@ -109,13 +108,13 @@ def _errors(outputs: Mapping[str, OutputFit], *, grown: bool) -> list[str]:
         after = [scale.text(output.heldout_rms_after)] if grown else []
         before = scale.text(output.heldout_rms_before)
         rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
-    told = "held out: each group of runs is predicted with values fitted without it"
+    told = f"held out: each group of {data} is predicted with values fitted without it"
     return [*aligned(rows), f"  ({told})"]
 
 
 def _ladder(answer: Answer) -> list[str]:
     """What each of several effects buys: added first alone, and dropped last."""
-    ladder = waterfall_of(answer) if _sampled(answer) else None
+    ladder = waterfall_of(answer)
     if ladder is None or len(ladder.first) < 2:
         return []
     outputs = answer.diagnosis.outputs
@@ -142,8 +141,9 @@ def _shown(answer: Answer) -> list[str]:
     if not rows:
         return []
     able, count = [row for row in rows if row.usual], len(rows) + len(blind)
+    data = answer.diagnosis.data
     head = (
-        f"these runs would have shown {len(able)} of {count} effects in their usual size, soonest"
+        f"these {data} would have shown {len(able)} of {count} effects in their usual size, soonest"
     )
     soonest = [[row.effect, f"{row.parameter} {row.text}"] for row in able[:_SOONEST]]
     lines = [head, *aligned(soonest, words=2)]
@@ -154,8 +154,8 @@ def _shown(answer: Answer) -> list[str]:
     never = [row.effect for row in rows if isnan(row.share)]
     if never:
         lines += paragraph(f"at no size that can be: {', '.join(never)}", "  ", "    ")
-    if (large or never) and _sampled(answer):
-        lines.append("  'winchkit plan' proposes the run that shows most of them")
+    if large or never:
+        lines.append("  'winchkit plan' proposes what shows most of them")
     if blind:
         lines += paragraph(
             f"not looked for, a part or channel lacks: {', '.join(blind)}", "  ", "    "
@@ -165,11 +165,11 @@ def _shown(answer: Answer) -> list[str]:
 
 def _confusion(diagnosis: Diagnosis) -> list[str]:
     rows = []
-    for step in diagnosis.steps:
+    for step in (step for step in diagnosis.steps if not step.whole):
         for effect, angle in step.angles.items():
             own = next(name for name in step.effects if name not in step.angles)
             rows.append([f"{own} / {effect}", f"{degrees(angle):.1f}° apart"])
-    return ["these runs cannot tell apart", *aligned(rows, words=2)] if rows else []
+    return [f"these {diagnosis.data} cannot tell apart", *aligned(rows, words=2)] if rows else []
 
 
 def _places(answer: Answer) -> list[str]:
@@ -177,11 +177,11 @@ def _places(answer: Answer) -> list[str]:
     diagnosis, lines = answer.diagnosis, []
     for where in telling(diagnosis.where)[:_FEW]:
         lines += paragraph(where_text(where), "  ", "    ")
-        if not where.frequency and _sampled(answer) and diagnosis.verdict in {"partly", "unknown"}:
+        if not where.frequency and diagnosis.verdict in {"partly", "unknown"}:
             lines.append(f"    {_shape(answer, where)}")
     if not lines:
         return []
-    if diagnosis.empirical and _sampled(answer):
+    if diagnosis.empirical:
         name = diagnosis.empirical[0]
         lines += paragraph(
             f"'winchkit add {name}' adds it as a curve, marked as not understood; "
@@ -192,17 +192,11 @@ def _places(answer: Answer) -> list[str]:
     return ["where the rest lives", *lines]
 
 
-def _sampled(answer: Answer) -> bool:
-    """Whether there is time between rows: a robot's poses are no recordings."""
-    return bool(answer.inquiry.problem.dataset.recordings)
-
-
 def _shape(answer: Answer, where: Where) -> str:
     """The mean residual along where it lives, as bars from its lowest to its highest."""
-    over = Followed(where.output, where.variable, where.share, where.order)
-    mean = curve_of(answer.inquiry.problem, answer.found.final.residual, over).mean
+    _, mean = rest_of(answer, where)
     low, high = float(mean.min()), float(mean.max())
-    scale = scale_for((low, high), OUTPUT_UNITS[where.output])
+    scale = scale_for((low, high), LADDER_UNITS[where.output])
     bars = sparkline(mean, min(_BARS, len(mean)))
     return f"{bars}  {scale.text(low, 2)} to {scale.text(high, 2)}"
 

@@ -6,10 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.gate import held_out_rms
+from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.problem import Hypothesis
+from winchkit.diagnosis.search import Found
 
-__all__ = ["Waterfall", "waterfall_of"]
+__all__ = ["GEOMETRY_NAME", "Waterfall", "waterfall_of"]
+
+GEOMETRY_NAME = "the geometry, all of it"
+"""What a robot's model lacks where its whole geometry had to be let go."""
 
 
 @dataclass(frozen=True)
@@ -26,41 +30,55 @@ class Waterfall:
 
 def waterfall_of(answer: Answer) -> Waterfall | None:
     """The ladder of a diagnosis; None where it names nothing."""
-    diagnosis, inquiry, found = answer.diagnosis, answer.inquiry, answer.found
+    diagnosis, inquiry, filed = answer.diagnosis, answer.inquiry, answer.filed
     if not diagnosis.steps:
         return None
-    whole = found.final.hypothesis
-    given = tuple(range(inquiry.given))
+    whole = answer.found.final.hypothesis
     added = tuple(range(inquiry.given, len(whole.terms)))
     names = [whole.terms[index].label for index in added]
-    folds = inquiry.folds(found.final, found.noise)
-    known: dict[tuple[int, ...], Mapping[str, float]] = {
-        given: {o: fit.heldout_rms_before for o, fit in diagnosis.outputs.items()},
-        (*given, *added): {o: fit.heldout_rms_after for o, fit in diagnosis.outputs.items()},
-    }
+    before = {o: fit.heldout_rms_before for o, fit in diagnosis.outputs.items()}
+    after = {o: fit.heldout_rms_after for o, fit in diagnosis.outputs.items()}
+    ladder = _Ladder(inquiry, answer.found, {added: after})
+    rungs: list[tuple[str, Mapping[str, float]]] = [("profile as it is", before)]
+    first: dict[str, Mapping[str, float]] = {}
+    last: dict[str, Mapping[str, float]] = {}
+    if filed is inquiry:
+        ladder.known[()] = before
+        plain = ladder
+    else:
+        plain = _Ladder(filed, answer.found, {(): before})
+        rungs.append((f"+ {GEOMETRY_NAME}", ladder.error()))
+        first[GEOMETRY_NAME], last[GEOMETRY_NAME] = ladder.error(), plain.error(*added)
+    rungs += [(f"+ {name}", ladder.error(*added[: n + 1])) for n, name in enumerate(names)]
+    for name, index in zip(names, added, strict=True):
+        first[name] = plain.error(index)
+        last[name] = ladder.error(*(other for other in added if other != index))
+    return Waterfall(tuple(rungs), first, last)
 
-    def error(*terms: int) -> Mapping[str, float]:
-        kept = (*given, *terms)
-        if kept not in known:
-            fitted = inquiry.refit(_only(whole, kept), found.noise)
-            known[kept] = held_out_rms(inquiry.problem, fitted, found.noise, folds)
-        return known[kept]
 
-    rungs = [("profile as it is", error())]
-    rungs += [(f"+ {name}", error(*added[: n + 1])) for n, name in enumerate(names)]
-    return Waterfall(
-        rungs=tuple(rungs),
-        first={name: error(index) for name, index in zip(names, added, strict=True)},
-        last={
-            name: error(*(other for other in added if other != index))
-            for name, index in zip(names, added, strict=True)
-        },
-    )
+@dataclass(frozen=True)
+class _Ladder:
+    """Held-out errors of one inquiry's model with some of the terms found."""
+
+    inquiry: Inquiry
+    found: Found
+    known: dict[tuple[int, ...], Mapping[str, float]]
+
+    def error(self, *terms: int) -> Mapping[str, float]:
+        """With what the profile has and these additions, refitted."""
+        if terms not in self.known:
+            inquiry, noise = self.inquiry, self.found.noise
+            kept = _only(self.found.final.hypothesis, (*range(inquiry.given), *terms))
+            fitted = inquiry.refit(kept, noise)
+            folds = inquiry.folds(self.found.final, noise)
+            self.known[terms] = inquiry.held_out_errors(fitted, noise, folds)
+        return self.known[terms]
 
 
 def _only(whole: Hypothesis, kept: tuple[int, ...]) -> Hypothesis:
+    """Some terms of a hypothesis; nuisances are linear and start anew."""
     return Hypothesis(
         tuple(whole.terms[index] for index in kept),
-        whole.nuisances,
+        (),
         tuple(whole.starts[index] for index in kept),
     )

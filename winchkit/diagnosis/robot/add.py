@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from winchkit.diagnosis.add import Addition
 from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.robot.diagnose import Study, study_of
-from winchkit.diagnosis.robot.figures import Shown, figures
+from winchkit.diagnosis.robot.figures import Errors, Shown, errors_of, figures
 from winchkit.diagnosis.robot.places import lacking, needless
+from winchkit.diagnosis.robot.problem import RobotProblem
+from winchkit.diagnosis.robot.study import Study, study_of
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.effects.bind_robot import declared_terms, robot_terms
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -18,7 +20,17 @@ from winchkit.errors import UsageError
 from winchkit.runs.run import Run
 from winchkit.schema.robot import RobotProfile
 
-__all__ = ["add_to_robot"]
+__all__ = ["RobotGrown", "add_to_robot", "grow_robot"]
+
+
+@dataclass(frozen=True)
+class RobotGrown:
+    """An addition with everything behind it, for reports."""
+
+    problem: RobotProblem
+    errors: tuple[Errors, Errors]
+    """Before and after, at every pose."""
+    addition: Addition
 
 
 def add_to_robot(
@@ -33,6 +45,17 @@ def add_to_robot(
     Raises UsageError for an effect that is unknown, there already, at no such place, or that the
     poses cannot show; RunError with every fault of every run.
     """
+    return grow_robot(effect_id, runs, profile, line, catalogue).addition
+
+
+def grow_robot(
+    effect_id: str,
+    runs: Sequence[Run],
+    profile: RobotProfile,
+    line: str | None = None,
+    catalogue: Catalogue | None = None,
+) -> RobotGrown:
+    """As :func:`add_to_robot`, with the errors that the figures were taken from."""
     catalogue = catalogue or load_catalogue()
     effect = _placed(catalogue[effect_id], profile, line)
     if any(term.effect.id == effect.id for term in robot_terms(profile, catalogue)):
@@ -63,7 +86,7 @@ def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
     return at_line(effect, line)
 
 
-def _added(study: Study, effect: Effect) -> Addition:
+def _added(study: Study, effect: Effect) -> RobotGrown:
     inquiry = study.as_filed()
     begin, noise = inquiry.settle(inquiry.begin)
     scores = [s for s in inquiry.scores(begin, noise) if s.atom.effect.id == effect.id]
@@ -77,4 +100,6 @@ def _added(study: Study, effect: Effect) -> Addition:
     found = estimates(problem, final, spread)
     # What a line's winch brings along is refitted beside it and stays in the winch's own profile.
     terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
-    return Addition(figures(before, after, study.noise), terms, study.dataset.notes)
+    was, now = (errors_of(problem, problem.at(fit.hypothesis)) for fit in (begin, final))
+    addition = Addition(figures(before, after, study.noise), terms, study.dataset.notes)
+    return RobotGrown(problem, (was, now), addition)

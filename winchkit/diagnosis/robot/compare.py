@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.diagnosis.follows import Followed
 from winchkit.diagnosis.result import Comparison, OutputError
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
@@ -19,9 +21,20 @@ from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.robot import RobotProfile
 
-__all__ = ["compare_robot"]
+__all__ = ["RobotCompared", "compare_robot", "compared_robot"]
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RobotCompared:
+    """A comparison with everything behind it, for reports."""
+
+    comparison: Comparison
+    problem: RobotProblem
+    errors: Errors
+    followed: Mapping[str, Followed]
+    """Per output what its error follows most."""
 
 
 def compare_robot(
@@ -31,6 +44,13 @@ def compare_robot(
 
     Raises RunError with every fault of every run, FileError for effects that do not bind.
     """
+    return compared_robot(runs, profile, catalogue).comparison
+
+
+def compared_robot(
+    runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue | None = None
+) -> RobotCompared:
+    """As :func:`compare_robot`, with the errors that its figures were taken from."""
     dataset = prepare_poses(runs, profile)
     robot = robot_with_effects(profile, catalogue)
     equations = Equations(dataset, start_pose(dataset), robot)
@@ -54,7 +74,10 @@ def compare_robot(
         )
         for name, error in errors.items()
     }
-    return Comparison(outputs, None, dataset.notes)
+    most: dict[str, Followed] = {}
+    for followed in follows:
+        most.setdefault(followed.output, followed)
+    return RobotCompared(Comparison(outputs, None, dataset.notes), problem, errors, most)
 
 
 def _largest(name: str, error: Array) -> float:

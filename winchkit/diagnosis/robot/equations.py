@@ -146,24 +146,30 @@ class Equations:
         return _wrapped(there - shown)
 
     @cached_property
-    def _as_forces(self) -> Array:
+    def _split(self) -> tuple[Array, Array]:
         """What turns a wrench left over into forces, one each of what the ropes can tell apart and
-        as noisy as one cell, (p, k, 6); NaN where the ropes tell less."""
+        as noisy as one cell, (p, k, 6), NaN where the ropes tell less; and these onto the ropes."""
         structure = structure_matrix(self.basis.geometry, self.pose.position, self.pose.rotation)
         good = np.all(np.isfinite(structure), axis=(1, 2))
-        left, size, _ = np.linalg.svd(
+        left, size, right = np.linalg.svd(
             np.where(good[:, None, None], structure, 0.0), full_matrices=False
         )
         seen = size > _SEEN * np.maximum(size[:, :1], 1e-300)
         inverse = np.where(seen, 1 / np.where(seen, size, 1.0), np.nan)
-        return np.asarray(inverse[..., None] * np.swapaxes(left, 1, 2))
+        forces = np.asarray(inverse[..., None] * np.swapaxes(left, 1, 2))
+        return forces, np.asarray(np.swapaxes(right, 1, 2))
+
+    @property
+    def to_ropes(self) -> Array:
+        """Unbalanced forces onto the ropes: the least change of their tensions, (p, n, k)."""
+        return self._split[1]
 
     def _unbalanced(self, robot: Robot, force: Array) -> Array:
         """Forces that should carry the weight less those that do, (p, k), N."""
         structure = structure_matrix(robot.geometry, self.pose.position, self.pose.rotation)
         weight = gravity_wrench(robot.platform, self.pose.rotation)
         left = (structure @ force[..., None])[..., 0] + weight
-        return np.asarray(-(self._as_forces @ left[..., None])[..., 0])
+        return np.asarray(-(self._split[0] @ left[..., None])[..., 0])
 
 
 def start_pose(dataset: RobotDataset) -> Pose:

@@ -20,7 +20,7 @@ from winchkit.diagnosis.result import OutputFit
 from winchkit.diagnosis.robot.noise import PoseNoise
 from winchkit.diagnosis.robot.problem import RobotProblem
 
-__all__ = ["Errors", "Shown", "errors_of", "figures", "noise_rms"]
+__all__ = ["UNITS", "Errors", "Shown", "errors_of", "figures", "held_out_rms", "noise_rms", "rms"]
 
 Array = NDArray[np.float64]
 Errors = dict[str, Array]
@@ -78,7 +78,7 @@ def noise_rms(problem: RobotProblem, noise: PoseNoise) -> dict[str, float]:
 def figures(begin: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit]:
     """Every output before and after; a position's rms is of its distance."""
     before, after = (errors_of(s.problem, s.problem.at(s.fit.hypothesis)) for s in (begin, final))
-    held_before, held_after = _held_out(begin), _held_out(final)
+    held_before, held_after = held_out_rms(begin), held_out_rms(final)
     least = noise_rms(final.problem, noise)
     signal = signals(final.problem)
     source = "repeats" if noise.from_repeats else "saturated fit"
@@ -89,8 +89,8 @@ def figures(begin: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit
             signal_rms=signal[name],
             rms_before=rms(name, before[name]),
             rms_after=rms(name, after[name]),
-            heldout_rms_before=rms(name, held_before[name]),
-            heldout_rms_after=rms(name, held_after[name]),
+            heldout_rms_before=held_before[name],
+            heldout_rms_after=held_after[name],
             noise_rms=least[name],
             noise_source=source,
         )
@@ -124,6 +124,11 @@ def signals(problem: RobotProblem) -> dict[str, float]:
         apart = array[known] - array[known].mean(axis=0) if known.any() else array[known]
         out[name] = rms(name, apart) if known.any() else float("nan")
     return out
+
+
+def held_out_rms(shown: Shown) -> dict[str, float]:
+    """Error of every output on poses held out, rms in SI."""
+    return {name: rms(name, error) for name, error in _held_out(shown).items()}
 
 
 def _held_out(shown: Shown) -> Errors:

@@ -14,7 +14,9 @@ from winchkit.diagnosis.gate import Folds
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise, Presence
 from winchkit.diagnosis.problem import Hypothesis
+from winchkit.diagnosis.robot.figures import Shown, held_out_rms
 from winchkit.diagnosis.robot.noise import PoseNoise
+from winchkit.diagnosis.robot.places import lacking, lacking_parts
 from winchkit.diagnosis.robot.problem import RobotProblem
 from winchkit.effects.effect import Effect
 
@@ -62,6 +64,17 @@ class RobotInquiry(Inquiry):
         if len(sizes) > 1 and sizes.min() >= _RUN_LEAST and apart:
             return self._folded(dataset.measured.run, len(sizes))
         return self._folded(dataset.pose % _GROUPS, _GROUPS)
+
+    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+        """Held-out error of rope lengths, the platform's position and tensions, rms in SI."""
+        return held_out_rms(Shown(self.robot_problem, fitted, noise, folds))
+
+    def lacking(self, effect: Effect) -> list[str]:
+        """What poses would have to bring to show an effect, in words."""
+        if not effect.on_robot:
+            return ["a motion: poses stand still"]
+        dataset = self.robot_problem.dataset
+        return lacking(effect, dataset) or lacking_parts(effect, dataset)
 
     def folds(self, fitted: Fit, noise: Noise) -> Folds:
         """Poses say enough of everything that is common to all."""

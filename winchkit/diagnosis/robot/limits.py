@@ -9,7 +9,7 @@ import numpy as np
 from winchkit.model.robot.rotation import rotation_of, rotation_vector
 
 if TYPE_CHECKING:
-    from winchkit.diagnosis.robot.diagnose import Study
+    from winchkit.diagnosis.robot.study import Study
 
 __all__ = ["what_poses_cannot_show"]
 

@@ -21,7 +21,7 @@ from winchkit.effects.placed import (
 )
 from winchkit.schema.winch import LAYERED, WinchProfile
 
-__all__ = ["GEOMETRY", "candidates_at", "geometry_believed", "lacking", "needless"]
+__all__ = ["GEOMETRY", "candidates_at", "geometry_believed", "lacking", "lacking_parts", "needless"]
 
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius", "drum-radius", "layer-thickness")
 """Effects that are the geometry which a calibration fits."""
@@ -34,6 +34,11 @@ _PRIORS = {
 }
 """Their names in ``[prior]`` with the standard deviation where a file has none, m: CABTIVE paper,
 Table 4, its bounds read as two standard deviations."""
+_PARTS = {
+    "swivel-radius": "a line with a swivel_radius",
+    "layer-thickness": "a drum that winds in layers",
+    "guide-offset": "a [guide] in a line's winch",
+}
 _OUTSIDE_LINES = {"tension": "LINE.tension [N] of the load cells", "temperature": "a temperature"}
 
 
@@ -57,6 +62,11 @@ def lacking(effect: Effect, dataset: RobotDataset) -> list[str]:
     if "temperature" in effect.needs and not np.isfinite(dataset.measured.temperature).all():
         out.append(_OUTSIDE_LINES["temperature"])
     return out
+
+
+def lacking_parts(effect: Effect, dataset: RobotDataset) -> list[str]:
+    """Parts that no line has and that an effect is about, in words."""
+    return [] if _has_part(effect, dataset) else [_PARTS[base_of(effect)]]
 
 
 def needless(effect: Effect, dataset: RobotDataset) -> Effect:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isnan
-from typing import Any
+from typing import Any, ClassVar
 
 from winchkit.diagnosis.result import Diagnosis, Step
 from winchkit.effects.placed import HOME
@@ -17,9 +17,15 @@ __all__ = ["RobotDiagnosis", "apart", "plain_step"]
 class RobotDiagnosis(Diagnosis):
     """As a winch's; ids of effects at a place are ``EFFECT/LINE`` inside."""
 
+    data: ClassVar[str] = "poses"
     geometry: str = "file"
     """``file`` where the numbers of the profile were taken as they are, ``refitted`` where the
     geometry was let go."""
+
+    @property
+    def empirical(self) -> tuple[str, ...]:
+        """None: a curve over a pose has no effect of its own."""
+        return ()
 
     def to_json(self) -> dict[str, Any]:
         """As ``winchkit diagnose --json`` prints it for a robot."""
@@ -28,7 +34,6 @@ class RobotDiagnosis(Diagnosis):
         out["steps"] = [_step(step) for step in self.steps]
         out["candidates"] = [_placed(candidate) for candidate in out["candidates"]]
         out["detectable"] = _detectable(out["detectable"])
-        out["unexplained"]["empirical"] = []
         for run in out["next_runs"]:
             run["separates"] = [apart(name)[0] for name in run["separates"]]
         return out
@@ -67,6 +72,7 @@ def _step(step: Step) -> dict[str, Any]:
         "parameters": parameters,
         "heldout_gain": step.heldout_gain,
         "angles": dict(step.angles),
+        "whole": step.whole,
     }
 
 

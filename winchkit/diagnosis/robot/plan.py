@@ -1,0 +1,138 @@
+"""What poses to take next, as a list: what they tell apart, and what they show besides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from winchkit.diagnosis.confusion import pairs_of
+from winchkit.diagnosis.next_run import power_of
+from winchkit.diagnosis.robot.answer import RobotAnswer
+from winchkit.diagnosis.robot.next_poses import POSES, WORTHWHILE, PoseOffer, Question, pose_offers
+from winchkit.effects.bind import Term
+from winchkit.effects.card import usual_values
+from winchkit.effects.placed import base_of
+from winchkit.model.robot import angles_of
+from winchkit.runs.run import Channel, Run
+
+__all__ = ["PosePlan", "plan_poses"]
+
+_SURE = 0.9
+_MOST = 6
+
+
+@dataclass(frozen=True)
+class PosePlan:
+    """Kinds of poses, the most telling first, and what was asked of them."""
+
+    pairs: tuple[tuple[Term, Term], ...]
+    """To be told apart; the first powers of every offer are theirs."""
+    hidden: tuple[Term, ...]
+    """Effects of a usual size that the poses so far would not have shown."""
+    offers: tuple[PoseOffer, ...]
+    lines: tuple[str, ...]
+
+    def shows(self, offer: PoseOffer) -> list[str]:
+        """Effects that an offer would show for the first time."""
+        powers = offer.powers[len(self.pairs) :]
+        shown = zip(self.hidden, powers, strict=True)
+        return [term.effect.id for term, power in shown if power >= _SURE]
+
+    @property
+    def best(self) -> PoseOffer | None:
+        """The most telling offer; None where none tells anything apart or shows anything new."""
+        for offer in self.offers[:1]:
+            if self.shows(offer) or max(self.of_pairs(offer), default=0.0) >= WORTHWHILE:
+                return offer
+        return None
+
+    def of_pairs(self, offer: PoseOffer) -> tuple[float, ...]:
+        """Chances of telling each pair apart."""
+        return offer.powers[: len(self.pairs)]
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``winchkit plan --json`` prints it for a robot."""
+        return {"schema": 1, "offers": [self._offer(offer) for offer in self.offers]}
+
+    def _offer(self, offer: PoseOffer) -> Mapping[str, Any]:
+        asked = zip(self.pairs, offer.powers, offer.so_far, strict=False)
+        angles = angles_of(offer.pose.rotation)
+        return {
+            "kind": offer.kind.name,
+            "separates": [
+                {"effects": [a.effect.id, b.effect.id], "power": power, "power_so_far": before}
+                for (a, b), power, before in asked
+            ],
+            "shows": self.shows(offer),
+            "poses": [
+                {
+                    "position": place.tolist(),
+                    "angles": turned.tolist(),
+                    "motor_angle": dict(zip(self.lines, motor.tolist(), strict=True)),
+                }
+                for place, turned, motor in zip(
+                    offer.pose.position, angles, offer.motor_angle, strict=True
+                )
+            ],
+        }
+
+    def run(self, offer: PoseOffer) -> Run:
+        """The poses of an offer, as a run to drive to and to fill with what is measured."""
+        angles = angles_of(offer.pose.rotation)
+        channels = {
+            f"platform_{axis}": Channel(offer.pose.position[:, k], "m")
+            for k, axis in enumerate("xyz")
+        }
+        channels |= {
+            f"platform_{name}": Channel(angles[:, k], "rad")
+            for k, name in enumerate(("roll", "pitch", "yaw"))
+        }
+        for k, line in enumerate(self.lines):
+            channels[f"{line}.motor_angle"] = Channel(offer.motor_angle[:, k], "rad")
+            if np.isfinite(offer.tension[:, k]).all():
+                channels[f"{line}.tension"] = Channel(offer.tension[:, k], "N")
+        time = np.arange(len(angles), dtype=float)
+        told = {"programme": f"proposed: {offer.kind.words}"}
+        return Run("proposed", time, channels, told)
+
+
+def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
+    """Kinds of poses, tried on the model that a diagnosis came to; the most telling first."""
+    problem, final = answer.robot_problem, answer.found.final.hypothesis
+    pairs = tuple(pairs_of(answer.sets))
+    hidden = _hidden(answer)
+    questions: list[Question] = [*pairs, *((term, None) for term in hidden)]
+    offers = pose_offers(problem, final, questions, count) if questions else []
+    many = len(pairs)
+
+    def worth(offer: PoseOffer) -> tuple[float, ...]:
+        sure = sum(power >= _SURE for power in offer.powers[:many])
+        told = round(sum(offer.powers[:many]), 1)
+        shown = sum(power >= _SURE for power in offer.powers[many:])
+        return sure, told, shown, round(sum(offer.powers[many:]), 1)
+
+    return PosePlan(
+        pairs, hidden, tuple(sorted(offers, key=worth, reverse=True)), problem.dataset.names
+    )
+
+
+def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
+    """Effects whose usual size these poses would not have shown, the nearest to it first.
+
+    Of those on one line each, the line where it shows least.
+    """
+    faint: dict[str, tuple[float, Term]] = {}
+    there = {term.effect.id for term in answer.found.final.hypothesis.terms}
+    for score in answer.found.scores:
+        effect = score.atom.effect
+        if not score.strength > 0 or power_of(score.strength) >= _SURE or effect.id in there:
+            continue
+        known = faint.get(base_of(effect))
+        if known is None or score.strength < known[0]:
+            values = {**usual_values(effect), **score.atom.shape}
+            faint[base_of(effect)] = score.strength, Term(effect, values)
+    ranked = sorted(faint.values(), key=lambda item: -item[0])[:_MOST]
+    return tuple(term for _, term in ranked)
