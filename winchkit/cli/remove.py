@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.output import echo_json
-from winchkit.cli.runs_option import Asked, ManyValues, json_option, model_options
-from winchkit.errors import UsageError
+from winchkit.cli.runs_option import Asked, ManyValues, json_option, model_options, read_all
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.remove import Removal
@@ -27,16 +26,22 @@ __all__ = ["command"]
 def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json: bool) -> None:
     """Write a profile without EFFECT; with --fit the effects that stay are refitted.
 
-    The ledger notes the step, and 'winchkit undo' takes it back.
+    A robot's effect on one line is EFFECT/LINE, or EFFECT with --winch LINE. The ledger notes the
+    step, and 'winchkit undo' takes it back.
     """
-    from winchkit.cli.robot_model import read_profile
+    from winchkit.cli.robot_model import read_profile, refuse_options
     from winchkit.diagnosis.remove import remove
     from winchkit.schema.robot import RobotProfile
 
     declared, removal = read_profile(asked.source), None
-    if runs and isinstance(declared, RobotProfile):
-        raise UsageError("--fit: a robot's effects are not refitted here; remove, then calibrate")
-    if runs and not isinstance(declared, RobotProfile):
+    if isinstance(declared, RobotProfile):
+        from winchkit.diagnosis.robot.remove import remove_from_robot
+
+        refuse_options(asked.band)
+        effect = f"{effect}/{asked.winch}" if asked.winch else effect
+        if runs:
+            removal = remove_from_robot(effect, read_all(runs), declared, asked.catalogue)
+    elif runs:
         removal = remove(effect, asked.runs(runs), declared, asked.catalogue, asked.band)
     _write(asked.source, effect, removal, runs, Path(output))
     click.echo(f"written: {output}", err=True)

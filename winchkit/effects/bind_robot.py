@@ -23,6 +23,7 @@ from winchkit.units import suggest
 __all__ = [
     "check_robot",
     "declared_terms",
+    "lines_with_home_length",
     "robot_terms",
     "robot_with_effects",
     "robot_with_terms",
@@ -90,6 +91,12 @@ def declared_terms(profile: RobotProfile, catalogue: Catalogue) -> list[Term]:
 def check_robot(profile: RobotProfile, catalogue: Catalogue | None = None) -> list[Fault]:
     """Every fault of the effects that a robot declares itself."""
     return _bind(profile, catalogue or load_catalogue())[1]
+
+
+def lines_with_home_length(profile: RobotProfile) -> set[str]:
+    """Lines whose home length the profile has as an effect already."""
+    own = (table for table in _single(profile.effect) if table.id == _HOME_LENGTH)
+    return {str(table.values["line"]) for table in own if "line" in table.values}
 
 
 def _bind(profile: RobotProfile, catalogue: Catalogue) -> tuple[list[Term], list[Fault]]:

@@ -43,13 +43,13 @@ def at_line(effect: Effect, line: str) -> LineEffect:
 
 
 def with_home_lengths(effect: Effect, lines: Sequence[str]) -> Effect:
-    """A law of the rope with a home length per line on which it acts.
+    """A law of the rope with a home length per line on which it acts, of those given.
 
     The ropes were stretched at home too, by tensions that nobody knows: what the law adds is a
     strain beyond that of home.
     """
     place = line_of_effect(effect)
-    on = [place] if place else list(lines)
+    on = [line for line in lines if place in ("", line)]
     homes = tuple(
         Parameter(HOME + line, "m", null=0.0, typical=_HOME_TYPICAL, low=-1.0, high=1.0)
         for line in on

@@ -31,6 +31,8 @@ from winchkit.schema.winch import SHORTHANDS
 
 __all__ = ["Fitted", "write_fitted", "write_without"]
 
+_HOME_LENGTH = "home-length"
+
 
 @dataclass(frozen=True)
 class Fitted:
@@ -58,11 +60,12 @@ def write_without(
 ) -> None:
     """Copy the profile ``source`` to ``out`` without an effect, the others as fitted.
 
-    Raises FileError where the profile has no such effect or a file cannot be read or written.
+    A robot's effect on one line is ``EFFECT/LINE``. Raises FileError where the profile has no such
+    effect or a file cannot be read or written.
     """
     document = read_document(source)
-    there = [table["id"] for table in effect_tables(document)]
     short = {SHORTHANDS[key]: key for key in shorthands(document)}
+    there = [label for table in effect_tables(document) for label in _labels(table)]
     if effect_id not in there and effect_id not in short:
         has = ", ".join([*there, *short]) or "none"
         raise FileError(Fault(f"has no effect '{effect_id}'; it has {has}", str(source)))
@@ -71,9 +74,28 @@ def write_without(
         part, _, name = short[effect_id].partition(".")
         del document[part][name]
     else:
-        del effect_tables(document)[len(there) - 1 - there[::-1].index(effect_id)]
+        _take_out(document, effect_id)
     _put(document, fitted)
     write_document(document, out)
+
+
+def _labels(table: Any) -> list[str]:
+    """What an effect's table is called: with its line where it has one, or several."""
+    name = str(table["id"])
+    if _of_lines(table):
+        return [name, *(f"{name}/{line}" for line in table["length"])]
+    return [f"{name}/{table['line']}"] if "line" in table else [name]
+
+
+def _take_out(document: Any, label: str) -> None:
+    """Delete the last table of this name, or one line's length out of it."""
+    tables = effect_tables(document)
+    last = max(index for index, table in enumerate(tables) if label in _labels(table))
+    _, _, line = label.partition("/")
+    if line and _of_lines(tables[last]) and len(tables[last]["length"]) > 1:
+        del tables[last]["length"][line]
+    else:
+        del tables[last]
 
 
 def _put(document: Any, fitted: Sequence[Fitted]) -> None:
@@ -83,6 +105,9 @@ def _put(document: Any, fitted: Sequence[Fitted]) -> None:
         if _update_shorthand(document, item):
             continue
         name, line = base_of(item.term.effect), line_of_effect(item.term.effect)
+        if name == _HOME_LENGTH and line in (lengths := _home_lengths(document)):
+            lengths[line] = written(item.term.values["length"], "m")
+            continue
         table = next((t for t in unused if (t["id"], t.get("line", "")) == (name, line)), None)
         if table is None:
             table = tomlkit.table()
@@ -103,14 +128,22 @@ def _put_home_lengths(document: Any, item: Fitted) -> None:
     homes = {n.removeprefix(HOME): values[n] for n in values if n.startswith(HOME)}
     if not homes:
         return
-    tables = [t for t in effect_tables(document) if t["id"] == "home-length" and "line" not in t]
-    if not tables:
-        effect_tables(document).append(tomlkit.item({"id": "home-length"}))
-        tables = [effect_tables(document)[-1]]
-    lengths = tomlkit.inline_table()
-    lengths.update({line: written(value, "m") for line, value in homes.items()})
-    tables[0]["length"] = lengths
-    tables[0]["fitted"] = {"runs": list(item.runs), "date": item.date}
+    if not _home_lengths(document):
+        lengths = tomlkit.inline_table()
+        effect_tables(document).append(tomlkit.item({"id": _HOME_LENGTH}))
+        effect_tables(document)[-1]["length"] = lengths
+    table = next(t for t in effect_tables(document) if _of_lines(t))
+    table["length"].update({line: written(value, "m") for line, value in homes.items()})
+    table["fitted"] = {"runs": list(item.runs), "date": item.date}
+
+
+def _home_lengths(document: Any) -> Any:
+    """Home lengths of several lines in one table, by line; empty where there is none."""
+    return next((t["length"] for t in effect_tables(document) if _of_lines(t)), {})
+
+
+def _of_lines(table: Any) -> bool:
+    return table["id"] == _HOME_LENGTH and isinstance(table.get("length"), Mapping)
 
 
 def _update_shorthand(document: Any, item: Fitted) -> bool:

@@ -30,6 +30,7 @@ from winchkit.diagnosis.report.waterfall import waterfall_of
 from winchkit.diagnosis.report.wording import Scale, grouped, percent, scale_for, significant
 from winchkit.diagnosis.result import Comparison, Diagnosis, OutputFit, Where
 from winchkit.effects.card import sparkline
+from winchkit.effects.placed import HOME
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
@@ -86,13 +87,15 @@ def compare_text(comparison: Comparison) -> str:
 def addition_text(addition: Addition | Removal) -> str:
     """What was fitted, and what the step did to the error out of sample."""
     fitted = []
-    for term, values in addition.terms:
+    for term, every in addition.terms:
+        values = {name: e for name, e in every.items() if not name.startswith(HOME)}
         told = ", ".join(estimate_text(name, value) for name, value in values.items())
-        fitted.append([term.label, told])
+        beside = "; the lines' home lengths beside it" if len(values) < len(every) else ""
+        fitted.append([term.label, told + beside])
         sure = {n: interval_text(n, v) for n, v in values.items()}
         fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
     blocks = [
-        ["fitted", *aligned(fitted, words=2)] if fitted else [],
+        ["fitted", *hanging(fitted)] if fitted else [],
         _errors(addition.outputs, grown=True),
         _notes(addition.notes),
     ]

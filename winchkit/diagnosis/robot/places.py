@@ -10,6 +10,7 @@ import numpy as np
 from winchkit.diagnosis.robot.believed import Believed
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.effects.bind import Term
+from winchkit.effects.bind_robot import lines_with_home_length
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.placed import (
@@ -72,7 +73,8 @@ def lacking_parts(effect: Effect, dataset: RobotDataset) -> list[str]:
 def needless(effect: Effect, dataset: RobotDataset) -> Effect:
     """An effect as the search takes it: its needs are met; a rope's law brings home lengths."""
     if "rope_force" in effect.needs and effect.outputs == ("cable_length",):
-        effect = with_home_lengths(effect, dataset.names)
+        known = lines_with_home_length(dataset.robot)
+        effect = with_home_lengths(effect, [n for n in dataset.names if n not in known])
     return replace(effect, needs=())
 
 
