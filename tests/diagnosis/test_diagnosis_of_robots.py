@@ -117,6 +117,52 @@ def test_an_effect_is_added_on_its_line_and_taken_back(tmp_path: Path) -> None:
     assert read_robot(back).effect == ()
 
 
+def test_effects_are_added_removed_and_taken_back_with_the_others_refitted(tmp_path: Path) -> None:
+    """A rope's law brings home lengths along; each line has one, whatever comes after."""
+    profile, run = files(tmp_path, "elastic, exit point", count=40, repeats=12)
+    names = ("rope", "both", "rope-again", "back")
+    rope, both, again, back = (tmp_path / f"{name}.toml" for name in names)
+    first = answered("add", "cable-elongation-linear", "--fit", run, "-p", profile, "-o", rope)[
+        "outputs"
+    ]["platform_position"]
+    answered("add", "exit-point/3", "--fit", run, "-p", rope, "-o", both)
+    assert call("check", both).exit_code == 0
+    assert len(read_robot(both).effect) == 3
+    removed = answered("remove", "exit-point/3", "--fit", run, "-p", both, "-o", again)
+    assert call("check", again).exit_code == 0
+    left = removed["outputs"]["platform_position"]
+    assert left["heldout_rms_after"] == pytest.approx(first["heldout_rms_after"], rel=0.05)
+    assert left["heldout_rms_after"] > 1.2 * left["heldout_rms_before"]
+    before, after = (read_robot(path).effect[0].values for path in (rope, again))
+    kilonewtons = [float(str(v["axial_stiffness"]).split()[0]) / 1e3 for v in (before, after)]
+    assert kilonewtons[1] == pytest.approx(kilonewtons[0], rel=0.02)
+    assert len(read_robot(again).effect) == 2
+    steps = answered("ledger", "-p", again)["steps"]
+    assert [step["did"] for step in steps] == ["add", "add", "remove"]
+    errors = [step["after"]["platform_position"] for step in steps]
+    assert errors[1] < errors[0]
+    assert errors[1] < errors[2]
+    assert "platform position" in call("ledger", "-p", again).output
+    assert call("undo", "-p", again, "-o", back).exit_code == 0
+    assert [table.id for table in read_robot(back).effect] == [
+        table.id for table in read_robot(both).effect
+    ]
+
+
+def test_one_lines_home_length_is_taken_out_of_the_table_of_all(tmp_path: Path) -> None:
+    profile = tmp_path / "robot.toml"
+    lengths = '[[effect]]\nid = "home-length"\nlength = { 1 = "1 mm", 2 = "2 mm" }\n'
+    profile.write_text(profile_text() + "\n" + lengths)
+    one, none = tmp_path / "one.toml", tmp_path / "none.toml"
+    assert call("remove", "home-length/2", "-p", profile, "-o", one).exit_code == 0
+    assert dict(read_robot(one).effect[0].values["length"]) == {"1": "1 mm"}
+    assert call("remove", "home-length", "--winch", "1", "-p", one, "-o", none).exit_code == 0
+    assert read_robot(none).effect == ()
+    result = call("remove", "home-length/3", "-p", profile, "-o", none)
+    assert result.exit_code == 3
+    assert "home-length/1, home-length/2" in result.output
+
+
 def test_bad_input_is_told_with_the_reason(tmp_path: Path) -> None:
     profile, run = files(tmp_path, "none", count=14, repeats=0)
     lines = run.read_text().splitlines()
