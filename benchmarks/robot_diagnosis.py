@@ -73,16 +73,23 @@ def _members(step: dict[str, Any]) -> list[str]:
 
 def wrong(case: Case, found: dict[str, Any]) -> list[str]:
     """Effects named alone that are not hidden."""
-    sets = [_members(step) for step in found["steps"]]
+    steps = [step for step in found["steps"] if not step["whole"]]
+    sets = [_members(step) for step in steps]
     return [own[0] for own in sets if len(own) == 1 and own[0] not in case.answers]
 
 
 def right(case: Case, found: dict[str, Any]) -> bool:
     """Whether all that is hidden is in a set, nothing else is named, and what is not known is
-    called so."""
-    sets = [_members(step) for step in found["steps"]]
+    called so; without repeats it is enough to name nothing and to say what cannot be excluded."""
+    steps = found["steps"]
+    if case.outside and case.as_geometry and steps:
+        return len(steps) == 1 and bool(steps[0]["whole"])
+    sets = [_members(step) for step in steps]
     if case.outside:
-        return found["verdict"] in ("unknown", "partly") and not sets
+        told = found["verdict"] in ("unknown", "partly") or (
+            not case.repeats and any("cannot be excluded" in note for note in found["notes"])
+        )
+        return told and not sets
     if not case.answers:
         return found["verdict"] == "adequate"
     hit = {answer for own in sets for answer in own if answer in case.answers}

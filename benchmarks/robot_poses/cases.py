@@ -138,7 +138,7 @@ CASES: tuple[Case, ...] = (
     ),
     Case("outside: waves", beyond=_waves, outside=True),
     Case("outside: a joint gives way", beyond=_joint, outside=True),
-    Case("outside: platform bends", beyond=_bends, outside=True),
-    Case("outside: tracker's metre", seen=_scaled, outside=True),
+    Case("outside: platform bends", beyond=_bends, outside=True, as_geometry=True),
+    Case("outside: tracker's metre", seen=_scaled, outside=True, as_geometry=True),
     Case("outside: waves, no repeats", beyond=_waves, outside=True, repeats=0),
 )

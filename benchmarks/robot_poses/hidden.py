@@ -54,6 +54,8 @@ class Case:
     repeats: int = 15
     outside: bool = False
     """Whether no effect of the catalogue is to be named."""
+    as_geometry: bool = False
+    """Whether all of the geometry together may be said to be off: it does what is hidden."""
 
 
 def record(

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from winchkit.schema.robot import RobotProfile
     from winchkit.schema.winch import WinchProfile
 
-__all__ = ["read_profile", "refuse_options"]
+__all__ = ["read_profile", "refuse_curves", "refuse_options"]
 
 
 def read_profile(path: Path) -> WinchProfile | RobotProfile:
@@ -31,3 +31,15 @@ def refuse_options(band: float | None, winch: str | None = None) -> None:
         raise UsageError("--band: a robot's poses stand still and have no torque to filter")
     if winch is not None:
         raise UsageError("--winch: a robot's lines are judged together; leave it out")
+
+
+def refuse_curves(declared: WinchProfile | RobotProfile) -> None:
+    """Raise UsageError for a robot's profile where a curve along a winch's run is asked for."""
+    from winchkit.schema.robot import RobotProfile
+
+    if isinstance(declared, RobotProfile):
+        raise UsageError(
+            f"'{declared.name}' is a robot: there is no curve to begin from along its poses. "
+            "'winchkit diagnose' says over what the rest lives; write the effect by hand, as "
+            "examples/my_effect.py, with on_robot, and give it with --effects"
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite, nan
+from math import isfinite, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,10 +61,13 @@ def _figure(trace: Trace, noise: float | None) -> Markup:
     """Dots of every pose, means as lines, the noise as a band."""
     how, unit = reading(trace.over.variable), UNITS[trace.over.output]
     scale = scale_for(float(np.abs(trace.before).max(initial=0.0)), unit)
-    size = float(np.sqrt(np.mean(trace.before**2)))
-    states = [("residual" if size < AT_NOISE * (noise or 0.0) else "before", trace.before)]
+    if noise is not None and trace.over.output == "platform_position":
+        noise /= sqrt(len(AXES))  # That of one axis; a position's is of its distance.
+    states = [("before", trace.before)]
     if trace.after is not None and _differ(trace):
         states.append(("after", trace.after))
+    elif float(np.sqrt(np.mean(trace.before**2))) < AT_NOISE * (noise or 0.0):
+        states = [("residual", trace.before)]
     caption = _caption(trace, noise)
     across = _axis(trace, how.label, np.asarray(how.shown(trace.x)))
     every = [float(v) / scale.worth for _, values in states for v in values]

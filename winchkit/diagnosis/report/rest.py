@@ -21,7 +21,8 @@ def rest_of(answer: Answer, where: Where) -> tuple[Array, Array]:
     """Mean of the variable and of the residual in every bin, (bins,) each, SI."""
     over = Followed(where.output, where.variable, where.share, where.order, line=where.line)
     if isinstance(answer, RobotAnswer):
-        trace = trace_over(answer.seen.final.problem, over, answer.seen.errors[1])
+        problem, errors = answer.seen.rest
+        trace = trace_over(problem, over, errors)
         return trace.means(trace.before)
     curve = curve_of(answer.inquiry.problem, answer.found.final.residual, over)
     return curve.x, curve.mean

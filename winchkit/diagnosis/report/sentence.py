@@ -51,6 +51,7 @@ _CHANGES = {
     },
 }
 """Other data, by what a diagnosis was made from."""
+_CONSTANT = ("winch", "pose")
 _COUNTS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
 
 
@@ -99,7 +100,8 @@ def where_text(where: Where) -> str:
         on = "along" if where.output == "platform_position" else "of line"
         output = f"{output} {on} {where.line}"
     if where.variable == "winch":
-        return f"{output}, the same at every pose ({percent(where.share)} of all lines' error)"
+        what = "the same at every pose" if where.line else "by a constant of each line"
+        return f"{output}, {what} ({percent(where.share)} of all lines' error)"
     if where.variable == "pose":
         return f"{output}, alike on all lines of a pose ({percent(where.share)} of its error)"
     variable = VARIABLE_NAMES.get(where.variable, where.variable)
@@ -119,9 +121,17 @@ def often_per_turn(angle: str, order: int) -> str:
 
 
 def telling(places: Sequence[Where]) -> list[Where]:
-    """Places with the most telling first, one per output: a clear order says more than a trend."""
+    """Places with the most telling first, one per output.
+
+    A clear order says more than a trend, and a trend more than a constant of a robot's line.
+    """
     ranked = sorted(
-        places, key=lambda w: (w.order is None or w.share < CLEAR_ORDER, w.frequency is not None)
+        places,
+        key=lambda w: (
+            w.order is None or w.share < CLEAR_ORDER,
+            w.variable in _CONSTANT,
+            w.frequency is not None,
+        ),
     )
     first: dict[str, Where] = {}
     for place in ranked:

@@ -10,7 +10,7 @@ from winchkit.diagnosis.confusion import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.diagnose import Answer, candidates_of, steps_of
 from winchkit.diagnosis.power import detectable
 from winchkit.diagnosis.result import Estimate, OutputFit, Step, Where
-from winchkit.diagnosis.robot.figures import Errors, Shown, errors_of, figures
+from winchkit.diagnosis.robot.figures import Errors, Shown, errors_of, figures, rms
 from winchkit.diagnosis.robot.inquiry import RobotInquiry
 from winchkit.diagnosis.robot.limits import what_poses_cannot_show
 from winchkit.diagnosis.robot.next_poses import next_pose_runs
@@ -26,6 +26,9 @@ from winchkit.diagnosis.verdict import Judgement
 __all__ = ["RobotAnswer", "Seen", "answer_of"]
 
 _WHERE = 6
+_FAR_OFF, _NO_WORSE = 0.7, 1.1
+"""A geometry that was let go is worth a look where some error falls below this share of what it
+was, and none rises above that one."""
 
 
 class RobotAnswer(Answer):
@@ -82,6 +85,18 @@ class Seen:
         )
         return begin, final
 
+    @property
+    def rest(self) -> tuple[RobotProblem, Errors]:
+        """Where to look for what is left: beside the geometry as filed, unless that is far off.
+
+        A geometry that was let go for nothing has moved to imitate what is missing.
+        """
+        before, after = self.errors
+        falls = [rms(name, after[name]) / rms(name, before[name]) for name in after]
+        if self.refitted and (min(falls) > _FAR_OFF or max(falls) > _NO_WORSE):
+            return self.begin.problem, before
+        return self.final.problem, after
+
 
 def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
     """What was found, in words, figures and places; ``geometry`` is how that was taken."""
@@ -111,7 +126,7 @@ def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
 
 def _places(seen: Seen) -> tuple[Where, ...]:
     """Where the rest lives, the largest share first."""
-    found = follows_of(seen.final.problem, seen.errors[1])
+    found = follows_of(*seen.rest)
     places = [Where(f.output, f.variable, f.share, line=f.line) for f in found]
     return tuple(sorted(places, key=lambda w: -w.share)[:_WHERE])
 

@@ -40,7 +40,7 @@ class _Share:
     """What chance hardly reaches."""
     column: int
     """Which line or axis has most of it."""
-    alone: bool = True
+    alone: bool
     """Whether that one has over half of it."""
 
 
@@ -139,7 +139,8 @@ def _constants(problem: RobotProblem, output: str, error: Array) -> list[Followe
     for name, values in (("winch", winch), ("pose", pose)):
         taken = _category_share(values[known], error[known])
         if taken.share > max(_WORTH, taken.by_chance):
-            line = problem.dataset.names[taken.column] if name == "winch" else None
+            own = name == "winch" and taken.alone
+            line = problem.dataset.names[taken.column] if own else None
             out.append(Followed(output, name, taken.share, line=line))
     return out
 
@@ -156,4 +157,6 @@ def _category_share(category: NDArray[np.intp], error: Array) -> _Share:
     many = int(np.count_nonzero(used))
     share = float(means.sum()) / total - many / len(error)
     chance = _SURE * float(np.sqrt(2 * many)) / len(error)
-    return _Share(max(0.0, share), chance, int(np.argmax(means)))
+    most = int(np.argmax(means))
+    alone = bool(means[most] > _MOSTLY * means.sum())
+    return _Share(max(0.0, share), chance, most, alone)
