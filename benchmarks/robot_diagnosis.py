@@ -1,11 +1,13 @@
 """What ``winchkit diagnose`` says of robots with one thing hidden (or two, or none, or unknown).
 
-    python benchmarks/robot_diagnosis.py [--seeds N] [--case NAME] [--json]
+    python benchmarks/robot_diagnosis.py [--seeds N] [--first SEED] [--case NAME] [--json]
+    python benchmarks/robot_diagnosis.py --intervals [--seeds N] [--case NAME] [--json]
 
 Poses are made by robot_poses, which shares no code with winchkit. The profile has the true
 geometry; "calibrated" cases give the CABTIVE robot's nominal numbers to ``winchkit calibrate``
 first, as a user would, with the elasticity hidden from it. At the end: how often the answer was
 right, how often a single wrong effect was named, and how often 95 % intervals held the truth.
+``--intervals`` asks the latter alone, quicker: ``winchkit add`` is told what is hidden.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
@@ -45,6 +48,22 @@ def calibrated(case: Case, seed: int, folder: Path) -> dict[str, Any]:
     profile = folder / "calibrated.toml"
     _called(["calibrate", "cabtive", str(run), "-o", str(profile), "--json"])
     return _diagnosed(run, profile)
+
+
+def added(case: Case, seed: int, folder: Path) -> dict[str, bool]:
+    """For every hidden number whether the interval of ``winchkit add`` holds it."""
+    profile = folder / "robot.toml"
+    profile.write_text(profile_text())
+    run = record(case, folder, "poses.csv", seed=seed)
+    out = folder / "better.toml"
+    told = ["--fit", str(run), "--profile", str(profile), "-o", str(out), "--json"]
+    found = json.loads(_called(["add", case.answers[0], *told]))
+    return {
+        f"{effect}.{name}": estimate["interval"][0] <= truth <= estimate["interval"][1]
+        for effect, values in found["parameters"].items()
+        for name, estimate in values.items()
+        if (truth := case.values.get(f"{effect}.{name}")) is not None
+    }
 
 
 def _diagnosed(run: Path, profile: Path) -> dict[str, Any]:
@@ -119,13 +138,17 @@ def main_of(arguments: list[str]) -> None:
     parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--case", action="append")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--intervals", action="store_true", help="coverage alone")
     options = parser.parse_args(arguments)
+    seeds = range(options.first, options.first + options.seeds)
+    cases = [case for case in CASES if not options.case or case.name in options.case]
+    if options.intervals:
+        _intervals([case for case in cases if case.values and _alone(case)], seeds, options.json)
+        return
     rows = []
-    for case in CASES:
+    for case in cases:
         for flow in (answer, calibrated) if case.name in CALIBRATED else (answer,):
-            if options.case and case.name not in options.case:
-                continue
-            for seed in range(options.first, options.first + options.seeds):
+            for seed in seeds:
                 with TemporaryDirectory() as folder:
                     start = process_time()
                     found = flow(case, seed, Path(folder))
@@ -137,6 +160,34 @@ def main_of(arguments: list[str]) -> None:
         print(json.dumps({"schema": 1, "summary": told, "cases": rows}, indent=1))
     else:
         print("\n".join(f"{name}: {value}" for name, value in told.items()))
+
+
+def _alone(case: Case) -> bool:
+    """Whether one effect alone is hidden, by whatever name."""
+    return len({name.partition("/")[2] for name in case.answers}) == 1 and "," not in case.name
+
+
+def _intervals(cases: Sequence[Case], seeds: range, as_json: bool) -> None:
+    """How often the intervals of every case held the truth."""
+    rows: dict[str, list[bool]] = {}
+    for case in cases:
+        for seed in seeds:
+            with TemporaryDirectory() as folder:
+                for name, held in added(case, seed, Path(folder)).items():
+                    rows.setdefault(name, []).append(held)
+        if not as_json:
+            told = {n: rows[n] for n in case.values if n in rows}
+            print("\n".join(f"{n}: {_share(held)}" for n, held in told.items()), flush=True)
+    every = [held for own in rows.values() for held in own]
+    if as_json:
+        counts = {name: {"held": sum(own), "of": len(own)} for name, own in rows.items()}
+        print(json.dumps({"schema": 1, "intervals": counts}, indent=1))
+    else:
+        print(f"all: {_share(every)}")
+
+
+def _share(held: Sequence[bool]) -> str:
+    return f"{sum(held)} of {len(held)}, {100 * sum(held) / max(len(held), 1):.1f} %"
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, str]:
@@ -151,8 +202,7 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, str]:
     out = {k: f"{sum(r['right'] for r in v)} of {len(v)}" for k, v in kinds.items()}
     out["a wrong effect named alone"] = f"{sum(bool(r['wrong']) for r in rows)} of {len(rows)}"
     held = [inside for r in rows for inside in r["covered"].values()]
-    share = f", {100 * sum(held) / len(held):.1f} %" if held else ""
-    out["95 % intervals that hold the truth"] = f"{sum(held)} of {len(held)}{share}"
+    out["95 % intervals that hold the truth"] = _share(held)
     return out
 
 
