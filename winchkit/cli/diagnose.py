@@ -119,7 +119,8 @@ def _tell_robot(
     """What a robot's model lacks, from poses."""
     from winchkit.diagnosis.robot.diagnose import diagnose_robot
 
-    answer = diagnose_robot(read_all(runs), declared, asked.catalogue)
+    with progress_bar() as told:
+        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, told)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         from winchkit.diagnosis.report.pose_page import robot_report_html

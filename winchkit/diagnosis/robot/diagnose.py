@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from winchkit.diagnosis.diagnose import Told, silent
 from winchkit.diagnosis.fit import fit
 from winchkit.diagnosis.problem import Hypothesis
 from winchkit.diagnosis.robot.answer import RobotAnswer, Seen, answer_of
@@ -34,13 +35,19 @@ _ONE_OF_FEW = 0.4
 
 
 def diagnose_robot(
-    runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue | None = None
+    runs: Sequence[Run],
+    profile: RobotProfile,
+    catalogue: Catalogue | None = None,
+    told: Told = silent,
 ) -> RobotAnswer:
     """Find which effect of the catalogue a robot's model lacks on these poses.
 
-    Raises RunError with every fault of every run, FileError for effects that do not bind.
+    ``told`` hears what is begun and which share (0 to 1) of the work is about done. Raises RunError
+    with every fault of every run, FileError for effects that do not bind.
     """
+    told("judging the noise", 0.0)
     study = study_of(runs, profile, catalogue or load_catalogue())
+    told("searching", 0.4)
     if fitted_to(profile, runs):
         inquiry = study.let_go()
         return _concluded(study, inquiry, inquiry)
