@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.model.line import Line
 from winchkit.model.robot import (
     Pose,
     Robot,
@@ -30,7 +31,7 @@ from winchkit.model.robot import (
 )
 from winchkit.model.robot.robot import standing
 from winchkit.model.robot.rotation import angle_rates, rotation_by, rotation_vector
-from winchkit.model.stages import Stage
+from winchkit.model.stages import At, Stage
 
 __all__ = ["POSED", "Equations", "placed_by", "start_pose"]
 
@@ -43,6 +44,7 @@ _STRIDE = 0.3
 _SETTLED = 1e-9
 _RIDGE = 1e-9
 _SEEN = 1e-6
+_INVERTING, _SMALL_FORCE, _FLATTEST = 8, 1e-4, 0.05
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Equations:
             if any(m.stage is Stage.CELL for m in line.modifiers):
                 angle = self.dataset.measured.motor_angle[:, i]
                 at = standing(line, angle, shown[:, i], self.warm[:, i])
-                out[:, i] = 2 * shown[:, i] - line.shown_tension(at, shown[:, i])
+                out[:, i] = _behind(line, at, shown[:, i])
         return out
 
     def residuals(self, robot: Robot) -> dict[str, Array]:
@@ -204,6 +206,23 @@ def placed_by(equations: Equations, robot: Robot, sigma: Sigma) -> Pose:
         if np.max(size) < _SETTLED:
             break
     return pose
+
+
+def _behind(line: Line, at: At, shown: Array) -> Array:
+    """The rope force that a cell shows as ``shown``, N: Newton's method, exact at once for a span.
+
+    A cell at rest shows every force by itself, so derivatives are one difference for all.
+    """
+    force, size = shown.copy(), max(float(np.nanmax(np.abs(shown), initial=0.0)), 1.0)
+    step = _SMALL_FORCE * size
+    for _ in range(_INVERTING):
+        here = line.shown_tension(at, force)
+        missing = shown - here
+        if np.nanmax(np.abs(missing), initial=0.0) < _SETTLED * size:
+            break
+        slope = (line.shown_tension(at, force + step) - here) / step
+        force = force + missing / np.maximum(slope, _FLATTEST)
+    return force
 
 
 def _wrapped(angle: Array) -> Array:
