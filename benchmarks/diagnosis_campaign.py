@@ -75,7 +75,7 @@ def main() -> None:
         result = summary(run_cases(args.seed, todo, args.jobs, args.keep, args.log))
     print(table(result), file=sys.stderr)
     if args.json:
-        print(json.dumps(result, indent=1))
+        print(json.dumps(result, indent=1, default=float))
 
 
 if __name__ == "__main__":

@@ -46,8 +46,6 @@ def command(
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band, asked.winch)
         _tell_robot(runs, declared, asked, as_json, html)
-    elif asked.each and html:
-        raise UsageError("--html is a page of one winch; name it with --winch")
     elif asked.each:
         _tell_each(runs, declared, asked, thin, as_json, html)
     else:
