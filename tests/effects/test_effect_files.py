@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from effect_lines import ALL_IDS, MINE
 
 import winchkit.effects.catalogue as module
 from winchkit.effects import Effect, Term, line_of, load_catalogue
+from winchkit.effects.own_file import check_own
 from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
 from winchkit.errors import FileError, UsageError
 from winchkit.model.line import Line
@@ -86,3 +88,30 @@ def test_an_unknown_effect_suggests_a_name() -> None:
 def test_simple_effects_come_first() -> None:
     counts = [len(effect.parameters) for effect in load_catalogue()]
     assert counts == sorted(counts)
+
+
+def test_an_id_that_is_taken_is_refused_and_a_file_given_twice_is_one(tmp_path: Path) -> None:
+    mine = write(tmp_path, MINE)
+    assert len(load_catalogue([mine, mine])) == len(ALL_IDS) + 1
+    taken = write(tmp_path, MINE.replace('"my-own"', '"cell-gain"'), "taken.py")
+    with pytest.raises(FileError, match=r"taken.py: there is an effect 'cell-gain' already"):
+        load_catalogue([taken])
+
+
+@pytest.mark.parametrize(
+    ("effect_id", "name", "said"),
+    [
+        ("my-own", "mine.txt", "is no Python file; name it mine.py"),
+        ("my own", "mine.py", "'my own' is no id of an effect"),
+        ("Mine", "mine.py", "'Mine' is no id of an effect"),
+        ("cell-gain", "mine.py", "there is an effect 'cell-gain' already"),
+        ("my-own", "there.py", "there.py: is there already"),
+    ],
+)
+def test_a_new_file_is_refused_before_any_work(
+    tmp_path: Path, effect_id: str, name: str, said: str
+) -> None:
+    write(tmp_path, MINE, "there.py")
+    with pytest.raises((UsageError, FileError), match=re.escape(said)):
+        check_own(effect_id, tmp_path / name, ALL_IDS)
+    check_own("my-own-2", tmp_path / "mine.py", ALL_IDS)

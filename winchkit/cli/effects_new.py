@@ -36,11 +36,12 @@ def command(
     It is ready for --effects: diagnose with it, then put in the physics that you recognise.
     """
     from winchkit.cli.robot_model import read_profile, refuse_curves
-    from winchkit.effects.own_file import write_wave_on_drum
+    from winchkit.effects.own_file import check_own, write_wave_on_drum
 
     refuse_curves(read_profile(asked.source))
-    data = (asked.runs(runs), asked.declared, asked.catalogue, asked.band)
     name = effect_id or Path(file).stem.replace("_", "-")
+    check_own(name, Path(file), asked.catalogue)
+    data = (asked.runs(runs), asked.declared, asked.catalogue, asked.band)
     if curve is None:
         found = _unexplained(data)
         order = _order_of_drum(found)

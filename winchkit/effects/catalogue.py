@@ -59,8 +59,12 @@ def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:
             found.append(import_module(f"{package.__name__}.{module.name}").EFFECT)
     for point in entry_points(group="winchkit.effects"):
         found.extend(_effects_in(point.load(), point.name))
-    for file in files:
-        found.extend(_from_file(Path(file)))
+    for path in dict.fromkeys(Path(file).absolute() for file in files):
+        for effect in _from_file(path):
+            if any(other.id == effect.id for other in found):
+                message = f"there is an effect '{effect.id}' already; give yours another id"
+                raise FileError(Fault(message, str(path)))
+            found.append(effect)
     return Catalogue(sorted(found, key=lambda effect: (len(effect.parameters), effect.id)))
 
 

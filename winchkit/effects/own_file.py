@@ -2,17 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Container, Mapping
 from pathlib import Path
 
 from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import knots, variable_of
 from winchkit.effects.own_templates import CURVE, DRUM, FOOT, HEAD, WAVE
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, UsageError
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 
-__all__ = ["write_own", "write_wave_on_drum"]
+__all__ = ["check_own", "write_own", "write_wave_on_drum"]
+
+_THERE = "is there already; name another file, or remove it first"
+
+
+_ID = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+
+
+def check_own(effect_id: str, path: Path, taken: Container[object]) -> None:
+    """Refuse a name or a file before anything is worked out for it.
+
+    Raises UsageError for an id that is none or taken, FileError where the file cannot be new.
+    """
+    if path.suffix != ".py":
+        raise UsageError(f"'{path}' is no Python file; name it {path.stem or 'mine'}.py")
+    if not _ID.fullmatch(effect_id):
+        raise UsageError(
+            f"'{effect_id}' is no id of an effect: lower-case letters and digits, joined by "
+            "hyphens, such as stuck-sheave; give one with --id"
+        )
+    if effect_id in taken:
+        raise UsageError(f"there is an effect '{effect_id}' already; give another with --id")
+    if path.exists():
+        raise FileError(Fault(_THERE, str(path)))
 
 
 def write_own(term: Term, effect_id: str, path: Path) -> None:
@@ -46,8 +70,7 @@ def _write(text: str, path: Path) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        message = "is there already; name another file, or remove it first"
-        raise FileError(Fault(message, str(path))) from error
+        raise FileError(Fault(_THERE, str(path))) from error
     except OSError as error:
         raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from error
 
@@ -64,10 +87,12 @@ def _wave(effect: Effect, values: Mapping[str, float]) -> tuple[str, dict[str, o
 
 
 def _curve(term: Term) -> tuple[str, dict[str, object]]:
+    """The curve through the values that data determined; one that none touched stays at zero."""
     y = [value for name, value in term.values.items() if name.startswith("value_")]
+    points = [(x, v) for x, v in zip(knots(term.values), y, strict=True) if v != 0.0]
     facts: dict[str, object] = {
-        "x": [float(f"{x:.6g}") for x in knots(term.values)],
-        "y": [float(f"{v:.6g}") for v in y],
+        "x": [float(f"{x:.6g}") for x, _ in points],
+        "y": [float(f"{v:.6g}") for _, v in points],
         "unit": term.effect.parameter("value_1").unit,
     }
     return CURVE, facts

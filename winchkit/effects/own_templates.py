@@ -52,6 +52,8 @@ PARAMETERS = (Parameter("scale", "1", null=0.0, typical=1.0, low=-100.0, high=10
 POLAR = None
 '''
 FOOT = """
+# Where it acts. Control follows what happens to the rope (Stage.ROPE, FRAME, PULLEY, CELL), not
+# what an instrument or the torque shows: 'winchkit effects {id} --effects {file}' says which.
 EFFECT = Effect(
     id="{id}",
     stage=Stage.{stage},
