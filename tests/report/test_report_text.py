@@ -58,7 +58,7 @@ def test_every_verdict_tells_what_these_runs_could_show_and_what_not(bench: str)
     faint = [row.effect for row in rows if not row.share <= 1]
     assert faint
     assert all(effect in text for effect in (*blind, *faint))
-    assert "'winchkit plan' proposes the run" in text
+    assert "'winchkit plan' proposes" in text
     assert " ".join(changes_text(answer.diagnosis).split()) in " ".join(text.split())
 
 

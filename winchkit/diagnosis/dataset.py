@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from winchkit.diagnosis.admit import OUTPUTS, admit
 from winchkit.diagnosis.calm import calm_motions
+from winchkit.diagnosis.layers import jerked
 from winchkit.diagnosis.repeats import Repeats, find_repeats
 from winchkit.diagnosis.spectrum import Band, torque_band
 from winchkit.diagnosis.thin import Thinning, thinning_for
@@ -44,7 +45,6 @@ class Filtering:
 
 _GAP = 2.5
 _SHAKEN = 0.25
-_MOVING = 0.9
 
 
 @dataclass(frozen=True)
@@ -213,9 +213,10 @@ def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
         # Accelerations at the ends of a run are not known.
         edge = 1 + reach_of(run.time)
         good[:edge] = good[-edge:] = False
-        if motion.load_mass is not None:
-            good &= _away_from_layers(motion, edge)
-    return _away_from_gaps(good, band.rate, band.cut_off)
+    good = _away_from_gaps(good, band.rate, band.cut_off)
+    if output != "cable_length":
+        good &= ~jerked(run.time, _bridged(run[output]), output, motion)
+    return good
 
 
 def _away_from_time_gaps(time: Array) -> Mask:
@@ -227,29 +228,8 @@ def _away_from_time_gaps(time: Array) -> Mask:
     return out
 
 
-def _away_from_layers(motion: Motion, reach: int) -> Mask:
-    """Samples at which a hanging weight is not jerked by the step from one layer to the next.
-
-    A spiral drum's radius jumps there, so that how hard depends on what gives way, which the
-    nominal line does not know: its accelerations are differences across the jump. Where the rope
-    rests on a step nothing jerks, though the encoder's noise may step to and fro.
-    """
-    wound = motion.at.wound_angle
-    jumps = np.zeros(len(wound), dtype=bool)
-    if motion.at.profile.drum.kind == "spiral":
-        moving = np.abs(motion.at.direction) > _MOVING
-        jumps[1:] = (np.diff(np.floor(wound / (2 * np.pi))) != 0) & moving[1:]
-    return ~_smeared(jumps, reach + 1)
-
-
-def _smeared(marked: Mask, reach: int) -> Mask:
-    """Marks with ``reach`` samples to either side."""
-    if not marked.any():
-        return marked
-    return np.convolve(marked, np.ones(2 * reach + 1), mode="same") > 0
-
-
 def _away_from_gaps(good: Mask, rate: float, cut_off: float | None) -> Mask:
     """Samples to compare: away from bridged ones by what the low-pass smears."""
     reach = 1 if cut_off is None else max(1, round(rate / cut_off))
-    return ~_smeared(~good, reach)
+    smeared = np.convolve(~good, np.ones(2 * reach + 1), mode="same") > 0
+    return ~smeared

@@ -1,0 +1,53 @@
+"""Where a hanging weight is jerked by the step from one layer of a spiral drum to the next.
+
+The radius jumps there, and with it the rope's speed: how hard that pulls depends on what gives
+way, which the nominal line does not know. Its accelerations are differences across the jump.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.model.derivatives import reach_of, span_of
+from winchkit.model.drum import Spiral, drum_of
+from winchkit.model.line import Motion
+
+__all__ = ["jerked"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_MOVING = 0.9
+_HEARD = 0.3
+"""Of the noise: a jerk of this size, once a turn, adds up to something."""
+_NORMAL = 1.4826
+"""Standard deviation of normal noise by its median absolute deviation."""
+
+
+def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
+    """Samples of ``tension`` or ``motor_torque`` that a step from layer to layer may shake.
+
+    Only steps count whose jerk does not drown in the instrument's own noise. Where the rope
+    rests on a step nothing jerks, though the encoder's noise may step to and fro.
+    """
+    drum = drum_of(motion.at.profile)
+    none = np.zeros(len(time), dtype=bool)
+    if motion.load_mass is None or not isinstance(drum, Spiral):
+        return none
+    at, speed = motion.at, np.abs(motion.at.speed)
+    steps = np.diff(np.floor(at.wound_angle / (2 * np.pi)), prepend=np.nan) != 0
+    steps[0] = False
+    pull = motion.load_mass * speed * (drum.growth / drum.winding_radius) / span_of(time)
+    if output == "motor_torque":
+        pull = pull * speed / np.maximum(np.abs(at.motor_rate), 1e-12)
+    shaken = steps & (np.abs(at.direction) > _MOVING) & (pull > _HEARD * _white(measured))
+    if not shaken.any():
+        return none
+    reach = 2 + reach_of(time)
+    return np.convolve(shaken, np.ones(2 * reach + 1), mode="same") > 0
+
+
+def _white(measured: Array) -> float:
+    """White noise of a signal, from second differences: what moves slowly takes no part."""
+    bends = np.diff(measured, 2)
+    return float(_NORMAL * np.median(np.abs(bends)) / np.sqrt(6))
