@@ -18,8 +18,8 @@ __all__ = ["jerked"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _MOVING = 0.9
-_HEARD = 0.3
-"""Of the noise: a jerk of this size, once a turn, adds up to something."""
+_HEARD = 2.0
+"""Of the noise: a smaller jerk tells by its moment where a layer begins, and spoils nothing."""
 _NORMAL = 1.4826
 """Standard deviation of normal noise by its median absolute deviation."""
 
@@ -27,8 +27,8 @@ _NORMAL = 1.4826
 def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
     """Samples of ``tension`` or ``motor_torque`` that a step from layer to layer may shake.
 
-    Only steps count whose jerk does not drown in the instrument's own noise. Where the rope
-    rests on a step nothing jerks, though the encoder's noise may step to and fro.
+    Only steps count whose jerk stands out of the instrument's own noise. Where the rope rests on
+    a step nothing jerks, though the encoder's noise may step to and fro.
     """
     drum = drum_of(motion.at.profile)
     none = np.zeros(len(time), dtype=bool)
