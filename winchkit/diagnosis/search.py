@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.diagnosis.couples import couples
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import confidence, held_out, held_out_rms
 from winchkit.diagnosis.inquiry import Inquiry, Trial
@@ -67,6 +68,8 @@ def search(inquiry: Inquiry) -> Found:
         trials = _short_list(inquiry, present, noise, scores)
         tried = tried or _fits(trials)
         grown = _grow(inquiry, present, noise, trials)
+        if grown is None and inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
+            grown = _grow(inquiry, present, noise, _side_by_side(inquiry, present, noise, scores))
         if grown is None:
             break
         inquiry.look_again(grown.hypothesis)
@@ -111,6 +114,13 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
     return [inquiry.trial(present, item, noise) for item in listed]
 
 
+def _side_by_side(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> list[Trial]:
+    """Pairs of candidates of which neither helps alone, both fitted beside the present terms."""
+    projected = inquiry.projected(present, noise)
+    pairs = couples(projected, present.residual, scores, inquiry.price)
+    return [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in pairs]
+
+
 def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
     return tuple(trial.fit for trial in trials)
 
@@ -136,7 +146,7 @@ def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
     after = held_out(problem, trial.fit, noise, blocks)
     groups = inquiry.folds(trial.fit, noise)
     gain = held_out(problem, present, noise, groups) - held_out(problem, trial.fit, noise, groups)
-    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _freedom(trial))
+    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _added(present, trial))
     if np.sum(before - after) <= 0 or (confidence(before, after) > _GATE_LEVEL and not pays):
         return False
     was = held_out_rms(problem, present, noise, groups)
@@ -147,8 +157,13 @@ def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
     return bool(np.sum(gain) > 0) and matters
 
 
-def _freedom(trial: Trial) -> int:
-    return Coordinates(trial.effect).freedom
+def _added(present: Fit, trial: Trial) -> int:
+    """Degrees of freedom that a trial has more than the present model, one at least."""
+    after, before = (
+        sum(Coordinates(term.effect).freedom for term in fitted.hypothesis.terms)
+        for fitted in (trial.fit, present)
+    )
+    return max(1, after - before)
 
 
 def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:

@@ -27,7 +27,7 @@ _DOUBTFUL_TRACE = 0.25
 _DOUBTFUL = 1e-3
 _NEGLIGIBLE = 0.02
 _AT_NOISE = 1.1
-_NEAR_NOISE = 1.5
+_NEAR_NOISE = 1.25
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,54 @@
+"""Two effects that hide each other: neither helps alone, both together explain.
+
+A wrong ratio and a rope wound under tension, say, change the length alike and may all but cancel:
+taken one at a time neither would ever be added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.signature import Atom, Projected, Score
+
+__all__ = ["couples"]
+
+Array = NDArray[np.float64]
+_MOST = 3
+_TOGETHER = 1.5
+_UNIDENTIFIABLE = 1e-5
+
+
+def couples(
+    projected: Projected, residual: Array, scores: Sequence[Score], price: float
+) -> list[tuple[Score, Score]]:
+    """Pairs of candidates, best first, that take far more together than the one and the other.
+
+    ``price`` is what a degree of freedom must save; pairs that do not pay are left out.
+    """
+    products = projected.products(residual)
+    size = np.sqrt(np.maximum(np.diag(projected.inner), 1e-300))
+    inner, products = projected.inner / np.outer(size, size), products / size
+    found = []
+    for first, second in combinations(scores, 2):
+        one, other = first.atom, second.atom
+        if other.effect.id in one.effect.contains or one.effect.id in other.effect.contains:
+            continue
+        gain = _together(inner, products, one, other)
+        pays = gain - price * (one.freedom + other.freedom)
+        if pays > 0 and gain > _TOGETHER * (first.gain + second.gain):
+            found.append((pays, (first, second)))
+    found.sort(key=lambda item: -item[0])
+    return [pair for _, pair in found[:_MOST]]
+
+
+def _together(inner: Array, products: Array, one: Atom, other: Atom) -> float:
+    """Whitened squares that two atoms take side by side."""
+    columns = np.r_[one.columns, other.columns]
+    values, vectors = np.linalg.eigh(inner[np.ix_(columns, columns)])
+    kept = values > _UNIDENTIFIABLE
+    along = vectors[:, kept].T @ products[columns]
+    return float(np.sum(along**2 / values[kept]))
