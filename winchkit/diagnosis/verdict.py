@@ -22,7 +22,7 @@ __all__ = ["Judgement", "judge", "output_fits"]
 
 _HALF = 0.5
 _GENERALISES = 0.15
-_TRACE = 0.05
+_TRACE = 0.025
 _DOUBTFUL_TRACE = 0.25
 _DOUBTFUL = 1e-3
 _NEGLIGIBLE = 0.02
