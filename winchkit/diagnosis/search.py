@@ -67,9 +67,7 @@ def search(inquiry: Inquiry) -> Found:
             break
         trials = _short_list(inquiry, present, noise, scores)
         tried = tried or _fits(trials)
-        grown = _grow(inquiry, present, noise, trials)
-        if grown is None and inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
-            grown = _grow(inquiry, present, noise, _side_by_side(inquiry, present, noise, scores))
+        grown = _grow(inquiry, present, noise, trials) or _coupled(inquiry, present, noise, scores)
         if grown is None:
             break
         inquiry.look_again(grown.hypothesis)
@@ -114,11 +112,13 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
     return [inquiry.trial(present, item, noise) for item in listed]
 
 
-def _side_by_side(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> list[Trial]:
-    """Pairs of candidates of which neither helps alone, both fitted beside the present terms."""
-    projected = inquiry.projected(present, noise)
-    pairs = couples(projected, present.residual, scores, inquiry.price)
-    return [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in pairs]
+def _coupled(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> Fit | None:
+    """Where something is missing and no candidate holds alone: the best of pairs that do."""
+    if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
+        return None
+    pairs = couples(inquiry.projected(present, noise), present.residual, scores, inquiry.price)
+    trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in pairs]
+    return _grow(inquiry, present, noise, trials)
 
 
 def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
