@@ -6,7 +6,8 @@ from diagnosis_runs import GROOVED, Ride, made, term
 
 from winchkit.diagnosis.couples import couples
 from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, inquire
+from winchkit.diagnosis.diagnose import inquire
+from winchkit.diagnosis.search import _coupled
 from winchkit.effects.catalogue import load_catalogue
 
 RIDE = Ride(samples=600, stroke=400.0)
@@ -33,10 +34,15 @@ def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
     assert len(pairs) <= 3
 
 
-def test_both_are_found() -> None:
-    found = diagnose(RUNS, GROOVED).diagnosis
-    assert found.verdict == "explained"
-    named = [set(step.effects) for step in found.steps]
-    assert len(named) == 2
-    assert any("cell-gain" in names for names in named)
-    assert any("cell-offset" in names for names in named)
+def test_both_are_fitted_side_by_side_but_not_upon_what_is_there() -> None:
+    inquiry = inquire(prepare(RUNS, GROOVED), load_catalogue())
+    present, noise = inquiry.settle(inquiry.begin)
+    grown = _coupled(inquiry, present, noise, inquiry.scores(present, noise))
+    assert grown is not None
+    assert set(grown.labels) == {"cell-gain", "cell-offset"}
+    gain, offset = sorted(grown.hypothesis.terms, key=lambda t: t.label)
+    assert abs(gain.values["gain_error"] + 0.05) < 0.005
+    assert abs(offset.values["offset"] - 9.8) < 1.0
+    other = present.hypothesis.with_term(term("motor-coulomb", torque=1e-3), inquiry.problem.runs)
+    begun, noise = inquiry.settle(other)
+    assert _coupled(inquiry, begun, noise, inquiry.scores(begun, noise)) is None

@@ -113,8 +113,12 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
 
 
 def _coupled(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> Fit | None:
-    """Where something is missing and no candidate holds alone: the best of pairs that do."""
-    if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
+    """Where something is missing and no candidate holds alone: the best of pairs that do.
+
+    Only to begin with: pairs upon what is there already would piece together what nobody knows.
+    """
+    begun = len(present.hypothesis.terms) > inquiry.given
+    if begun or not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
         return None
     pairs = couples(inquiry.projected(present, noise), present.residual, scores, inquiry.price)
     trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in pairs]
