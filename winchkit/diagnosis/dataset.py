@@ -231,5 +231,7 @@ def _away_from_time_gaps(time: Array) -> Mask:
 def _away_from_gaps(good: Mask, rate: float, cut_off: float | None) -> Mask:
     """Samples to compare: away from bridged ones by what the low-pass smears."""
     reach = 1 if cut_off is None else max(1, round(rate / cut_off))
+    if good.all():
+        return good
     smeared = np.convolve(~good, np.ones(2 * reach + 1), mode="same") > 0
     return ~smeared
