@@ -46,7 +46,6 @@ _HALVINGS = 7
 class Trial:
     """A candidate fitted beside the present terms, all refitted, and its criterion."""
 
-    effect: Effect
     fit: Fit
     criterion: float
     """Whitened squares and the price of all added degrees of freedom: lower is better."""
@@ -199,7 +198,7 @@ class Inquiry:
             price < self.criterion(present) and self._rests_on_states(hypothesis, fitted, noise)
         ):
             price = np.inf
-        return Trial(effect, fitted, float(price))
+        return Trial(fitted, float(price))
 
     def _placed(
         self, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array
