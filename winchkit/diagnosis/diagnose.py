@@ -10,6 +10,7 @@ import numpy as np
 from winchkit.diagnosis.compare import begin_hypothesis
 from winchkit.diagnosis.confusion import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.dataset import Dataset, prepare
+from winchkit.diagnosis.doubt import doubted
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.follows import follows, harmonics
 from winchkit.diagnosis.gate import held_out
@@ -38,6 +39,7 @@ from winchkit.schema.winch import WinchProfile
 __all__ = ["Answer", "Told", "candidates_of", "diagnose", "inquire", "silent", "steps_of"]
 
 _WHERE = 6
+_LOCATED = ("unknown", "partly")
 
 
 Told = Callable[[str, float], None]
@@ -101,7 +103,7 @@ def diagnose(
 
 def _answer(inquiry: Inquiry, found: Found) -> Answer:
     """Everything that is said of what a search found."""
-    judgement = judge(inquiry, found)
+    judgement = doubted(inquiry, found, judge(inquiry, found))
     shown = judgement.shown
     added = range(inquiry.given, len(shown.final.hypothesis.terms))
     sets = [confusion_of(inquiry, shown.final, shown.noise, index) for index in added]
@@ -113,7 +115,7 @@ def _answer(inquiry: Inquiry, found: Found) -> Answer:
         candidates=candidates_of(inquiry, found),
         detectable=detectable(found.scores, inquiry.price, found.threshold),
         unexplained_share=judgement.share,
-        where=_where(inquiry, found, shown.final) if found.still else (),
+        where=_where(inquiry.problem, found) if judgement.verdict in _LOCATED else (),
         next_runs=next_runs(inquiry.problem, pairs, found.noise.rms),
         notes=(
             *inquiry.problem.dataset.notes,
@@ -198,12 +200,17 @@ def candidates_of(inquiry: Inquiry, found: Found) -> tuple[Candidate, ...]:
     return tuple(out)
 
 
-def _where(inquiry: Inquiry, found: Found, fitted: Fit) -> tuple[Where, ...]:
-    """Where the rest lives: angles with an order, other variables, and the loudest band."""
-    problem = inquiry.problem
+def _where(problem: Problem, found: Found) -> tuple[Where, ...]:
+    """Where the rest lives: angles with an order, other variables, and the loudest band.
+
+    The rest beside what came closest; where that left nothing, yet may not be named, all of it.
+    """
+    fitted, presence = found.final, found.presence
+    if not found.still:
+        fitted, presence = found.begin, found.begin_presence
     places = [*harmonics(problem, fitted.residual), *follows(problem, fitted.residual)]
     out = [Where(f.output, f.variable, f.share, f.order) for f in places]
-    excess = found.presence.excess
+    excess = presence.excess
     if excess.size and excess.max() > 0:
         loudest = int(np.argmax(excess))
         output, low, high = problem.bands[loudest]

@@ -18,7 +18,7 @@ from winchkit.diagnosis.denoise import contrasts
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.spectrum import smoothed
 
-__all__ = ["Noise", "Presence", "noise_from_repeats", "noise_saturated", "presence"]
+__all__ = ["Noise", "Presence", "noise_from_repeats", "noise_saturated", "orthonormal", "presence"]
 
 Array = NDArray[np.float64]
 _KNOWN_DIFFERENCES = 6
@@ -117,7 +117,7 @@ def noise_saturated(problem: Problem, residual: Array, columns: Array) -> Noise:
     power = _even(problem, residual)
     for _ in range(_REWEIGHTED):
         weight = 1 / np.sqrt(power[bands])
-        basis = _orthonormal(columns * weight[:, None], _fewest_rows(problem) // _ROWS_EACH)
+        basis = orthonormal(columns * weight[:, None], _fewest_rows(problem) // _ROWS_EACH)
         whitened = residual * weight
         left = (whitened - basis @ (basis.T @ whitened)) / weight
         freedom = np.maximum(total - _sums(np.sum(basis**2, axis=1), bands, count), 1.0)
@@ -134,7 +134,7 @@ def presence(problem: Problem, residual: Array, jacobian: Array, noise: Noise) -
     split = _split(problem, residual)
     total = _sums(split.mean**2, split.mean_band, count)
     freedom = _sums(np.ones_like(split.mean), split.mean_band, count)
-    basis = _orthonormal(jacobian * noise.weight(problem)[:, None])
+    basis = orthonormal(jacobian * noise.weight(problem)[:, None])
     # Each fitted unknown takes one degree of freedom from where it has leverage.
     taken = _sums(np.sum(basis**2, axis=1), problem.band_of_row, count)
     freedom = np.maximum(freedom - taken, 1.0)
@@ -223,7 +223,7 @@ def _fewest_rows(problem: Problem) -> int:
     return min(rows.values())
 
 
-def _orthonormal(columns: Array, most: int | None = None) -> Array:
+def orthonormal(columns: Array, most: int | None = None) -> Array:
     """Orthonormal basis of columns, those that add nothing left out; (rows, rank).
 
     Of more than ``most`` directions the strongest are kept: as many columns as a short run has

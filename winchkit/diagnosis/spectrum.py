@@ -73,10 +73,10 @@ class Band:
 
 
 def to_frequency(signal: Array, band: Band) -> Array:
-    """Coefficients of a signal within its band, shape (kept,)."""
+    """Coefficients of a signal within its band, shape (kept,); of several, (many, kept)."""
     full: Array = np.asarray(dct(signal, type=2, norm="ortho"))
     gain = band.gain
-    return full[: len(gain)] * gain
+    return full[..., : len(gain)] * gain
 
 
 def to_time(coefficients: Array, band: Band) -> Array:

@@ -18,7 +18,7 @@ from winchkit.diagnosis.result import OutputFit, Verdict
 from winchkit.diagnosis.search import Found
 from winchkit.diagnosis.skirt import Skirt
 
-__all__ = ["Judgement", "judge", "output_fits"]
+__all__ = ["Judgement", "judge", "output_fits", "withheld"]
 
 _HALF = 0.5
 _GENERALISES = 0.15
@@ -59,6 +59,12 @@ def judge(inquiry: Inquiry, found: Found) -> Judgement:
     if verdict == "explained" or not added:
         return Judgement(verdict, share, outputs, found, ())
     note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
+    return withheld(inquiry, found, share, note)
+
+
+def withheld(inquiry: Inquiry, found: Found, share: float, note: str) -> Judgement:
+    """The judgement that names nothing, though something was found; with the reason in words."""
+    verdict: Verdict = "unknown" if share > _HALF else "partly"
     shown = replace(found, final=found.begin, noise=found.begin_noise)
     before = (found.begin, found.begin_noise)
     return Judgement(verdict, share, output_fits(inquiry, before, before), shown, (note,))

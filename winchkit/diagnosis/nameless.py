@@ -1,0 +1,177 @@
+"""Curves that no effect of the catalogue has: whether one explains more than what has a name.
+
+What no catalogue has is often imitated by effects that it has, one or several side by side. A
+curve of one output, of the rope's force or of the winding over one variable needs no physics: where
+the best of them pays better than the named effects, the names are not what is there. It is never
+named itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.diagnosis.dataset import Recording
+from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.follows import variables_of
+from winchkit.diagnosis.noise import Noise, orthonormal
+from winchkit.diagnosis.predictor import masked
+from winchkit.diagnosis.problem import Problem
+from winchkit.model.variables import ANGLES
+
+__all__ = ["Curve", "best_curve"]
+
+Array = NDArray[np.float64]
+_HATS = 24
+_TAILS = 0.001
+_DEGREES = (1, 2, 3, 4)
+_COARSE = (6, 12)
+_POWERS = (1.5, 2.0, 3.0)
+_UNIDENTIFIABLE = 1e-7
+_WARMER = 1.0
+"""Less is noise of the thermometer rather than a change, K."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve over one variable, and what it would save."""
+
+    place: str
+    """Output that it is added to, or ``rope force`` or ``winding``, which show in several."""
+    variable: str
+    pays: float
+    """Whitened squares that it takes, less the price of its numbers."""
+
+
+def best_curve(
+    problem: Problem, base: Fit, noise: Noise, outputs: Sequence[str], price: float
+) -> Curve | None:
+    """The curve that pays best beside a fit, among those that show in one of ``outputs``."""
+    weight = noise.weight(problem)
+    beside = orthonormal(base.jacobian * weight[:, None])
+    residual = base.residual * weight
+    residual = residual - beside @ (beside.T @ residual)
+    best: Curve | None = None
+    for place, variable, laws, columns in _curves(problem, outputs):
+        whitened = columns * weight
+        whitened -= (whitened @ beside) @ beside.T
+        inner, products = whitened @ whitened.T, whitened @ residual
+        pays = max(_gain(law, inner, products) - price * freedom for law, freedom in laws)
+        if best is None or pays > best.pays:
+            best = Curve(place, variable, pays)
+    return best
+
+
+def _gain(law: Array, inner: Array, products: Array) -> float:
+    """Whitened squares that a law of hats, (hats, k), takes."""
+    own = law.T @ inner @ law
+    size = np.sqrt(np.maximum(np.diag(own), 1e-300))
+    values, vectors = np.linalg.eigh(own / np.outer(size, size))
+    kept = values > _UNIDENTIFIABLE
+    along = vectors[:, kept].T @ ((law.T @ products) / size)
+    return float(np.sum(along**2 / values[kept]))
+
+
+_Law = tuple[Array, int]
+
+
+def _curves(
+    problem: Problem, outputs: Sequence[str]
+) -> Iterator[tuple[str, str, list[_Law], Array]]:
+    """Place, variable, laws and the columns of their hats, (hats, rows)."""
+    recordings = problem.dataset.recordings
+    known = [variables_of(recording) for recording in recordings]
+    names = [n for n in known[0] if n not in ANGLES and all(n in other for other in known)]
+    for name in (*names, *(f"direction x {n}" for n in names if n in ("cable_length", "load"))):
+        own = name.removeprefix("direction x ")
+        ends = _ends(own, [k[own] for k in known])
+        if ends is None:
+            continue
+        knots = np.linspace(*ends, _HATS)
+        hats = [_hats(k[own], knots) for k in known]
+        if name != own:
+            hats = [h * k["direction"] for h, k in zip(hats, known, strict=True)]
+        laws = _laws(knots, name)
+        for place, reach in _PLACES.items():
+            if name != "cable_length" and place == "winding":
+                continue
+            if not set(reach) & set(outputs) & set(problem.dataset.outputs):
+                continue
+            yield place, name, laws, _columns(problem, place, hats, knots)
+
+
+_PLACES: Mapping[str, tuple[str, ...]] = {
+    "cable_length": ("cable_length",),
+    "tension": ("tension",),
+    "motor_torque": ("motor_torque",),
+    "rope force": ("tension", "motor_torque"),
+    "winding": ("cable_length",),
+}
+
+
+def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
+    low, high = np.quantile(np.concatenate(values), [_TAILS, 1 - _TAILS])
+    least = _WARMER if name == "temperature" else 1e-9 * max(abs(low), abs(high))
+    return (float(low), float(high)) if high - low > least else None
+
+
+def _hats(values: Array, knots: Array) -> Array:
+    """Triangles over the knots that add up to one, (knots, n)."""
+    at = np.clip((values - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
+    return np.asarray(np.maximum(0.0, 1.0 - np.abs(at - np.arange(len(knots))[:, None])))
+
+
+def _laws(knots: Array, name: str) -> list[_Law]:
+    """What a curve may be, in values at the knots, with what each costs to choose."""
+    z = np.linspace(-1.0, 1.0, len(knots))
+    level = name.startswith("direction x")
+    out: list[_Law] = []
+    for degree in _DEGREES:
+        powers: Array = np.polynomial.legendre.legvander(z, degree)
+        out.append((powers, degree + 1) if level else (powers[:, 1:], degree))
+    for count in _COARSE:
+        out.append((_hats(z, np.linspace(-1.0, 1.0, count)).T, count))
+    if level:
+        return out
+    for at in z[1:-1]:
+        above, below = np.maximum(z - at, 0.0), np.maximum(at - z, 0.0)
+        out += [(above[:, None], 2), (below[:, None], 2), (np.column_stack([above, below]), 3)]
+    if name == "speed":
+        out += [((np.sign(knots) * np.abs(knots) ** n)[:, None], 2) for n in _POWERS]
+    return out
+
+
+def _columns(problem: Problem, place: str, hats: Sequence[Array], knots: Array) -> Array:
+    """What the hats change in the outputs when they act at a place, (hats, rows)."""
+    out = np.zeros((len(knots), problem.rows))
+    for segment in problem.segments:
+        recording, own = problem.dataset.recordings[segment.run], hats[segment.run]
+        if segment.output not in _PLACES[place] and place != "winding":
+            continue
+        if place == "winding" and segment.output == "motor_torque":
+            # Virtual work: what the rope moves per turn more, its force does.
+            own = recording.nominal_smooth["motor_torque"] * _slopes(recording, knots)
+        elif place == "winding" and segment.output == "tension":
+            continue
+        elif place == "rope force" and segment.output == "motor_torque":
+            own = own * _arm(recording)
+        out[:, segment.rows] = masked(recording, segment.output, own)
+    return out
+
+
+def _arm(recording: Recording) -> Array:
+    """Motor torque of one newton of the rope, m."""
+    force = recording.smooth.at.tension
+    heavy = np.maximum(np.abs(force), 1e-9)
+    return np.asarray(recording.nominal_smooth["motor_torque"] * np.sign(force) / heavy)
+
+
+def _slopes(recording: Recording, knots: Array) -> Array:
+    """Derivatives of the hats over the length, (knots, n)."""
+    step = knots[1] - knots[0]
+    cell = np.floor((recording.smooth.at.free_length - knots[0]) / step)
+    index = np.arange(len(knots))[:, None]
+    return np.asarray(((index == cell + 1) * 1.0 - (index == cell) * 1.0) / step)
