@@ -130,7 +130,7 @@ def _laws(knots: Array, name: str) -> list[_Law]:
     level = name.startswith("direction x")
     out: list[_Law] = []
     for degree in _DEGREES:
-        powers: Array = np.polynomial.legendre.legvander(z, degree)
+        powers = np.asarray(np.polynomial.legendre.legvander(z, degree), dtype=np.float64)
         out.append((powers, degree + 1) if level else (powers[:, 1:], degree))
     for count in _COARSE:
         out.append((_hats(z, np.linspace(-1.0, 1.0, count)).T, count))
