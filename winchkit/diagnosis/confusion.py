@@ -84,11 +84,16 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
 
 
 def _richer(own: Effect, final: Fit, fitted: Fit) -> bool | None:
-    """Whether a rival with more numbers counts; None where it has no more, or is kindred."""
+    """Whether a rival with more numbers counts; None where it has no more, or is kindred.
+
+    A carded one that explains as much counts: creep beside a drift with temperature, a guide whose
+    detour is as straight as a wrong ratio. Only the prior belief in few numbers would tell them
+    apart, and no run yet.
+    """
     rival = fitted.hypothesis.terms[-1].effect
     more = Coordinates(rival).freedom - Coordinates(own).freedom
-    if more > 0 and _drifts_alike(rival, own):
-        return fitted.cost < final.cost
+    if more > 0 and _carded(rival, own) and not _nested(rival, own):
+        return fitted.cost < final.cost + _ALIKE
     if more > 0 and not _kindred(rival, own):
         return _leant_to(final, fitted, more)
     return None
@@ -96,8 +101,17 @@ def _richer(own: Effect, final: Fit, fitted: Fit) -> bool | None:
 
 def _kindred(rival: Effect, own: Effect) -> bool:
     """Whether one law of a family may stand for the other, neither being a case of the other."""
-    nested = own.id in rival.contains or rival.id in own.contains
-    return bool(own.family) and rival.family == own.family and not nested
+    return bool(own.family) and rival.family == own.family and not _nested(rival, own)
+
+
+def _nested(rival: Effect, own: Effect) -> bool:
+    """Whether one law is a case of the other."""
+    return own.id in rival.contains or rival.id in own.contains
+
+
+def _carded(rival: Effect, own: Effect) -> bool:
+    """Whether the cards say that one is easily taken for the other."""
+    return rival.id in own.confused_with or own.id in rival.confused_with
 
 
 def _leant_to(simple: Fit, rich: Fit, more: int) -> bool:
@@ -112,14 +126,9 @@ def _leant_to(simple: Fit, rich: Fit, more: int) -> bool:
 
 
 def _drifts_alike(rival: Effect, own: Effect) -> bool:
-    """Whether a rival that creeps is, by the cards, easily taken for this effect.
-
-    Creep needs more numbers than a drift with temperature; where it explains as much, only the
-    prior belief in few numbers would tell them apart, and no run yet.
-    """
-    carded = own.id in rival.confused_with or rival.id in own.confused_with
+    """Whether a rival that creeps is, by the cards, easily taken for this effect."""
     creeps = rival.memory and any(p.role == "shape" and p.unit == "s" for p in rival.parameters)
-    return creeps and carded
+    return creeps and _carded(rival, own)
 
 
 def _flip_chance(worse: Array) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from winchkit.diagnosis.compare import begin_hypothesis
 from winchkit.diagnosis.confusion import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.dataset import Dataset, prepare
-from winchkit.diagnosis.doubt import doubted
+from winchkit.diagnosis.doubt import judge_and_doubt
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.follows import follows, harmonics
 from winchkit.diagnosis.gate import held_out
@@ -29,7 +29,7 @@ from winchkit.diagnosis.result import (
 )
 from winchkit.diagnosis.search import Found, search
 from winchkit.diagnosis.uncertainty import estimates, spread_of
-from winchkit.diagnosis.verdict import Judgement, judge
+from winchkit.diagnosis.verdict import Judgement
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.coordinates import Coordinates
@@ -103,7 +103,7 @@ def diagnose(
 
 def _answer(inquiry: Inquiry, found: Found) -> Answer:
     """Everything that is said of what a search found."""
-    judgement = doubted(inquiry, found, judge(inquiry, found))
+    judgement = judge_and_doubt(inquiry, found)
     shown = judgement.shown
     added = range(inquiry.given, len(shown.final.hypothesis.terms))
     sets = [confusion_of(inquiry, shown.final, shown.noise, index) for index in added]

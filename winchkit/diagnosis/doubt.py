@@ -2,58 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import replace
 
-from winchkit.diagnosis.fit import Fit
+import numpy as np
+
 from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.nameless import Curve, best_curve
-from winchkit.diagnosis.search import Found
-from winchkit.diagnosis.verdict import Judgement, withheld
+from winchkit.diagnosis.nameless import Beside, Curve, best_curve
+from winchkit.diagnosis.resolution import rounded
+from winchkit.diagnosis.search import Found, without_term
+from winchkit.diagnosis.verdict import Judgement, judge, withheld
 from winchkit.effects.bind import Term
 
-__all__ = ["doubted"]
+__all__ = ["judge_and_doubt"]
 
 _SLIGHT = 1e-3
 """Share of what a name explains by which the physics of a real part may differ from its formula."""
 
 
-def doubted(inquiry: Inquiry, found: Found, judgement: Judgement) -> Judgement:
-    """The judgement, or one that names nothing where a nameless curve explains more.
+def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
+    """The judgement of what was found, less the names that a nameless curve beats.
 
-    Every addition is doubted alone, beside the others, and all of them together.
+    All additions are doubted together, then each beside the others. One that is beaten is
+    dropped; where too much is then left, nothing is named.
     """
+    judgement = judge(inquiry, found)
     if judgement.verdict != "explained":
         return judgement
-    final, noise = found.final, found.noise
-    added = final.hypothesis.terms[inquiry.given :]
-    whole = inquiry.refit(found.begin.hypothesis, noise)
-    for terms, base in _without(inquiry, found, whole):
-        outputs = sorted({output for term in terms for output in term.effect.outputs})
-        curve = best_curve(inquiry.problem, base, noise, outputs, inquiry.price)
-        pays = inquiry.criterion(base) - inquiry.criterion(final)
-        if curve and curve.pays > pays + max(inquiry.price, _SLIGHT * pays):
-            share = (base.cost - final.cost) / (whole.cost - final.cost)
-            others = [term.label for term in added if term not in terms]
-            return withheld(inquiry, found, min(1.0, share), _words(terms, others, curve))
+    final = found.final
+    added = range(inquiry.given, len(final.hypothesis.terms))
+    terms = final.hypothesis.terms[inquiry.given :]
+    curve, _ = _beaten(inquiry, found, added)
+    if curve:
+        return withheld(inquiry, found, 1.0, _words(terms, terms, curve))
+    for index in reversed(added) if len(added) > 1 else ():
+        curve, taken = _beaten(inquiry, found, [index])
+        if not curve:
+            continue
+        doubted = final.hypothesis.terms[index : index + 1]
+        without = judge_and_doubt(inquiry, without_term(inquiry, found, index))
+        if without.verdict == "explained":
+            return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
+        share = taken / (_beside(inquiry, found, added).cost - _beside(inquiry, found, ()).cost)
+        return withheld(inquiry, found, min(1.0, share), _words(terms, doubted, curve))
     return judgement
 
 
-def _without(inquiry: Inquiry, found: Found, whole: Fit) -> Iterator[tuple[list[Term], Fit]]:
-    """What is doubted together, and the fit without it."""
-    hypothesis = found.final.hypothesis
-    added = range(inquiry.given, len(hypothesis.terms))
-    yield list(hypothesis.terms[inquiry.given :]), whole
-    for index in added if len(added) > 1 else ():
-        base = inquiry.refit(hypothesis.without(index), found.noise)
-        yield [hypothesis.terms[index]], base
+def _beside(inquiry: Inquiry, found: Found, indices: Sequence[int]) -> Beside:
+    """What is left without some terms, the others free about where they are.
+
+    Not fitted anew: a lag that stands in for a lost friction is far from where both are right.
+    Nor is what sampling may have rounded held against a name.
+    """
+    problem, final = inquiry.problem, found.final
+    hypothesis = final.hypothesis
+    others, own = hypothesis, np.zeros(len(final.vector), dtype=bool)
+    for index in sorted(indices, reverse=True):
+        own |= problem.unknowns_of(index, hypothesis)
+        others = others.without(index)
+    lost = problem.change(hypothesis) - problem.change(others) if indices else 0.0
+    free = np.column_stack([final.jacobian[:, ~own], rounded(problem, hypothesis)])
+    return Beside(final.residual + lost, free, found.noise.weight(problem))
 
 
-def _words(terms: list[Term], others: list[str], curve: Curve) -> str:
-    """Why nothing is named."""
-    names = ", ".join(term.label for term in terms)
+def _beaten(inquiry: Inquiry, found: Found, indices: Sequence[int]) -> tuple[Curve | None, float]:
+    """A curve that pays better than terms do, if there is one; whitened squares they take."""
+    problem, final = inquiry.problem, found.final
+    terms = [final.hypothesis.terms[index] for index in indices]
+    outputs = sorted({output for term in terms for output in term.effect.outputs})
+    beside = _beside(inquiry, found, indices)
+    taken = beside.cost - _beside(inquiry, found, ()).cost
+    pays = taken - inquiry.price * inquiry.freedom(final.hypothesis, indices)
+    curve = best_curve(problem, beside, outputs)
+    if curve and curve.pays > pays + max(inquiry.price, _SLIGHT * taken):
+        return curve, taken
+    return None, taken
+
+
+def _words(terms: Sequence[Term], doubted: Sequence[Term], curve: Curve) -> str:
+    """Why names are not given."""
     place, variable = curve.place.replace("_", " "), curve.variable.replace("_", " ")
-    beside = f" beside {', '.join(others)}" if others else ""
+    than = "" if len(doubted) == len(terms) else f" than {_names(doubted)}"
     return (
-        f"closest, but not named: {names}{beside}; an unknown curve of the {place} over the "
-        f"{variable} explains more than that does"
+        f"closest, but not named: {_names(terms)}; an unknown curve of the {place} over the "
+        f"{variable} explains more{than}"
     )
+
+
+def _names(terms: Sequence[Term]) -> str:
+    return ", ".join(term.label for term in terms)

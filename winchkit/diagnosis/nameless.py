@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.dataset import Recording
-from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.follows import variables_of
-from winchkit.diagnosis.noise import Noise, orthonormal
+from winchkit.diagnosis.noise import orthonormal
 from winchkit.diagnosis.predictor import masked
 from winchkit.diagnosis.problem import Problem
 from winchkit.model.variables import ANGLES
 
-__all__ = ["Curve", "best_curve"]
+__all__ = ["Beside", "Curve", "best_curve"]
 
 Array = NDArray[np.float64]
 _HATS = 24
@@ -31,6 +30,7 @@ _DEGREES = (1, 2, 3, 4)
 _COARSE = (6, 12)
 _POWERS = (1.5, 2.0, 3.0)
 _UNIDENTIFIABLE = 1e-7
+_NOTHING = 1e-300
 _WARMER = 1.0
 """Less is noise of the thermometer rather than a change, K."""
 
@@ -46,33 +46,56 @@ class Curve:
     """Whitened squares that it takes, less the price of its numbers."""
 
 
-def best_curve(
-    problem: Problem, base: Fit, noise: Noise, outputs: Sequence[str], price: float
-) -> Curve | None:
-    """The curve that pays best beside a fit, among those that show in one of ``outputs``."""
-    weight = noise.weight(problem)
-    beside = orthonormal(base.jacobian * weight[:, None])
-    residual = base.residual * weight
-    residual = residual - beside @ (beside.T @ residual)
+class Beside:
+    """A whitened residual beside which curves are tried, and what explains a part of it."""
+
+    def __init__(self, residual: Array, jacobian: Array, weight: Array) -> None:
+        """``residual`` (rows,) with unknowns of derivative ``jacobian`` (rows, k) still free."""
+        self.weight = weight
+        self.explained = orthonormal(jacobian * weight[:, None])
+        whitened = residual * weight
+        self.residual = whitened - self.explained @ (self.explained.T @ whitened)
+
+    @property
+    def cost(self) -> float:
+        """Whitened squares that are left."""
+        return float(self.residual @ self.residual)
+
+
+def best_curve(problem: Problem, beside: Beside, outputs: Sequence[str]) -> Curve | None:
+    """The curve that takes most of a residual, among those that show in one of ``outputs``."""
     best: Curve | None = None
+    price = float(np.log(problem.rows))
     for place, variable, laws, columns in _curves(problem, outputs):
-        whitened = columns * weight
-        whitened -= (whitened @ beside) @ beside.T
-        inner, products = whitened @ whitened.T, whitened @ residual
-        pays = max(_gain(law, inner, products) - price * freedom for law, freedom in laws)
+        whitened = columns * beside.weight
+        plain = whitened @ whitened.T
+        whitened -= (whitened @ beside.explained) @ beside.explained.T
+        hats = _Hats(plain, whitened @ whitened.T, whitened @ beside.residual)
+        pays = max(hats.gain(law) - price * freedom for law, freedom in laws)
         if best is None or pays > best.pays:
             best = Curve(place, variable, pays)
     return best
 
 
-def _gain(law: Array, inner: Array, products: Array) -> float:
-    """Whitened squares that a law of hats, (hats, k), takes."""
-    own = law.T @ inner @ law
-    size = np.sqrt(np.maximum(np.diag(own), 1e-300))
-    values, vectors = np.linalg.eigh(own / np.outer(size, size))
-    kept = values > _UNIDENTIFIABLE
-    along = vectors[:, kept].T @ ((law.T @ products) / size)
-    return float(np.sum(along**2 / values[kept]))
+@dataclass(frozen=True)
+class _Hats:
+    """Inner products of whitened hats, and of what is left of them beside a fit."""
+
+    plain: Array
+    """(hats, hats)."""
+    inner: Array
+    """(hats, hats), without what the fit's unknowns explain."""
+    products: Array
+    """With the residual, (hats,)."""
+
+    def gain(self, law: Array) -> float:
+        """Whitened squares that a law of hats, (hats, k), takes."""
+        size = np.sqrt(np.maximum(np.diag(law.T @ self.plain @ law), _NOTHING))
+        values, vectors = np.linalg.eigh(law.T @ self.inner @ law / np.outer(size, size))
+        # Measured by what they were: of what a fit explains whole only rounding is left.
+        kept = values > _UNIDENTIFIABLE
+        along = vectors[:, kept].T @ ((law.T @ self.products) / size)
+        return float(np.sum(along**2 / values[kept]))
 
 
 _Law = tuple[Array, int]

@@ -154,6 +154,13 @@ class Problem:
             at += len(start)
         return Hypothesis(tuple(terms), nuisances, tuple(starts))
 
+    def unknowns_of(self, index: int, like: Hypothesis) -> NDArray[np.bool_]:
+        """Which elements of the vector belong to one term: its coordinates, its states."""
+        owners = [np.full(self.nuisance_columns.shape[1], -1)]
+        owners += [np.full(len(Coordinates(t.effect)), i) for i, t in enumerate(like.terms)]
+        owners += [np.full(len(start), i) for i, start in enumerate(like.starts)]
+        return np.asarray(np.concatenate(owners) == index)
+
     def bounds(self, like: Hypothesis) -> tuple[Array, Array]:
         """Lower and upper ends of the vector."""
         pairs = [Coordinates(t.effect).bounds() for t in like.terms]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from winchkit.diagnosis.noise import Noise, Presence
 from winchkit.diagnosis.signature import Score, chance_level
 from winchkit.effects.coordinates import Coordinates
 
-__all__ = ["Found", "search"]
+__all__ = ["Found", "search", "without_term"]
 
 Array = NDArray[np.float64]
 _MOST_STEPS = 6
@@ -93,6 +93,15 @@ def search(inquiry: Inquiry) -> Found:
         tried=tried if alarmed else (),
         threshold=threshold,
     )
+
+
+def without_term(inquiry: Inquiry, found: Found, index: int) -> Found:
+    """The same search as if it had ended without one of its additions."""
+    hypothesis = found.final.hypothesis.without(index)
+    present, noise = inquiry.settle(hypothesis, found.noise)
+    presence = inquiry.presence(present, noise)
+    still = _missing(presence, inquiry.scores(present, noise), found.threshold)
+    return replace(found, final=present, noise=noise, presence=presence, still=still)
 
 
 def _missing(presence: Presence, scores: list[Score], threshold: float) -> bool:

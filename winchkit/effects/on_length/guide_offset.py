@@ -32,7 +32,7 @@ EFFECT = Effect(
     formula="ℓ − (√(h² + (x0 + m Φ/2π)²) − h), h = guide.distance, m per turn",
     source="Pythagoras; cable-winding device, section on the guide",
     looks_like="A parabola of the length error over the travel of the guide.",
-    confused_with=("layer-thickness",),
+    confused_with=("layer-thickness", "drum-radius", "gear-ratio"),
     told_apart="Shift the guide by a known amount; or the torque at constant weight.",
     needs=("guide",),
     order=1,
