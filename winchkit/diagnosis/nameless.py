@@ -196,5 +196,6 @@ def _slopes(recording: Recording, knots: Array) -> Array:
     """Derivatives of the hats over the length, (knots, n)."""
     step = knots[1] - knots[0]
     cell = np.floor((recording.smooth.at.free_length - knots[0]) / step)
+    cell = np.clip(cell, 0, len(knots) - 2)
     index = np.arange(len(knots))[:, None]
     return np.asarray(((index == cell + 1) * 1.0 - (index == cell) * 1.0) / step)

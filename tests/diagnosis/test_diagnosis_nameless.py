@@ -1,0 +1,156 @@
+"""Curves without a name: what they take, and when they take a name away."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_channel
+from hypothesis import given
+from hypothesis import strategies as st
+
+from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.diagnose import diagnose, inquire
+from winchkit.diagnosis.doubt import _beside, judge_and_doubt
+from winchkit.diagnosis.inquiry import Inquiry
+from winchkit.diagnosis.nameless import Beside, _columns, _Hats, _hats, _laws, best_curve
+from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.search import Found, search
+from winchkit.effects.bind import Term
+from winchkit.runs.run import Run
+
+OUTPUTS = ("cable_length", "tension", "motor_torque")
+RIDES = (Ride(samples=600, stroke=400.0), Ride(samples=600, stroke=150.0))
+
+
+def speed_of(run: Run) -> Array:
+    """Of the rope paid out, m/s, of a grooved drum of 60 mm behind 20.4 turns."""
+    return np.asarray(-np.gradient(run["motor_angle"], run.time) / 20.4 * 0.06)
+
+
+def driven(hidden: tuple[Term, ...] = (), drag: float = 0.0) -> list[Run]:
+    """Fast and slow under two loads, twice; ``drag``: N per (m/s)² on the rope, in the cell."""
+    out = []
+    for i, (ride, mass) in enumerate((r, m) for r in RIDES for m in (10.0, 20.0)):
+        for repeat in range(2):
+            run = made(10 * i + repeat, GROOVED, hidden, load_mass=mass, ride=ride, encoder=0.0)
+            v = speed_of(run)
+            run = with_channel(run, "tension", run["tension"] + drag * v * np.abs(v))
+            out.append(run)
+    return out
+
+
+@given(seed=st.integers(0, 999), free=st.integers(0, 4), width=st.integers(1, 5))
+def test_a_gain_is_what_least_squares_takes(seed: int, free: int, width: int) -> None:
+    random = np.random.default_rng(seed)
+    jacobian, hats = random.standard_normal((60, free)), random.standard_normal((24, 60))
+    residual, weight = random.standard_normal(60), np.exp(random.standard_normal(60))
+    law = random.standard_normal((24, width))
+    beside = Beside(residual, jacobian, weight)
+    whitened = hats * weight
+    left = whitened - (whitened @ beside.explained) @ beside.explained.T
+    gain = _Hats(whitened @ whitened.T, left @ left.T, left @ beside.residual).gain(law)
+
+    def squares(columns: Array) -> float:
+        columns = columns * weight[:, None]
+        found = np.linalg.lstsq(columns, residual * weight, rcond=None)[0]
+        return float(np.sum((residual * weight - columns @ found) ** 2))
+
+    assert beside.cost == pytest.approx(squares(jacobian))
+    together = squares(np.hstack([jacobian, hats.T @ law]))
+    assert gain == pytest.approx(squares(jacobian) - together, rel=1e-6, abs=1e-9)
+
+
+def test_what_the_model_explains_whole_leaves_curves_nothing() -> None:
+    """Rounding of a column that is there already must not be blown up into evidence."""
+    random = np.random.default_rng(1)
+    hats, weight = random.standard_normal((24, 80)), np.ones(80)
+    residual = random.standard_normal(80)
+    beside = Beside(residual, hats[:1].T, weight)
+    left = hats - (hats @ beside.explained) @ beside.explained.T
+    only = np.eye(24)[:, :1]
+    assert _Hats(hats @ hats.T, left @ left.T, left @ beside.residual).gain(only) == 0.0
+
+
+def test_hats_add_up_to_one_and_draw_straight_lines() -> None:
+    knots = np.linspace(-2.0, 5.0, 24)
+    values = np.linspace(-2.0, 5.0, 101)
+    hats = _hats(values, knots)
+    assert hats.sum(axis=0) == pytest.approx(np.ones(101))
+    assert knots @ hats == pytest.approx(values)
+    assert all(law.shape[0] == 24 and freedom >= 1 for law, freedom in _laws(knots, "speed"))
+
+
+def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
+    """A radius larger by a share is a straight curve over the length: both outputs follow it."""
+    share = 0.01
+    # Slowly: a curve does not ask how the weight's acceleration changes with it.
+    slow = Ride(samples=2000, period=20.0)
+    run = made(0, GROOVED, noise=dict.fromkeys(OUTPUTS, 0.0), ride=slow, encoder=0.0)
+    problem = Problem(prepare([run], GROOVED))
+    radius = term("drum-radius", radius_error=share * 0.06)
+    wrong = problem.change(Hypothesis().with_term(radius, problem.runs))
+    lengths = [r.smooth.at.free_length for r in problem.dataset.recordings]
+    knots = np.linspace(min(map(np.min, lengths)), max(map(np.max, lengths)), 24)
+    hats = [_hats(length, knots) for length in lengths]
+    curve = (share * (knots - 4.0)) @ _columns(problem, "winding", hats, knots)
+    for output, close in (("cable_length", 0.02), ("motor_torque", 0.02)):
+        rows = np.concatenate([np.r_[s.rows] for s in problem.segments if s.output == output])
+        across = wrong[rows] - wrong[rows].mean(), curve[rows] - curve[rows].mean()
+        assert np.linalg.norm(across[0] - across[1]) < close * np.linalg.norm(across[0]), output
+
+
+def test_a_square_drag_is_not_called_viscous() -> None:
+    answer = diagnose(driven(drag=12.0), GROOVED)
+    found = answer.diagnosis
+    assert found.verdict in {"unknown", "partly"}
+    assert not found.steps
+    assert any(place.variable == "speed" for place in found.where)
+
+
+def test_a_viscous_drag_keeps_its_name() -> None:
+    hidden = (term("pulley-viscous", viscosity=6.0),)
+    found = diagnose(driven(hidden), GROOVED).diagnosis
+    assert found.verdict == "explained"
+    assert [step.effects for step in found.steps] == [("pulley-viscous",)]
+
+
+def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name() -> None:
+    """Beside a friction that is there, a drift fitted to a faint unknown bend of the length."""
+    hidden = (term("motor-coulomb", torque=0.05),)
+    runs = []
+    for run in driven(hidden):
+        far = (run["cable_length"] - 4.0) / 0.5
+        runs.append(with_channel(run, "cable_length", run["cable_length"] + 1.5e-4 * far**3, "m"))
+    inquiry = inquire(prepare(runs, GROOVED), CATALOGUE)
+    found = search(inquiry)
+    judged = judge_and_doubt(inquiry, found)
+    named = [t.effect.id for t in judged.shown.final.hypothesis.terms]
+    assert set(named) <= {"motor-coulomb"}
+    assert judged.verdict in {"explained", "partly"}
+
+
+@cache
+def rubbed() -> tuple[Inquiry, Found]:
+    """A search that found dry friction of the motor."""
+    inquiry = inquire(prepare(driven((term("motor-coulomb", torque=0.05),)), GROOVED), CATALOGUE)
+    return inquiry, search(inquiry)
+
+
+def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
+    inquiry, found = rubbed()
+    whole = _beside(inquiry, found, ())
+    assert 0.99 * found.final.cost < whole.cost <= found.final.cost * (1 + 1e-9)
+    without = _beside(inquiry, found, [0])
+    refitted = inquiry.refit(found.final.hypothesis.without(0), found.noise)
+    # What sampling may have rounded is taken out of the one and not of the other.
+    assert 0.95 * refitted.cost < without.cost <= refitted.cost * (1 + 1e-9)
+
+
+def test_curves_are_sought_only_where_the_names_act() -> None:
+    inquiry, found = rubbed()
+    curve = best_curve(inquiry.problem, _beside(inquiry, found, [0]), ["motor_torque"])
+    assert curve is not None
+    assert curve.place in {"motor_torque", "rope force"}
+    assert best_curve(inquiry.problem, _beside(inquiry, found, [0]), []) is None
