@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, inquire
-from winchkit.diagnosis.doubt import _beside, judge_and_doubt
+from winchkit.diagnosis.doubt import Doubt, judge_and_doubt
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.nameless import Beside, _columns, _Hats, _hats, _laws, best_curve
 from winchkit.diagnosis.problem import Hypothesis, Problem
@@ -149,9 +149,10 @@ def rubbed() -> tuple[Inquiry, Found]:
 
 def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
     inquiry, found = rubbed()
-    whole = _beside(inquiry, found, ())
+    doubt = Doubt(inquiry, found)
+    whole = doubt.beside(())
     assert 0.99 * found.final.cost < whole.cost <= found.final.cost * (1 + 1e-9)
-    without = _beside(inquiry, found, [0])
+    without = doubt.beside([0])
     refitted = inquiry.refit(found.final.hypothesis.without(0), found.noise)
     # What sampling may have rounded is taken out of the one and not of the other.
     assert 0.95 * refitted.cost < without.cost <= refitted.cost * (1 + 1e-9)
@@ -159,7 +160,8 @@ def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
 
 def test_curves_are_sought_only_where_the_names_act() -> None:
     inquiry, found = rubbed()
-    curve = best_curve(inquiry.problem, _beside(inquiry, found, [0]), ["motor_torque"])
+    beside = Doubt(inquiry, found).beside([0])
+    curve = best_curve(inquiry.problem, beside, ["motor_torque"])
     assert curve is not None
     assert curve.place in {"motor_torque", "rope force"}
-    assert best_curve(inquiry.problem, _beside(inquiry, found, [0]), []) is None
+    assert best_curve(inquiry.problem, beside, []) is None

@@ -14,7 +14,7 @@ from winchkit.diagnosis.search import Found, without_term
 from winchkit.diagnosis.verdict import Judgement, judge, withheld
 from winchkit.effects.bind import Term
 
-__all__ = ["judge_and_doubt"]
+__all__ = ["Doubt", "judge_and_doubt"]
 
 _SLIGHT = 1e-3
 """Share of what a name explains by which the physics of a real part may differ from its formula."""
@@ -24,69 +24,89 @@ def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
     """The judgement of what was found, less the names that a nameless curve beats.
 
     All additions are doubted together, then each beside the others. One that is beaten is
-    dropped; where too much is then left, nothing is named.
+    dropped; where too much is then left, nothing is named. Without repeats something unknown is
+    always left, and a doubt of one addition is told only.
     """
     judgement = judge(inquiry, found)
     if judgement.verdict != "explained":
         return judgement
-    final = found.final
-    added = range(inquiry.given, len(final.hypothesis.terms))
-    terms = final.hypothesis.terms[inquiry.given :]
-    curve, _ = _beaten(inquiry, found, added)
-    if curve:
+    doubt = Doubt(inquiry, found)
+    terms = doubt.terms
+    if curve := doubt.beaten(doubt.added):
         return withheld(inquiry, found, 1.0, _words(terms, terms, curve))
-    for index in reversed(added) if len(added) > 1 else ():
-        curve, taken = _beaten(inquiry, found, [index])
-        if not curve:
-            continue
-        doubted = final.hypothesis.terms[index : index + 1]
-        without = judge_and_doubt(inquiry, without_term(inquiry, found, index))
-        if without.verdict == "explained":
-            return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
-        share = taken / (_beside(inquiry, found, added).cost - _beside(inquiry, found, ()).cost)
-        return withheld(inquiry, found, min(1.0, share), _words(terms, doubted, curve))
+    for index in reversed(doubt.added) if len(terms) > 1 else ():
+        curve = doubt.beaten([index])
+        if curve and found.noise.from_repeats:
+            return _less(doubt, index, curve)
+        if curve:
+            note = f"{_over(curve)} would explain more than {terms[index - inquiry.given].label}"
+            judgement = replace(judgement, notes=(*judgement.notes, note))
     return judgement
 
 
-def _beside(inquiry: Inquiry, found: Found, indices: Sequence[int]) -> Beside:
-    """What is left without some terms, the others free about where they are.
-
-    Not fitted anew: a lag that stands in for a lost friction is far from where both are right.
-    Nor is what sampling may have rounded held against a name.
-    """
-    problem, final = inquiry.problem, found.final
-    hypothesis = final.hypothesis
-    others, own = hypothesis, np.zeros(len(final.vector), dtype=bool)
-    for index in sorted(indices, reverse=True):
-        own |= problem.unknowns_of(index, hypothesis)
-        others = others.without(index)
-    lost = problem.change(hypothesis) - problem.change(others) if indices else 0.0
-    free = np.column_stack([final.jacobian[:, ~own], rounded(problem, hypothesis)])
-    return Beside(final.residual + lost, free, found.noise.weight(problem))
+def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
+    """The judgement without a beaten addition, or without any name where it is needed."""
+    inquiry, found = doubt.inquiry, doubt.found
+    doubted = found.final.hypothesis.terms[index : index + 1]
+    without = judge_and_doubt(inquiry, without_term(inquiry, found, index))
+    if without.verdict == "explained":
+        return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
+    share = doubt.taken([index]) / doubt.taken(doubt.added)
+    return withheld(inquiry, found, min(1.0, share), _words(doubt.terms, doubted, curve))
 
 
-def _beaten(inquiry: Inquiry, found: Found, indices: Sequence[int]) -> tuple[Curve | None, float]:
-    """A curve that pays better than terms do, if there is one; whitened squares they take."""
-    problem, final = inquiry.problem, found.final
-    terms = [final.hypothesis.terms[index] for index in indices]
-    outputs = sorted({output for term in terms for output in term.effect.outputs})
-    beside = _beside(inquiry, found, indices)
-    taken = beside.cost - _beside(inquiry, found, ()).cost
-    pays = taken - inquiry.price * inquiry.freedom(final.hypothesis, indices)
-    curve = best_curve(problem, beside, outputs)
-    if curve and curve.pays > pays + max(inquiry.price, _SLIGHT * taken):
-        return curve, taken
-    return None, taken
+class Doubt:
+    """What a search found, and what is left of the data without some of it."""
+
+    def __init__(self, inquiry: Inquiry, found: Found) -> None:
+        self.inquiry = inquiry
+        self.found = found
+        self.added = range(inquiry.given, len(found.final.hypothesis.terms))
+        self.terms = found.final.hypothesis.terms[inquiry.given :]
+        self._rounding = rounded(inquiry.problem, found.final.hypothesis)
+        self._least = self.beside(()).cost
+
+    def beside(self, indices: Sequence[int]) -> Beside:
+        """What is left without some terms, the others free about where they are.
+
+        Not fitted anew: a lag that stands in for a lost friction is far from where both are right.
+        Nor is what sampling may have rounded held against a name.
+        """
+        problem, final = self.inquiry.problem, self.found.final
+        hypothesis = final.hypothesis
+        others, own = hypothesis, np.zeros(len(final.vector), dtype=bool)
+        for index in sorted(indices, reverse=True):
+            own |= problem.unknowns_of(index, hypothesis)
+            others = others.without(index)
+        lost = problem.change(hypothesis) - problem.change(others) if indices else 0.0
+        free = np.column_stack([final.jacobian[:, ~own], self._rounding])
+        return Beside(final.residual + lost, free, self.found.noise.weight(problem))
+
+    def taken(self, indices: Sequence[int]) -> float:
+        """Whitened squares that terms take beside the others."""
+        return self.beside(indices).cost - self._least
+
+    def beaten(self, indices: Sequence[int]) -> Curve | None:
+        """A curve that pays better than terms do, if there is one."""
+        inquiry, hypothesis = self.inquiry, self.found.final.hypothesis
+        acting = [hypothesis.terms[index].effect.outputs for index in indices]
+        beside = self.beside(indices)
+        taken = beside.cost - self._least
+        pays = taken - inquiry.price * inquiry.freedom(hypothesis, indices)
+        curve = best_curve(inquiry.problem, beside, sorted({o for own in acting for o in own}))
+        margin = max(inquiry.price, _SLIGHT * taken)
+        return curve if curve and curve.pays > pays + margin else None
 
 
 def _words(terms: Sequence[Term], doubted: Sequence[Term], curve: Curve) -> str:
     """Why names are not given."""
-    place, variable = curve.place.replace("_", " "), curve.variable.replace("_", " ")
     than = "" if len(doubted) == len(terms) else f" than {_names(doubted)}"
-    return (
-        f"closest, but not named: {_names(terms)}; an unknown curve of the {place} over the "
-        f"{variable} explains more{than}"
-    )
+    return f"closest, but not named: {_names(terms)}; {_over(curve)} explains more{than}"
+
+
+def _over(curve: Curve) -> str:
+    place, variable = curve.place.replace("_", " "), curve.variable.replace("_", " ")
+    return f"an unknown curve of the {place} over the {variable}"
 
 
 def _names(terms: Sequence[Term]) -> str:

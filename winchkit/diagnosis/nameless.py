@@ -29,6 +29,8 @@ _TAILS = 0.001
 _DEGREES = (1, 2, 3, 4)
 _COARSE = (6, 12)
 _POWERS = (1.5, 2.0, 3.0)
+_TAKEN = (*ANGLES, "direction")
+"""Variables of which any curve has a name already."""
 _UNIDENTIFIABLE = 1e-7
 _NOTHING = 1e-300
 _WARMER = 1.0
@@ -107,7 +109,7 @@ def _curves(
     """Place, variable, laws and the columns of their hats, (hats, rows)."""
     recordings = problem.dataset.recordings
     known = [variables_of(recording) for recording in recordings]
-    names = [n for n in known[0] if n not in ANGLES and all(n in other for other in known)]
+    names = [n for n in known[0] if n not in _TAKEN and all(n in other for other in known)]
     for name in (*names, *(f"direction x {n}" for n in names if n in ("cable_length", "load"))):
         own = name.removeprefix("direction x ")
         ends = _ends(own, [k[own] for k in known])
@@ -116,7 +118,8 @@ def _curves(
         knots = np.linspace(*ends, _HATS)
         hats = [_hats(k[own], knots) for k in known]
         if name != own:
-            hats = [h * k["direction"] for h, k in zip(hats, known, strict=True)]
+            # The model's own direction: how sharply friction turns is nobody's name.
+            hats = [h * r.smooth.at.direction for h, r in zip(hats, recordings, strict=True)]
         laws = _laws(knots, name)
         for place, reach in _PLACES.items():
             if name != "cable_length" and place == "winding":
