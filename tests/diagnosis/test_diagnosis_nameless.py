@@ -14,7 +14,7 @@ from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, inquire
 from winchkit.diagnosis.doubt import Doubt, judge_and_doubt
 from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.nameless import Beside, _columns, _Hats, _hats, _laws, best_curve
+from winchkit.diagnosis.nameless import _PLACES, Beside, _columns, _Hats, _hats, _laws, best_curve
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.search import Found, search
 from winchkit.effects.bind import Term
@@ -94,7 +94,9 @@ def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
     lengths = [r.smooth.at.free_length for r in problem.dataset.recordings]
     knots = np.linspace(min(map(np.min, lengths)), max(map(np.max, lengths)), 24)
     hats = [_hats(length, knots) for length in lengths]
-    curve = (share * (knots - 4.0)) @ _columns(problem, "winding", hats, knots)
+    own, columns = _columns(problem, _PLACES["winding"], hats, knots)
+    curve = np.zeros(problem.rows)
+    curve[own] = (share * (knots - 4.0)) @ columns
     for output, close in (("cable_length", 0.02), ("motor_torque", 0.02)):
         rows = np.concatenate([np.r_[s.rows] for s in problem.segments if s.output == output])
         across = wrong[rows] - wrong[rows].mean(), curve[rows] - curve[rows].mean()

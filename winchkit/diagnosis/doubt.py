@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.nameless import Beside, Curve, best_curve
@@ -16,6 +18,7 @@ from winchkit.effects.bind import Term
 
 __all__ = ["Doubt", "judge_and_doubt"]
 
+Array = NDArray[np.float64]
 _SLIGHT = 1e-3
 """Share of what a name explains by which the physics of a real part may differ from its formula."""
 
@@ -63,14 +66,16 @@ class Doubt:
         self.found = found
         self.added = range(inquiry.given, len(found.final.hypothesis.terms))
         self.terms = found.final.hypothesis.terms[inquiry.given :]
-        self._rounding = rounded(inquiry.problem, found.final.hypothesis)
-        self._least = self.beside(()).cost
 
-    def beside(self, indices: Sequence[int]) -> Beside:
+    @cached_property
+    def _rounding(self) -> Array:
+        return rounded(self.inquiry.problem, self.found.final.hypothesis)[:, None]
+
+    def beside(self, indices: Sequence[int], *, rounding: bool = True) -> Beside:
         """What is left without some terms, the others free about where they are.
 
         Not fitted anew: a lag that stands in for a lost friction is far from where both are right.
-        Nor is what sampling may have rounded held against a name.
+        With ``rounding`` what sampling may have rounded is free as well.
         """
         problem, final = self.inquiry.problem, self.found.final
         hypothesis = final.hypothesis
@@ -79,19 +84,26 @@ class Doubt:
             own |= problem.unknowns_of(index, hypothesis)
             others = others.without(index)
         lost = problem.change(hypothesis) - problem.change(others) if indices else 0.0
-        free = np.column_stack([final.jacobian[:, ~own], self._rounding])
+        free = final.jacobian[:, ~own]
+        free = np.hstack([free, self._rounding]) if rounding else free
         return Beside(final.residual + lost, free, self.found.noise.weight(problem))
 
     def taken(self, indices: Sequence[int]) -> float:
         """Whitened squares that terms take beside the others."""
-        return self.beside(indices).cost - self._least
+        return self.beside(indices).cost - self.beside(()).cost
 
     def beaten(self, indices: Sequence[int]) -> Curve | None:
         """A curve that pays better than terms do, if there is one."""
+        if not self._beaten(indices, rounding=False):
+            return None
+        # What sampling may have rounded is not held against a name; it takes a while to know.
+        return self._beaten(indices, rounding=True)
+
+    def _beaten(self, indices: Sequence[int], *, rounding: bool) -> Curve | None:
         inquiry, hypothesis = self.inquiry, self.found.final.hypothesis
         acting = [hypothesis.terms[index].effect.outputs for index in indices]
-        beside = self.beside(indices)
-        taken = beside.cost - self._least
+        beside = self.beside(indices, rounding=rounding)
+        taken = beside.cost - self.beside((), rounding=rounding).cost
         pays = taken - inquiry.price * inquiry.freedom(hypothesis, indices)
         curve = best_curve(inquiry.problem, beside, sorted({o for own in acting for o in own}))
         margin = max(inquiry.price, _SLIGHT * taken)

@@ -8,7 +8,7 @@ named itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,11 +68,11 @@ def best_curve(problem: Problem, beside: Beside, outputs: Sequence[str]) -> Curv
     """The curve that takes most of a residual, among those that show in one of ``outputs``."""
     best: Curve | None = None
     price = float(np.log(problem.rows))
-    for place, variable, laws, columns in _curves(problem, outputs):
-        whitened = columns * beside.weight
-        plain = whitened @ whitened.T
-        whitened -= (whitened @ beside.explained) @ beside.explained.T
-        hats = _Hats(plain, whitened @ whitened.T, whitened @ beside.residual)
+    for place, variable, laws, (rows, columns) in _curves(problem, outputs):
+        whitened = columns * beside.weight[rows]
+        plain, through = whitened @ whitened.T, whitened @ beside.explained[rows]
+        left = plain - through @ through.T
+        hats = _Hats(plain, left, whitened @ beside.residual[rows])
         pays = max(hats.gain(law) - price * freedom for law, freedom in laws)
         if best is None or pays > best.pays:
             best = Curve(place, variable, pays)
@@ -101,12 +101,13 @@ class _Hats:
 
 
 _Law = tuple[Array, int]
+_Columns = tuple[NDArray[np.intp], Array]
 
 
 def _curves(
     problem: Problem, outputs: Sequence[str]
-) -> Iterator[tuple[str, str, list[_Law], Array]]:
-    """Place, variable, laws and the columns of their hats, (hats, rows)."""
+) -> Iterator[tuple[str, str, list[_Law], _Columns]]:
+    """Place, variable, laws, and the rows and columns of their hats."""
     recordings = problem.dataset.recordings
     known = [variables_of(recording) for recording in recordings]
     names = [n for n in known[0] if n not in _TAKEN and all(n in other for other in known)]
@@ -121,21 +122,10 @@ def _curves(
             # The model's own direction: how sharply friction turns is nobody's name.
             hats = [h * r.smooth.at.direction for h, r in zip(hats, recordings, strict=True)]
         laws = _laws(knots, name)
-        for place, reach in _PLACES.items():
-            if name != "cable_length" and place == "winding":
-                continue
-            if not set(reach) & set(outputs) & set(problem.dataset.outputs):
-                continue
-            yield place, name, laws, _columns(problem, place, hats, knots)
-
-
-_PLACES: Mapping[str, tuple[str, ...]] = {
-    "cable_length": ("cable_length",),
-    "tension": ("tension",),
-    "motor_torque": ("motor_torque",),
-    "rope force": ("tension", "motor_torque"),
-    "winding": ("cable_length",),
-}
+        for place, shown in _PLACES.items():
+            seen = set(shown) & set(outputs) & set(problem.dataset.outputs)
+            if seen and (place != "winding" or name == "cable_length"):
+                yield place, name, laws, _columns(problem, shown, hats, knots)
 
 
 def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
@@ -170,35 +160,50 @@ def _laws(knots: Array, name: str) -> list[_Law]:
     return out
 
 
-def _columns(problem: Problem, place: str, hats: Sequence[Array], knots: Array) -> Array:
-    """What the hats change in the outputs when they act at a place, (hats, rows)."""
-    out = np.zeros((len(knots), problem.rows))
+_Shown = Callable[[Recording, Array, Array], Array]
+
+
+def _columns(
+    problem: Problem, shown: Mapping[str, _Shown], hats: Sequence[Array], knots: Array
+) -> _Columns:
+    """What the hats change in the outputs: rows (n,) and columns (hats, n)."""
+    rows, columns = [], []
     for segment in problem.segments:
-        recording, own = problem.dataset.recordings[segment.run], hats[segment.run]
-        if segment.output not in _PLACES[place] and place != "winding":
-            continue
-        if place == "winding" and segment.output == "motor_torque":
-            # Virtual work: what the rope moves per turn more, its force does.
-            own = recording.nominal_smooth["motor_torque"] * _slopes(recording, knots)
-        elif place == "winding" and segment.output == "tension":
-            continue
-        elif place == "rope force" and segment.output == "motor_torque":
-            own = own * _arm(recording)
-        out[:, segment.rows] = masked(recording, segment.output, own)
-    return out
+        if segment.output in shown:
+            recording = problem.dataset.recordings[segment.run]
+            signal = shown[segment.output](recording, hats[segment.run], knots)
+            rows.append(np.arange(segment.rows.start, segment.rows.stop))
+            columns.append(masked(recording, segment.output, signal))
+    return np.concatenate(rows), np.hstack(columns)
 
 
-def _arm(recording: Recording) -> Array:
-    """Motor torque of one newton of the rope, m."""
+def _plainly(recording: Recording, hats: Array, knots: Array) -> Array:
+    """An instrument's own curve."""
+    return hats
+
+
+def _by_the_arm(recording: Recording, hats: Array, knots: Array) -> Array:
+    """Motor torque of a curve of the rope's force."""
     force = recording.smooth.at.tension
     heavy = np.maximum(np.abs(force), 1e-9)
-    return np.asarray(recording.nominal_smooth["motor_torque"] * np.sign(force) / heavy)
+    return np.asarray(hats * recording.nominal_smooth["motor_torque"] * np.sign(force) / heavy)
 
 
-def _slopes(recording: Recording, knots: Array) -> Array:
-    """Derivatives of the hats over the length, (knots, n)."""
+def _by_virtual_work(recording: Recording, hats: Array, knots: Array) -> Array:
+    """Motor torque of a curve of the winding: what the rope moves per turn more, it pulls more."""
     step = knots[1] - knots[0]
     cell = np.floor((recording.smooth.at.free_length - knots[0]) / step)
     cell = np.clip(cell, 0, len(knots) - 2)
     index = np.arange(len(knots))[:, None]
-    return np.asarray(((index == cell + 1) * 1.0 - (index == cell) * 1.0) / step)
+    slopes = ((index == cell + 1) * 1.0 - (index == cell) * 1.0) / step
+    return np.asarray(recording.nominal_smooth["motor_torque"] * slopes)
+
+
+_PLACES: Mapping[str, Mapping[str, _Shown]] = {
+    "cable_length": {"cable_length": _plainly},
+    "tension": {"tension": _plainly},
+    "motor_torque": {"motor_torque": _plainly},
+    "rope force": {"tension": _plainly, "motor_torque": _by_the_arm},
+    "winding": {"cable_length": _plainly, "motor_torque": _by_virtual_work},
+}
+"""Where a curve may act, and how each output shows it."""
