@@ -19,6 +19,7 @@ from winchkit.diagnosis.gate import (
     groups_of,
     held_out_rms,
 )
+from winchkit.diagnosis.last import Last
 from winchkit.diagnosis.noise import (
     Noise,
     Presence,
@@ -59,6 +60,8 @@ class Inquiry:
         self.begin = begin
         self.given = len(begin.terms)
         self._candidates = tuple(candidates)
+        self._last_folds: Last[Folds] = Last()
+        self._last_presence: Last[Presence] = Last()
         self.signatures = self._signatures(begin)
 
     def _signatures(self, present: Hypothesis) -> Signatures:
@@ -92,8 +95,12 @@ class Inquiry:
         With few groups, say two loads, one may be what determines an unknown: a prediction that
         rests on little fails whether or not the effect is there.
         """
-        unsure = extrapolation(self.problem, fitted, noise, self.groups) > _UNSURE
-        return self._five_blocks if unsure else self.groups
+
+        def compute() -> Folds:
+            unsure = extrapolation(self.problem, fitted, noise, self.groups) > _UNSURE
+            return self._five_blocks if unsure else self.groups
+
+        return self._last_folds.of(fitted, noise, compute)
 
     def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
         """Held-out error of every output that a user reads, rms in SI."""
@@ -141,8 +148,12 @@ class Inquiry:
 
     def presence(self, present: Fit, noise: Noise) -> Presence:
         """Whether a fit leaves more than noise, and more than sampling may have rounded."""
-        left = without_rounding(self.problem, present, noise.weight(self.problem))
-        return presence(self.problem, left, present.jacobian, noise)
+
+        def compute() -> Presence:
+            left = without_rounding(self.problem, present, noise.weight(self.problem))
+            return presence(self.problem, left, present.jacobian, noise)
+
+        return self._last_presence.of(present, noise, compute)
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
         """Signatures with a fit's unknowns projected out."""

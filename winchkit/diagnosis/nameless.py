@@ -8,7 +8,7 @@ named itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,7 @@ from winchkit.model.variables import ANGLES
 __all__ = ["Beside", "Curve", "best_curve"]
 
 Array = NDArray[np.float64]
-_HATS = 24
+_HATS = 20
 _TAILS = 0.001
 _DEGREES = (1, 2, 3, 4)
 _COARSE = (6, 12)
@@ -68,11 +68,8 @@ def best_curve(problem: Problem, beside: Beside, outputs: Sequence[str]) -> Curv
     """The curve that takes most of a residual, among those that show in one of ``outputs``."""
     best: Curve | None = None
     price = float(np.log(problem.rows))
-    for place, variable, laws, (rows, columns) in _curves(problem, outputs):
-        whitened = columns * beside.weight[rows]
-        plain, through = whitened @ whitened.T, whitened @ beside.explained[rows]
-        left = plain - through @ through.T
-        hats = _Hats(plain, left, whitened @ beside.residual[rows])
+    for place, variable, laws, columns in _curves(problem, outputs):
+        hats = _beside(beside, columns)
         pays = max(hats.gain(law) - price * freedom for law, freedom in laws)
         if best is None or pays > best.pays:
             best = Curve(place, variable, pays)
@@ -101,13 +98,26 @@ class _Hats:
 
 
 _Law = tuple[Array, int]
-_Columns = tuple[NDArray[np.intp], Array]
+_Columns = Iterable[tuple[slice, Array]]
+"""Some rows, and what the hats change in them, (hats, rows)."""
+
+
+def _beside(beside: Beside, columns: _Columns) -> _Hats:
+    """Inner products of hats, piece by piece."""
+    plain, products = np.zeros((_HATS, _HATS)), np.zeros(_HATS)
+    through = np.zeros((_HATS, beside.explained.shape[1]))
+    for rows, signal in columns:
+        whitened = signal * beside.weight[rows]
+        plain += whitened @ whitened.T
+        through += whitened @ beside.explained[rows]
+        products += whitened @ beside.residual[rows]
+    return _Hats(plain, plain - through @ through.T, products)
 
 
 def _curves(
     problem: Problem, outputs: Sequence[str]
 ) -> Iterator[tuple[str, str, list[_Law], _Columns]]:
-    """Place, variable, laws, and the rows and columns of their hats."""
+    """Place, variable, laws, and what their hats change."""
     recordings = problem.dataset.recordings
     known = [variables_of(recording) for recording in recordings]
     names = [n for n in known[0] if n not in _TAKEN and all(n in other for other in known)]
@@ -137,7 +147,11 @@ def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
 def _hats(values: Array, knots: Array) -> Array:
     """Triangles over the knots that add up to one, (knots, n)."""
     at = np.clip((values - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
-    return np.asarray(np.maximum(0.0, 1.0 - np.abs(at - np.arange(len(knots))[:, None])))
+    cell = np.minimum(at.astype(np.intp), len(knots) - 2)
+    out, sample = np.zeros((len(knots), len(values))), np.arange(len(values))
+    out[cell, sample] = 1.0 - (at - cell)
+    out[cell + 1, sample] = at - cell
+    return out
 
 
 def _laws(knots: Array, name: str) -> list[_Law]:
@@ -153,8 +167,7 @@ def _laws(knots: Array, name: str) -> list[_Law]:
     if level:
         return out
     for at in z[1:-1]:
-        above, below = np.maximum(z - at, 0.0), np.maximum(at - z, 0.0)
-        out += [(above[:, None], 2), (below[:, None], 2), (np.column_stack([above, below]), 3)]
+        out.append((np.column_stack([np.maximum(z - at, 0.0), np.maximum(at - z, 0.0)]), 3))
     if name == "speed":
         out += [((np.sign(knots) * np.abs(knots) ** n)[:, None], 2) for n in _POWERS]
     return out
@@ -166,15 +179,12 @@ _Shown = Callable[[Recording, Array, Array], Array]
 def _columns(
     problem: Problem, shown: Mapping[str, _Shown], hats: Sequence[Array], knots: Array
 ) -> _Columns:
-    """What the hats change in the outputs: rows (n,) and columns (hats, n)."""
-    rows, columns = [], []
+    """What the hats change in every output of every run."""
     for segment in problem.segments:
         if segment.output in shown:
             recording = problem.dataset.recordings[segment.run]
             signal = shown[segment.output](recording, hats[segment.run], knots)
-            rows.append(np.arange(segment.rows.start, segment.rows.stop))
-            columns.append(masked(recording, segment.output, signal))
-    return np.concatenate(rows), np.hstack(columns)
+            yield segment.rows, masked(recording, segment.output, signal)
 
 
 def _plainly(recording: Recording, hats: Array, knots: Array) -> Array:
