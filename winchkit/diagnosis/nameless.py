@@ -119,23 +119,41 @@ def _curves(
 ) -> Iterator[tuple[str, str, list[_Law], _Columns]]:
     """Place, variable, laws, and what their hats change."""
     recordings = problem.dataset.recordings
-    known = [variables_of(recording) for recording in recordings]
+    known = [
+        variables_of(recording) | {"direction": recording.smooth.at.direction}
+        for recording in recordings
+    ]
     names = [n for n in known[0] if n not in _TAKEN and all(n in other for other in known)]
-    for name in (*names, *(f"direction x {n}" for n in names if n in ("cable_length", "load"))):
-        own = name.removeprefix("direction x ")
-        ends = _ends(own, [k[own] for k in known])
+    for factor, name in (*((None, n) for n in names), *_products(names)):
+        ends = _ends(name, [k[name] for k in known])
         if ends is None:
             continue
         knots = np.linspace(*ends, _HATS)
-        hats = [_hats(k[own], knots) for k in known]
-        if name != own:
-            # The model's own direction: how sharply friction turns is nobody's name.
-            hats = [h * r.smooth.at.direction for h, r in zip(hats, recordings, strict=True)]
-        laws = _laws(knots, name)
+        hats = [_hats(k[name], knots) for k in known]
+        if factor is not None:
+            hats = [h * k[factor] for h, k in zip(hats, known, strict=True)]
+        laws = _laws(knots, name, level=factor is not None)
         for place, shown in _PLACES.items():
             seen = set(shown) & set(outputs) & set(problem.dataset.outputs)
-            if seen and (place != "winding" or name == "cable_length"):
-                yield place, name, laws, _columns(problem, shown, hats, knots)
+            if seen and (place != "winding" or (name, factor) == ("cable_length", None)):
+                variable = name if factor is None else f"{factor} times {name}"
+                yield place, variable, laws, _columns(problem, shown, hats, knots)
+
+
+def _products(names: Sequence[str]) -> list[tuple[str, str]]:
+    """What is worth trying times a curve over what: frictions by place and load, soft ropes.
+
+    The direction is the model's own: how sharply a friction turns is nobody's name.
+    """
+    force = "load" if "load" in names else "tension"
+    pairs = (
+        ("direction", "cable_length"),
+        ("direction", force),
+        (force, "cable_length"),
+        ("cable_length", force),
+        (force, "temperature"),
+    )
+    return [pair for pair in pairs if set(pair) <= {"direction", *names}]
 
 
 def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
@@ -154,20 +172,21 @@ def _hats(values: Array, knots: Array) -> Array:
     return out
 
 
-def _laws(knots: Array, name: str) -> list[_Law]:
-    """What a curve may be, in values at the knots, with what each costs to choose."""
+def _laws(knots: Array, name: str, *, level: bool) -> list[_Law]:
+    """What a curve may be, in values at the knots, with what each costs to choose.
+
+    With its ``level`` where it is a factor; else that is an offset, and there are effects for it.
+    """
     z = np.linspace(-1.0, 1.0, len(knots))
-    level = name.startswith("direction x")
     out: list[_Law] = []
     for degree in _DEGREES:
         powers = np.asarray(np.polynomial.legendre.legvander(z, degree), dtype=np.float64)
         out.append((powers, degree + 1) if level else (powers[:, 1:], degree))
     for count in _COARSE:
         out.append((_hats(z, np.linspace(-1.0, 1.0, count)).T, count))
-    if level:
-        return out
     for at in z[1:-1]:
-        out.append((np.column_stack([np.maximum(z - at, 0.0), np.maximum(at - z, 0.0)]), 3))
+        sides = [np.maximum(z - at, 0.0), np.maximum(at - z, 0.0), np.ones_like(z)]
+        out.append((np.column_stack(sides[: 2 + level]), 3 + level))
     if name == "speed":
         out += [((np.sign(knots) * np.abs(knots) ** n)[:, None], 2) for n in _POWERS]
     return out
