@@ -14,8 +14,10 @@ from can_commands import Served, invoke, served
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.client import RemoteStation, attach
+from winchkit.bench.programme import earlier_runs
 from winchkit.bench.snapshot import Phase
 from winchkit.errors import UsageError
+from winchkit.schema.programme import Programme
 
 pytestmark = pytest.mark.realtime
 
@@ -166,6 +168,24 @@ def test_a_programme_is_rehearsed_move_by_move(bench: Served, tmp_path: Path) ->
     assert shown.exit_code == 0, shown.output
     assert "0Fh enable operation" in shown.stdout
     assert not (tmp_path / "runs").exists()
+
+
+def test_earlier_runs_of_a_programme_are_not_written_over(bench: Served, tmp_path: Path) -> None:
+    programme, runs = tmp_path / "p.toml", tmp_path / "runs"
+    programme.write_text(
+        'schema = 1\nkind = "programme"\nname = "tiny"\n[[step]]\nwinch = "all"\nby = "0.02 m"\n'
+    )
+    runs.mkdir()
+    for name in ("tiny-10kg-1.csv", "tiny-2b.csv", "tiny-1.mcap", "tinyer-1.csv", "mine.csv"):
+        (runs / name).write_text("precious")
+    assert [p.name for p in earlier_runs(Programme("tiny", ()), runs)] == [
+        "tiny-10kg-1.csv",
+        "tiny-2b.csv",
+    ]
+    refused = invoke("run", programme, "-b", bench.file, "-o", runs)
+    assert refused.exit_code == 2, refused.output
+    assert "tiny-10kg-1.csv holds an earlier run of 'tiny'" in refused.stderr
+    assert {path.read_text() for path in runs.iterdir()} == {"precious"}
 
 
 def test_who_attaches_does_the_same_through_the_owner(bench: Served) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from winchkit.bench.winch import Winch
 from winchkit.errors import MotionError, RunError, UsageError
 from winchkit.schema.programme import Programme, Step
 
-__all__ = ["Ask", "Progress", "run_programme"]
+__all__ = ["Ask", "Progress", "earlier_runs", "run_programme"]
 
 Ask = Callable[[Step], None]
 """Asks the operator to do something; returns when it is done, raises when it is refused."""
@@ -54,6 +55,13 @@ def run_programme(
     finally:
         execution.abandon()
     return execution.written
+
+
+def earlier_runs(programme: Programme, folder: str | Path, suffix: str = ".csv") -> list[Path]:
+    """Files in a folder that runs of a programme of this name may be written over."""
+    named = re.compile(re.escape(programme.name) + r"(-[\d.e+-]+kg)?-\d+[a-z]?" + re.escape(suffix))
+    found = (path for path in Path(folder).glob(f"*{suffix}") if named.fullmatch(path.name))
+    return sorted(found)
 
 
 def _parts(steps: list[tuple[int, Step]]) -> list[list[tuple[int, Step]]]:

@@ -42,6 +42,7 @@ _POLL = 0.05
     is_flag=True,
     help="Answer every question with yes; a simulated bench does what is asked.",
 )
+@click.option("--replace", is_flag=True, help="Write over earlier runs of that programme.")
 @effects_option
 @dry_run_option
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
@@ -52,6 +53,7 @@ def command(
     out: Path,
     suffix: str,
     yes: bool,
+    replace: bool,
     effects: Sequence[str],
     dry_run: bool,
     as_json: bool,
@@ -67,6 +69,8 @@ def command(
     if dry_run:
         _rehearse(bench, declared, effects, as_json=as_json)
         return
+    if not replace:
+        _refuse_to_lose(declared, out, f".{suffix}")
     ask = partial(_agree, bench) if yes else _ask
     written = _execute(bench, effects, declared, out, f".{suffix}", ask)
     if as_json:
@@ -94,6 +98,17 @@ def _execute(
 
     with open_bench(bench, effects=effects) as opened:
         return run_programme(opened, programme, out, ask, suffix=suffix, progress=tell)
+
+
+def _refuse_to_lose(programme: Programme, out: Path, suffix: str) -> None:
+    """Raise UsageError where runs of an earlier time would be written over."""
+    from winchkit.bench.programme import earlier_runs
+
+    if held := earlier_runs(programme, out, suffix):
+        raise click.UsageError(
+            f"{held[0]} holds an earlier run of '{programme.name}'; "
+            "name another folder with --out, or --replace."
+        )
 
 
 def _rehearse(bench: str, programme: Programme, effects: Sequence[str], *, as_json: bool) -> None:

@@ -40,6 +40,7 @@ EFFECT = Effect(
         {"mismatch": 1e-3},
         {"offset": 0.01, "mismatch": 1e-3},
         {"offset": -0.02, "mismatch": 1e-3},
+        {"offset": 0.1, "mismatch": 1e-3},
     ),
     on_robot=frozenset({"one"}),
 )
