@@ -173,7 +173,8 @@ def test_a_programme_is_rehearsed_move_by_move(bench: Served, tmp_path: Path) ->
 def test_earlier_runs_of_a_programme_are_not_written_over(bench: Served, tmp_path: Path) -> None:
     programme, runs = tmp_path / "p.toml", tmp_path / "runs"
     programme.write_text(
-        'schema = 1\nkind = "programme"\nname = "tiny"\n[[step]]\nwinch = "all"\nby = "0.02 m"\n'
+        'schema = 1\nkind = "programme"\nname = "tiny"\n'
+        '[[step]]\nwinch = "all"\nby = "0.02 m"\nspeed = "0.2 m/s"\n'
     )
     runs.mkdir()
     for name in ("tiny-10kg-1.csv", "tiny-2b.csv", "tiny-1.mcap", "tinyer-1.csv", "mine.csv"):

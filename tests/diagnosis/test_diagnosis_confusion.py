@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,7 +12,7 @@ from diagnosis_runs import CATALOGUE, GROOVED, SPIRAL, Ride, made, term
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.result import Diagnosis
 from winchkit.effects.bind import Term
-from winchkit.schema.winch import WinchProfile
+from winchkit.schema.winch import GuideSpec, WinchProfile
 
 HIDDEN = {
     "radius": term("drum-radius", radius_error=3e-4),
@@ -134,3 +135,33 @@ def test_a_bend_that_the_data_lean_to_is_not_denied() -> None:
     assert straight not in sets[0]
     assert sets[-1] == {straight}
     assert any(straight in between and len(between) > 1 for between in sets)
+
+
+GUIDED = replace(GROOVED, guide=GuideSpec(screw_lead=0.005, distance=0.3))
+
+
+def guided(offset: float, mismatch: float) -> Diagnosis:
+    """A guide far aside, whose rope bends the more the more its screw is wrong."""
+    own = (term("guide-offset", offset=offset, mismatch=mismatch),)
+    ride = Ride(samples=400, stroke=400.0)
+    runs = [
+        made(int(10 * mass) + seed, GUIDED, own, load_mass=mass, ride=ride)
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    return diagnose(runs, GUIDED).diagnosis
+
+
+def test_a_guide_whose_detour_is_straight_stands_beside_a_wrong_ratio() -> None:
+    (step,) = guided(0.1, 3e-4).steps
+    assert {"guide-offset", "gear-ratio", "drum-radius"} == set(step.effects)
+
+
+def test_a_guide_whose_detour_bends_stands_alone() -> None:
+    (step,) = guided(0.02, -6e-3).steps
+    assert step.effects == ("guide-offset",)
+    values = step.parameters["guide-offset"]
+    # The same path with both signs turned.
+    sign = np.sign(values["offset"].value)
+    assert sign * values["offset"].value == pytest.approx(0.02, rel=0.1)
+    assert sign * values["mismatch"].value == pytest.approx(-6e-3, rel=0.05)
