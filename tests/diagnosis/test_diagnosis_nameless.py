@@ -10,11 +10,12 @@ from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_cha
 from hypothesis import given
 from hypothesis import strategies as st
 
+from winchkit.diagnosis.curves import PLACES, columns_of, hats_over, laws_over
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, inquire
 from winchkit.diagnosis.doubt import Doubt, judge_and_doubt
 from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.nameless import _PLACES, Beside, _columns, _Hats, _hats, _laws, best_curve
+from winchkit.diagnosis.nameless import Beside, _Hats, best_curve
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.search import Found, search
 from winchkit.effects.bind import Term
@@ -76,12 +77,11 @@ def test_what_the_model_explains_whole_leaves_curves_nothing() -> None:
 def test_hats_add_up_to_one_and_draw_straight_lines() -> None:
     knots = np.linspace(-2.0, 5.0, 20)
     values = np.linspace(-2.0, 5.0, 101)
-    hats = _hats(values, knots)
+    hats = hats_over(values, knots)
     assert hats.sum(axis=0) == pytest.approx(np.ones(101))
     assert knots @ hats == pytest.approx(values)
-    assert all(
-        law.shape[0] == 20 and freedom >= 1 for law, freedom in _laws(knots, "speed", level=False)
-    )
+    laws = laws_over(knots, "speed", level=False)
+    assert all(law.shape[0] == 20 and freedom >= 1 for law, freedom in laws)
 
 
 def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
@@ -95,9 +95,9 @@ def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
     wrong = problem.change(Hypothesis().with_term(radius, problem.runs))
     lengths = [r.smooth.at.free_length for r in problem.dataset.recordings]
     knots = np.linspace(min(map(np.min, lengths)), max(map(np.max, lengths)), 20)
-    hats = [_hats(length, knots) for length in lengths]
+    hats = [hats_over(length, knots) for length in lengths]
     curve = np.zeros(problem.rows)
-    for own, columns in _columns(problem, _PLACES["winding"], hats, knots):
+    for own, columns in columns_of(problem, PLACES["winding"], hats, knots):
         curve[own] = (share * (knots - 4.0)) @ columns
     for output, close in (("cable_length", 0.02), ("motor_torque", 0.02)):
         rows = np.concatenate([np.r_[s.rows] for s in problem.segments if s.output == output])
