@@ -15,6 +15,7 @@ from winchkit.diagnosis.resolution import rounded
 from winchkit.diagnosis.search import Found, without_term
 from winchkit.diagnosis.verdict import Judgement, judge, withheld
 from winchkit.effects.bind import Term
+from winchkit.effects.coordinates import Coordinates
 
 __all__ = ["Doubt", "judge_and_doubt"]
 
@@ -101,11 +102,12 @@ class Doubt:
 
     def _beaten(self, indices: Sequence[int], *, rounding: bool) -> Curve | None:
         inquiry, hypothesis = self.inquiry, self.found.final.hypothesis
-        acting = [hypothesis.terms[index].effect.outputs for index in indices]
+        effects = [hypothesis.terms[index].effect for index in indices]
         beside = self.beside(indices, rounding=rounding)
         taken = beside.cost - self.beside((), rounding=rounding).cost
-        pays = taken - inquiry.price * inquiry.freedom(hypothesis, indices)
-        curve = best_curve(inquiry.problem, beside, sorted({o for own in acting for o in own}))
+        # The states in which runs begin are no numbers of a law, and cost it nothing here.
+        pays = taken - inquiry.price * sum(Coordinates(effect).freedom for effect in effects)
+        curve = best_curve(inquiry.problem, beside, sorted({o for e in effects for o in e.outputs}))
         margin = max(inquiry.price, _SLIGHT * taken)
         return curve if curve and curve.pays > pays + margin else None
 

@@ -180,15 +180,10 @@ class Inquiry:
 
     def criterion(self, fitted: Fit) -> float:
         """Whitened squares and the price of everything that was added."""
-        added = range(self.given, len(fitted.hypothesis.terms))
-        return fitted.cost + self.price * self.freedom(fitted.hypothesis, added)
-
-    def freedom(self, hypothesis: Hypothesis, indices: Iterable[int]) -> int:
-        """Degrees of freedom of some terms, with the states in which runs begin."""
-        return sum(
-            Coordinates(hypothesis.terms[i].effect).freedom + len(hypothesis.starts[i])
-            for i in indices
-        )
+        added = fitted.hypothesis.terms[self.given :]
+        freedom = sum(Coordinates(term.effect).freedom for term in added)
+        states = sum(len(start) for start in fitted.hypothesis.starts[self.given :])
+        return fitted.cost + self.price * (freedom + states)
 
     def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
         """Fit a candidate beside the present terms; those that it contains give way to it."""
