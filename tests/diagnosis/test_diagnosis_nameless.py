@@ -165,7 +165,7 @@ def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
 def test_curves_are_sought_only_where_the_names_act() -> None:
     inquiry, found = rubbed()
     beside = Doubt(inquiry, found).beside([0])
-    curve = best_curve(inquiry.problem, beside, ["motor_torque"])
+    curve = best_curve(inquiry.problem, beside, ["motor_torque"], inquiry.price)
     assert curve is not None
     assert curve.place in {"motor_torque", "rope force"}
-    assert best_curve(inquiry.problem, beside, []) is None
+    assert best_curve(inquiry.problem, beside, [], inquiry.price) is None

@@ -92,7 +92,7 @@ def _richer(own: Effect, final: Fit, fitted: Fit) -> bool | None:
     """
     rival = fitted.hypothesis.terms[-1].effect
     more = Coordinates(rival).freedom - Coordinates(own).freedom
-    if more > 0 and _carded(rival, own) and not _nested(rival, own):
+    if more > 0 and _carded(rival, own) and not rival.nested_with(own):
         return fitted.cost < final.cost + _ALIKE
     if more > 0 and not _kindred(rival, own):
         return _leant_to(final, fitted, more)
@@ -101,12 +101,7 @@ def _richer(own: Effect, final: Fit, fitted: Fit) -> bool | None:
 
 def _kindred(rival: Effect, own: Effect) -> bool:
     """Whether one law of a family may stand for the other, neither being a case of the other."""
-    return bool(own.family) and rival.family == own.family and not _nested(rival, own)
-
-
-def _nested(rival: Effect, own: Effect) -> bool:
-    """Whether one law is a case of the other."""
-    return own.id in rival.contains or rival.id in own.contains
+    return bool(own.family) and rival.family == own.family and not rival.nested_with(own)
 
 
 def _carded(rival: Effect, own: Effect) -> bool:

@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.diagnosis.gain import gain
 from winchkit.diagnosis.signature import Atom, Projected, Score
 
 __all__ = ["couples"]
@@ -35,11 +36,11 @@ def couples(
     found = []
     for first, second in combinations(scores, 2):
         one, other = first.atom, second.atom
-        if other.effect.id in one.effect.contains or one.effect.id in other.effect.contains:
+        if one.effect.nested_with(other.effect):
             continue
-        gain = _together(inner, products, one, other)
-        pays = gain - price * (one.freedom + other.freedom)
-        if pays > 0 and gain > _TOGETHER * (first.gain + second.gain):
+        taken = _together(inner, products, one, other)
+        pays = taken - price * (one.freedom + other.freedom)
+        if pays > 0 and taken > _TOGETHER * (first.gain + second.gain):
             found.append((pays, (first, second)))
     found.sort(key=lambda item: -item[0])
     return [pair for _, pair in found[:_MOST]]
@@ -48,7 +49,4 @@ def couples(
 def _together(inner: Array, products: Array, one: Atom, other: Atom) -> float:
     """Whitened squares that two atoms take side by side."""
     columns = np.r_[one.columns, other.columns]
-    values, vectors = np.linalg.eigh(inner[np.ix_(columns, columns)])
-    kept = values > _UNIDENTIFIABLE
-    along = vectors[:, kept].T @ products[columns]
-    return float(np.sum(along**2 / values[kept]))
+    return gain(inner[np.ix_(columns, columns)], products[columns], _UNIDENTIFIABLE)

@@ -107,7 +107,8 @@ class Doubt:
         taken = beside.cost - self.beside((), rounding=rounding).cost
         # The states in which runs begin are no numbers of a law, and cost it nothing here.
         pays = taken - inquiry.price * sum(Coordinates(effect).freedom for effect in effects)
-        curve = best_curve(inquiry.problem, beside, sorted({o for e in effects for o in e.outputs}))
+        outputs = sorted({output for effect in effects for output in effect.outputs})
+        curve = best_curve(inquiry.problem, beside, outputs, inquiry.price)
         margin = max(inquiry.price, _SLIGHT * taken)
         return curve if curve and curve.pays > pays + margin else None
 

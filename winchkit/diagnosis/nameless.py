@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.curves import Columns, curves
+from winchkit.diagnosis.gain import gain
 from winchkit.diagnosis.noise import orthonormal
 from winchkit.diagnosis.problem import Problem
 
@@ -52,10 +53,14 @@ class Beside:
         return float(self.residual @ self.residual)
 
 
-def best_curve(problem: Problem, beside: Beside, outputs: Sequence[str]) -> Curve | None:
-    """The curve that takes most of a residual, among those that show in one of ``outputs``."""
+def best_curve(
+    problem: Problem, beside: Beside, outputs: Sequence[str], price: float
+) -> Curve | None:
+    """The curve that pays best, among those that show in one of ``outputs``.
+
+    ``price`` is what each of its numbers must save.
+    """
     best: Curve | None = None
-    price = float(np.log(problem.rows))
     for place, variable, laws, columns in curves(problem, outputs):
         hats = _inner_products(beside, columns, len(laws[0][0]))
         pays = max(hats.gain(law) - price * freedom for law, freedom in laws)
@@ -78,11 +83,9 @@ class _Hats:
     def gain(self, law: Array) -> float:
         """Whitened squares that a law of hats, (hats, k), takes."""
         size = np.sqrt(np.maximum(np.diag(law.T @ self.plain @ law), _NOTHING))
-        values, vectors = np.linalg.eigh(law.T @ self.inner @ law / np.outer(size, size))
+        inner = law.T @ self.inner @ law / np.outer(size, size)
         # Measured by what they were: of what a fit explains whole only rounding is left.
-        kept = values > _UNIDENTIFIABLE
-        along = vectors[:, kept].T @ ((law.T @ self.products) / size)
-        return float(np.sum(along**2 / values[kept]))
+        return gain(inner, (law.T @ self.products) / size, _UNIDENTIFIABLE)
 
 
 def _inner_products(beside: Beside, columns: Columns, count: int) -> _Hats:

@@ -107,6 +107,10 @@ class Effect:
         """A parameter by name."""
         return next(p for p in self.parameters if p.name == name)
 
+    def nested_with(self, other: Effect) -> bool:
+        """Whether one of the two laws is a case of the other."""
+        return other.id in self.contains or self.id in other.contains
+
     @property
     def of_robots(self) -> bool:
         """Whether only a robot can have it."""
