@@ -24,54 +24,75 @@ def calm_motions(
     """Motions whose rope force and temperature carry no noise, one per run.
 
     The acceleration of the rope is what repeats agree on; a measured force is what follows it
-    and, of the rest, what repeats agree on; a known weight's force follows it alone.
+    and, of the rest, what repeats agree on; a known weight's force follows it alone. How far
+    differences have rounded the acceleration a measured force tells as well; for a known weight
+    it is an unknown of the fit.
     """
     out = list(motions)
     for group in repeats:
-        weights = [_unit_weight(line, signals[index]) for index in group.runs]
-        follow = [w.mean() + s for w, s in zip(weights, _shared(weights, group), strict=True)]
-        forces = _forces([signals[index] for index in group.runs], follow, group)
-        for index, force in zip(group.runs, forces, strict=True):
-            out[index] = _with(out[index], force, signals[index].temperature)
+        own = [signals[index] for index in group.runs]
+        units = [_unit_weight(line, s) for s in own]
+        follow = _shared([load for load, _ in units], group)
+        rounding = _shared([rounding for _, rounding in units], group)
+        moved = [np.column_stack(pair) for pair in zip(follow, rounding, strict=True)]
+        for index, force, r in zip(group.runs, _forces(own, moved, group), rounding, strict=True):
+            out[index] = _with(out[index], force, r, signals[index].temperature)
     return out
 
 
-def _unit_weight(line: Line, signals: Signals) -> Array:
-    """What one kilogram would pull, m/s²."""
-    weight = line.motion(replace(signals, load=None, tension=None, load_mass=1.0)).load
-    assert weight is not None
-    return weight
+def _unit_weight(line: Line, signals: Signals) -> tuple[Array, Array]:
+    """What one kilogram would pull, m/s², and how far differences may have rounded that."""
+    motion = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
+    assert motion.load is not None
+    assert motion.rounding is not None
+    return motion.load, motion.rounding
 
 
 def _shared(values: Sequence[Array], group: Repeats) -> list[Array]:
-    """What repeats agree on, about each one's mean."""
-    return agreed([value - value.mean() for value in values], group.rows)
+    """What repeats agree on, and the mean; where a run has no repeat, its own without noise."""
+    about = [value - value.mean() for value in values]
+    out = []
+    for value, own, shared, rows in zip(
+        values, about, agreed(about, group.rows), group.rows, strict=True
+    ):
+        alone = np.ones(len(own), dtype=bool)
+        alone[rows] = False
+        if alone.any():
+            shared[alone] = quiet(own)[alone]
+        out.append(shared + value.mean())
+    return out
 
 
 def _forces(
-    signals: Sequence[Signals], follow: Sequence[Array], group: Repeats
+    signals: Sequence[Signals], moved: Sequence[Array], group: Repeats
 ) -> list[Array | None]:
-    """Rope force of every run of a group; None where none is known."""
+    """Rope force of every run of a group; None where none is known.
+
+    ``moved`` (n, 2) of each run is what a unit weight pulls, and its rounding.
+    """
     measured = [s.load if s.load is not None else s.tension for s in signals]
     known = [s.load_mass if s.load is None else None for s in signals]
     if all(mass is not None for mass in known):
-        return [mass * f for mass, f in zip(known, follow, strict=True) if mass is not None]
+        pairs = zip(known, moved, strict=True)
+        return [mass * pulled[:, 0] for mass, pulled in pairs if mass is not None]
     values = [value for value in measured if value is not None]
     if len(values) < len(signals):
         return [None] * len(signals)
-    followed = [_followed(v, f) for v, f in zip(values, follow, strict=True)]
+    followed = [_followed(v, f) for v, f in zip(values, moved, strict=True)]
     rest = agreed([v - f for v, f in zip(values, followed, strict=True)], group.rows)
     return [f + r for f, r in zip(followed, rest, strict=True)]
 
 
-def _followed(force: Array, weight: Array) -> Array:
+def _followed(force: Array, moved: Array) -> Array:
     """The part of a force that is constant or follows the rope's acceleration."""
-    columns = np.column_stack([np.ones_like(force), weight - weight.mean()])
+    columns = np.column_stack([np.ones_like(force), moved - moved.mean(axis=0)])
     return np.asarray(columns @ np.linalg.lstsq(columns, force, rcond=None)[0])
 
 
-def _with(motion: Motion, force: Array | None, temperature: Array | None) -> Motion:
-    """A motion with a calm rope force and temperature."""
+def _with(
+    motion: Motion, force: Array | None, rounding: Array, temperature: Array | None
+) -> Motion:
+    """A motion with a calm rope force and temperature; ``rounding`` is that of a unit weight."""
     at = motion.at
     if temperature is not None:
         at = replace(at, temperature=quiet(temperature))
@@ -82,4 +103,5 @@ def _with(motion: Motion, force: Array | None, temperature: Array | None) -> Mot
         at=replace(at, tension=force),
         load=None if motion.load is None else force,
         drum_tension=None if motion.drum_tension is None else force,
+        rounding=None if motion.load_mass is None else motion.load_mass * rounding,
     )

@@ -20,7 +20,7 @@ from winchkit.effects.coordinates import Coordinates
 __all__ = ["Doubt", "judge_and_doubt"]
 
 Array = NDArray[np.float64]
-_SLIGHT = 1e-3
+_SLIGHT = 2e-4
 """Share of what a name explains by which the physics of a real part may differ from its formula."""
 
 
@@ -32,9 +32,9 @@ def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
     always left, and a doubt of one addition is told only.
     """
     judgement = judge(inquiry, found)
-    if judgement.verdict != "explained":
-        return judgement
     doubt = Doubt(inquiry, found)
+    if judgement.shown is not found or not doubt.added:
+        return judgement
     terms = doubt.terms
     if curve := doubt.beaten(doubt.added):
         return withheld(inquiry, found, 1.0, _words(terms, terms, curve))
@@ -53,7 +53,7 @@ def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
     inquiry, found = doubt.inquiry, doubt.found
     doubted = found.final.hypothesis.terms[index : index + 1]
     without = judge_and_doubt(inquiry, without_term(inquiry, found, index))
-    if without.verdict == "explained":
+    if without.shown.final.labels[inquiry.given :]:
         return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
     share = doubt.taken([index]) / doubt.taken(doubt.added)
     return withheld(inquiry, found, min(1.0, share), _words(doubt.terms, doubted, curve))

@@ -6,6 +6,7 @@ with a tolerance in units of χ² are ten times quicker here than a general solv
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,13 +14,15 @@ from numpy.typing import NDArray
 
 from winchkit.diagnosis.problem import Hypothesis, Problem
 
-__all__ = ["Fit", "fit"]
+__all__ = ["Fit", "fit", "fit_from"]
 
 Array = NDArray[np.float64]
 _ITERATIONS = 15
 _PATIENT = 40
 _ENOUGH = 0.02
 _FORGET = 1e-9
+_LOOK = 8
+_PROMISING = 2
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,11 @@ class Fit:
         return tuple(term.label for term in self.hypothesis.terms)
 
 
-def fit(problem: Problem, start: Hypothesis, weight: Array) -> Fit:
-    """Fit all unknowns from ``start``; ``weight`` is 1/σ per row. Bounds are kept."""
+def fit(problem: Problem, start: Hypothesis, weight: Array, most: int | None = None) -> Fit:
+    """Fit all unknowns from ``start``; ``weight`` is 1/σ per row. Bounds are kept.
+
+    ``most`` is how many steps it may take, by default as many as are worth walking.
+    """
     x = problem.vector(start)
     low, high = problem.bounds(start)
     x = np.clip(x, low, high)
@@ -51,7 +57,7 @@ def fit(problem: Problem, start: Hypothesis, weight: Array) -> Fit:
     cost = _cost(residual, weight)
     damping = 1e-6
     jacobian = problem.jacobian(x, start)
-    for _ in range(_iterations(start) if len(x) else 0):
+    for _ in range((most or _iterations(start)) if len(x) else 0):
         step, promised = _step(
             jacobian * weight[:, None], residual * weight, damping, x, (low, high)
         )
@@ -72,6 +78,15 @@ def fit(problem: Problem, start: Hypothesis, weight: Array) -> Fit:
                 break
     fitted = problem.hypothesis(x, start)
     return Fit(fitted, x, residual, jacobian, cost, len(x))
+
+
+def fit_from(problem: Problem, starts: Sequence[Hypothesis], weight: Array) -> Fit:
+    """The best fit from several starts; after a first look only from the most promising ones."""
+    if len(starts) > _PROMISING:
+        looked = [fit(problem, start, weight, _LOOK) for start in starts]
+        looked.sort(key=lambda fitted: fitted.cost)
+        starts = [fitted.hypothesis for fitted in looked[:_PROMISING]]
+    return min((fit(problem, start, weight) for start in starts), key=lambda fitted: fitted.cost)
 
 
 def _iterations(start: Hypothesis) -> int:

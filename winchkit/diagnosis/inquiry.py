@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.begun import rests_on_states
-from winchkit.diagnosis.fit import Fit, fit
+from winchkit.diagnosis.fit import Fit, fit, fit_from
 from winchkit.diagnosis.gate import (
     Folds,
     blocks_of,
@@ -197,7 +197,7 @@ class Inquiry:
             hypothesis.with_term(Term(effect, values), self.problem.runs)
             for values in self._placed(hypothesis, present, item, weight)
         ]
-        fitted = min((fit(self.problem, start, weight) for start in begun), key=lambda f: f.cost)
+        fitted = fit_from(self.problem, begun, weight)
         disguised = in_disguise(fitted.hypothesis.terms[-1])
         simpler = with_fewer_coefficients(effect) if disguised else None
         if simpler is not None:

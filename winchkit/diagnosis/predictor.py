@@ -7,7 +7,8 @@ moves one part of the line only. So every part is kept with the terms that it ca
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.spectrum import to_frequency
 from winchkit.effects.bind import Term, modifiers_of
-from winchkit.model.line import Line
+from winchkit.model.derivatives import span_of
+from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Stage, Way
 from winchkit.schema.winch import WinchProfile
 
@@ -41,11 +43,11 @@ class Predictor:
     def __init__(self, profile: WinchProfile, recording: Recording) -> None:
         self._profile = profile
         self._recording = recording
-        self._motion = recording.smooth
         self._kept: dict[str, OrderedDict[Hashable, Any]] = {}
         # A measured load does not care how the rope is paid out; a known weight does.
-        force = _FORCE if self._motion.load_mass is None else _WAY + _FORCE
-        self._stages = {
+        force = _FORCE if recording.smooth.load_mass is None else _WAY + _FORCE
+        self._stages: dict[str, tuple[Stage, ...]] = {
+            "nominal": (),
             "way": _WAY,
             "force": force,
             "cable_length": _WAY + _SHOWN["cable_length"],
@@ -53,45 +55,72 @@ class Predictor:
             "motor_torque": _WAY + force + _SHOWN["motor_torque"],
         }
 
-    def change(self, output: str, terms: Sequence[Term]) -> Array:
-        """Coefficients of what the terms change in an output, (kept,); zero where not compared."""
+    def change(self, output: str, terms: Sequence[Term], sharper: float | None = None) -> Array:
+        """Coefficients of what the terms change in an output, (kept,); zero where not compared.
+
+        ``sharper`` is the share of its rounding that a known weight's force is given back: a loop
+        that turns around where the rope is quickest to speed up depends on it.
+        """
 
         def compute() -> Array:
             recording = self._recording
-            moved = self._shown(output, terms) - recording.nominal_smooth[output]
-            return masked(recording, output, moved)
+            motion = self._motion(sharper)
+            moved = self._shown(output, motion, terms, sharper)
+            return masked(recording, output, moved - self._nominal(motion, sharper)[output])
 
-        return self._remembered(output, terms, compute)
+        return self._remembered(output, terms, sharper, compute)
 
-    def _shown(self, output: str, terms: Sequence[Term]) -> Array:
-        line, at, way = self._line(terms), self._motion.at, self._way(terms)
+    def _motion(self, sharper: float | None) -> Motion:
+        smooth = self._recording.smooth
+        if sharper is None or smooth.load is None or smooth.rounding is None:
+            return smooth
+        load = smooth.load + sharper * smooth.rounding
+        # Differences of differences round by h²/3 of the fourth derivative, those here by span²/12.
+        time = smooth.at.time
+        most = (float(np.median(np.diff(time))) / span_of(time)) ** 2 / 3
+        rounded = float(np.clip((sharper + 1 / 12) / most, 0.0, 1.0))
+        return replace(smooth, at=replace(smooth.at, tension=load), load=load, rounded=rounded)
+
+    def _nominal(self, motion: Motion, sharper: float | None) -> Mapping[str, Array]:
+        def compute() -> Mapping[str, Array]:
+            if motion is self._recording.smooth:
+                return self._recording.nominal_smooth
+            return self._line(()).predict(motion)
+
+        return self._remembered("nominal", (), sharper, compute)
+
+    def _shown(self, output: str, motion: Motion, terms: Sequence[Term], sharper: float | None) -> Array:
+        line, at, way = self._line(terms), motion.at, self._way(terms)
         if output == "cable_length":
             return line.shown_length(at, way)
         if output == "tension":
-            return line.shown_tension(at, self._force(terms))
-        return line.shown_torque(at, way, self._force(terms))
+            return line.shown_tension(at, self._force(motion, terms, sharper))
+        return line.shown_torque(at, way, self._force(motion, terms, sharper))
 
     def _way(self, terms: Sequence[Term]) -> Way:
         def compute() -> Way:
-            return self._line(terms).way(self._motion.at)
+            return self._line(terms).way(self._recording.smooth.at)
 
-        return self._remembered("way", terms, compute)
+        return self._remembered("way", terms, None, compute)
 
-    def _force(self, terms: Sequence[Term]) -> Array:
+    def _force(self, motion: Motion, terms: Sequence[Term], sharper: float | None) -> Array:
         def compute() -> Array:
-            return self._line(terms).drum_side(self._motion, self._way(terms))
+            return self._line(terms).drum_side(motion, self._way(terms))
 
-        return self._remembered("force", terms, compute)
+        return self._remembered("force", terms, sharper, compute)
 
     def _line(self, terms: Sequence[Term]) -> Line:
         return Line(self._profile, modifiers_of(terms))
 
-    def _remembered(self, part: str, terms: Sequence[Term], compute: Callable[[], Part]) -> Part:
+    def _remembered(
+        self, part: str, terms: Sequence[Term], sharper: float | None, compute: Callable[[], Part]
+    ) -> Part:
         """A part of the prediction from the terms that act on it, computed or kept."""
         stages = self._stages[part]
-        key = tuple(
+        own = (
             (term.effect.id, *term.values.items()) for term in terms if term.effect.stage in stages
         )
+        key = (sharper, *own)
         kept = self._kept.setdefault(part, OrderedDict())
         if key not in kept:
             kept[key] = compute()

@@ -77,9 +77,10 @@ class Problem:
         offset, rounding = self._offset_column(), self._rounding_column()
         self.fits_offset = bool(np.any(offset))
         """Whether the length instrument's offset is an unknown; it is the first one then."""
+        self._rounds = bool(np.any(rounding))
         present = [column for column in (offset, rounding) if np.any(column)]
         self.nuisance_columns = np.array(present).reshape(len(present), self.rows).T
-        """Linear in their unknowns, (rows, nuisances)."""
+        """By their unknowns, (rows, nuisances); the rounding is the last, where it is one."""
 
     @cached_property
     def band_of_row(self) -> NDArray[np.intp]:
@@ -114,10 +115,11 @@ class Problem:
         if not hypothesis.terms:
             return np.zeros(self.rows)
         terms = [started(hypothesis, run) for run in range(self.runs)]
+        sharper = hypothesis.nuisances[-1] if self._rounds and hypothesis.nuisances else None
         out = np.empty(self.rows)
         for segment in self.segments:
             predictor = self._predictors[segment.run]
-            out[segment.rows] = predictor.change(segment.output, terms[segment.run])
+            out[segment.rows] = predictor.change(segment.output, terms[segment.run], sharper)
         return out
 
     def residual(self, hypothesis: Hypothesis) -> Array:
@@ -182,13 +184,16 @@ class Problem:
         states = sum(len(start) for start in like.starts)
         count = self.nuisance_columns.shape[1]
         out[:, :count] = self.nuisance_columns
-        for index in range(count, len(vector) - states):
+        # What sharpens a weight's force also acts through the terms.
+        through = [count - 1] if self._rounds and like.terms else []
+        for index in (*through, *range(count, len(vector) - states)):
             step = 1e-3 * max(1.0, abs(vector[index]))
             if vector[index] + step > high[index]:
                 step = -step
             moved = vector.copy()
             moved[index] += step
-            out[:, index] = (self.change(self.hypothesis(moved, like)) - here) / step
+            own = self.nuisance_columns[:, index] if index < count else 0.0
+            out[:, index] = own + (self.change(self.hypothesis(moved, like)) - here) / step
         self._by_states(out, vector, like, here, len(vector) - states)
         return out
 

@@ -44,7 +44,7 @@ class Judgement:
 
 
 def judge(inquiry: Inquiry, found: Found) -> Judgement:
-    """Decide the verdict; while something is unexplained no addition is named.
+    """Decide the verdict; while more than a trace is unexplained no addition is named.
 
     A name would be a guess then: something outside the catalogue is often imitated by an effect
     inside it. The candidates stay, and a note says what came closest.
@@ -58,6 +58,10 @@ def judge(inquiry: Inquiry, found: Found) -> Judgement:
     added = found.final.labels[inquiry.given :]
     if verdict == "explained" or not added:
         return Judgement(verdict, share, outputs, found, ())
+    if share < _TRACE and found.noise.from_repeats:
+        # Nothing but the effect itself explains so much of what is so far above the noise.
+        note = f"beside {', '.join(added)} {share:.1%} of what was missing is still unexplained"
+        return Judgement(verdict, share, outputs, found, (note,))
     note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
     return withheld(inquiry, found, share, note)
 

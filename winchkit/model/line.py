@@ -48,6 +48,8 @@ class Motion:
     """The weight whose acceleration makes the load, kg, where no instrument measures it."""
     rounding: Array | None = None
     """Curvature of that load over the span of its differences, N: how far it may be rounded."""
+    rounded: float = 0.0
+    """Of what the line adds to that load's acceleration, the share that is rounded, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -180,6 +182,9 @@ class Line:
         paid_out = (self._pace(at.motor_angle) - way.arm) * at.motor_rate
         rest = sharp_gradient(way.free_length - at.free_length, at.time) - paid_out
         added = sharp_gradient(paid_out, at.time) + wide_gradient(rest, at.time)
+        if motion.rounded:
+            twice = np.gradient(np.gradient(way.free_length - at.free_length, at.time), at.time)
+            added = added + motion.rounded * (twice - added)
         return load - motion.load_mass * added
 
     def drum_side(self, motion: Motion, way: Way) -> Array:

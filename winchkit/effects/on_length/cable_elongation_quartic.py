@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 _SOFTEST = 0.1
 _TABLE = 513
 _NEWTON_STEPS = 4
-_LAST_STEP = 1e-8
+_LAST_STEP = 1e-5
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
@@ -41,7 +41,7 @@ def _solve(force: Array, law: Polynomial) -> Array:
         value, rate = reach(strain)
         step = (value - force) / rate
         strain = strain - step
-        # Steps shrink by their square: after one this small the rest is rounding.
+        # Steps shrink by their square: after one this small the rest is a 10⁻¹⁰.
         if np.max(np.abs(step), initial=0.0) < _LAST_STEP * table[-1]:
             break
     return strain
