@@ -28,13 +28,13 @@ def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
     alone = {s.atom.effect.id: s.gain for s in scores}
     projected = inquiry.projected(present, noise)
     pairs = couples(projected, present.residual, scores, inquiry.price)
-    named = [{a.atom.effect.id, b.atom.effect.id} for a, b in pairs]
+    named = [{item.atom.effect.id for item in pair.scores} for pair in pairs if pair.hidden]
     assert {"cell-gain", "cell-offset"} in named
     assert alone["cell-offset"] < 0.5 * present.cost
-    assert len(pairs) <= 3
+    assert [pair.pays for pair in pairs] == sorted((p.pays for p in pairs), reverse=True)
 
 
-def test_both_are_fitted_side_by_side_but_not_upon_what_is_there() -> None:
+def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() -> None:
     inquiry = inquire(prepare(RUNS, GROOVED), load_catalogue())
     present, noise = inquiry.settle(inquiry.begin)
     grown = _coupled(inquiry, present, noise, inquiry.scores(present, noise))
@@ -45,4 +45,6 @@ def test_both_are_fitted_side_by_side_but_not_upon_what_is_there() -> None:
     assert abs(offset.values["offset"] - 9.8) < 1.0
     other = present.hypothesis.with_term(term("motor-coulomb", torque=1e-3), inquiry.problem.runs)
     begun, noise = inquiry.settle(other)
-    assert _coupled(inquiry, begun, noise, inquiry.scores(begun, noise)) is None
+    exchanged = _coupled(inquiry, begun, noise, inquiry.scores(begun, noise))
+    assert exchanged is not None
+    assert set(exchanged.labels) == {"cell-gain", "cell-offset"}

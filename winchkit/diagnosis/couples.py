@@ -7,6 +7,7 @@ taken one at a time neither would ever be added.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -15,21 +16,33 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.gain import gain
 from winchkit.diagnosis.signature import Atom, Projected, Score
 
-__all__ = ["couples"]
+__all__ = ["Couple", "couples"]
 
 Array = NDArray[np.float64]
-_MOST = 3
 _TOGETHER = 1.5
 _UNIDENTIFIABLE = 1e-5
 
 
+@dataclass(frozen=True)
+class Couple:
+    """Two candidates side by side."""
+
+    scores: tuple[Score, Score]
+    taken: float
+    """Whitened squares."""
+    pays: float
+    """The same less the price of their degrees of freedom."""
+
+    @property
+    def hidden(self) -> bool:
+        """Whether they take far more together than the one and the other."""
+        return self.taken > _TOGETHER * sum(item.gain for item in self.scores)
+
+
 def couples(
     projected: Projected, residual: Array, scores: Sequence[Score], price: float
-) -> list[tuple[Score, Score]]:
-    """Pairs of candidates, best first, that take far more together than the one and the other.
-
-    ``price`` is what a degree of freedom must save; pairs that do not pay are left out.
-    """
+) -> list[Couple]:
+    """Pairs of candidates that pay, best first; ``price`` is what a degree of freedom must save."""
     products = projected.products(residual)
     size = np.sqrt(np.maximum(np.diag(projected.inner), 1e-300))
     inner, products = projected.inner / np.outer(size, size), products / size
@@ -40,10 +53,9 @@ def couples(
             continue
         taken = _together(inner, products, one, other)
         pays = taken - price * (one.freedom + other.freedom)
-        if pays > 0 and taken > _TOGETHER * (first.gain + second.gain):
-            found.append((pays, (first, second)))
-    found.sort(key=lambda item: -item[0])
-    return [pair for _, pair in found[:_MOST]]
+        if pays > 0:
+            found.append(Couple((first, second), taken, pays))
+    return sorted(found, key=lambda couple: -couple.pays)
 
 
 def _together(inner: Array, products: Array, one: Atom, other: Atom) -> float:

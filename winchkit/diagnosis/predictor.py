@@ -26,6 +26,8 @@ __all__ = ["Predictor", "masked"]
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
+Sharper = float | None
+"""The share of its rounding that a known weight's force is given back; None leaves it as it is."""
 _KEPT = 3
 """The hypothesis at hand, the one moved from it, and the one it came from."""
 _WAY = (Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND)
@@ -47,6 +49,7 @@ class Predictor:
         # A measured load does not care how the rope is paid out; a known weight does.
         force = _FORCE if recording.smooth.load_mass is None else _WAY + _FORCE
         self._stages: dict[str, tuple[Stage, ...]] = {
+            "motion": (),
             "nominal": (),
             "way": _WAY,
             "force": force,
@@ -55,47 +58,37 @@ class Predictor:
             "motor_torque": _WAY + force + _SHOWN["motor_torque"],
         }
 
-    def change(self, output: str, terms: Sequence[Term], sharper: float | None = None) -> Array:
-        """Coefficients of what the terms change in an output, (kept,); zero where not compared.
-
-        ``sharper`` is the share of its rounding that a known weight's force is given back: a loop
-        that turns around where the rope is quickest to speed up depends on it.
-        """
+    def change(self, output: str, terms: Sequence[Term], sharper: Sharper = None) -> Array:
+        """Coefficients of what the terms change in an output, (kept,); zero where not compared."""
 
         def compute() -> Array:
-            recording = self._recording
-            motion = self._motion(sharper)
-            moved = self._shown(output, motion, terms, sharper)
-            return masked(recording, output, moved - self._nominal(motion, sharper)[output])
+            moved = self._shown(output, terms, sharper) - self._nominal(sharper)[output]
+            return masked(self._recording, output, moved)
 
         return self._remembered(output, terms, sharper, compute)
 
-    def _motion(self, sharper: float | None) -> Motion:
+    def _motion(self, sharper: Sharper) -> Motion:
         smooth = self._recording.smooth
-        if sharper is None or smooth.load is None or smooth.rounding is None:
+        if sharper is None:
             return smooth
-        load = smooth.load + sharper * smooth.rounding
-        # Differences of differences round by h²/3 of the fourth derivative, those here by span²/12.
-        time = smooth.at.time
-        most = (float(np.median(np.diff(time))) / span_of(time)) ** 2 / 3
-        rounded = float(np.clip((sharper + 1 / 12) / most, 0.0, 1.0))
-        return replace(smooth, at=replace(smooth.at, tension=load), load=load, rounded=rounded)
+        return self._remembered("motion", (), sharper, lambda: _sharpened(smooth, sharper))
 
-    def _nominal(self, motion: Motion, sharper: float | None) -> Mapping[str, Array]:
+    def _nominal(self, sharper: Sharper) -> Mapping[str, Array]:
+        if sharper is None:
+            return self._recording.nominal_smooth
+
         def compute() -> Mapping[str, Array]:
-            if motion is self._recording.smooth:
-                return self._recording.nominal_smooth
-            return self._line(()).predict(motion)
+            return self._line(()).predict(self._motion(sharper))
 
         return self._remembered("nominal", (), sharper, compute)
 
-    def _shown(self, output: str, motion: Motion, terms: Sequence[Term], sharper: float | None) -> Array:
-        line, at, way = self._line(terms), motion.at, self._way(terms)
+    def _shown(self, output: str, terms: Sequence[Term], sharper: Sharper) -> Array:
+        line, at, way = self._line(terms), self._motion(sharper).at, self._way(terms)
         if output == "cable_length":
             return line.shown_length(at, way)
         if output == "tension":
-            return line.shown_tension(at, self._force(motion, terms, sharper))
-        return line.shown_torque(at, way, self._force(motion, terms, sharper))
+            return line.shown_tension(at, self._force(terms, sharper))
+        return line.shown_torque(at, way, self._force(terms, sharper))
 
     def _way(self, terms: Sequence[Term]) -> Way:
         def compute() -> Way:
@@ -103,9 +96,9 @@ class Predictor:
 
         return self._remembered("way", terms, None, compute)
 
-    def _force(self, motion: Motion, terms: Sequence[Term], sharper: float | None) -> Array:
+    def _force(self, terms: Sequence[Term], sharper: Sharper) -> Array:
         def compute() -> Array:
-            return self._line(terms).drum_side(motion, self._way(terms))
+            return self._line(terms).drum_side(self._motion(sharper), self._way(terms))
 
         return self._remembered("force", terms, sharper, compute)
 
@@ -113,7 +106,7 @@ class Predictor:
         return Line(self._profile, modifiers_of(terms))
 
     def _remembered(
-        self, part: str, terms: Sequence[Term], sharper: float | None, compute: Callable[[], Part]
+        self, part: str, terms: Sequence[Term], sharper: Sharper, compute: Callable[[], Part]
     ) -> Part:
         """A part of the prediction from the terms that act on it, computed or kept."""
         stages = self._stages[part]
@@ -134,3 +127,18 @@ class Predictor:
 def masked(recording: Recording, output: str, signal: Array) -> Array:
     """Coefficients of a signal within its band, zero where the output is not compared, (kept,)."""
     return to_frequency(np.where(recording.valid[output], signal, 0.0), recording.bands[output])
+
+
+def _sharpened(motion: Motion, sharper: float) -> Motion:
+    """A motion with a known weight's force given back what differences rounded off.
+
+    Loops depend on it: they turn around where the rope is quickest to speed up.
+    """
+    if motion.load is None or motion.rounding is None:
+        return motion
+    load, time = motion.load + sharper * motion.rounding, motion.at.time
+    # Over a span the second difference is off by span²/12 of the fourth derivative; that of a
+    # simulation that differentiates twice over steps h by h²/3: as far is what the line adds.
+    twice = (float(np.median(np.diff(time))) / span_of(time)) ** 2 / 3
+    rounded = float(np.clip((sharper + 1 / 12) / twice, 0.0, 1.0))
+    return replace(motion, at=replace(motion.at, tension=load), load=load, rounded=rounded)

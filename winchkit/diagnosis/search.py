@@ -12,6 +12,7 @@ from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import confidence, held_out, held_out_rms
 from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
+from winchkit.diagnosis.recouple import recoupled
 from winchkit.diagnosis.signature import Score, chance_level
 from winchkit.effects.coordinates import Coordinates
 
@@ -22,6 +23,7 @@ _MOST_STEPS = 6
 _SHORT_LIST = 5
 _RIVALS = 2
 _RECONSIDERED = 3
+_COUPLES = 3
 _PRESENCE_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
 _GATE_LEVEL = 0.02
@@ -124,13 +126,17 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
 def _coupled(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
-    Only to begin with: pairs upon what is there already would piece together what nobody knows.
+    Later only in exchange for an addition: pairs upon what is there already would piece together
+    what nobody knows.
     """
-    begun = len(present.hypothesis.terms) > inquiry.given
-    if begun or not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
+    if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
         return None
+    if len(present.hypothesis.terms) > inquiry.given:
+        better = recoupled(inquiry, present, noise, 1)
+        return None if better is present else better
     pairs = couples(inquiry.projected(present, noise), present.residual, scores, inquiry.price)
-    trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in pairs]
+    hidden = [pair.scores for pair in pairs if pair.hidden][:_COUPLES]
+    trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in hidden]
     return _grow(inquiry, present, noise, trials)
 
 
@@ -188,6 +194,7 @@ def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Nois
     for _ in range(_RECONSIDERED):
         before = present.labels
         present = _replaced(inquiry, _without_the_needless(inquiry, present, noise), noise)
+        present = recoupled(inquiry, present, noise, 2)
         present = _without_the_needless(inquiry, present, noise)
         if present.labels == before or len(present.hypothesis.terms) < inquiry.given + 2:
             break

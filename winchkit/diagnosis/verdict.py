@@ -56,12 +56,10 @@ def judge(inquiry: Inquiry, found: Found) -> Judgement:
     )
     verdict = _verdict(found, outputs, share)
     added = found.final.labels[inquiry.given :]
-    if verdict == "explained" or not added:
+    # Nothing but the effect itself explains nearly all of what is far above the noise.
+    nearly = share < _TRACE and found.noise.from_repeats
+    if verdict == "explained" or nearly or not added:
         return Judgement(verdict, share, outputs, found, ())
-    if share < _TRACE and found.noise.from_repeats:
-        # Nothing but the effect itself explains so much of what is so far above the noise.
-        note = f"beside {', '.join(added)} {share:.1%} of what was missing is still unexplained"
-        return Judgement(verdict, share, outputs, found, (note,))
     note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
     return withheld(inquiry, found, share, note)
 

@@ -1,0 +1,49 @@
+"""Two effects in exchange for one or two that the search took first.
+
+Taken one at a time, the first of two effects may be one that stands for a part of both; the second
+then makes up for it, and neither is there. A pair that explains more is found side by side.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from winchkit.diagnosis.couples import couples
+from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.inquiry import Inquiry
+from winchkit.diagnosis.noise import Noise
+
+__all__ = ["recoupled"]
+
+_BETTER = 2.0
+
+
+def recoupled(inquiry: Inquiry, present: Fit, noise: Noise, exchanged: int) -> Fit:
+    """The present fit, or one with a better pair in the place of ``exchanged`` additions."""
+    added = range(inquiry.given, len(present.hypothesis.terms))
+    for indices in combinations(added, exchanged):
+        better = _better(inquiry, present, noise, indices)
+        if better is not None:
+            return better
+    return present
+
+
+def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ...]) -> Fit | None:
+    """A fit with a pair that pays more than the terms at ``indices`` do; None where none does."""
+    hypothesis = present.hypothesis
+    for index in reversed(indices):
+        hypothesis = hypothesis.without(index)
+    base = inquiry.refit(hypothesis, noise)
+    pays = inquiry.criterion(base) - inquiry.criterion(present) + _BETTER
+    pairs = couples(
+        inquiry.projected(base, noise), base.residual, inquiry.scores(base, noise), inquiry.price
+    )
+    own = {hypothesis_term.effect.id for hypothesis_term in present.hypothesis.terms}
+    for pair in pairs:
+        if pair.pays <= pays or {item.atom.effect.id for item in pair.scores} <= own:
+            continue
+        first, second = pair.scores
+        trial = inquiry.trial(inquiry.trial(base, first, noise).fit, second, noise)
+        if trial.criterion < inquiry.criterion(present) - _BETTER:
+            return trial.fit
+    return None
