@@ -5,24 +5,21 @@ from __future__ import annotations
 import pytest
 from diagnosis_runs import CATALOGUE, term
 
-from winchkit.diagnosis.shapes import in_disguise, with_fewer_coefficients
-from winchkit.effects.effect import Effect
+from winchkit.diagnosis.shapes import by_coefficients, in_disguise
 
 
-def test_coefficients_are_given_up_from_the_last() -> None:
-    law: Effect | None = CATALOGUE["cable-elongation-quartic"]
+def test_coefficients_are_taken_from_the_first() -> None:
     fitted = []
-    while law is not None:
+    for law in by_coefficients(CATALOGUE["cable-elongation-quartic"]):
         fitted.append([p.name for p in law.parameters if p.role != "fixed"])
         assert all(name in fitted[-1] for probe in law.probes for name in probe)
-        law = with_fewer_coefficients(law)
-    assert fitted == [["k1", "b2", "b3", "b4"], ["k1", "b2", "b3"], ["k1", "b2"]]
+    assert fitted == [["k1", "b2"], ["k1", "b2", "b3"], ["k1", "b2", "b3", "b4"]]
 
 
 def test_what_is_no_series_keeps_its_shapes() -> None:
     for effect in CATALOGUE:
         if effect.id != "cable-elongation-quartic":
-            assert with_fewer_coefficients(effect) is None, effect.id
+            assert by_coefficients(effect) == [effect], effect.id
 
 
 @pytest.mark.parametrize(("static", "disguised"), [(0.03, False), (0.01, True)])

@@ -30,7 +30,7 @@ from winchkit.diagnosis.noise import (
 from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.resolution import without_rounding
-from winchkit.diagnosis.shapes import gap, in_disguise, starting_values, with_fewer_coefficients
+from winchkit.diagnosis.shapes import by_coefficients, gap, in_disguise, starting_values
 from winchkit.diagnosis.signature import Projected, Score, Signatures, score, signatures, worthless
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -186,7 +186,26 @@ class Inquiry:
         return fitted.cost + self.price * (freedom + states)
 
     def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
-        """Fit a candidate beside the present terms; those that it contains give way to it."""
+        """Fit a candidate beside the present terms; those that it contains give way to it.
+
+        Of a series it takes as many coefficients as pay, each added to what was fitted before.
+        """
+        laws = by_coefficients(item.atom.effect)
+        best: Trial | None = None
+        for law in laws:
+            probes = law.probes if len(laws) > 1 else item.atom.secants
+            if best is not None and np.isfinite(best.criterion):
+                probes = (best.fit.hypothesis.terms[-1].values,)
+            atom = replace(item.atom, effect=law, secants=tuple(dict(p) for p in probes))
+            longer = self._fitted(present, replace(item, atom=atom), noise)
+            if best is not None and not longer.criterion < best.criterion:
+                break
+            best = longer
+        assert best is not None
+        return best
+
+    def _fitted(self, present: Fit, item: Score, noise: Noise) -> Trial:
+        """One law fitted beside the present terms."""
         effect = item.atom.effect
         hypothesis = present.hypothesis
         for index in reversed(range(self.given, len(hypothesis.terms))):
@@ -198,14 +217,8 @@ class Inquiry:
             for values in self._placed(hypothesis, present, item, weight)
         ]
         fitted = fit_from(self.problem, begun, weight)
-        disguised = in_disguise(fitted.hypothesis.terms[-1])
-        simpler = with_fewer_coefficients(effect) if disguised else None
-        if simpler is not None:
-            return self.trial(
-                present, replace(item, atom=replace(item.atom, effect=simpler)), noise
-            )
         price = self.criterion(fitted)
-        if disguised or (
+        if in_disguise(fitted.hypothesis.terms[-1]) or (
             price < self.criterion(present) and self._rests_on_states(hypothesis, fitted, noise)
         ):
             price = np.inf

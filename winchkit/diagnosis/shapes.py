@@ -11,7 +11,7 @@ from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
 
-__all__ = ["gap", "in_disguise", "starting_values", "with_fewer_coefficients"]
+__all__ = ["by_coefficients", "gap", "in_disguise", "starting_values"]
 
 
 def in_disguise(term: Term) -> bool:
@@ -27,20 +27,22 @@ def in_disguise(term: Term) -> bool:
     return bool(np.any(ends[shapes]))
 
 
-def with_fewer_coefficients(effect: Effect) -> Effect | None:
-    """The effect with its last coefficient of a series held at zero; None where it has none.
+def by_coefficients(effect: Effect) -> list[Effect]:
+    """The effect with one coefficient of its series, with two, …, with all of them.
 
     A few loads show a law's first curvature, not its third: coefficients beyond what the data
-    can show run to their bounds, and the law without them is still that law.
+    can show run to their bounds, and the law without them is still that law. What has no series
+    is itself alone.
     """
     series = [p for p in effect.parameters if p.role == "shape" and p.low < p.null == 0.0 < p.high]
-    if len(series) < 2:
-        return None
-    last = series[-1]
-    held = replace(last, role="fixed")
-    parameters = tuple(held if p is last else p for p in effect.parameters)
-    probes = tuple(probe for probe in effect.probes if last.name not in probe)
-    return replace(effect, parameters=parameters, probes=probes)
+    out = [effect]
+    while len(series) > 1:
+        last, longer = series.pop(), out[0]
+        held = replace(last, role="fixed")
+        parameters = tuple(held if p is last else p for p in longer.parameters)
+        probes = tuple(probe for probe in longer.probes if last.name not in probe)
+        out.insert(0, replace(longer, parameters=parameters, probes=probes))
+    return out
 
 
 def gap(grid: tuple[float, ...], at: float) -> float:
