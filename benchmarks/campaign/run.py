@@ -6,7 +6,7 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
@@ -55,16 +55,20 @@ def run_cases(
 ) -> list[Score]:
     """Scores in the order of the plans; progress on stderr, each score as a line of ``log``."""
     work = [(seed * 100_000 + i, p, str(keep) if keep else None) for i, p in enumerate(plans)]
-    if jobs > 1:
-        with ProcessPoolExecutor(jobs) as pool:
-            return [got for got in pool.map(_one, work) if got is not None]
-    out = []
-    for job in work:
-        got = _one(job)
+    if jobs == 1:
+        return list(_told(zip(work, map(_one, work), strict=True), log))
+    with ProcessPoolExecutor(jobs) as pool:
+        return list(_told(zip(work, pool.map(_one, work), strict=True), log))
+
+
+def _told(
+    answers: Iterable[tuple[tuple[int, Plan, str | None], Score | None]], log: Path | None
+) -> Iterator[Score]:
+    """Answers as they come, each told and kept at once."""
+    for job, got in answers:
         if got is None:
             print(f"none {job[0]} cannot be made: {job[1]}", file=sys.stderr)
             continue
-        out.append(got)
         if log is not None:
             with log.open("a", encoding="utf-8") as lines:
                 lines.write(json.dumps(asdict(got)) + "\n")
@@ -76,4 +80,4 @@ def run_cases(
             file=sys.stderr,
             flush=True,
         )
-    return out
+        yield got

@@ -34,6 +34,11 @@ class Couple:
     """The same less the price of their degrees of freedom."""
 
     @property
+    def ids(self) -> set[str]:
+        """Names of the two."""
+        return {item.atom.effect.id for item in self.scores}
+
+    @property
     def hidden(self) -> bool:
         """Whether they take far more together than the one and the other."""
         return self.taken > _TOGETHER * sum(item.gain for item in self.scores)

@@ -16,6 +16,7 @@ from winchkit.diagnosis.noise import Noise
 __all__ = ["recoupled"]
 
 _BETTER = 2.0
+_TRIED = 2
 
 
 def recoupled(inquiry: Inquiry, present: Fit, noise: Noise, exchanged: int) -> Fit:
@@ -38,11 +39,9 @@ def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ..
     pairs = couples(
         inquiry.projected(base, noise), base.residual, inquiry.scores(base, noise), inquiry.price
     )
-    own = {hypothesis_term.effect.id for hypothesis_term in present.hypothesis.terms}
-    for pair in pairs:
-        if pair.pays <= pays or {item.atom.effect.id for item in pair.scores} <= own:
-            continue
-        first, second = pair.scores
+    there = set(present.labels)
+    promising = [pair for pair in pairs if pair.pays > pays and not pair.ids <= there]
+    for first, second in (pair.scores for pair in promising[:_TRIED]):
         trial = inquiry.trial(inquiry.trial(base, first, noise).fit, second, noise)
         if trial.criterion < inquiry.criterion(present) - _BETTER:
             return trial.fit
