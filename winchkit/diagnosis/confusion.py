@@ -14,6 +14,7 @@ from winchkit.diagnosis.gate import held_out
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.signature import Projected
+from winchkit.diagnosis.unseen import is_unseen
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
@@ -67,6 +68,8 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
         term = fitted.hypothesis.terms[-1]
         size = Coordinates(term.effect).freedom
         counted = _richer(own.effect, final, fitted)
+        if counted is False and own.effect.id in term.effect.contains:
+            counted = is_unseen(inquiry, final, noise, index, term.effect)
         if counted is None:
             theirs = held_out(inquiry.problem, fitted, noise, blocks)
             alike = fitted.cost < final.cost + _ALIKE

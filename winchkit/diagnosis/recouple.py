@@ -17,11 +17,14 @@ __all__ = ["recoupled"]
 
 _BETTER = 2.0
 _TRIED = 2
+_MOST = 3
 
 
 def recoupled(inquiry: Inquiry, present: Fit, noise: Noise, exchanged: int) -> Fit:
     """The present fit, or one with a better pair in the place of ``exchanged`` additions."""
     added = range(inquiry.given, len(present.hypothesis.terms))
+    if len(added) > _MOST:
+        return present  # So many stand for something that no pair is.
     for indices in combinations(added, exchanged):
         better = _better(inquiry, present, noise, indices)
         if better is not None:
@@ -39,8 +42,9 @@ def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ..
     pairs = couples(
         inquiry.projected(base, noise), base.residual, inquiry.scores(base, noise), inquiry.price
     )
-    there = set(present.labels)
-    promising = [pair for pair in pairs if pair.pays > pays and not pair.ids <= there]
+    leave = {present.hypothesis.terms[index].effect.id for index in indices}
+    # What is left of the exchange would be no more than an addition.
+    promising = [pair for pair in pairs if pair.pays > pays and len(pair.ids & leave) < len(leave)]
     for first, second in (pair.scores for pair in promising[:_TRIED]):
         trial = inquiry.trial(inquiry.trial(base, first, noise).fit, second, noise)
         if trial.criterion < inquiry.criterion(present) - _BETTER:

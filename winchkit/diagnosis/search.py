@@ -65,11 +65,12 @@ def search(inquiry: Inquiry) -> Found:
     threshold = max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
     tried: tuple[Fit, ...] = ()
     for _ in range(_MOST_STEPS):
-        if not scores or scores[0].value <= threshold:
-            break
-        trials = _short_list(inquiry, present, noise, scores)
-        tried = tried or _fits(trials)
-        grown = _grow(inquiry, present, noise, trials) or _coupled(inquiry, present, noise, scores)
+        grown: Fit | None = None
+        if scores and scores[0].value > threshold:
+            trials = _short_list(inquiry, present, noise, scores)
+            tried = tried or _fits(trials)
+            grown = _grow(inquiry, present, noise, trials)
+        grown = grown or _coupled(inquiry, present, noise, scores)
         if grown is None:
             break
         inquiry.look_again(grown.hypothesis)
@@ -133,7 +134,8 @@ def _coupled(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) 
         return None
     if len(present.hypothesis.terms) > inquiry.given:
         better = recoupled(inquiry, present, noise, 1)
-        return None if better is present else better
+        holds = better is not present and _holds(inquiry, present, better, noise)
+        return better if holds else None
     pairs = couples(inquiry.projected(present, noise), present.residual, scores, inquiry.price)
     hidden = [pair.scores for pair in pairs if pair.hidden][:_COUPLES]
     trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in hidden]
@@ -148,12 +150,12 @@ def _grow(inquiry: Inquiry, present: Fit, noise: Noise, trials: list[Trial]) -> 
     """The best of the short list that passes the gate, all refitted; None where none does."""
     before = inquiry.criterion(present)
     for trial in sorted(trials, key=lambda t: t.criterion):
-        if trial.criterion < before - _BETTER and _holds(inquiry, present, trial, noise):
+        if trial.criterion < before - _BETTER and _holds(inquiry, present, trial.fit, noise):
             return trial.fit
     return None
 
 
-def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
+def _holds(inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise) -> bool:
     """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
 
     An effect that shows in few blocks, such as those of one kind of move, cannot be certain by
@@ -162,25 +164,25 @@ def _holds(inquiry: Inquiry, present: Fit, trial: Trial, noise: Noise) -> bool:
     problem = inquiry.problem
     blocks = inquiry.blocks
     before = held_out(problem, present, noise, blocks)
-    after = held_out(problem, trial.fit, noise, blocks)
-    groups = inquiry.folds(trial.fit, noise)
-    gain = held_out(problem, present, noise, groups) - held_out(problem, trial.fit, noise, groups)
-    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _added(present, trial))
+    after = held_out(problem, grown, noise, blocks)
+    groups = inquiry.folds(grown, noise)
+    gain = held_out(problem, present, noise, groups) - held_out(problem, grown, noise, groups)
+    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _added(present, grown))
     if np.sum(before - after) <= 0 or (confidence(before, after) > _GATE_LEVEL and not pays):
         return False
     was = held_out_rms(problem, present, noise, groups)
-    now = held_out_rms(problem, trial.fit, noise, groups)
+    now = held_out_rms(problem, grown, noise, groups)
     ratios = [now[output] / was[output] for output in problem.dataset.outputs]
     # What is certain and changes nothing, such as a clock a millisecond off, is not worth a name.
     matters = min(ratios) < _MATTERS and max(ratios) < _NO_WORSE
     return bool(np.sum(gain) > 0) and matters
 
 
-def _added(present: Fit, trial: Trial) -> int:
-    """Degrees of freedom that a trial has more than the present model, one at least."""
+def _added(present: Fit, grown: Fit) -> int:
+    """Degrees of freedom that a grown model has more than the present model, one at least."""
     after, before = (
         sum(Coordinates(term.effect).freedom for term in fitted.hypothesis.terms)
-        for fitted in (trial.fit, present)
+        for fitted in (grown, present)
     )
     return max(1, after - before)
 

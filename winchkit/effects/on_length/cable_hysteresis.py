@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
+from winchkit.model.turning import with_turning_points
 
 Array = NDArray[np.float64]
 _STUCK = 0.5
@@ -19,8 +20,9 @@ def apply(length: Array, at: At, values: Values) -> Array:
     """
     if values["fraction"] == 0.0:
         return length
-    limit = values["fraction"] * np.abs(at.tension)
-    held = dahl(at.tension, limit, _STUCK, start=values["start"])
+    tension, own = with_turning_points(at.tension)
+    limit = values["fraction"] * np.abs(tension)
+    held = dahl(tension, limit, _STUCK, start=values["start"])[own]
     return length - at.stressed_length * held / values["stiffness"]
 
 

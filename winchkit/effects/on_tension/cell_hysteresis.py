@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
+from winchkit.model.turning import with_turning_points
 
 Array = NDArray[np.float64]
 _REACH = 0.1
@@ -16,8 +17,9 @@ def apply(tension: Array, at: At, values: Values) -> Array:
     fraction = values["fraction"]
     if fraction == 0.0:
         return tension
-    limit = fraction * np.abs(tension)
-    return tension - dahl(tension, limit, fraction / _REACH, start=values["start"])
+    turned, own = with_turning_points(tension)
+    limit = fraction * np.abs(turned)
+    return tension - dahl(turned, limit, fraction / _REACH, start=values["start"])[own]
 
 
 def carried(after: Array, before: Array, _at: At, values: Values) -> float:

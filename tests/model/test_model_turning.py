@@ -1,0 +1,44 @@
+"""Turning points between samples, against motions in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from winchkit.model.turning import with_turning_points
+
+
+@given(st.floats(0.02, 0.97), st.floats(0.5, 40.0))
+def test_the_top_of_a_parabola_is_found(at: float, bend: float) -> None:
+    time = np.arange(9.0)
+    moved = 7.0 - bend * (time - 4.0 - at) ** 2
+    turned, own = with_turning_points(moved)
+    if at == 0.5:
+        return  # Two samples are the highest: the motion does not turn at either.
+    assert len(turned) == 10
+    assert np.max(turned) == pytest.approx(7.0)
+    assert np.array_equal(turned[own], moved)
+    assert np.all(np.diff(own) >= 1)
+
+
+def test_a_wave_turns_at_its_crests() -> None:
+    time = np.arange(0.0, 10.0, 0.1)
+    turned, own = with_turning_points(np.sin(2 * np.pi * time / 0.9))
+    added = np.delete(turned, own)
+    assert len(added) == pytest.approx(2 * 10.0 / 0.9, abs=1.5)
+    assert np.allclose(np.abs(added), 1.0, atol=0.01)
+    assert np.max(np.abs(turned[own])) < 0.99995
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_too_few_samples_turn_nowhere(count: int) -> None:
+    turned, own = with_turning_points(np.arange(float(count)))
+    assert np.array_equal(turned[own], np.arange(float(count)))
+
+
+def test_a_rest_is_no_turn() -> None:
+    still = np.array([0.0, 1.0, 2.0, 2.0, 2.0, 1.0])
+    turned, _ = with_turning_points(still)
+    assert np.array_equal(turned, still)
