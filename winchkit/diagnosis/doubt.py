@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.nameless import Beside, Curve, best_curve
 from winchkit.diagnosis.resolution import rounded
-from winchkit.diagnosis.search import Found, without_term
+from winchkit.diagnosis.search import Found, with_a_pair, without_term
 from winchkit.diagnosis.verdict import Judgement, judge, withheld
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -28,8 +28,8 @@ def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
     """The judgement of what was found, less the names that a nameless curve beats.
 
     All additions are doubted together, then each beside the others. One that is beaten is
-    dropped; where too much is then left, nothing is named. Without repeats something unknown is
-    always left, and a doubt of one addition is told only.
+    dropped, or gives way to a pair; where too much is then left, nothing is named. Without
+    repeats something unknown is always left, and a doubt of one addition is told only.
     """
     judgement = judge(inquiry, found)
     doubt = Doubt(inquiry, found)
@@ -37,6 +37,9 @@ def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
         return judgement
     terms = doubt.terms
     if curve := doubt.beaten(doubt.added):
+        pair = with_a_pair(inquiry, found)
+        if pair is not None:
+            return judge_and_doubt(inquiry, pair)
         return withheld(inquiry, found, 1.0, _words(terms, terms, curve))
     for index in reversed(doubt.added) if len(terms) > 1 else ():
         curve = doubt.beaten([index])

@@ -12,11 +12,12 @@ from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import confidence, held_out, held_out_rms
 from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
+from winchkit.diagnosis.problem import Hypothesis
 from winchkit.diagnosis.recouple import recoupled
 from winchkit.diagnosis.signature import Score, chance_level
 from winchkit.effects.coordinates import Coordinates
 
-__all__ = ["Found", "search", "without_term"]
+__all__ = ["Found", "search", "with_a_pair", "without_term"]
 
 Array = NDArray[np.float64]
 _MOST_STEPS = 6
@@ -100,7 +101,21 @@ def search(inquiry: Inquiry) -> Found:
 
 def without_term(inquiry: Inquiry, found: Found, index: int) -> Found:
     """The same search as if it had ended without one of its additions."""
-    hypothesis = found.final.hypothesis.without(index)
+    return _ended(inquiry, found, found.final.hypothesis.without(index))
+
+
+def with_a_pair(inquiry: Inquiry, found: Found) -> Found | None:
+    """The same search with a pair in the place of its only addition; None where none is better."""
+    if len(found.final.hypothesis.terms) != inquiry.given + 1:
+        return None
+    better = recoupled(inquiry, found.final, found.noise, 1)
+    if better is found.final or not _holds(inquiry, found.begin, better, found.noise):
+        return None
+    return _ended(inquiry, found, better.hypothesis)
+
+
+def _ended(inquiry: Inquiry, found: Found, hypothesis: Hypothesis) -> Found:
+    """A search as if it had ended with this hypothesis."""
     present, noise = inquiry.settle(hypothesis, found.noise)
     presence = inquiry.presence(present, noise)
     still = _missing(presence, inquiry.scores(present, noise), found.threshold)
