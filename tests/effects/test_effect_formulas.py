@@ -88,6 +88,20 @@ def _dahl(position: np.ndarray, limit: np.ndarray, stiffness: float) -> np.ndarr
     return np.array(out)
 
 
+def _loop(x: np.ndarray, share: float, stiffness: float) -> np.ndarray:
+    """Dahl's loop of a limit that is a share of ``x``, which turns at the crests of parabolas."""
+    walked, own = [x[0]], [0]
+    for before, now, after in zip(x[:-2], x[1:-1], x[2:], strict=True):
+        bend = np.polyfit([-1.0, 0.0, 1.0], [before, now, after], 2)
+        crest = -bend[1] / (2 * bend[0]) if (now - before) * (after - now) < 0 else 0.0
+        top = [np.polyval(bend, crest)] if crest else []
+        walked += [*top, now] if crest < 0 else [now, *top]
+        own.append(len(walked) - 1 - (len(top) if crest > 0 else 0))
+    walked.append(x[-1])
+    path = np.array(walked)
+    return _dahl(path, share * path, stiffness)[[*own, len(walked) - 1]]
+
+
 def _play(x: np.ndarray, gap: float) -> np.ndarray:
     y, out = x[0], []
     for now in x.tolist():
@@ -216,7 +230,7 @@ CASES: dict[str, Case] = {
     ),
     "cable-hysteresis": (
         {"stiffness": 1e5, "fraction": 0.08},
-        lambda: _longer(-_dahl(X.T, 0.08 * X.T, 0.5) / 1e5),
+        lambda: _longer(-_loop(X.T, 0.08, 0.5) / 1e5),
     ),
     "cable-creep": (
         {"creep_stiffness": 8e5, "time_constant": 25, "start": 0.3},
@@ -254,7 +268,7 @@ CASES: dict[str, Case] = {
     "cell-lag": ({"time_constant": 0.1}, lambda: {"tension": _lag(X.T, 0.1, X.T[0])}),
     "cell-hysteresis": (
         {"fraction": 0.01},
-        lambda: {"tension": X.T - _dahl(X.T, 0.01 * X.T, 0.1)},
+        lambda: {"tension": X.T - _loop(X.T, 0.01, 0.1)},
     ),
     "cell-creep": (
         {"fraction": 0.002, "time_constant": 50},

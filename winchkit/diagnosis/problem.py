@@ -77,10 +77,11 @@ class Problem:
         offset, rounding = self._offset_column(), self._rounding_column()
         self.fits_offset = bool(np.any(offset))
         """Whether the length instrument's offset is an unknown; it is the first one then."""
-        self._rounds = bool(np.any(rounding))
+        self.rounds = bool(np.any(rounding))
+        """Whether how a known weight's acceleration is rounded is an unknown; the last one then."""
         present = [column for column in (offset, rounding) if np.any(column)]
         self.nuisance_columns = np.array(present).reshape(len(present), self.rows).T
-        """By their unknowns, (rows, nuisances); the rounding is the last, where it is one."""
+        """By their unknowns, (rows, nuisances)."""
 
     @cached_property
     def band_of_row(self) -> NDArray[np.intp]:
@@ -115,7 +116,7 @@ class Problem:
         if not hypothesis.terms:
             return np.zeros(self.rows)
         terms = [started(hypothesis, run) for run in range(self.runs)]
-        sharper = hypothesis.nuisances[-1] if self._rounds and hypothesis.nuisances else None
+        sharper = hypothesis.nuisances[-1] if self.rounds and hypothesis.nuisances else None
         out = np.empty(self.rows)
         for segment in self.segments:
             predictor = self._predictors[segment.run]
@@ -185,7 +186,7 @@ class Problem:
         count = self.nuisance_columns.shape[1]
         out[:, :count] = self.nuisance_columns
         # What sharpens a weight's force also acts through the terms.
-        through = [count - 1] if self._rounds and like.terms else []
+        through = [count - 1] if self.rounds and like.terms else []
         for index in (*through, *range(count, len(vector) - states)):
             step = 1e-3 * max(1.0, abs(vector[index]))
             if vector[index] + step > high[index]:

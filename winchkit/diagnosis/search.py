@@ -142,12 +142,13 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
 def _coupled(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
-    Later only in exchange for an addition: pairs upon what is there already would piece together
-    what nobody knows.
+    To begin with, or in exchange for a first addition: pairs upon what is there already would
+    piece together what nobody knows.
     """
-    if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
+    added = len(present.hypothesis.terms) - inquiry.given
+    if added > 1 or not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
         return None
-    if len(present.hypothesis.terms) > inquiry.given:
+    if added:
         better = recoupled(inquiry, present, noise, 1)
         holds = better is not present and _holds(inquiry, present, better, noise)
         return better if holds else None

@@ -74,7 +74,7 @@ class RobotProblem(Problem):
         self.rows = self.segments[-1].rows.stop
         self.base = self._beside(here, self._prior)
         self._here = here
-        self.fits_offset = False
+        self.fits_offset = self.rounds = False
         self.nuisance_columns = self._nuisances()
 
     @cached_property
