@@ -21,7 +21,7 @@ HIDDEN = {
     "rope": term("cable-elongation-linear", axial_stiffness=2e5),
 }
 
-BENDS = (3000.0, 6000.0, 12000.0)
+BENDS = (14000.0, 16000.0, 18000.0)
 """Force scales of ropes that are nearly straight under 50 to 400 N, N."""
 
 

@@ -67,9 +67,7 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
             continue
         term = fitted.hypothesis.terms[-1]
         size = Coordinates(term.effect).freedom
-        counted = _richer(own.effect, final, fitted)
-        if counted is False and own.effect.id in term.effect.contains:
-            counted = is_unseen(inquiry, final, noise, index, term.effect)
+        counted = _richer(inquiry, final, noise, index, fitted)
         if counted is None:
             theirs = held_out(inquiry.problem, fitted, noise, blocks)
             alike = fitted.cost < final.cost + _ALIKE
@@ -86,19 +84,22 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
     return Confusion(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
 
 
-def _richer(own: Effect, final: Fit, fitted: Fit) -> bool | None:
+def _richer(inquiry: Inquiry, final: Fit, noise: Noise, index: int, fitted: Fit) -> bool | None:
     """Whether a rival with more numbers counts; None where it has no more, or is kindred.
 
     A carded one that explains as much counts: creep beside a drift with temperature, a guide whose
     detour is as straight as a wrong ratio. Only the prior belief in few numbers would tell them
     apart, and no run yet.
     """
-    rival = fitted.hypothesis.terms[-1].effect
+    own, rival = final.hypothesis.terms[index].effect, fitted.hypothesis.terms[-1].effect
     more = Coordinates(rival).freedom - Coordinates(own).freedom
     if more > 0 and _carded(rival, own) and not rival.nested_with(own):
         return fitted.cost < final.cost + _ALIKE
     if more > 0 and not _kindred(rival, own):
-        return _leant_to(final, fitted, more)
+        bent = own.id in rival.contains
+        return _leant_to(final, fitted, more) or (
+            bent and is_unseen(inquiry, final, noise, index, rival)
+        )
     return None
 
 

@@ -20,8 +20,10 @@ from winchkit.effects.coordinates import Coordinates
 __all__ = ["Doubt", "judge_and_doubt"]
 
 Array = NDArray[np.float64]
-_SLIGHT = 2e-4
+_SLIGHT = 1e-3
 """Share of what a name explains by which the physics of a real part may differ from its formula."""
+_SLIGHT_OF_MORE = 2e-4
+"""The same where more is certainly missing."""
 
 
 def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
@@ -112,7 +114,9 @@ class Doubt:
         pays = taken - inquiry.price * sum(Coordinates(effect).freedom for effect in effects)
         outputs = sorted({output for effect in effects for output in effect.outputs})
         curve = best_curve(inquiry.problem, beside, outputs, inquiry.price)
-        margin = max(inquiry.price, _SLIGHT * taken)
+        # What is certainly there is no chance deviation of the right formula.
+        slight = _SLIGHT_OF_MORE if self.found.still else _SLIGHT
+        margin = inquiry.price + slight * taken
         return curve if curve and curve.pays > pays + margin else None
 
 

@@ -31,7 +31,14 @@ from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Hypothesis, Problem
 from winchkit.diagnosis.resolution import without_rounding
 from winchkit.diagnosis.shapes import by_coefficients, gap, in_disguise, starting_values
-from winchkit.diagnosis.signature import Projected, Score, Signatures, score, signatures, worthless
+from winchkit.diagnosis.signature import (
+    Projected,
+    Score,
+    Signatures,
+    score,
+    signatures,
+    worthless,
+)
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
@@ -190,39 +197,35 @@ class Inquiry:
 
         Of a series it takes as many coefficients as pay, each added to what was fitted before.
         """
-        laws = by_coefficients(item.atom.effect)
-        best: Trial | None = None
-        for law in laws:
-            probes = law.probes if len(laws) > 1 else item.atom.secants
-            if best is not None and np.isfinite(best.criterion):
-                probes = (best.fit.hypothesis.terms[-1].values,)
-            atom = replace(item.atom, effect=law, secants=tuple(dict(p) for p in probes))
-            longer = self._fitted(present, replace(item, atom=atom), noise)
-            if best is not None and not longer.criterion < best.criterion:
-                break
-            best = longer
-        assert best is not None
-        return best
-
-    def _fitted(self, present: Fit, item: Score, noise: Noise) -> Trial:
-        """One law fitted beside the present terms."""
-        effect = item.atom.effect
+        effect, weight = item.atom.effect, noise.weight(self.problem)
         hypothesis = present.hypothesis
         for index in reversed(range(self.given, len(hypothesis.terms))):
             if hypothesis.terms[index].effect.id in effect.contains:
                 hypothesis = hypothesis.without(index)
-        weight = noise.weight(self.problem)
-        begun = [
-            hypothesis.with_term(Term(effect, values), self.problem.runs)
-            for values in self._placed(hypothesis, present, item, weight)
-        ]
-        fitted = fit_from(self.problem, begun, weight)
+        best: Trial | None = None
+        for law in by_coefficients(effect):
+            if best is None:
+                own = replace(item, atom=item.atom.of_law(law))
+                places = self._placed(hypothesis, present, own, weight)
+                terms = [Term(law, values) for values in places]
+                starts = [hypothesis.with_term(term, self.problem.runs) for term in terms]
+            else:
+                starts = [best.fit.hypothesis.with_law(law)]
+            fitted = fit_from(self.problem, starts, weight)
+            longer = Trial(fitted, self._price_of(fitted, hypothesis, present, noise))
+            if best is not None and not longer.criterion < best.criterion:
+                break
+            best = longer if np.isfinite(longer.criterion) else best
+        return best or longer
+
+    def _price_of(self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise) -> float:
+        """The criterion of a trial; infinite where its last term is not what it is called."""
         price = self.criterion(fitted)
         if in_disguise(fitted.hypothesis.terms[-1]) or (
-            price < self.criterion(present) and self._rests_on_states(hypothesis, fitted, noise)
+            price < self.criterion(present) and self._rests_on_states(without, fitted, noise)
         ):
             price = np.inf
-        return Trial(fitted, float(price))
+        return float(price)
 
     def _placed(
         self, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array

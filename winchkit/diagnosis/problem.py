@@ -20,6 +20,7 @@ from winchkit.diagnosis.predictor import Predictor, masked
 from winchkit.diagnosis.spectrum import Band, band_edges, narrow_edges, to_time
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
+from winchkit.effects.effect import Effect
 from winchkit.model.line import Line
 
 __all__ = ["Hypothesis", "Problem", "Segment", "started"]
@@ -53,6 +54,10 @@ class Hypothesis:
         remembers = term.effect.memory and _START in term.values
         start = (0.0,) * runs if remembers else ()
         return replace(self, terms=(*self.terms, term), starts=(*self.starts, start))
+
+    def with_law(self, effect: Effect) -> Hypothesis:
+        """With another effect at the values of the last term."""
+        return replace(self, terms=(*self.terms[:-1], Term(effect, self.terms[-1].values)))
 
     def without(self, index: int) -> Hypothesis:
         """With one term less."""

@@ -62,11 +62,10 @@ def search(inquiry: Inquiry) -> Found:
     begin, begin_noise = present, noise
     begin_presence = inquiry.presence(present, noise)
     begin_scores = scores = inquiry.scores(present, noise)
-    chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
-    threshold = max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
+    threshold = _threshold(inquiry, present, noise)
     tried: tuple[Fit, ...] = ()
     for _ in range(_MOST_STEPS):
-        grown: Fit | None = None
+        grown = None
         if scores and scores[0].value > threshold:
             trials = _short_list(inquiry, present, noise, scores)
             tried = tried or _fits(trials)
@@ -97,6 +96,12 @@ def search(inquiry: Inquiry) -> Found:
         tried=tried if alarmed else (),
         threshold=threshold,
     )
+
+
+def _threshold(inquiry: Inquiry, present: Fit, noise: Noise) -> float:
+    """Score that noise alone reaches in one case of a hundred."""
+    chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
+    return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
 
 
 def without_term(inquiry: Inquiry, found: Found, index: int) -> Found:

@@ -54,6 +54,12 @@ class Atom:
         """Degrees of freedom that choosing it costs."""
         return Coordinates(self.effect).freedom
 
+    def of_law(self, law: Effect) -> Atom:
+        """The same of a law with fewer coefficients, begun where these alone say so."""
+        fixed = {p.name for p in law.parameters if p.role == "fixed"}
+        secants = tuple(secant for secant in self.secants if not fixed & secant.keys())
+        return replace(self, effect=law, secants=secants)
+
 
 @dataclass(frozen=True)
 class Signatures:

@@ -20,11 +20,13 @@ __all__ = ["is_unseen"]
 
 _VISIBLE = 1.0
 """Noncentrality below which a difference is told from noise in one case of six."""
+_MATTERS = 0.02
+"""Share of the effect, rms: a bend that is less makes no difference to anyone."""
 
 
 def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Effect) -> bool:
     """Whether a richer ``rival`` of the term at ``index``, in its usual shape and as large as
-    that, would differ from it by less than the noise."""
+    that, would differ from it, though by less than the noise."""
     atom = _usual(inquiry, rival)
     if atom is None:
         return False
@@ -34,6 +36,7 @@ def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Eff
     here = problem.change(without)
     own = (problem.change(hypothesis) - here) * weight
     explained = orthonormal(final.jacobian * weight[:, None])
+    differs = False
     for secant in atom.secants:
         values = {**rival.null, **atom.shape, **secant}
         column = problem.change(without.with_term(Term(rival, values), problem.runs)) - here
@@ -43,7 +46,9 @@ def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Eff
         left = column - explained @ (explained.T @ column)
         if float(left @ left) > _VISIBLE:
             return False
-    return True
+        bend = column - own
+        differs = differs or float(bend @ bend) > _MATTERS**2 * float(own @ own)
+    return differs
 
 
 def _usual(inquiry: Inquiry, effect: Effect) -> Atom | None:
