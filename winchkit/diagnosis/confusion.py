@@ -96,7 +96,7 @@ def _richer(inquiry: Inquiry, final: Fit, noise: Noise, index: int, fitted: Fit)
     if more > 0 and _carded(rival, own) and not rival.nested_with(own):
         return fitted.cost < final.cost + _ALIKE
     if more > 0 and not _kindred(rival, own):
-        bent = own.id in rival.contains
+        bent = inquiry.loads_are_chosen and own.id in rival.contains
         return _leant_to(final, fitted, more) or (
             bent and is_unseen(inquiry, final, noise, index, rival)
         )

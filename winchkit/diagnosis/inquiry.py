@@ -62,6 +62,9 @@ class Trial:
 class Inquiry:
     """What stays the same through a search: data, candidates, folds, the model it began with."""
 
+    loads_are_chosen = True
+    """Whether a next run may hang another load, which shows how a rope's law bends."""
+
     def __init__(self, problem: Problem, begin: Hypothesis, candidates: Iterable[Effect]) -> None:
         self.problem = problem
         self.begin = begin

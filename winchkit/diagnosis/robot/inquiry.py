@@ -31,6 +31,8 @@ _RUN_LEAST = 10
 class RobotInquiry(Inquiry):
     """What stays the same through a search on poses."""
 
+    loads_are_chosen = False  # Tensions are what the balance makes them, whatever the pose.
+
     def __init__(
         self,
         problem: RobotProblem,
