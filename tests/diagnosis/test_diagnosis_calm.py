@@ -32,6 +32,8 @@ NOISE = {"cable_length": 1e-4, "tension": 0.4, "motor_torque": 3e-3}
 BRISK = ((60.0, 9.1), (1.0, 0.4))
 GENTLE = ((10.0, 9.1), (0.5, 0.7))
 """Waves of the motor: amplitude in rad, period in s."""
+DRIVEN = ((20.0, 0), (20.0, 1), (45.0, 10), (45.0, 11))
+"""Two weights in kg, each twice, with the seeds of the noise."""
 Waves = tuple[tuple[float, float], ...]
 
 
@@ -118,11 +120,7 @@ def alone(found: Diagnosis, effect: str) -> list[tuple[float, float]]:
 
 @pytest.mark.parametrize("measured", [True, False])
 def test_a_loop_is_explained_whole(measured: bool) -> None:
-    runs = [
-        rubbing(mass, 10 * i + k, measured=measured)
-        for i, mass in enumerate((20.0, 45.0))
-        for k in (0, 1)
-    ]
+    runs = [rubbing(mass, seed, measured=measured) for mass, seed in DRIVEN]
     found = diagnose(runs, GROOVED).diagnosis
     for (value, std), truth in zip(
         alone(found, "cable-hysteresis"), (STIFFNESS, FRACTION), strict=True
@@ -134,11 +132,7 @@ def test_a_loop_is_explained_whole(measured: bool) -> None:
 
 @pytest.mark.parametrize("differences", [True, False])
 def test_a_ripple_of_a_known_weight_is_explained_whole(differences: bool) -> None:
-    runs = [
-        rippling(mass, 10 * i + k, differences=differences)
-        for i, mass in enumerate((20.0, 45.0))
-        for k in (0, 1)
-    ]
+    runs = [rippling(mass, seed, differences=differences) for mass, seed in DRIVEN]
     found = diagnose(runs, GROOVED).diagnosis
     (amplitude, _), _, (order, _) = alone(found, "gear-transmission-error")
     assert order == ORDER

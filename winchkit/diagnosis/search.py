@@ -113,10 +113,8 @@ def with_a_pair(inquiry: Inquiry, found: Found) -> Found | None:
     """The same search with a pair in the place of its only addition; None where none is better."""
     if len(found.final.hypothesis.terms) != inquiry.given + 1:
         return None
-    better = recoupled(inquiry, found.final, found.noise, 1)
-    if better is found.final or not _holds(inquiry, found.begin, better, found.noise):
-        return None
-    return _ended(inquiry, found, better.hypothesis)
+    better = _exchanged(inquiry, found.final, found.noise, found.begin)
+    return None if better is None else _ended(inquiry, found, better.hypothesis)
 
 
 def _ended(inquiry: Inquiry, found: Found, hypothesis: Hypothesis) -> Found:
@@ -154,13 +152,18 @@ def _coupled(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) 
     if added > 1 or not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
         return None
     if added:
-        better = recoupled(inquiry, present, noise, 1)
-        holds = better is not present and _holds(inquiry, present, better, noise)
-        return better if holds else None
+        return _exchanged(inquiry, present, noise, present)
     pairs = couples(inquiry.projected(present, noise), present.residual, scores, inquiry.price)
     hidden = [pair.scores for pair in pairs if pair.hidden][:_COUPLES]
     trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in hidden]
     return _grow(inquiry, present, noise, trials)
+
+
+def _exchanged(inquiry: Inquiry, present: Fit, noise: Noise, against: Fit) -> Fit | None:
+    """A better pair in the place of one addition, that holds against another fit; or None."""
+    better = recoupled(inquiry, present, noise, 1)
+    holds = better is not present and _holds(inquiry, against, better, noise)
+    return better if holds else None
 
 
 def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
