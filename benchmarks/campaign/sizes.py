@@ -31,7 +31,7 @@ TENSION = (
 TORQUE = (
     "torque-constant", "gear-efficiency", "motor-coulomb", "motor-coulomb-asymmetry",
     "motor-viscous", "motor-stribeck", "motor-cogging",
-    "rotor-inertia", "torque-lag",
+    "rotor-inertia", "torque-lag", "motor-viscous-asymmetry", "torque-lead",
 )  # fmt: skip
 CATALOGUE = LENGTH + TENSION + TORQUE
 OUTSIDE = (
@@ -112,6 +112,8 @@ _ONE = {
     "motor-viscous": ("viscosity", 1e-3, False),
     "rotor-inertia": ("inertia", 1e-4, False),
     "torque-lag": ("time_constant", 0.02, False),
+    "motor-viscous-asymmetry": ("viscosity_difference", 3e-4, True),
+    "torque-lead": ("lead", 5e-3, False),
     "outside-crosstalk": ("size", 0.02, True),
     "outside-shaken-length": ("size", 1e-5, True),
     "outside-wander": ("size", 5e-4, True),

@@ -230,6 +230,8 @@ class _Line:
         torque = torque + (self.get("motor-coulomb") or {}).get("torque", 0.0) * way
         torque = torque + (self.get("motor-coulomb-asymmetry") or {}).get("offset", 0.0)
         torque = torque + (self.get("motor-viscous") or {}).get("viscosity", 0.0) * rate
+        if p := self.get("motor-viscous-asymmetry"):
+            torque = torque + p["viscosity_difference"] * np.abs(rate)
         if p := self.get("motor-stribeck"):
             torque = torque + way * p["torque"] * np.exp(-((rate / p["stribeck_speed"]) ** 2))
         if p := self.get("motor-cogging"):
@@ -239,6 +241,8 @@ class _Line:
             torque = torque + p["inertia"] * np.gradient(rate, self.time)
         if p := self.get("outside-crosstalk"):
             torque = torque + p["size"] * (free - self.winch.length_reference)
+        if p := self.get("torque-lead"):
+            torque = np.interp(self.time + p["lead"], self.time, torque)
         if p := self.get("torque-lag"):
             torque = lag(torque, self.time, p["time_constant"], float(torque[0]))
         return torque

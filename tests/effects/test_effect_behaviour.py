@@ -46,6 +46,7 @@ LINEAR = {
     "motor-coulomb",
     "motor-coulomb-asymmetry",
     "motor-viscous",
+    "motor-viscous-asymmetry",
     "motor-stribeck",
     "motor-cogging",
     "rotor-inertia",

@@ -68,6 +68,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "motor-coulomb": {"torque": ("N m", 0)},
     "motor-coulomb-asymmetry": {"offset": ("N m", 0)},
     "motor-viscous": {"viscosity": ("N m s", 0)},
+    "motor-viscous-asymmetry": {"viscosity_difference": ("N m s", 0)},
     "motor-stribeck": {"torque": ("N m", 0), "stribeck_speed": ("rad/s", SHAPE)},
     "motor-cogging": {
         "amplitude": ("N m", 0),
@@ -76,6 +77,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     },
     "rotor-inertia": {"inertia": ("kg m^2", 0)},
     "torque-lag": {"time_constant": ("s", 0)},
+    "torque-lead": {"lead": ("s", 0)},
 }
 every_effect = pytest.mark.parametrize("effect", EFFECTS, ids=IDS)
 

@@ -282,6 +282,10 @@ CASES: dict[str, Case] = {
     "motor-coulomb": ({"torque": 0.03}, lambda: _torque(0.03 * X.sm)),
     "motor-coulomb-asymmetry": ({"offset": 0.01}, lambda: _torque(np.full_like(X.t, 0.01))),
     "motor-viscous": ({"viscosity": 2e-3}, lambda: _torque(2e-3 * X.rate)),
+    "motor-viscous-asymmetry": (
+        {"viscosity_difference": 2e-3},
+        lambda: _torque(2e-3 * np.abs(X.rate)),
+    ),
     "motor-stribeck": (
         {"torque": 0.03, "stribeck_speed": 20},
         lambda: _torque(0.03 * X.sm * np.exp(-(X.rate**2) / 400)),
@@ -296,7 +300,7 @@ CASES: dict[str, Case] = {
         lambda: {"motor_torque": _lag(X.T * X.arm, 0.1, (X.T * X.arm)[0])},
     ),
 }
-OWN_TESTS = {"pulley-dahl", "length-time-offset", "drum-winding-tension"}
+OWN_TESTS = {"pulley-dahl", "length-time-offset", "drum-winding-tension", "torque-lead"}
 
 
 def test_every_effect_is_tested_here() -> None:

@@ -76,6 +76,23 @@ def test_an_instrument_that_is_late_shows_the_length_of_a_moment_ago() -> None:
         assert found[end] == line.predict(line.motion(signals))["cable_length"][end]
 
 
+def test_what_a_drive_is_told_is_the_torque_of_a_moment_later() -> None:
+    time = np.linspace(0, 10, 501)
+    line = Line(profile_with("grooved"))
+
+    def torque(t: np.ndarray) -> np.ndarray:
+        signals = Signals(time, 40.0 + 0.0 * time, load=200.0 + 90.0 * np.sin(0.8 * t))
+        return line.predict(line.motion(signals))["motor_torque"]
+
+    for lead in (0.004, 0.4):
+        signals = Signals(time, 40.0 + 0.0 * time, load=200.0 + 90.0 * np.sin(0.8 * time))
+        told = predict(line.profile, line.motion(signals), CATALOGUE["torque-lead"], {"lead": lead})
+        inside = (time > 0.1) & (time + lead < 9.9)
+        exact = torque(time + lead)
+        assert np.allclose(told["motor_torque"][inside], exact[inside], rtol=1e-6)
+        assert not np.allclose(exact[inside], torque(time)[inside], rtol=1e-4)
+
+
 def _stack(wound: np.ndarray, strain: np.ndarray) -> np.ndarray:
     """Rope on the drum as a list of pieces, last in first out."""
     before = float(np.mean(strain))

@@ -36,9 +36,7 @@ def recorded(bench: str, programme: str | Path, **options: Any) -> list[Run]:
 def test_every_example_is_known_here() -> None:
     files = {path.name for path in EXAMPLES.iterdir() if path.is_file()}
     toml = {"ladder.toml", "short.toml", "stroke.toml", "winding-device.toml"}
-    assert (
-        files == {"better_position.py", "drag_by_direction.py", "heave.py", "my_effect.py"} | toml
-    )
+    assert files == {"better_position.py", "heave.py", "my_effect.py"} | toml
 
 
 def test_ones_own_effect_explains_what_the_catalogue_cannot() -> None:
@@ -67,18 +65,6 @@ def test_ones_own_effect_vanishes_at_its_null_and_carries_its_derivative() -> No
     for angle in (3.0, 40.0, 41.3):
         change = wave.cable_length(angle + step) - wave.cable_length(angle - step)
         assert wave.arm(angle) == pytest.approx(-change / (2 * step), rel=1e-4)
-
-
-def test_a_drag_by_direction_tells_two_directions_apart() -> None:
-    effect = load_catalogue([EXAMPLES / "drag_by_direction.py"])["drag-by-direction"]
-    motion = standard_motion()
-    bare = Line(STANDARD_PROFILE).predict(motion)["motor_torque"]
-    term = Term(effect, {"viscosity_difference": 1e-3})
-    torque = Line(STANDARD_PROFILE, (term.modifier(),)).predict(motion)["motor_torque"]
-    # The standard motion goes both ways: so does the speed, the drag's difference does not.
-    speed = np.gradient(motion.at.motor_angle, motion.at.time)
-    assert np.allclose(torque - bare, 1e-3 * np.abs(speed), atol=1e-3 * 0.02 * np.ptp(speed))
-    assert speed.min() < 0 < speed.max()
 
 
 @pytest.mark.realtime

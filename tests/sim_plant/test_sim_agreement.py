@@ -65,6 +65,7 @@ PAIRS = [
     Pair("lossy gear", "gear-efficiency"),
     Pair("motor drag", "motor-coulomb"),
     Pair("motor grease", "motor-viscous"),
+    Pair("one-way grease", "motor-viscous-asymmetry"),
     Pair("motor stiction", "motor-stribeck"),
     Pair("cogging", "motor-cogging"),
     Pair("heavy rotor", "rotor-inertia"),

@@ -21,7 +21,7 @@ from winchkit.diagnosis.thin import Thinning, thinning_for
 from winchkit.errors import UsageError
 from winchkit.model.derivatives import reach_of
 from winchkit.model.line import Line, Motion
-from winchkit.model.stages import Signals
+from winchkit.model.stages import At, Signals
 from winchkit.runs.run import Run
 from winchkit.schema.winch import WinchProfile
 
@@ -86,6 +86,11 @@ class Dataset:
     def outputs(self) -> tuple[str, ...]:
         """Outputs that at least one recording has, in a fixed order."""
         return tuple(o for o in OUTPUTS if any(o in r.measured for r in self.recordings))
+
+    @property
+    def motions(self) -> tuple[At, ...]:
+        """What every recording's profile makes of its motion."""
+        return tuple(recording.raw.at for recording in self.recordings)
 
     @property
     def repeated(self) -> tuple[Repeats, ...]:

@@ -224,7 +224,7 @@ class Inquiry:
     def _price_of(self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise) -> float:
         """The criterion of a trial; infinite where its last term is not what it is called."""
         price = self.criterion(fitted)
-        if in_disguise(fitted.hypothesis.terms[-1]) or (
+        if in_disguise(fitted.hypothesis.terms[-1], self.problem.dataset.motions) or (
             price < self.criterion(present) and self._rests_on_states(without, fitted, noise)
         ):
             price = np.inf

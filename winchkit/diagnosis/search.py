@@ -14,7 +14,9 @@ from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
 from winchkit.diagnosis.problem import Hypothesis
 from winchkit.diagnosis.recouple import recoupled
+from winchkit.diagnosis.shapes import elsewhere, in_disguise
 from winchkit.diagnosis.signature import Score, chance_level
+from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 
 __all__ = ["Found", "search", "with_a_pair", "without_term"]
@@ -232,14 +234,19 @@ def _replaced(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
     for index in range(inquiry.given, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
             break  # A rival stood for two.
-        own = present.hypothesis.terms[index].effect
+        own = present.hypothesis.terms[index]
         base = inquiry.refit(present.hypothesis.without(index), noise)
-        rivals = [s for s in inquiry.scores(base, noise) if s.atom.effect.id != own.id][:_RIVALS]
+        rivals = [item for item in inquiry.scores(base, noise) if _another(item, own)][:_RIVALS]
         trials = [inquiry.trial(base, item, noise) for item in rivals if item.value > 0]
         best = min(trials, key=lambda t: t.criterion, default=None)
         if best is not None and best.criterion < inquiry.criterion(present) - _BETTER:
             present = best.fit
     return present
+
+
+def _another(item: Score, own: Term) -> bool:
+    """Whether a candidate is another effect than a term, or the same from another place."""
+    return item.atom.effect.id != own.effect.id or elsewhere(own, item.atom.shape)
 
 
 def _without_the_doubtful(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
@@ -255,8 +262,11 @@ def _without_the_doubtful(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple
 
 
 def _without_the_needless(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
+    """Drop additions that do not pay, and those that beside later ones became something else."""
     for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
         without = inquiry.refit(present.hypothesis.without(index), noise)
-        if inquiry.criterion(without) < inquiry.criterion(present):
+        if inquiry.criterion(without) < inquiry.criterion(present) or in_disguise(
+            present.hypothesis.terms[index], inquiry.problem.dataset.motions
+        ):
             present = without
     return present

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +11,19 @@ from winchkit.diagnosis.signature import Score
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
+from winchkit.model.stages import At
 
-__all__ = ["by_coefficients", "gap", "in_disguise", "starting_values"]
+__all__ = ["by_coefficients", "elsewhere", "gap", "in_disguise", "starting_values"]
 
 
-def in_disguise(term: Term) -> bool:
-    """Whether a term has become another effect: a shape at its bound, values that cannot be."""
+def in_disguise(term: Term, motions: Iterable[At]) -> bool:
+    """Whether a term has become another effect: a shape at its bound, values that cannot be.
+
+    Or values that none of the motions is far enough for to show what they mean.
+    """
     effect = term.effect
+    if effect.visible and not any(effect.visible(at, term.values) for at in motions):
+        return True
     if effect.possible is not None and not effect.possible(term.values):
         return True
     coordinates = Coordinates(effect)
@@ -49,6 +56,16 @@ def gap(grid: tuple[float, ...], at: float) -> float:
     """Distance from a point of a grid to its farther neighbour."""
     index = grid.index(at)
     return max(abs(grid[i] - at) for i in (index - 1, index + 1) if 0 <= i < len(grid))
+
+
+def elsewhere(term: Term, shape: Mapping[str, float]) -> bool:
+    """Whether a point of a grid is another place to rest than where a fit has left a term.
+
+    An order has as many places as the grid has points; a moment has one in every hold, and the
+    best of them may be another once more is explained.
+    """
+    grids = [p for p in term.effect.parameters if p.name in shape and p.grid]
+    return any(shape[p.name] != term.values[p.name] for p in grids if p.whole or p.low == 0.0)
 
 
 def starting_values(item: Score) -> list[dict[str, float]]:

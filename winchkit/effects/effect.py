@@ -82,6 +82,8 @@ class Effect:
     """May stand several times, with other orders."""
     probes: tuple[Mapping[str, float], ...] = field(default=())
     """Values whose secants make the signature where single parameters have no gradient."""
+    visible: Callable[[At, Values], bool] | None = None
+    """Whether a motion gets so far that it looks like what it is called, and like nothing else."""
     possible: Callable[[Values], bool] | None = None
     """Whether values make sense together, where the bounds of each cannot say it."""
     on_robot: frozenset[Placement] = frozenset()

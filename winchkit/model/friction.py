@@ -22,12 +22,15 @@ __all__ = [
     "dahl",
     "dahl_constant",
     "dahl_step",
+    "has_fallen",
     "normal_force",
     "stribeck",
     "tension_after",
 ]
 
 Array = NDArray[np.float64]
+_FALLEN = 1.5
+"""Speed over the Stribeck speed at which e^(−(v/vs)²) is a tenth."""
 
 
 def normal_force(before: Array, after: Array, wrap: float) -> Array:
@@ -67,6 +70,14 @@ def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float)
     """Coefficient μc + (μs − μc) e^(−(v/vs)²), unsigned; speeds in m/s."""
     fallen = np.exp(-((speed / stribeck_speed) ** 2))
     return np.asarray(coulomb * (1 - fallen) + static * fallen)
+
+
+def has_fallen(speed: Array, stribeck_speed: float) -> bool:
+    """Whether speeds get so high that the extra of a Stribeck curve falls to a tenth.
+
+    Where it never does, it is a dry friction that is not quite constant.
+    """
+    return bool(np.max(np.abs(speed), initial=0.0) > _FALLEN * stribeck_speed)
 
 
 def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape: float) -> float:

@@ -94,6 +94,7 @@ _CLAUSES = {
     "motor-coulomb-asymmetry": "your torque signal has an offset",
     "motor-stribeck": "your motor side rubs more at creep speed",
     "motor-viscous": "your motor side drags with speed",
+    "motor-viscous-asymmetry": "your motor side drags more one way than the other",
     "pulley-capstan": "your rope drags around a stuck pulley",
     "pulley-coulomb": "your pulleys rub",
     "pulley-dahl": "your pulleys give before they slide",
@@ -103,6 +104,7 @@ _CLAUSES = {
     "rotor-inertia": "your rotor's inertia counts",
     "torque-constant": "your drive's torque constant is off",
     "torque-lag": "your drive's torque signal comes late",
+    "torque-lead": "your torque signal is what the drive was told",
 }
 _SYMBOLS = {"axial_stiffness": "EA"}
 _SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.friction import coulomb_ratio, stribeck
+from winchkit.model.friction import coulomb_ratio, has_fallen, stribeck
 from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
@@ -19,6 +19,11 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 def _sticks(values: Values) -> bool:
     """Friction falls as a film of grease builds up: it is no less at creep speed."""
     return values["static"] >= values["coulomb"]
+
+
+def _passed(at: At, values: Values) -> bool:
+    """Whether the extra that is there at creep speed ever falls."""
+    return has_fallen(at.speed, values["stribeck_speed"])
 
 
 EFFECT = Effect(
@@ -50,4 +55,5 @@ EFFECT = Effect(
     contains=("pulley-coulomb", "pulley-capstan"),
     needs=("pulley", "load"),
     possible=_sticks,
+    visible=_passed,
 )

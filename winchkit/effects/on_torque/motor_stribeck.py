@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.friction import has_fallen
 from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
@@ -14,6 +15,11 @@ def apply(torque: Array, at: At, values: Values) -> Array:
     return torque + values["torque"] * at.motor_direction * np.exp(
         -((at.motor_rate / values["stribeck_speed"]) ** 2)
     )
+
+
+def _passed(at: At, values: Values) -> bool:
+    """Whether the extra that is there at creep speed ever falls."""
+    return has_fallen(at.motor_rate, values["stribeck_speed"])
 
 
 EFFECT = Effect(
@@ -41,4 +47,5 @@ EFFECT = Effect(
     confused_with=("motor-coulomb", "pulley-stribeck"),
     told_apart="Very slow ramps at several speeds.",
     family="motor friction",
+    visible=_passed,
 )

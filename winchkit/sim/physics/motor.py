@@ -30,6 +30,7 @@ __all__ = [
     "MotorDrag",
     "MotorGrease",
     "MotorStiction",
+    "OneWayGrease",
     "SlowTorque",
     "WeakMotor",
 ]
@@ -71,6 +72,18 @@ class MotorGrease(Physics):
     def motor(self, state: State) -> float:
         """Torque proportional to speed."""
         return self.viscosity * state.motor_speed
+
+
+@dataclass
+class OneWayGrease(Physics):
+    """Viscous friction that differs between the two directions, by this much from their mean."""
+
+    viscosity_difference: RotationalViscosity = 1e-4
+    size: ClassVar[str] = "viscosity_difference"
+
+    def motor(self, state: State) -> float:
+        """Torque proportional to how fast, whichever way."""
+        return self.viscosity_difference * abs(state.motor_speed)
 
 
 @dataclass

@@ -50,6 +50,7 @@ PHYSICS: dict[str, type[Physics]] = {
     "lossy gear": motor.LossyGear,
     "motor drag": motor.MotorDrag,
     "motor grease": motor.MotorGrease,
+    "one-way grease": motor.OneWayGrease,
     "motor stiction": motor.MotorStiction,
     "cogging": motor.Cogging,
     "heavy rotor": motor.HeavyRotor,

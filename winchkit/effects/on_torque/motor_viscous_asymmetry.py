@@ -1,13 +1,9 @@
-"""An effect of one's own: friction grows faster with speed one way than the other.
-
-The catalogue has an offset for two directions (motor-coulomb-asymmetry). On EMPS, a real drive,
-this explains more; docs/diagnosis.md tells how much: ``--effects examples/drag_by_direction.py``.
-"""
+"""motor-viscous-asymmetry: friction grows faster with speed one way than the other."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.effects import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
 
 Array = NDArray[np.float64]
@@ -19,7 +15,7 @@ def apply(torque: Array, at: At, values: Values) -> Array:
 
 
 EFFECT = Effect(
-    id="drag-by-direction",
+    id="motor-viscous-asymmetry",
     stage=Stage.MOTOR,
     parameters=(
         Parameter("viscosity_difference", "N m s", null=0.0, typical=3e-4, low=-1e6, high=1e6),
@@ -29,7 +25,8 @@ EFFECT = Effect(
     what="Preloaded screws, worms and lip seals drag more one way than the other, in proportion "
     "to the speed.",
     formula="τ + d |θ'|, d = (b₊ − b₋)/2",
-    source="viscous friction, one value a direction; seen on EMPS, whose two directions differ",
+    source="viscous friction, one value a direction; seen on EMPS (Janot et al. 2019), whose two "
+    "directions differ",
     looks_like="A torque error that is even in the motor's speed and linear in it.",
     confused_with=("motor-coulomb-asymmetry", "motor-viscous"),
     told_apart="A ladder of speeds in both directions: an offset is the same at every speed.",
