@@ -1,0 +1,63 @@
+"""What the search fits anew once more is explained: it may have come to rest elsewhere before."""
+
+from __future__ import annotations
+
+import pytest
+from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
+
+from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.diagnose import inquire
+from winchkit.diagnosis.inquiry import Inquiry
+from winchkit.diagnosis.recouple import recoupled
+from winchkit.diagnosis.search import _replaced, _without_the_needless
+from winchkit.effects.bind import Term
+
+RIDE = Ride(samples=1200, rate=25.0, period=12.0)
+
+
+def inquiry_into(*hidden: Term) -> Inquiry:
+    runs = [
+        made(int(mass) + seed, GROOVED, hidden, load_mass=mass, ride=RIDE)
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    return inquire(prepare(runs, GROOVED), CATALOGUE)
+
+
+def test_a_slip_that_came_to_rest_at_another_moment_is_found_where_it_was() -> None:
+    late = term("length-time-offset", delay=0.01)
+    inquiry = inquiry_into(term("encoder-slip", step=0.01, time=14.7), late)
+    runs = inquiry.problem.runs
+    wrong = inquiry.begin.with_term(term("encoder-slip", step=0.008, time=20.5), runs)
+    present, noise = inquiry.settle(wrong.with_term(late, runs))
+    stuck = present.hypothesis.terms[0].values["time"]
+    assert abs(stuck - 14.7) > 1.0
+    found = _replaced(inquiry, present, noise).hypothesis.terms
+    assert sorted(t.label for t in found) == ["encoder-slip", "length-time-offset"]
+    slip = next(t for t in found if t.label == "encoder-slip")
+    assert slip.values["time"] == pytest.approx(14.7, abs=0.1)
+    assert slip.values["step"] == pytest.approx(0.01, rel=0.05)
+
+
+def test_what_stood_for_two_is_fitted_beside_the_second() -> None:
+    """A slip makes a creep seem slow and soft; beside the slip it is neither."""
+    hidden = (
+        term("cable-creep", creep_stiffness=3e5, time_constant=6.0),
+        term("encoder-slip", step=-0.04, time=14.7),
+    )
+    inquiry = inquiry_into(*hidden)
+    alone = term("cable-creep", creep_stiffness=2e5, time_constant=20.0)
+    present, noise = inquiry.settle(inquiry.begin.with_term(alone, inquiry.problem.runs))
+    terms = {t.label: t.values for t in recoupled(inquiry, present, noise, 1).hypothesis.terms}
+    assert set(terms) == {"cable-creep", "encoder-slip"}
+    assert terms["encoder-slip"]["time"] == pytest.approx(14.7, abs=0.1)
+    assert terms["cable-creep"]["time_constant"] == pytest.approx(6.0, rel=0.1)
+
+
+def test_what_became_another_effect_beside_a_later_one_is_dropped() -> None:
+    """A Stribeck curve faster than any run is Coulomb's friction, nearly."""
+    inquiry = inquiry_into(term("motor-coulomb", torque=0.03))
+    wide = term("motor-stribeck", torque=0.03, stribeck_speed=400.0)
+    present, noise = inquiry.settle(inquiry.begin.with_term(wide, inquiry.problem.runs))
+    assert present.labels == ("motor-stribeck",)
+    assert _without_the_needless(inquiry, present, noise).labels == ()
