@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
 
+from winchkit.diagnosis.confusion import confusion_of
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.recouple import recoupled
-from winchkit.diagnosis.search import _replaced, _without_the_needless
+from winchkit.diagnosis.search import _replaced
 from winchkit.effects.bind import Term
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
@@ -54,10 +55,14 @@ def test_what_stood_for_two_is_fitted_beside_the_second() -> None:
     assert terms["cable-creep"]["time_constant"] == pytest.approx(6.0, rel=0.1)
 
 
-def test_what_became_another_effect_beside_a_later_one_is_dropped() -> None:
-    """A Stribeck curve faster than any run is Coulomb's friction, nearly."""
-    inquiry = inquiry_into(term("motor-coulomb", torque=0.03))
-    wide = term("motor-stribeck", torque=0.03, stribeck_speed=400.0)
+@pytest.mark.parametrize(("share", "alone"), [(0.9, False), (0.2, True)])
+def test_a_stribeck_speed_that_no_run_passes_stands_beside_coulombs_friction(
+    share: float, alone: bool
+) -> None:
+    fastest = max(abs(at.motor_rate).max() for at in inquiry_into().problem.dataset.motions)
+    wide = term("motor-stribeck", torque=0.1, stribeck_speed=share * fastest)
+    inquiry = inquiry_into(wide)
     present, noise = inquiry.settle(inquiry.begin.with_term(wide, inquiry.problem.runs))
-    assert present.labels == ("motor-stribeck",)
-    assert _without_the_needless(inquiry, present, noise).labels == ()
+    told = confusion_of(inquiry, present, noise, 0).effects
+    assert "motor-stribeck" in told
+    assert ("motor-coulomb" not in told) is alone

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from diagnosis_runs import GROOVED, Ride, made, term
 
+from winchkit.diagnosis.admissible import best_of_each
 from winchkit.diagnosis.couples import couples
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
@@ -24,8 +25,8 @@ RUNS = [
 def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
     inquiry = inquire(prepare(RUNS, GROOVED), load_catalogue())
     present, noise = inquiry.settle(inquiry.begin)
-    scores = inquiry.scores(present, noise)
-    alone = {s.atom.effect.id: s.gain for s in scores}
+    scores = inquiry.every_score(present, noise)
+    alone = {s.atom.effect.id: s.gain for s in best_of_each(scores)}
     projected = inquiry.projected(present, noise)
     pairs = couples(projected, present.residual, scores, inquiry.price)
     named = [{item.atom.effect.id for item in pair.scores} for pair in pairs if pair.hidden]
@@ -37,7 +38,7 @@ def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
 def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() -> None:
     inquiry = inquire(prepare(RUNS, GROOVED), load_catalogue())
     present, noise = inquiry.settle(inquiry.begin)
-    grown = _coupled(inquiry, present, noise, inquiry.scores(present, noise))
+    grown = _coupled(inquiry, present, noise)
     assert grown is not None
     assert set(grown.labels) == {"cell-gain", "cell-offset"}
     gain, offset = sorted(grown.hypothesis.terms, key=lambda t: t.label)
@@ -45,6 +46,6 @@ def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() ->
     assert abs(offset.values["offset"] - 9.8) < 1.0
     other = present.hypothesis.with_term(term("motor-coulomb", torque=1e-3), inquiry.problem.runs)
     begun, noise = inquiry.settle(other)
-    exchanged = _coupled(inquiry, begun, noise, inquiry.scores(begun, noise))
+    exchanged = _coupled(inquiry, begun, noise)
     assert exchanged is not None
     assert set(exchanged.labels) == {"cell-gain", "cell-offset"}

@@ -8,8 +8,6 @@ from diagnosis_runs import CATALOGUE, term
 from winchkit.diagnosis.shapes import by_coefficients, elsewhere, in_disguise
 from winchkit.effects.standard import standard_motion
 
-MOTIONS = (standard_motion().at,)
-
 
 def test_coefficients_are_taken_from_the_first() -> None:
     fitted = []
@@ -30,25 +28,23 @@ def test_rubbing_less_at_creep_speed_is_no_stribeck_friction(
     static: float, disguised: bool
 ) -> None:
     curve = term("pulley-stribeck", coulomb=0.02, static=static, stribeck_speed=0.03)
-    assert in_disguise(curve, MOTIONS) is disguised
+    assert in_disguise(curve) is disguised
 
 
 def test_a_shape_at_its_end_is_another_effect() -> None:
     ends = CATALOGUE["motor-stribeck"].parameter("stribeck_speed")
     inside = term("motor-stribeck", torque=0.02, stribeck_speed=ends.typical)
-    assert not in_disguise(inside, MOTIONS)
-    assert in_disguise(term("motor-stribeck", torque=0.02, stribeck_speed=ends.high), MOTIONS)
+    assert not in_disguise(inside)
+    assert in_disguise(term("motor-stribeck", torque=0.02, stribeck_speed=ends.high))
 
 
-def test_a_stribeck_speed_that_no_run_passes_is_a_dry_friction() -> None:
-    fastest = max(abs(at.motor_rate).max() for at in MOTIONS)
-    for share, disguised in ((0.5, False), (0.8, True)):
-        curve = term("motor-stribeck", torque=0.02, stribeck_speed=share * fastest)
-        assert in_disguise(curve, MOTIONS) is disguised
-    fastest = max(abs(at.speed).max() for at in MOTIONS)
-    for share, disguised in ((0.5, False), (0.8, True)):
-        curve = term("pulley-stribeck", coulomb=0.02, static=0.03, stribeck_speed=share * fastest)
-        assert in_disguise(curve, MOTIONS) is disguised
+def test_a_stribeck_speed_is_visible_where_a_run_passes_it() -> None:
+    motion = standard_motion().at
+    for effect, rate in (("motor-stribeck", motion.motor_rate), ("pulley-stribeck", motion.speed)):
+        visible = CATALOGUE[effect].visible
+        assert visible is not None
+        for share, seen in ((0.5, True), (0.8, False)):
+            assert visible(motion, {"stribeck_speed": share * abs(rate).max()}) is seen
 
 
 def test_a_moment_and_an_order_are_sought_elsewhere_too_and_a_time_constant_is_not() -> None:

@@ -26,6 +26,7 @@ _RIVALS = 6
 _NEAR = 40.0
 _ALIKE = 6.0
 _SHARE = 0.5
+_NEARLY = 0.75
 _LEVEL = 0.05
 _FLIPS = 2000
 
@@ -72,6 +73,7 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
             theirs = held_out(inquiry.problem, fitted, noise, blocks)
             alike = fitted.cost < final.cost + _ALIKE
             counted = alike or _flip_chance(theirs - ours) > _LEVEL
+        counted = counted or _stands_for(inquiry, fitted, final, base, index)
         if counted:
             members.append((size, fitted.cost, term))
     ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
@@ -101,6 +103,21 @@ def _richer(inquiry: Inquiry, final: Fit, noise: Noise, index: int, fitted: Fit)
             bent and is_unseen(inquiry, final, noise, index, rival)
         )
     return None
+
+
+def _stands_for(inquiry: Inquiry, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:
+    """Whether a simpler law of the family is what the runs show, as far as they get.
+
+    A Stribeck curve whose extra never falls within the runs is a dry friction that is not quite
+    constant: for which of many reasons they do not tell.
+    """
+    own, rival = final.hypothesis.terms[index], fitted.hypothesis.terms[-1].effect
+    shown = own.effect.visible
+    if shown is None or any(shown(at, own.values) for at in inquiry.problem.dataset.motions):
+        return False
+    simpler = Coordinates(rival).freedom < Coordinates(own.effect).freedom
+    related = bool(own.effect.family) and rival.family == own.effect.family
+    return simpler and related and base.cost - fitted.cost > _NEARLY * (base.cost - final.cost)
 
 
 def _kindred(rival: Effect, own: Effect) -> bool:

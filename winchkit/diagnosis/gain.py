@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["gain"]
+__all__ = ["gain", "gains"]
 
 Array = NDArray[np.float64]
 
@@ -16,7 +16,12 @@ def gain(inner: Array, products: Array, least: float) -> float:
     ``inner`` (k, k) and ``products`` with the residual (k,) are of columns scaled to length one
     before anything was projected out; directions shorter than the root of ``least`` are left out.
     """
+    return float(gains(inner[None], products[None], least)[0])
+
+
+def gains(inner: Array, products: Array, least: float) -> Array:
+    """The same for many sets of columns: (n, k, k) and (n, k) → (n,)."""
     values, vectors = np.linalg.eigh(inner)
+    along = np.einsum("nji,nj->ni", vectors, products)
     kept = values > least
-    along = vectors[:, kept].T @ products
-    return float(np.sum(along**2 / values[kept]))
+    return np.asarray(np.sum(along**2 / np.where(kept, values, np.inf), axis=-1))

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.diagnosis.admissible import admissible, best_of_each
 from winchkit.diagnosis.begun import rests_on_states
 from winchkit.diagnosis.fit import Fit, fit, fit_from
 from winchkit.diagnosis.gate import (
@@ -37,7 +38,6 @@ from winchkit.diagnosis.signature import (
     Signatures,
     score,
     signatures,
-    worthless,
 )
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -170,23 +170,13 @@ class Inquiry:
         return Projected(self.problem, self.signatures, present.jacobian, noise)
 
     def scores(self, present: Fit, noise: Noise) -> list[Score]:
-        """Candidates beside a fit, best first, one point of its grid each; none that is there.
+        """Candidates beside a fit, best first, one point of its grid each; none that is there."""
+        return best_of_each(self.every_score(present, noise))
 
-        What would help only with the wrong sign, such as an inertia below zero, gains nothing.
-        """
-        rows = self.problem.rows
-        ranked = score(self.projected(present, noise), present.residual, rows)
-        ranked = [item if _possible(item) else worthless(item, rows) for item in ranked]
-        ranked.sort(key=lambda item: -item.value)
-        out: list[Score] = []
-        seen: set[str] = set()
-        for item in ranked:
-            effect = item.atom.effect
-            if effect.id in seen or _stands_there(effect, item, present.hypothesis):
-                continue
-            seen.add(effect.id)
-            out.append(item)
-        return out
+    def every_score(self, present: Fit, noise: Noise) -> list[Score]:
+        """The same at every point of their grids."""
+        ranked = score(self.projected(present, noise), present.residual, self.problem.rows)
+        return admissible(ranked, present.hypothesis, self.problem.rows)
 
     def criterion(self, fitted: Fit) -> float:
         """Whitened squares and the price of everything that was added."""
@@ -224,7 +214,7 @@ class Inquiry:
     def _price_of(self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise) -> float:
         """The criterion of a trial; infinite where its last term is not what it is called."""
         price = self.criterion(fitted)
-        if in_disguise(fitted.hypothesis.terms[-1], self.problem.dataset.motions) or (
+        if in_disguise(fitted.hypothesis.terms[-1]) or (
             price < self.criterion(present) and self._rests_on_states(without, fitted, noise)
         ):
             price = np.inf
@@ -273,28 +263,3 @@ class Inquiry:
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """Fit a hypothesis under a given noise."""
         return fit(self.problem, hypothesis, noise.weight(self.problem))
-
-
-def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
-    """Whether the effect, or one that contains it, is in the hypothesis already."""
-    for term in hypothesis.terms:
-        if effect.id in term.effect.contains:
-            return True
-        if term.effect.id == effect.id:
-            orders = [p.name for p in effect.parameters if p.whole]
-            if not effect.repeatable or all(
-                term.values[name] == item.atom.shape.get(name) for name in orders
-            ):
-                return True
-    return False
-
-
-def _possible(item: Score) -> bool:
-    """Whether the amplitudes that fit best are within an effect's bounds at all."""
-    coordinates = Coordinates(item.atom.effect)
-    if item.atom.effect.probes:
-        return True
-    base = {**item.atom.effect.null, **item.atom.shape}
-    amplitudes = slice(len(coordinates.amplitudes))
-    begun = coordinates.vector(starting_values(item)[0])[amplitudes]
-    return bool(np.any(begun != coordinates.vector(base)[amplitudes]))

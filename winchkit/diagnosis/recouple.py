@@ -12,7 +12,6 @@ from winchkit.diagnosis.couples import couples
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
-from winchkit.diagnosis.shapes import in_disguise
 
 __all__ = ["recoupled"]
 
@@ -40,23 +39,14 @@ def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ..
         hypothesis = hypothesis.without(index)
     base = inquiry.refit(hypothesis, noise)
     pays = inquiry.criterion(base) - inquiry.criterion(present) + _BETTER
-    pairs = couples(
-        inquiry.projected(base, noise), base.residual, inquiry.scores(base, noise), inquiry.price
-    )
+    projected, scores = inquiry.projected(base, noise), inquiry.every_score(base, noise)
+    pairs = couples(projected, base.residual, scores, inquiry.price)
     leave = {present.hypothesis.terms[index].effect.id for index in indices}
     promising = [pair for pair in pairs if pair.pays > pays and pair.ids != leave]
     for pair in promising[:_TRIED]:
         # Newcomers first: what stood for both alone would keep the values that it had.
         first, second = sorted(pair.scores, key=lambda item: item.atom.effect.id in leave)
         trial = inquiry.trial(inquiry.trial(base, first, noise).fit, second, noise)
-        if trial.criterion < inquiry.criterion(present) - _BETTER and not _disguised(
-            inquiry, trial.fit
-        ):
+        if trial.criterion < inquiry.criterion(present) - _BETTER:
             return trial.fit
     return None
-
-
-def _disguised(inquiry: Inquiry, fitted: Fit) -> bool:
-    """Whether an addition became another effect beside the one that came after it."""
-    motions = inquiry.problem.dataset.motions
-    return any(in_disguise(term, motions) for term in fitted.hypothesis.terms[inquiry.given :])

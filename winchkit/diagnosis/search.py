@@ -14,7 +14,7 @@ from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
 from winchkit.diagnosis.problem import Hypothesis
 from winchkit.diagnosis.recouple import recoupled
-from winchkit.diagnosis.shapes import elsewhere, in_disguise
+from winchkit.diagnosis.shapes import elsewhere
 from winchkit.diagnosis.signature import Score, chance_level
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -72,7 +72,7 @@ def search(inquiry: Inquiry) -> Found:
             trials = _short_list(inquiry, present, noise, scores)
             tried = tried or _fits(trials)
             grown = _grow(inquiry, present, noise, trials)
-        grown = grown or _coupled(inquiry, present, noise, scores)
+        grown = grown or _coupled(inquiry, present, noise)
         if grown is None:
             break
         inquiry.look_again(grown.hypothesis)
@@ -144,7 +144,7 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
     return [inquiry.trial(present, item, noise) for item in listed]
 
 
-def _coupled(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> Fit | None:
+def _coupled(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
     To begin with, or in exchange for a first addition: pairs upon what is there already would
@@ -155,7 +155,8 @@ def _coupled(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) 
         return None
     if added:
         return _exchanged(inquiry, present, noise, present)
-    pairs = couples(inquiry.projected(present, noise), present.residual, scores, inquiry.price)
+    projected, scores = inquiry.projected(present, noise), inquiry.every_score(present, noise)
+    pairs = couples(projected, present.residual, scores, inquiry.price)
     hidden = [pair.scores for pair in pairs if pair.hidden][:_COUPLES]
     trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in hidden]
     return _grow(inquiry, present, noise, trials)
@@ -262,11 +263,8 @@ def _without_the_doubtful(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple
 
 
 def _without_the_needless(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
-    """Drop additions that do not pay, and those that beside later ones became something else."""
     for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
         without = inquiry.refit(present.hypothesis.without(index), noise)
-        if inquiry.criterion(without) < inquiry.criterion(present) or in_disguise(
-            present.hypothesis.terms[index], inquiry.problem.dataset.motions
-        ):
+        if inquiry.criterion(without) < inquiry.criterion(present):
             present = without
     return present

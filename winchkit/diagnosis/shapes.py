@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,19 +11,13 @@ from winchkit.diagnosis.signature import Score
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
-from winchkit.model.stages import At
 
 __all__ = ["by_coefficients", "elsewhere", "gap", "in_disguise", "starting_values"]
 
 
-def in_disguise(term: Term, motions: Iterable[At]) -> bool:
-    """Whether a term has become another effect: a shape at its bound, values that cannot be.
-
-    Or values that none of the motions is far enough for to show what they mean.
-    """
+def in_disguise(term: Term) -> bool:
+    """Whether a term has become another effect: a shape at its bound, values that cannot be."""
     effect = term.effect
-    if effect.visible and not any(effect.visible(at, term.values) for at in motions):
-        return True
     if effect.possible is not None and not effect.possible(term.values):
         return True
     coordinates = Coordinates(effect)
