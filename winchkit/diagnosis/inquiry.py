@@ -48,6 +48,8 @@ __all__ = ["Inquiry", "Trial"]
 Array = NDArray[np.float64]
 _UNSURE = 0.2
 _HALVINGS = 7
+_WILD = 1.0
+"""Of what the differences round: more of it is not rounding."""
 
 
 @dataclass(frozen=True)
@@ -202,6 +204,7 @@ class Inquiry:
                 places = self._placed(hypothesis, present, own, weight)
                 terms = [Term(law, values) for values in places]
                 starts = [hypothesis.with_term(term, self.problem.runs) for term in terms]
+                starts += [anew for start in starts for anew in self._less_rounded(start)]
             else:
                 starts = [best.fit.hypothesis.with_law(law)]
             fitted = fit_from(self.problem, starts, weight)
@@ -210,6 +213,17 @@ class Inquiry:
                 break
             best = longer if np.isfinite(longer.criterion) else best
         return best or longer
+
+    def _less_rounded(self, start: Hypothesis) -> list[Hypothesis]:
+        """The same begun as if sampling rounded nothing, where a loop is added to a wild rounding.
+
+        Without the loop that was there all the time the rounding stood for a part of it, and a
+        loop fitted from there turns around too late for good.
+        """
+        wild = self.problem.rounds and bool(start.nuisances) and abs(start.nuisances[-1]) > _WILD
+        if not wild or not start.terms[-1].effect.memory:
+            return []
+        return [replace(start, nuisances=(*start.nuisances[:-1], 0.0))]
 
     def _price_of(self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise) -> float:
         """The criterion of a trial; infinite where its last term is not what it is called."""
