@@ -73,8 +73,7 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
             theirs = held_out(inquiry.problem, fitted, noise, blocks)
             alike = fitted.cost < final.cost + _ALIKE
             counted = alike or _flip_chance(theirs - ours) > _LEVEL
-        counted = counted or _stands_for(inquiry, fitted, final, base, index)
-        if counted:
+        if counted or _stands_for(inquiry, fitted, final, base, index):
             members.append((size, fitted.cost, term))
     ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
     projected = inquiry.projected(base, noise)
