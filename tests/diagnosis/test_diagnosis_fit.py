@@ -11,7 +11,8 @@ from scipy.optimize import least_squares
 
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.fit import fit
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.hypothesis import Hypothesis
+from winchkit.diagnosis.problem import Problem
 from winchkit.effects.bind import Term
 from winchkit.schema.winch import GuideSpec
 

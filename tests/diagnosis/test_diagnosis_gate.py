@@ -19,8 +19,9 @@ from winchkit.diagnosis.gate import (
     held_out_rms,
     left_out_steps,
 )
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.noise import Noise
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.effects.bind import Term
 
 RIDE = Ride(samples=300)

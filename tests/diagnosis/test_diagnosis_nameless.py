@@ -14,9 +14,10 @@ from winchkit.diagnosis.curves import PLACES, columns_of, hats_over, laws_over
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, inquire
 from winchkit.diagnosis.doubt import Doubt, judge_and_doubt
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.nameless import Beside, _Hats, best_curve
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.search import Found, search
 from winchkit.effects.bind import Term
 from winchkit.runs.run import Run

@@ -11,6 +11,7 @@ from scipy.fft import dct
 from scipy.stats import kstest
 
 from winchkit.diagnosis.fit import Fit, fit
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.noise import (
     Noise,
     Presence,
@@ -18,7 +19,7 @@ from winchkit.diagnosis.noise import (
     noise_saturated,
     presence,
 )
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 
 RIDE = Ride(samples=300)
 SIZE = 3e-4

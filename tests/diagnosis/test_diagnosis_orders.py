@@ -8,7 +8,7 @@ from diagnosis_runs import GROOVED, Ride, length_problem
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.follows import harmonics
-from winchkit.diagnosis.problem import Hypothesis
+from winchkit.diagnosis.hypothesis import Hypothesis
 
 Array = NDArray[np.float64]
 RIDE = Ride(samples=3000, rate=100.0)

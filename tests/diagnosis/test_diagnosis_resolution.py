@@ -11,8 +11,9 @@ from diagnosis_runs import GROOVED, Array, Ride, made, term
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.fit import Fit, fit
 from winchkit.diagnosis.gate import blocks_of
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.noise import Noise, noise_from_repeats
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.resolution import rounded, without_rounding
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.effects.bind import Term

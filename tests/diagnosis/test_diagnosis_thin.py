@@ -10,8 +10,9 @@ from diagnosis_runs import CATALOGUE, GROOVED
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.dataset import Filtering, assemble, prepare
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.thin import Thinning, thinning_for
 from winchkit.diagnosis.uncertainty import spread_of
 from winchkit.effects.bind import Term, modifiers_of

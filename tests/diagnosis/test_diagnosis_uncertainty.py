@@ -12,8 +12,9 @@ from scipy.optimize import least_squares
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.fit import Fit, fit
 from winchkit.diagnosis.gate import blocks_of
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.noise import Noise, noise_from_repeats
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.profile_likelihood import profile_ends
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 

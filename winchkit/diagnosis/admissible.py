@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from winchkit.diagnosis.problem import Hypothesis
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.shapes import starting_values
 from winchkit.diagnosis.signature import Score, worthless
 from winchkit.effects.coordinates import Coordinates

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.hypothesis import Hypothesis
+from winchkit.diagnosis.problem import Problem
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 

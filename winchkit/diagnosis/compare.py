@@ -12,8 +12,9 @@ from winchkit.diagnosis.admit import OUTPUT_UNITS
 from winchkit.diagnosis.dataset import Dataset, prepare
 from winchkit.diagnosis.denoise import contrasts
 from winchkit.diagnosis.follows import Followed, follows, harmonics
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.maps import residual_maps
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Comparison, OutputError
 from winchkit.diagnosis.spectrum import WHOLE_FILTER, low_pass
 from winchkit.effects.bind import terms_of

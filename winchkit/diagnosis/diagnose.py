@@ -14,12 +14,13 @@ from winchkit.diagnosis.doubt import judge_and_doubt
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.follows import follows, harmonics
 from winchkit.diagnosis.gate import held_out
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.limits import what_runs_cannot_show
 from winchkit.diagnosis.next_run import next_runs
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.power import detectable
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import (
     Candidate,
     Diagnosis,

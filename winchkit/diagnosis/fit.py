@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.hypothesis import Hypothesis
+from winchkit.diagnosis.problem import Problem
 
 __all__ = ["Fit", "fit", "fit_from"]
 

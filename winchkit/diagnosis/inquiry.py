@@ -20,6 +20,7 @@ from winchkit.diagnosis.gate import (
     groups_of,
     held_out_rms,
 )
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.last import Last
 from winchkit.diagnosis.noise import (
     Noise,
@@ -29,13 +30,14 @@ from winchkit.diagnosis.noise import (
     presence,
 )
 from winchkit.diagnosis.points import missing_needs
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.resolution import without_rounding
 from winchkit.diagnosis.shapes import by_coefficients, gap, in_disguise, starting_values
 from winchkit.diagnosis.signature import (
     Projected,
     Score,
     Signatures,
+    redrawn,
     score,
     signatures,
 )
@@ -83,8 +85,11 @@ class Inquiry:
 
     def look_again(self, present: Hypothesis) -> None:
         """Draw the signatures anew beside a grown model: a lag acts on what is there."""
-        del self.signatures  # Both at once would be the most memory of a whole diagnosis.
-        self.signatures = self._signatures(present)
+        grown = redrawn(self.problem, present, self.signatures)
+        if grown is None:
+            del self.signatures  # Both at once would be the most memory of a whole diagnosis.
+            grown = self._signatures(present)
+        self.signatures = grown
 
     @property
     def price(self) -> float:

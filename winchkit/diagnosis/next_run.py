@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ncx2
 
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.kinds import KINDS, imagined
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import NextRun
 from winchkit.effects.bind import Term
 from winchkit.effects.effect import told_apart

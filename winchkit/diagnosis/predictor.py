@@ -58,6 +58,10 @@ class Predictor:
             "motor_torque": _WAY + force + _SHOWN["motor_torque"],
         }
 
+    def outputs_of(self, stage: Stage) -> set[str]:
+        """Outputs on whose way a stage lies."""
+        return {output for output in _SHOWN if stage in self._stages[output]}
+
     def change(self, output: str, terms: Sequence[Term], sharper: Sharper = None) -> Array:
         """Coefficients of what the terms change in an output, (kept,); zero where not compared."""
 

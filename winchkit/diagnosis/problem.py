@@ -7,7 +7,6 @@ length instrument's offset and, where a known weight is the load, how its accele
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -16,17 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.dataset import Dataset
+from winchkit.diagnosis.hypothesis import START, Hypothesis, started
 from winchkit.diagnosis.predictor import Predictor, masked
 from winchkit.diagnosis.spectrum import Band, band_edges, narrow_edges, to_time
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
-from winchkit.effects.effect import Effect
 from winchkit.model.line import Line
+from winchkit.model.stages import Stage
 
-__all__ = ["Hypothesis", "Problem", "Segment", "started"]
+__all__ = ["Problem", "Segment"]
 
 Array = NDArray[np.float64]
-_START = "start"
 
 
 @dataclass(frozen=True)
@@ -37,36 +36,6 @@ class Segment:
     output: str
     rows: slice
     band: Band
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """Terms with their values, nuisances, and initial states."""
-
-    terms: tuple[Term, ...] = ()
-    nuisances: tuple[float, ...] = ()
-    """One per column of :attr:`Problem.nuisance_columns`; none is all zero."""
-    starts: tuple[tuple[float, ...], ...] = ()
-    """Per term: one initial state per run where it has memory, else nothing."""
-
-    def with_term(self, term: Term, runs: int) -> Hypothesis:
-        """With one term more."""
-        remembers = term.effect.memory and _START in term.values
-        start = (0.0,) * runs if remembers else ()
-        return replace(self, terms=(*self.terms, term), starts=(*self.starts, start))
-
-    def with_law(self, effect: Effect) -> Hypothesis:
-        """With another effect at the values of the last term."""
-        return replace(self, terms=(*self.terms[:-1], Term(effect, self.terms[-1].values)))
-
-    def without(self, index: int) -> Hypothesis:
-        """With one term less."""
-        keep = [i for i in range(len(self.terms)) if i != index]
-        return replace(
-            self,
-            terms=tuple(self.terms[i] for i in keep),
-            starts=tuple(self.starts[i] for i in keep),
-        )
 
 
 class Problem:
@@ -128,6 +97,10 @@ class Problem:
             out[segment.rows] = predictor.change(segment.output, terms[segment.run], sharper)
         return out
 
+    def outputs_of(self, stage: Stage) -> set[str]:
+        """Outputs on whose way a stage lies, in some run."""
+        return {output for p in self._predictors for output in p.outputs_of(stage)}
+
     def residual(self, hypothesis: Hypothesis) -> Array:
         """Measured minus predicted, rows."""
         residual = self.base - self.change(hypothesis)
@@ -177,7 +150,7 @@ class Problem:
         high = [np.full(count, np.inf), *(pair[1] for pair in pairs)]
         for term, start in zip(like.terms, like.starts, strict=True):
             if start:
-                parameter = term.effect.parameter(_START)
+                parameter = term.effect.parameter(START)
                 low.append(np.full(len(start), parameter.low))
                 high.append(np.full(len(start), parameter.high))
         return np.concatenate(low), np.concatenate(high)
@@ -286,12 +259,3 @@ def _segments(dataset: Dataset) -> list[Segment]:
                 segments.append(Segment(run, output, slice(at, at + kept), band))
                 at += kept
     return segments
-
-
-def started(hypothesis: Hypothesis, run: int) -> Sequence[Term]:
-    """Terms with the initial states of one run."""
-    out = []
-    for term, start in zip(hypothesis.terms, hypothesis.starts, strict=True):
-        values: Mapping[str, float] = term.values
-        out.append(Term(term.effect, {**values, _START: start[run]}) if start else term)
-    return out

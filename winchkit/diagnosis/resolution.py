@@ -17,7 +17,8 @@ from scipy.interpolate import make_interp_spline
 
 from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.problem import Hypothesis, Problem, started
+from winchkit.diagnosis.hypothesis import Hypothesis, started
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.spectrum import to_frequency
 from winchkit.effects.bind import modifiers_of
 from winchkit.model.derivatives import is_calmer

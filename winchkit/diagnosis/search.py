@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.couples import couples
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import confidence, held_out, held_out_rms
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
-from winchkit.diagnosis.problem import Hypothesis
 from winchkit.diagnosis.recouple import recoupled
 from winchkit.diagnosis.shapes import elsewhere
 from winchkit.diagnosis.signature import Score, chance_level
@@ -163,9 +163,13 @@ def _coupled(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit | None:
 
 
 def _exchanged(inquiry: Inquiry, present: Fit, noise: Noise, against: Fit) -> Fit | None:
-    """A better pair in the place of one addition, that holds against another fit; or None."""
+    """A better pair in the place of one addition, that holds against another fit; or None.
+
+    It need not lower an error by much: where something is missing, one effect may nearly do what
+    two did, with other values.
+    """
     better = recoupled(inquiry, present, noise, 1)
-    holds = better is not present and _holds(inquiry, against, better, noise)
+    holds = better is not present and _holds(inquiry, against, better, noise, matters=1.0)
     return better if holds else None
 
 
@@ -182,7 +186,9 @@ def _grow(inquiry: Inquiry, present: Fit, noise: Noise, trials: list[Trial]) -> 
     return None
 
 
-def _holds(inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise) -> bool:
+def _holds(
+    inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise, matters: float = _MATTERS
+) -> bool:
     """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
 
     An effect that shows in few blocks, such as those of one kind of move, cannot be certain by
@@ -201,8 +207,7 @@ def _holds(inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise) -> bool:
     now = held_out_rms(problem, grown, noise, groups)
     ratios = [now[output] / was[output] for output in problem.dataset.outputs]
     # What is certain and changes nothing, such as a clock a millisecond off, is not worth a name.
-    matters = min(ratios) < _MATTERS and max(ratios) < _NO_WORSE
-    return bool(np.sum(gain) > 0) and matters
+    return bool(np.sum(gain) > 0 and min(ratios) < matters and max(ratios) < _NO_WORSE)
 
 
 def _added(present: Fit, grown: Fit) -> int:

@@ -15,9 +15,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.points import points
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.problem import Problem
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
@@ -28,6 +29,7 @@ __all__ = [
     "Score",
     "Signatures",
     "chance_level",
+    "redrawn",
     "score",
     "signatures",
     "worthless",
@@ -70,6 +72,10 @@ class Signatures:
     """(rows, p)."""
     gram: Array
     """(bands, p, p)."""
+    beside: Hypothesis
+    """The present model that they were drawn beside."""
+    silent: tuple[Effect, ...] = ()
+    """Effects of which some point changed nothing there, and has no column."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +97,7 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
     here = problem.change(present)
     tried = list(points(problem, effects))
     atoms: list[Atom] = []
+    silent: dict[str, Effect] = {}
     # One column after another in memory: thousands of rows each, written and read whole.
     columns, count = np.empty((sum(len(secants) for *_, secants in tried), problem.rows)), 0
     for effect, shape, secants in tried:
@@ -101,10 +108,32 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
             if columns[count].any():
                 own.append(secant)
                 count += 1
+            else:
+                silent[effect.id] = effect
         if own:
             atoms.append(Atom(effect, shape, slice(count - len(own), count), tuple(own)))
     kept = columns[:count].T
-    return Signatures(tuple(atoms), kept, _gram(problem, kept))
+    return Signatures(tuple(atoms), kept, _gram(problem, kept), present, tuple(silent.values()))
+
+
+def redrawn(problem: Problem, present: Hypothesis, found: Signatures) -> Signatures | None:
+    """The same signatures beside a grown model, in the same memory; ``found`` is used up.
+
+    Only those are drawn anew that lie on the way to an output which changed terms touch: a lag
+    acts on what is there. None where an effect that had no column may have one now.
+    """
+    changed = [t for t in present.terms if t not in found.beside.terms]
+    changed += [t for t in found.beside.terms if t not in present.terms]
+    touched = {output for term in changed for output in problem.outputs_of(term.effect.stage)}
+    if any(touched & problem.outputs_of(effect.stage) for effect in found.silent):
+        return None
+    here = problem.change(present)
+    for atom in found.atoms:
+        if touched & problem.outputs_of(atom.effect.stage):
+            for index, secant in enumerate(atom.secants, atom.columns.start):
+                values = {**atom.effect.null, **atom.shape, **secant}
+                found.columns[:, index] = _column(problem, present, here, atom.effect, values)
+    return replace(found, gram=_gram(problem, found.columns), beside=present)
 
 
 def _column(

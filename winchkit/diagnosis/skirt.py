@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from winchkit.diagnosis.compare import repeat_noise
 from winchkit.diagnosis.dataset import Dataset
-from winchkit.diagnosis.problem import Hypothesis, Problem
+from winchkit.diagnosis.hypothesis import Hypothesis
+from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.spectrum import WHOLE_FILTER
 
 __all__ = ["Skirt"]

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.problem import Hypothesis
 from winchkit.diagnosis.search import Found
 
 __all__ = ["GEOMETRY_NAME", "Waterfall", "waterfall_of"]

@@ -16,7 +16,7 @@ from scipy.stats import f as f_distribution
 
 from winchkit.diagnosis.diagnose import Told, silent
 from winchkit.diagnosis.fit import fit
-from winchkit.diagnosis.problem import Hypothesis
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.robot.answer import RobotAnswer, Seen, answer_of
 from winchkit.diagnosis.robot.believed import Believed
 from winchkit.diagnosis.robot.inquiry import RobotInquiry

@@ -11,9 +11,9 @@ from scipy.stats import f as f_distribution
 
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import Folds
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise, Presence
-from winchkit.diagnosis.problem import Hypothesis
 from winchkit.diagnosis.robot.figures import Shown, held_out_rms
 from winchkit.diagnosis.robot.noise import PoseNoise
 from winchkit.diagnosis.robot.places import lacking, lacking_parts

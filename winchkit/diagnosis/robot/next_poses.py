@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.next_run import power_of
-from winchkit.diagnosis.problem import Hypothesis
 from winchkit.diagnosis.result import NextRun
 from winchkit.diagnosis.robot.next_kinds import KINDS, PoseKind, imagined, usable
 from winchkit.diagnosis.robot.problem import RobotProblem

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.diagnosis.problem import Hypothesis, Problem, Segment
+from winchkit.diagnosis.hypothesis import Hypothesis
+from winchkit.diagnosis.problem import Problem, Segment
 from winchkit.diagnosis.robot.believed import Believed, believed_profile
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.equations import POSED, Equations
@@ -23,6 +24,7 @@ from winchkit.effects.bind import Term
 from winchkit.effects.bind_robot import robot_with_terms
 from winchkit.effects.placed import base_of, line_of_effect
 from winchkit.model.robot import Pose, Robot
+from winchkit.model.stages import Stage
 from winchkit.schema.robot import RobotProfile
 
 __all__ = ["RobotProblem", "Standing"]
@@ -105,6 +107,10 @@ class RobotProblem(Problem):
     def samples(self, output: str) -> int:
         """Rows of an output, the prior's left out."""
         return max(1, int(np.count_nonzero(self._keep[output])))
+
+    def outputs_of(self, stage: Stage) -> set[str]:
+        """All: a rope that is longer moves the platform, and with it every force."""
+        return set(self.dataset.outputs)
 
     def change(self, hypothesis: Hypothesis) -> Array:
         """What the terms add to the prediction, rows."""

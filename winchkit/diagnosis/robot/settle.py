@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.fit import fit
-from winchkit.diagnosis.problem import Hypothesis
+from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.robot.believed import Believed
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
