@@ -74,8 +74,8 @@ class Signatures:
     """(bands, p, p)."""
     beside: Hypothesis
     """The present model that they were drawn beside."""
-    silent: tuple[Effect, ...] = ()
-    """Effects of which some point changed nothing there, and has no column."""
+    silent: tuple[tuple[Effect, dict[str, float]], ...] = ()
+    """Effects with values at which they changed nothing there, and so have no column."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
     here = problem.change(present)
     tried = list(points(problem, effects))
     atoms: list[Atom] = []
-    silent: dict[str, Effect] = {}
+    silent: list[tuple[Effect, dict[str, float]]] = []
     # One column after another in memory: thousands of rows each, written and read whole.
     columns, count = np.empty((sum(len(secants) for *_, secants in tried), problem.rows)), 0
     for effect, shape, secants in tried:
@@ -109,25 +109,27 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
                 own.append(secant)
                 count += 1
             else:
-                silent[effect.id] = effect
+                silent.append((effect, values))
         if own:
             atoms.append(Atom(effect, shape, slice(count - len(own), count), tuple(own)))
     kept = columns[:count].T
-    return Signatures(tuple(atoms), kept, _gram(problem, kept), present, tuple(silent.values()))
+    return Signatures(tuple(atoms), kept, _gram(problem, kept), present, tuple(silent))
 
 
 def redrawn(problem: Problem, present: Hypothesis, found: Signatures) -> Signatures | None:
     """The same signatures beside a grown model, in the same memory; ``found`` is used up.
 
     Only those are drawn anew that lie on the way to an output which changed terms touch: a lag
-    acts on what is there. None where an effect that had no column may have one now.
+    acts on what is there. None where an effect that had no column has one now.
     """
     changed = [t for t in present.terms if t not in found.beside.terms]
     changed += [t for t in found.beside.terms if t not in present.terms]
     touched = {output for term in changed for output in problem.outputs_of(term.effect.stage)}
-    if any(touched & problem.outputs_of(effect.stage) for effect in found.silent):
-        return None
     here = problem.change(present)
+    for effect, values in found.silent:
+        reached = touched & problem.outputs_of(effect.stage)
+        if reached and _column(problem, present, here, effect, values).any():
+            return None
     for atom in found.atoms:
         if touched & problem.outputs_of(atom.effect.stage):
             for index, secant in enumerate(atom.secants, atom.columns.start):
