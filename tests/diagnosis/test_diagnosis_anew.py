@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
 
@@ -11,6 +14,7 @@ from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.recouple import recoupled
 from winchkit.diagnosis.search import _replaced
+from winchkit.diagnosis.signature import Signatures, redrawn
 from winchkit.effects.bind import Term
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
@@ -66,3 +70,51 @@ def test_a_stribeck_speed_that_no_run_passes_stands_beside_coulombs_friction(
     told = confusion_of(inquiry, present, noise, 0).effects
     assert "motor-stribeck" in told
     assert ("motor-coulomb" not in told) is alone
+
+
+def columns_of(found: Signatures) -> dict[str, np.ndarray]:
+    """By effect and the values of a usual size."""
+    return {
+        f"{atom.effect.id} {atom.shape} {secant}": found.columns[:, index]
+        for atom in found.atoms
+        for index, secant in enumerate(atom.secants, atom.columns.start)
+    }
+
+
+def test_signatures_beside_a_grown_model_are_those_that_are_drawn_anew() -> None:
+    """A wrong ratio reaches every output, a stretching rope the length alone."""
+    for grown in (
+        term("gear-ratio", ratio_error=0.02),
+        term("cable-elongation-linear", axial_stiffness=3e5),
+    ):
+        inquiry = inquiry_into()
+        before = {name: column.copy() for name, column in columns_of(inquiry.signatures).items()}
+        present = inquiry.begin.with_term(grown, inquiry.problem.runs)
+        again = redrawn(inquiry.problem, present, inquiry.signatures)
+        assert again is not None
+        told, wanted = columns_of(again), columns_of(inquiry._signatures(present))
+        assert set(told) == set(wanted) == set(before)
+        changed = [
+            name for name, column in wanted.items() if not np.array_equal(column, before[name])
+        ]
+        assert changed
+        assert all(np.array_equal(told[name], wanted[name]) for name in wanted)
+        assert np.allclose(again.gram, inquiry._signatures(present).gram)
+
+
+@pytest.mark.parametrize(
+    ("grown", "anew"),
+    [
+        (term("pulley-coulomb", friction=0.05), True),
+        (term("cable-elongation-linear", axial_stiffness=3e5), False),
+    ],
+    ids=["on its way", "elsewhere"],
+)
+def test_a_candidate_that_had_no_signature_and_has_one_now_has_all_drawn_anew(
+    grown: Term, anew: bool
+) -> None:
+    inquiry = inquiry_into()
+    lag = CATALOGUE["cell-lag"]
+    silent = replace(inquiry.signatures, silent=((lag, {"time_constant": 0.05}),))
+    present = inquiry.begin.with_term(grown, inquiry.problem.runs)
+    assert (redrawn(inquiry.problem, present, silent) is None) is anew
