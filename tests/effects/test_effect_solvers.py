@@ -93,6 +93,20 @@ def test_what_a_drive_is_told_is_the_torque_of_a_moment_later() -> None:
         assert not np.allclose(exact[inside], torque(time)[inside], rtol=1e-4)
 
 
+def test_noise_of_the_encoder_opens_no_play_at_rest() -> None:
+    """Teeth that bear go on to bear while the winch stands, whatever the encoder's last digits."""
+    time = np.linspace(0, 10, 501)
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(len(time))
+    moved = 40.0 * np.clip(time / 5.0, 0.0, 1.0)
+    line = Line(profile_with("grooved"))
+    motion = line.motion(Signals(time, moved + noise, load=np.full(len(time), 200.0)))
+    play = {"gap": 0.01, "held": 0.0}
+    torque = predict(line.profile, motion, CATALOGUE["gear-backlash"], play)["motor_torque"]
+    bearing = time > 1.0
+    assert np.allclose(torque[bearing], line.predict(motion)["motor_torque"][bearing], rtol=1e-6)
+    assert np.any(torque[~bearing] == 0.0)
+
+
 def _stack(wound: np.ndarray, strain: np.ndarray) -> np.ndarray:
     """Rope on the drum as a list of pieces, last in first out."""
     before = float(np.mean(strain))

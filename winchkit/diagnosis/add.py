@@ -15,6 +15,7 @@ from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Estimate, OutputFit
+from winchkit.diagnosis.shaken import calmed
 from winchkit.diagnosis.signature import Score, score
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import output_fits
@@ -121,17 +122,26 @@ def grow(
         raise UsageError(
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
-    begin, noise = inquiry.settle(inquiry.begin)
-    trials = [inquiry.trial(begin, item, noise) for item in _atoms(inquiry, effect_id, noise)]
-    if not trials:
-        raise UsageError(f"effect '{effect_id}' changes nothing that these runs measured")
-    best = min(trials, key=lambda trial: trial.fit.cost)
-    final, final_noise = inquiry.settle(best.fit.hypothesis, noise)
+    (begin, noise), (final, final_noise) = _fitted(inquiry, effect_id)
+    calm = calmed(dataset, final.hypothesis)
+    if calm is not None:
+        inquiry = inquire(calm, candidates)
+        (begin, noise), (final, final_noise) = _fitted(inquiry, effect_id)
     spread = spread_of(inquiry.problem, final, final_noise, inquiry.blocks)
     outputs = output_fits(inquiry, (begin, noise), (final, final_noise))
     terms = tuple(estimates(inquiry.problem, final, spread))
     addition = Addition(outputs, terms, inquiry.problem.dataset.notes)
     return Grown(inquiry.problem, begin, final, addition)
+
+
+def _fitted(inquiry: Inquiry, effect_id: str) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:
+    """The profile as it is, and with the effect, each with its noise."""
+    begin, noise = inquiry.settle(inquiry.begin)
+    trials = [inquiry.trial(begin, item, noise) for item in _atoms(inquiry, effect_id, noise)]
+    if not trials:
+        raise UsageError(f"effect '{effect_id}' changes nothing that these runs measured")
+    best = min(trials, key=lambda trial: trial.fit.cost)
+    return (begin, noise), inquiry.settle(best.fit.hypothesis, noise)
 
 
 def _placed(effect: Effect, dataset: Dataset) -> Effect:

@@ -29,6 +29,7 @@ from winchkit.diagnosis.result import (
     Where,
 )
 from winchkit.diagnosis.search import Found, search
+from winchkit.diagnosis.shaken import calmed
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import Judgement
 from winchkit.effects.bind import Term
@@ -98,6 +99,11 @@ def diagnose(
     inquiry = inquire(dataset, catalogue)
     told("searching", 0.4)
     found = search(inquiry)
+    calm = calmed(dataset, found.final.hypothesis)
+    if calm is not None:
+        told("searching again without the jerks", 0.6)
+        inquiry = inquire(calm, catalogue)
+        found = search(inquiry)
     told("naming", 0.8)
     return _answer(inquiry, found)
 

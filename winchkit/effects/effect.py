@@ -10,6 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from winchkit.model.stages import ROBOT_STAGES, At, Stage
 
 __all__ = ["Effect", "Need", "Parameter", "Placement", "Values", "told_apart"]
@@ -82,6 +85,8 @@ class Effect:
     """May stand several times, with other orders."""
     probes: tuple[Mapping[str, float], ...] = field(default=())
     """Values whose secants make the signature where single parameters have no gradient."""
+    shakes: Callable[[At, Values], NDArray[np.bool_]] | None = None
+    """Samples (n,) around which it jerks force and torque by how much nobody knows."""
     visible: Callable[[At, Values], bool] | None = None
     """Whether a motion gets so far that it looks like what it is called, and like nothing else."""
     possible: Callable[[Values], bool] | None = None

@@ -6,12 +6,15 @@ there is fitted.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.recurrence import play
 from winchkit.model.stages import At, Path, Stage
 
-_ON_THE_FLANK = 1 - 1e-9
+Array = NDArray[np.float64]
+_ON_THE_FLANK = 0.98
+"""Of the way to a flank: what is nearer bears, though the encoder's noise may say otherwise."""
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
@@ -23,8 +26,22 @@ def apply(path: Path, at: At, values: Values) -> Path:
     if gap == 0.0 or len(path.value) < 2:
         return path
     drum_angle = play(path.value, gap, values["start"])
-    meshes = np.abs(drum_angle - path.value) >= gap / 2 * _ON_THE_FLANK
+    meshes = _meshes(path.value, drum_angle, gap)
     return Path(drum_angle, path.slope * np.where(meshes, 1.0, values["held"]))
+
+
+def _meshes(turned: Array, drum_angle: Array, gap: float) -> NDArray[np.bool_]:
+    """Where the teeth bear, and not somewhere in the gap."""
+    return np.asarray(np.abs(drum_angle - turned) >= gap / 2 * _ON_THE_FLANK)
+
+
+def shaken(at: At, values: Values) -> NDArray[np.bool_]:
+    """Where teeth part and meet: between two samples, at a speed that jumps."""
+    gap, turned = values["gap"], at.drum_angle
+    if gap == 0.0 or len(turned) < 2:
+        return np.zeros(len(turned), dtype=bool)
+    meshes = _meshes(turned, play(turned, gap, values["start"]), gap)
+    return np.diff(meshes, prepend=meshes[0])
 
 
 def carried(after: Path, before: Path, _at: At, values: Values) -> float:
@@ -44,8 +61,8 @@ EFFECT = Effect(
     apply=apply,
     outputs=("cable_length", "motor_torque"),
     what="Teeth have play: after a reversal the drum stands until the other flank bears.",
-    formula="play operator of gap b on φ; held: share of the rope's torque within the play; "
-    "start: place in the gap at the run's start, −½ to ½",
+    formula="play operator of gap b on φ; held: share of the rope's torque within the play, "
+    "but for the last fiftieth of the way to a flank; start: place in the gap at the run's start, −½ to ½",
     source="play operator (Krasnosel'skii and Pokrovskii, Systems with Hysteresis)",
     looks_like="A step of the length after a reversal, whatever the speed.",
     confused_with=("length-time-offset", "cable-hysteresis"),
@@ -54,6 +71,7 @@ EFFECT = Effect(
     order=2,
     memory=True,
     carry=carried,
+    shakes=shaken,
     probes=(
         {"gap": 1e-3},
         {"gap": 4e-3},
