@@ -62,7 +62,8 @@ EFFECT = Effect(
     outputs=("cable_length", "motor_torque"),
     what="Teeth have play: after a reversal the drum stands until the other flank bears.",
     formula="play operator of gap b on φ; held: share of the rope's torque within the play, "
-    "but for the last fiftieth of the way to a flank; start: place in the gap at the run's start, −½ to ½",
+    "but for the last fiftieth of the way to a flank; start: place in the gap at the run's "
+    "start, −½ to ½",
     source="play operator (Krasnosel'skii and Pokrovskii, Systems with Hysteresis)",
     looks_like="A step of the length after a reversal, whatever the speed.",
     confused_with=("length-time-offset", "cable-hysteresis"),
