@@ -156,6 +156,29 @@ def test_what_differs_for_a_known_reason_is_no_noise() -> None:
     assert wise.rms["cable_length"] == pytest.approx(SIZE, rel=0.1)
 
 
+def test_what_each_run_fits_for_itself_takes_no_noise_away() -> None:
+    """A level for each run takes the slowest noise; the power that is told stays as it was."""
+    random = np.random.default_rng(5)
+    whole, bare, told = [], [], []
+    for _ in range(60):
+        problem = length_problem([white(random, RIDE.samples) for _ in range(2)], RIDE)
+        levels = np.zeros((problem.rows, len(problem.segments)))
+        for index, segment in enumerate(problem.segments):
+            levels[segment.rows.start : segment.rows.start + 3, index] = 1.0
+        residual = fitted(problem).residual
+        left = residual - levels @ np.linalg.lstsq(levels, residual)[0]
+        none = np.zeros((problem.rows, 0))
+        first = [
+            noise_from_repeats(problem, residual, none).power[0],
+            noise_from_repeats(problem, left, none).power[0],
+            noise_from_repeats(problem, left, none, levels).power[0],
+        ]
+        for out, power in zip((whole, bare, told), first, strict=True):
+            out.append(power)
+    assert np.mean(bare) < 0.95 * np.mean(whole)
+    assert np.mean(told) == pytest.approx(np.mean(whole), rel=0.05)
+
+
 def test_without_repeats_noise_is_what_no_effect_explains() -> None:
     random = np.random.default_rng(8)
     ride = Ride(samples=2000)

@@ -146,21 +146,26 @@ class Inquiry:
         ]
         return self.signatures.columns[:, warm]
 
-    def noise(self, residual: Array, jacobian: Array) -> Noise:
-        """Noise under a present model, from repeats where there are any."""
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+        """Noise under a present model, from repeats where there are any.
+
+        The last ``states`` columns of ``jacobian`` are by unknowns that each run has for itself.
+        """
         if self.problem.dataset.repeated:
-            return noise_from_repeats(self.problem, residual, self._known)
+            own = jacobian[:, jacobian.shape[1] - states :]
+            return noise_from_repeats(self.problem, residual, self._known, own)
         columns = np.hstack([jacobian, self.signatures.columns])
         return noise_saturated(self.problem, residual, columns)
 
     def settle(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
         """Fit, with the noise re-estimated from what the fit leaves."""
+        states = sum(len(begun) for begun in start.starts)
         if noise is None:
             vector = self.problem.vector(start)
             jacobian = self.problem.jacobian(vector, start)
-            noise = self.noise(self.problem.residual(start), jacobian)
+            noise = self.noise(self.problem.residual(start), jacobian, states)
         first = fit(self.problem, start, noise.weight(self.problem))
-        noise = self.noise(first.residual, first.jacobian)
+        noise = self.noise(first.residual, first.jacobian, states)
         return fit(self.problem, first.hypothesis, noise.weight(self.problem)), noise
 
     def presence(self, present: Fit, noise: Noise) -> Presence:

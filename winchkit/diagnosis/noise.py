@@ -80,22 +80,28 @@ class _Split:
     mean_band: NDArray[np.intp]
 
 
-def noise_from_repeats(problem: Problem, residual: Array, known: Array) -> Noise:
+def noise_from_repeats(
+    problem: Problem, residual: Array, known: Array, own: Array | None = None
+) -> Noise:
     """Noise power from differences of repeats.
 
     ``known`` (rows, k) are signatures that may differ between repeats; their differences are
-    projected out where they are noticeable.
+    projected out where they are noticeable. ``own`` (rows, m) are derivatives by unknowns that
+    each run has for itself: as much of a difference as they may have taken is no noise's lack.
     """
     split = _split(problem, residual)
     count = len(problem.bands)
     freedom = _sums(np.ones_like(split.difference), split.difference_band, count)
     power = _power(problem, split.difference, split.difference_band, freedom)
     whole = freedom
-    for _ in range(_REWEIGHTED if known.size else 0):
+    taken = _differences(problem, own)
+    for _ in range(_REWEIGHTED if known.size or taken.size else 0):
         # What differs for a known reason made the first weights: they are drawn anew without it.
         weight = 1 / np.sqrt(_smooth(problem, power, np.maximum(freedom, 0.1))[0])
         weight = weight[split.difference_band]
         basis = _noticeable(problem, known, weight)
+        if taken.size:
+            basis = orthonormal(np.hstack([basis, taken * weight[:, None]]))
         whitened = split.difference * weight
         left = (whitened - basis @ (basis.T @ whitened)) / weight
         freedom = whole - _sums(np.sum(basis**2, axis=1), split.difference_band, count)
@@ -190,6 +196,13 @@ def _edges(problem: Problem) -> dict[str, tuple[int, Array]]:
         inner = [problem.bands[i][1] for i in own[1:]]
         out[output] = own[0], np.array([-np.inf, *inner, np.inf])
     return out
+
+
+def _differences(problem: Problem, columns: Array | None) -> Array:
+    """What of columns differs between repeats, (differences, m)."""
+    if columns is None or not columns.size:
+        return np.zeros((0, 0))
+    return np.array([_split(problem, column).difference for column in columns.T]).T
 
 
 def _noticeable(problem: Problem, known: Array, weight: Array) -> Array:

@@ -242,12 +242,23 @@ def _replaced(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
             break  # A rival stood for two.
         own = present.hypothesis.terms[index]
         base = inquiry.refit(present.hypothesis.without(index), noise)
-        rivals = [item for item in inquiry.scores(base, noise) if _another(item, own)][:_RIVALS]
-        trials = [inquiry.trial(base, item, noise) for item in rivals if item.value > 0]
+        rivals = _rivals_of(own, inquiry.scores(base, noise))
+        trials = [inquiry.trial(base, item, noise) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
         if best is not None and best.criterion < inquiry.criterion(present) - _BETTER:
             present = best.fit
     return present
+
+
+def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
+    """The best candidates for a term's place, and the simpler laws that they contain.
+
+    Before it is fitted a law with more numbers looks better than the simple one that it contains.
+    """
+    others = [item for item in scores if item.value > 0 and _another(item, own)]
+    best = others[:_RIVALS]
+    simpler = {name for item in best for name in item.atom.effect.contains}
+    return best + [item for item in others[_RIVALS:] if item.atom.effect.id in simpler]
 
 
 def _another(item: Score, own: Term) -> bool:

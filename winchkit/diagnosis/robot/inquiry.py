@@ -82,7 +82,7 @@ class RobotInquiry(Inquiry):
         """Poses say enough of everything that is common to all."""
         return self.groups
 
-    def noise(self, residual: Array, jacobian: Array) -> Noise:
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Rows are whitened by what is known of the instruments."""
         bands = self.robot_problem.bands
         freedom = np.array([self.pose_noise.freedom.get(output, 1.0) for output, _, _ in bands])

@@ -77,7 +77,9 @@ EFFECT = Effect(
         {"gap": 1e-3},
         {"gap": 4e-3},
         {"gap": 1.6e-2},
+        {"gap": 6e-2},
         {"gap": 4e-3, "held": 0.0},
         {"gap": 1.6e-2, "held": 0.0},
+        {"gap": 6e-2, "held": 0.0},
     ),
 )
