@@ -136,7 +136,9 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
     final, noise = inquiry.settle(hypothesis, noise)
     presence = inquiry.presence(final, noise)
     begun = inquiry.presence(begin, noise)
-    found = Found(begin, noise, begun, True, final, noise, presence, False, (), (), 0.0)
+    found = Found(
+        begin, noise, begun, True, final.hypothesis, final, noise, presence, False, (), (), 0.0
+    )
     judged = judge_and_doubt(inquiry, found)
     assert judged.verdict == "explained"
     assert judged.shown.final.labels == ("motor-coulomb",)

@@ -99,7 +99,7 @@ def diagnose(
     inquiry = inquire(dataset, catalogue)
     told("searching", 0.4)
     found = search(inquiry)
-    calm = calmed(dataset, found.final.hypothesis)
+    calm = calmed(dataset, found.reached)
     if calm is not None:
         told("searching again without the jerks", 0.6)
         inquiry = inquire(calm, catalogue)

@@ -45,6 +45,8 @@ class Found:
     begin_presence: Presence
     alarmed: bool
     """Whether anything beyond noise was there at the start."""
+    reached: Hypothesis
+    """The final model with additions that were dropped since they may only imitate something."""
     final: Fit
     noise: Noise
     presence: Presence
@@ -79,6 +81,7 @@ def search(inquiry: Inquiry) -> Found:
         present, noise = inquiry.settle(grown.hypothesis, noise)
         present, noise = _reconsider(inquiry, present, noise)
         scores = inquiry.scores(present, noise)
+    reached = present.hypothesis
     present, noise = _without_the_doubtful(inquiry, present, noise)
     grew = len(present.hypothesis.terms) > inquiry.given
     end_presence = inquiry.presence(present, noise)
@@ -90,6 +93,7 @@ def search(inquiry: Inquiry) -> Found:
         begin_noise=begin_noise,
         begin_presence=begin_presence,
         alarmed=alarmed,
+        reached=reached,
         final=present,
         noise=noise,
         presence=end_presence,
