@@ -80,6 +80,7 @@ def test_what_no_effect_explains_gets_no_name(kind: str, seed: int, tmp_path: Pa
         "other shape",
         "wild rounding",
         "teeth",
+        "jerk",
     ],
 )
 def test_what_searches_once_missed(
