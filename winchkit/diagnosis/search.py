@@ -62,11 +62,37 @@ class Found:
 
 def search(inquiry: Inquiry) -> Found:
     """Grow the model while something is missing and an effect holds out of sample."""
-    present, noise = inquiry.settle(inquiry.begin)
-    begin, begin_noise = present, noise
-    begin_presence = inquiry.presence(present, noise)
-    begin_scores = scores = inquiry.scores(present, noise)
-    threshold = _threshold(inquiry, present, noise)
+    begin, begin_noise = inquiry.settle(inquiry.begin)
+    begin_presence = inquiry.presence(begin, begin_noise)
+    begin_scores = inquiry.scores(begin, begin_noise)
+    threshold = _threshold(inquiry, begin, begin_noise)
+    reached, noise, tried = _grown(inquiry, begin, begin_noise, begin_scores, threshold)
+    final, noise = _without_the_doubtful(inquiry, reached, noise)
+    presence = inquiry.presence(final, noise)
+    grew = len(final.hypothesis.terms) > inquiry.given
+    alarmed = grew or _missing(begin_presence, begin_scores, threshold)
+    if alarmed and not tried:
+        tried = _fits(_short_list(inquiry, begin, begin_noise, begin_scores))
+    return Found(
+        begin=begin,
+        begin_noise=begin_noise,
+        begin_presence=begin_presence,
+        alarmed=alarmed,
+        reached=reached.hypothesis,
+        final=final,
+        noise=noise,
+        presence=presence,
+        still=_missing(presence, inquiry.scores(final, noise), threshold),
+        scores=tuple(begin_scores),
+        tried=tried if alarmed else (),
+        threshold=threshold,
+    )
+
+
+def _grown(
+    inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score], threshold: float
+) -> tuple[Fit, Noise, tuple[Fit, ...]]:
+    """The model with all that holds, its noise, and the candidates that were tried first."""
     tried: tuple[Fit, ...] = ()
     for _ in range(_MOST_STEPS):
         grown = None
@@ -81,27 +107,7 @@ def search(inquiry: Inquiry) -> Found:
         present, noise = inquiry.settle(grown.hypothesis, noise)
         present, noise = _reconsider(inquiry, present, noise)
         scores = inquiry.scores(present, noise)
-    reached = present.hypothesis
-    present, noise = _without_the_doubtful(inquiry, present, noise)
-    grew = len(present.hypothesis.terms) > inquiry.given
-    end_presence = inquiry.presence(present, noise)
-    alarmed = grew or _missing(begin_presence, begin_scores, threshold)
-    if alarmed and not tried:
-        tried = _fits(_short_list(inquiry, begin, begin_noise, begin_scores))
-    return Found(
-        begin=begin,
-        begin_noise=begin_noise,
-        begin_presence=begin_presence,
-        alarmed=alarmed,
-        reached=reached,
-        final=present,
-        noise=noise,
-        presence=end_presence,
-        still=_missing(end_presence, inquiry.scores(present, noise), threshold),
-        scores=tuple(begin_scores),
-        tried=tried if alarmed else (),
-        threshold=threshold,
-    )
+    return present, noise, tried
 
 
 def _threshold(inquiry: Inquiry, present: Fit, noise: Noise) -> float:
