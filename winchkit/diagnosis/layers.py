@@ -13,10 +13,12 @@ from winchkit.model.derivatives import reach_of, span_of
 from winchkit.model.drum import Spiral, drum_of
 from winchkit.model.line import Motion
 
-__all__ = ["jerked"]
+__all__ = ["around", "jerked"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+_BESIDE = 2
+"""Samples to either side of a jerk, and as many as accelerations reach."""
 _MOVING = 0.9
 _HEARD = 2.0
 """Of the noise: a smaller jerk tells by its moment where a layer begins, and spoils nothing."""
@@ -43,8 +45,13 @@ def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
     shaken = steps & (np.abs(at.direction) > _MOVING) & (pull > _HEARD * _white(measured))
     if not shaken.any():
         return none
-    reach = 2 + reach_of(time)
-    return np.convolve(shaken, np.ones(2 * reach + 1), mode="same") > 0
+    return around(shaken, time)
+
+
+def around(jerked: Mask, time: Array) -> Mask:
+    """Jerked samples with those beside them that their accelerations are differences across."""
+    reach = _BESIDE + reach_of(time)
+    return np.asarray(np.convolve(jerked, np.ones(2 * reach + 1), mode="same") > 0)
 
 
 def _white(measured: Array) -> float:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from winchkit.diagnosis.couples import couples
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
@@ -39,10 +38,10 @@ def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ..
         hypothesis = hypothesis.without(index)
     base = inquiry.refit(hypothesis, noise)
     pays = inquiry.criterion(base) - inquiry.criterion(present) + _BETTER
-    projected, scores = inquiry.projected(base, noise), inquiry.every_score(base, noise)
-    pairs = couples(projected, base.residual, scores, inquiry.price)
     leave = {present.hypothesis.terms[index].effect.id for index in indices}
-    promising = [pair for pair in pairs if pair.pays > pays and pair.ids != leave]
+    promising = [
+        pair for pair in inquiry.couples(base, noise) if pair.pays > pays and pair.ids != leave
+    ]
     for pair in promising[:_TRIED]:
         # Newcomers first: what stood for both alone would keep the values that it had.
         first, second = sorted(pair.scores, key=lambda item: item.atom.effect.id in leave)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.diagnosis.couples import couples
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import confidence, held_out, held_out_rms
 from winchkit.diagnosis.hypothesis import Hypothesis
@@ -165,8 +164,7 @@ def _coupled(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit | None:
         return None
     if added:
         return _exchanged(inquiry, present, noise, present)
-    projected, scores = inquiry.projected(present, noise), inquiry.every_score(present, noise)
-    pairs = couples(projected, present.residual, scores, inquiry.price)
+    pairs = inquiry.couples(present, noise)
     hidden = [pair.scores for pair in pairs if pair.hidden][:_COUPLES]
     trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in hidden]
     return _grow(inquiry, present, noise, trials)

@@ -14,15 +14,13 @@ import numpy as np
 
 from winchkit.diagnosis.dataset import Dataset, Recording
 from winchkit.diagnosis.hypothesis import Hypothesis, started
+from winchkit.diagnosis.layers import around
 from winchkit.effects.bind import Term
-from winchkit.model.derivatives import reach_of
 
 __all__ = ["calmed"]
 
 _FORCES = ("tension", "motor_torque")
 _MOST = 0.25
-_BESIDE = 2
-"""Samples to either side of a jerk, and as many as accelerations reach."""
 
 
 def calmed(dataset: Dataset, found: Hypothesis) -> Dataset | None:
@@ -62,8 +60,7 @@ def _calmed(recording: Recording, terms: Sequence[Term]) -> Recording:
     left = set(_FORCES if weighed else _FORCES[1:]) & recording.valid.keys()
     if not shaken.any() or not left:
         return recording
-    reach = _BESIDE + reach_of(at.time)
-    near = np.convolve(shaken, np.ones(2 * reach + 1), mode="same") > 0
+    near = around(shaken, at.time)
     valid = {
         output: good & ~near if output in left else good for output, good in recording.valid.items()
     }
