@@ -20,7 +20,7 @@ from winchkit.diagnosis.plan import offers as plan_offers
 from winchkit.diagnosis.power import detectable
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Detectable, NextRun
-from winchkit.diagnosis.signature import chance_level
+from winchkit.diagnosis.score import chance_level
 
 RIDE = Ride(samples=400)
 ROPE = term("cable-elongation-linear", axial_stiffness=3e5)

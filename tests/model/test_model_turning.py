@@ -15,8 +15,8 @@ def test_the_top_of_a_parabola_is_found(at: float, bend: float) -> None:
     time = np.arange(9.0)
     moved = 7.0 - bend * (time - 4.0 - at) ** 2
     turned, own = with_turning_points(moved)
-    if at == 0.5:
-        return  # Two samples are the highest: the motion does not turn at either.
+    if np.count_nonzero(moved == moved.max()) > 1:
+        return  # Two samples are the highest, by rounding too: it turns at neither.
     assert len(turned) == 10
     assert np.max(turned) == pytest.approx(7.0)
     assert np.array_equal(turned[own], moved)

@@ -15,8 +15,8 @@ from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Estimate, OutputFit
+from winchkit.diagnosis.score import Score, score
 from winchkit.diagnosis.shaken import calmed
-from winchkit.diagnosis.signature import Score, score
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import output_fits
 from winchkit.effects.bind import Term

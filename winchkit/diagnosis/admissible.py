@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from winchkit.diagnosis.hypothesis import Hypothesis
+from winchkit.diagnosis.score import Score, worthless
 from winchkit.diagnosis.shapes import starting_values
-from winchkit.diagnosis.signature import Score, worthless
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
 

@@ -13,7 +13,7 @@ from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import held_out
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
-from winchkit.diagnosis.signature import Projected
+from winchkit.diagnosis.score import Projected
 from winchkit.diagnosis.unseen import is_unseen
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates

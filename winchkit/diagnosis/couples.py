@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.gain import gains
-from winchkit.diagnosis.signature import Projected, Score
+from winchkit.diagnosis.score import Projected, Score
 
 __all__ = ["Couple", "couples"]
 

@@ -19,7 +19,6 @@ from winchkit.diagnosis.repeats import Repeats, find_repeats
 from winchkit.diagnosis.spectrum import Band, torque_band
 from winchkit.diagnosis.thin import Thinning, thinning_for
 from winchkit.errors import UsageError
-from winchkit.model.derivatives import reach_of
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import At, Signals
 from winchkit.runs.run import Run
@@ -216,7 +215,7 @@ def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
         good &= np.isfinite(run["load"])
     if output != "cable_length":
         # Accelerations at the ends of a run are not known.
-        edge = 1 + reach_of(run.time)
+        edge = 1 + motion.clock.reach
         good[:edge] = good[-edge:] = False
     good = _away_from_gaps(good, band.rate, band.cut_off)
     if output != "cable_length":

@@ -33,15 +33,9 @@ from winchkit.diagnosis.noise import (
 from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.resolution import without_rounding
+from winchkit.diagnosis.score import Projected, Score, score
 from winchkit.diagnosis.shapes import by_coefficients, gap, in_disguise, starting_values
-from winchkit.diagnosis.signature import (
-    Projected,
-    Score,
-    Signatures,
-    redrawn,
-    score,
-    signatures,
-)
+from winchkit.diagnosis.signature import Signatures, redrawn, signatures
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect

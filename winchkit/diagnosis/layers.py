@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.model.derivatives import reach_of, span_of
+from winchkit.model.derivatives import Clock
 from winchkit.model.drum import Spiral, drum_of
 from winchkit.model.line import Motion
 
@@ -39,7 +39,7 @@ def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
     at, speed = motion.at, np.abs(motion.at.speed)
     steps = np.diff(np.floor(at.wound_angle / (2 * np.pi)), prepend=np.nan) != 0
     steps[0] = False
-    pull = motion.load_mass * speed * (drum.growth / drum.winding_radius) / span_of(time)
+    pull = motion.load_mass * speed * (drum.growth / drum.winding_radius) / Clock(time).span
     if output == "motor_torque":
         pull = pull * speed / np.maximum(np.abs(at.motor_rate), 1e-12)
     shaken = steps & (np.abs(at.direction) > _MOVING) & (pull > _HEARD * _white(measured))
@@ -50,7 +50,7 @@ def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
 
 def around(jerked: Mask, time: Array) -> Mask:
     """Jerked samples with those beside them that their accelerations are differences across."""
-    reach = _BESIDE + reach_of(time)
+    reach = _BESIDE + Clock(time).reach
     return np.asarray(np.convolve(jerked, np.ones(2 * reach + 1), mode="same") > 0)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from winchkit.diagnosis.result import Detectable
-from winchkit.diagnosis.signature import Score
+from winchkit.diagnosis.score import Score
 from winchkit.effects.coordinates import Coordinates
 
 __all__ = ["detectable"]

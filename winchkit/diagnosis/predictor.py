@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.spectrum import to_frequency
 from winchkit.effects.bind import Term, modifiers_of
-from winchkit.model.derivatives import reach_of
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Stage, Way
 from winchkit.schema.winch import WinchProfile
@@ -143,6 +142,6 @@ def _sharpened(motion: Motion, sharper: float) -> Motion:
     load = motion.load + sharper * motion.rounding
     # Over a span the second difference is off by span²/12 of the fourth derivative; that of a
     # simulation that differentiates twice over steps h by h²/3: as far is what the line adds.
-    twice = 1 / (3 * reach_of(motion.at.time) ** 2)
+    twice = 1 / (3 * motion.clock.reach**2)
     rounded = float(np.clip((sharper + 1 / 12) / twice, 0.0, 1.0))
     return replace(motion, at=replace(motion.at, tension=load), load=load, rounded=rounded)

@@ -7,6 +7,7 @@ length instrument's offset and, where a known weight is the load, how its accele
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -85,17 +86,25 @@ class Problem:
         there = [r.valid[output] for r in self.dataset.recordings if output in r.valid]
         return max(1, sum(int(np.count_nonzero(valid)) for valid in there))
 
-    def change(self, hypothesis: Hypothesis) -> Array:
-        """What the terms add to the nominal prediction, rows."""
+    def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
+        """What the terms add to the nominal prediction, rows; only those of some outputs count.
+
+        What the others hold then is of no meaning.
+        """
         if not hypothesis.terms:
             return np.zeros(self.rows)
         terms = [started(hypothesis, run) for run in range(self.runs)]
         sharper = hypothesis.nuisances[-1] if self.rounds and hypothesis.nuisances else None
         out = np.empty(self.rows)
         for segment in self.segments:
-            predictor = self._predictors[segment.run]
-            out[segment.rows] = predictor.change(segment.output, terms[segment.run], sharper)
+            if outputs is None or segment.output in outputs:
+                predictor = self._predictors[segment.run]
+                out[segment.rows] = predictor.change(segment.output, terms[segment.run], sharper)
         return out
+
+    def rows_of(self, outputs: Container[str]) -> list[slice]:
+        """Where the segments of some outputs stand."""
+        return [s.rows for s in self.segments if s.output in outputs]
 
     def outputs_of(self, stage: Stage) -> set[str]:
         """Outputs on whose way a stage lies, in some run."""

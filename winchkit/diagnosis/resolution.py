@@ -102,14 +102,15 @@ def _finer(recording: Recording, line: Line) -> Motion | None:
         return np.asarray(make_interp_spline(here, values, k=_DEGREE)(there))
 
     time, angle = np.interp(there, here, signals.time), between(signals.motor_angle)
+    finer = line.motion(Signals(time, angle, fastest=signals.fastest))
     at = replace(
-        line.motion(Signals(time, angle, fastest=signals.fastest)).at,
+        finer.at,
         tension=between(smooth.at.tension + _sharper(recording, line)),
         temperature=np.interp(there, here, smooth.at.temperature),
     )
     load = None if smooth.load is None else at.tension
     drum_side = None if smooth.drum_tension is None else between(smooth.drum_tension)
-    return Motion(at, load, drum_side, smooth.load_mass)
+    return replace(finer, at=at, load=load, drum_tension=drum_side, load_mass=smooth.load_mass)
 
 
 def _sharper(recording: Recording, line: Line) -> Array:

@@ -13,8 +13,8 @@ from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
 from winchkit.diagnosis.recouple import recoupled
+from winchkit.diagnosis.score import Score, chance_level
 from winchkit.diagnosis.shapes import elsewhere
-from winchkit.diagnosis.signature import Score, chance_level
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.diagnosis.signature import Score
+from winchkit.diagnosis.score import Score
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect

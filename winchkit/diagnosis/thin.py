@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import firwin, upfirdn, welch
 
+from winchkit.model.derivatives import Clock
 from winchkit.model.line import Motion
 from winchkit.model.stages import At
 from winchkit.runs.run import Run
@@ -89,6 +90,7 @@ class Thinning:
         return replace(
             motion,
             at=replace(motion.at, **at),
+            clock=Clock(at["time"]),
             load=thinned(motion.load),
             drum_tension=thinned(motion.drum_tension),
             rounding=thinned(motion.rounding),

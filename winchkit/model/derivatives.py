@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "is_calmer",
-    "reach_of",
-    "second_derivative",
-    "sharp_gradient",
-    "smooth_sign",
-    "span_of",
-    "wide_gradient",
-]
+__all__ = ["Clock", "is_calmer", "smooth_sign"]
 
 Array = NDArray[np.float64]
 _LEAVES_BEHIND = 2.0
@@ -49,32 +44,56 @@ def is_calmer(measured: Array, differences: Array) -> bool:
     return float(np.std(np.diff(measured, 2))) < _CALMER * float(np.std(np.diff(differences, 2)))
 
 
-def reach_of(time: Array) -> int:
-    """Samples to either side over which accelerations are taken: at least 20 ms, at least one."""
-    return max(1, round(_LOAD_SPAN / float(np.median(np.diff(time)))))
+@dataclass(frozen=True)
+class Clock:
+    """When samples were taken, and the derivatives of what was sampled then."""
 
+    time: Array
+    """(n,), s."""
 
-def span_of(time: Array) -> float:
-    """The same in seconds."""
-    return reach_of(time) * float(np.median(np.diff(time)))
+    @cached_property
+    def _step(self) -> float:
+        return float(np.median(np.diff(self.time)))
 
+    @cached_property
+    def reach(self) -> int:
+        """Samples to either side over which accelerations are taken: at least 20 ms and one."""
+        return max(1, round(_LOAD_SPAN / self._step))
 
-def wide_gradient(x: Array, time: Array) -> Array:
-    """First derivative over at least ±20 ms, (n,)."""
-    step = reach_of(time)
-    if len(x) <= 2 * step:
-        return np.zeros_like(x)
-    inner = (x[2 * step :] - x[: -2 * step]) / (time[2 * step :] - time[: -2 * step])
-    return np.pad(inner, step, mode="edge")
+    @property
+    def span(self) -> float:
+        """The same in seconds."""
+        return self.reach * self._step
 
+    @cached_property
+    def _by_sample(self) -> Array:
+        return _by_number(self.time)
 
-def sharp_gradient(x: Array, time: Array) -> Array:
-    """First derivative of sixth order over seven samples, (n,): for what carries no noise.
+    def wide_gradient(self, x: Array) -> Array:
+        """First derivative over at least ±20 ms, (n,)."""
+        step, time = self.reach, self.time
+        if len(x) <= 2 * step:
+            return np.zeros_like(x)
+        inner = (x[2 * step :] - x[: -2 * step]) / (time[2 * step :] - time[: -2 * step])
+        return np.pad(inner, step, mode="edge")
 
-    Taken by sample number and divided by that of time, so that straight lines stay exact on
-    uneven samples; of second order at the ends.
-    """
-    return np.asarray(_by_number(x) / _by_number(time))
+    def sharp_gradient(self, x: Array) -> Array:
+        """First derivative of sixth order over seven samples, (n,): for what carries no noise.
+
+        Taken by sample number and divided by that of time, so that straight lines stay exact on
+        uneven samples; of second order at the ends.
+        """
+        return np.asarray(_by_number(x) / self._by_sample)
+
+    def second_derivative(self, x: Array) -> Array:
+        """Central second difference over at least ±20 ms, so that encoder noise stays small."""
+        step, time = self.reach, self.time
+        if len(x) <= 2 * step:
+            return np.zeros_like(x)
+        before, after = time[step:-step] - time[: -2 * step], time[2 * step :] - time[step:-step]
+        slope = (x[2 * step :] - x[step:-step]) / after - (x[step:-step] - x[: -2 * step]) / before
+        inner = 2 * slope / (before + after)
+        return np.pad(inner, step, mode="edge")
 
 
 def _by_number(x: Array) -> Array:
@@ -85,14 +104,3 @@ def _by_number(x: Array) -> Array:
         one, two, three = (x[3 + k : len(x) - 3 + k] - x[3 - k : len(x) - 3 - k] for k in (1, 2, 3))
         out[3:-3] = (45 * one - 9 * two + three) / 60
     return np.asarray(out)
-
-
-def second_derivative(x: Array, time: Array) -> Array:
-    """Central second difference over at least ±20 ms, so that encoder noise stays small."""
-    step = reach_of(time)
-    if len(x) <= 2 * step:
-        return np.zeros_like(x)
-    before, after = time[step:-step] - time[: -2 * step], time[2 * step :] - time[step:-step]
-    slope = (x[2 * step :] - x[step:-step]) / after - (x[step:-step] - x[: -2 * step]) / before
-    inner = 2 * slope / (before + after)
-    return np.pad(inner, step, mode="edge")

@@ -14,14 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.model.derivatives import (
-    is_calmer,
-    second_derivative,
-    sharp_gradient,
-    smooth_sign,
-    span_of,
-    wide_gradient,
-)
+from winchkit.model.derivatives import Clock, is_calmer, smooth_sign
 from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage, Way
 from winchkit.schema.winch import WinchProfile
@@ -40,6 +33,7 @@ class Motion:
     """The nominal line along one run, computed once: what modifiers look at, and the load."""
 
     at: At
+    clock: Clock
     load: Array | None
     """Tension at the platform end, N, where measured or known."""
     drum_tension: Array | None
@@ -61,11 +55,13 @@ class Line:
 
     @cached_property
     def _stages(self) -> dict[Stage, list[Modifier]]:
-        ordered = sorted(self.modifiers, key=lambda m: (m.stage, m.order))
-        return {stage: [m for m in ordered if m.stage is stage] for stage in Stage}
+        stages: dict[Stage, list[Modifier]] = {}
+        for modifier in sorted(self.modifiers, key=lambda m: (m.stage, m.order)):
+            stages.setdefault(modifier.stage, []).append(modifier)
+        return stages
 
     def _through(self, stage: Stage, value: Any, at: At) -> Any:
-        for modifier in self._stages[stage]:
+        for modifier in self._stages.get(stage, ()):
             value = modifier.apply(value, at)
         return value
 
@@ -100,23 +96,24 @@ class Line:
         time, angle = signals.time, signals.motor_angle
         drum_angle, length = self._nominal_length(angle)
         rate, speed = np.gradient(angle, time), -np.gradient(length, time)
+        clock, pace = Clock(time - time[0]), self._pace(angle)
         jitter = signals.motor_velocity is not None and is_calmer(signals.motor_velocity, rate)
         if jitter and signals.motor_velocity is not None:
-            speed = speed + self._pace(angle) * (signals.motor_velocity - rate)
+            speed = speed + pace * (signals.motor_velocity - rate)
             rate = signals.motor_velocity
         load, mass, rounding = signals.load, None, None
         if load is None and signals.load_mass is not None:
             mass = signals.load_mass
-            bent = -wide_gradient(speed, time) if jitter else second_derivative(length, time)
+            bent = -clock.wide_gradient(speed) if jitter else clock.second_derivative(length)
             load = mass * (GRAVITY - bent)
-            rounding = span_of(time) ** 2 * second_derivative(load, time)
+            rounding = clock.span**2 * clock.second_derivative(load)
         tension = load if load is not None else signals.tension
         missing = np.full_like(time, np.nan)
         fastest = signals.fastest or float(np.max(np.abs(rate), initial=0.0))
-        reeled = fastest * float(np.max(np.abs(self._pace(angle)), initial=0.0))
+        reeled = fastest * float(np.max(np.abs(pace), initial=0.0))
         at = At(
             profile=self.profile,
-            time=time - time[0],
+            time=clock.time,
             motor_angle=angle,
             motor_rate=rate,
             motor_acceleration=np.gradient(rate, time),
@@ -129,7 +126,8 @@ class Line:
             tension=np.zeros_like(time) if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
         )
-        return Motion(at, load, signals.tension if load is None else None, mass, rounding)
+        drum_tension = signals.tension if load is None else None
+        return Motion(at, clock, load, drum_tension, mass, rounding)
 
     def predict(self, motion: Motion) -> dict[str, Array]:
         """``cable_length``, ``motor_torque`` and, where a load is known, ``tension``."""
@@ -178,12 +176,13 @@ class Line:
         assert load is not None
         if motion.load_mass is None or not any(m.stage <= Stage.WOUND for m in self.modifiers):
             return load
-        at = motion.at
+        at, clock = motion.at, motion.clock
+        longer = way.free_length - at.free_length
         paid_out = (self._pace(at.motor_angle) - way.arm) * at.motor_rate
-        rest = sharp_gradient(way.free_length - at.free_length, at.time) - paid_out
-        added = sharp_gradient(paid_out, at.time) + wide_gradient(rest, at.time)
+        rest = clock.sharp_gradient(longer) - paid_out
+        added = clock.sharp_gradient(paid_out) + clock.wide_gradient(rest)
         if motion.rounded:
-            twice = np.gradient(np.gradient(way.free_length - at.free_length, at.time), at.time)
+            twice = np.gradient(np.gradient(longer, at.time), at.time)
             added = added + motion.rounded * (twice - added)
         return load - motion.load_mass * added
 
@@ -197,7 +196,7 @@ class Line:
     def _over_the_pulleys(self, load: Array, at: At) -> Array:
         """Tension at the drum of one at the platform, N."""
         tension = self._through(Stage.ROPE_WEIGHT, load, at)
-        if self._stages[Stage.PULLEY]:
+        if Stage.PULLEY in self._stages:
             for index in reversed(range(len(self.profile.pulley))):
                 here = replace(at, pulley=index, wrap=self.profile.pulley[index].wrap)
                 tension = self._through(Stage.PULLEY, tension, here)

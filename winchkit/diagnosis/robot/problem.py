@@ -7,7 +7,7 @@ are nuisances with a prior: rows that hold them where they were, spread over the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -112,8 +112,8 @@ class RobotProblem(Problem):
         """All: a rope that is longer moves the platform, and with it every force."""
         return set(self.dataset.outputs)
 
-    def change(self, hypothesis: Hypothesis) -> Array:
-        """What the terms add to the prediction, rows."""
+    def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
+        """What the terms add to the prediction, rows; one output is not had without the others."""
         if not hypothesis.terms:
             return np.zeros(self.rows)
         moved = self._rows_of(self.residuals(hypothesis.terms))
