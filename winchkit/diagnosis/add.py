@@ -19,6 +19,7 @@ from winchkit.diagnosis.score import Score, score
 from winchkit.diagnosis.shaken import calmed
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import output_fits
+from winchkit.diagnosis.weighing import weighed
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -127,11 +128,12 @@ def grow(
     if calm is not None:
         inquiry = inquire(calm, candidates)
         (begin, noise), (final, final_noise) = _fitted(inquiry, effect_id)
-    spread = spread_of(inquiry.problem, final, final_noise, inquiry.blocks)
-    outputs = output_fits(inquiry, (begin, noise), (final, final_noise))
-    terms = tuple(estimates(inquiry.problem, final, spread))
-    addition = Addition(outputs, terms, inquiry.problem.dataset.notes)
-    return Grown(inquiry.problem, begin, final, addition)
+    best = weighed(inquiry, final, final_noise)
+    spread = spread_of(inquiry.problem, best.fit, best.noise, inquiry.blocks)
+    outputs = output_fits(inquiry, (begin, noise), (best.fit, best.noise))
+    terms = tuple(estimates(inquiry.problem, best.fit, spread))
+    notes = (*inquiry.problem.dataset.notes, *best.notes)
+    return Grown(inquiry.problem, begin, best.fit, Addition(outputs, terms, notes))
 
 
 def _fitted(inquiry: Inquiry, effect_id: str) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:

@@ -31,7 +31,7 @@ from winchkit.diagnosis.result import (
 from winchkit.diagnosis.search import Found, search
 from winchkit.diagnosis.shaken import calmed
 from winchkit.diagnosis.uncertainty import estimates, spread_of
-from winchkit.diagnosis.verdict import Judgement
+from winchkit.diagnosis.verdict import Judgement, by_best_weights
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.coordinates import Coordinates
@@ -115,6 +115,9 @@ def _answer(inquiry: Inquiry, found: Found) -> Answer:
     added = range(inquiry.given, len(shown.final.hypothesis.terms))
     sets = [confusion_of(inquiry, shown.final, shown.noise, index) for index in added]
     pairs = pairs_of(sets or _closest(inquiry, found, judgement))
+    if sets:
+        judgement = by_best_weights(inquiry, judgement)
+        shown = judgement.shown
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,

@@ -12,6 +12,7 @@ from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.result import Estimate, OutputFit
 from winchkit.diagnosis.uncertainty import estimates, spread_of
 from winchkit.diagnosis.verdict import output_fits
+from winchkit.diagnosis.weighing import weighed
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.errors import UsageError
@@ -54,9 +55,10 @@ def remove(
     if not there:
         has = ", ".join(term.label for term in terms) or "none"
         raise UsageError(f"profile '{profile.name}' has no effect '{effect_id}'; it has {has}")
-    final, final_noise = inquiry.settle(begin.hypothesis.without(there[-1]))
+    best = weighed(inquiry, *inquiry.settle(begin.hypothesis.without(there[-1])))
     # Judged by the noise of the better model: without the effect its trace would pass for noise.
-    outputs = output_fits(inquiry, (begin, noise), (final, noise))
-    spread = spread_of(inquiry.problem, final, final_noise, inquiry.blocks)
-    left = tuple(estimates(inquiry.problem, final, spread))
-    return Removal(effect_id, outputs, left, inquiry.problem.dataset.notes)
+    outputs = output_fits(inquiry, (begin, noise), (best.fit, noise))
+    spread = spread_of(inquiry.problem, best.fit, best.noise, inquiry.blocks)
+    left = tuple(estimates(inquiry.problem, best.fit, spread))
+    notes = (*inquiry.problem.dataset.notes, *best.notes)
+    return Removal(effect_id, outputs, left, notes)

@@ -17,8 +17,9 @@ from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import OutputFit, Verdict
 from winchkit.diagnosis.search import Found
 from winchkit.diagnosis.skirt import Skirt
+from winchkit.diagnosis.weighing import weighed
 
-__all__ = ["Judgement", "judge", "output_fits", "withheld"]
+__all__ = ["Judgement", "by_best_weights", "judge", "output_fits", "withheld"]
 
 _HALF = 0.5
 _GENERALISES = 0.15
@@ -70,6 +71,22 @@ def withheld(inquiry: Inquiry, found: Found, share: float, note: str) -> Judgeme
     shown = replace(found, final=found.begin, noise=found.begin_noise)
     before = (found.begin, found.begin_noise)
     return Judgement(verdict, share, output_fits(inquiry, before, before), shown, (note,))
+
+
+def by_best_weights(inquiry: Inquiry, judgement: Judgement) -> Judgement:
+    """The same judgement with values by the weights that predict best."""
+    shown = judgement.shown
+    best = weighed(inquiry, shown.final, shown.noise)
+    if best.fit is shown.final:
+        return judgement
+    before, after = (shown.begin, shown.begin_noise), (best.fit, best.noise)
+    outputs = output_fits(inquiry, before, after, _folds(inquiry, shown))
+    return replace(
+        judgement,
+        outputs=outputs,
+        shown=replace(shown, final=best.fit, noise=best.noise),
+        notes=(*judgement.notes, *best.notes),
+    )
 
 
 def _unexplained(inquiry: Inquiry, found: Found) -> float:
