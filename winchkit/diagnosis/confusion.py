@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from winchkit.diagnosis.exchange import Exchange
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.gate import held_out
 from winchkit.diagnosis.inquiry import Inquiry
@@ -45,9 +46,8 @@ class Confusion:
 
 def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Confusion:
     """Refit the final model with each rival in place of one term, and compare block by block."""
-    own = final.hypothesis.terms[index]
-    base = inquiry.refit(final.hypothesis.without(index), noise)
-    scores = inquiry.scores(base, noise)
+    place = Exchange(inquiry, final, noise, index)
+    own, base, scores = place.own, place.base, place.scores
     mine = next((s.gain for s in scores if s.atom.effect.id == own.effect.id), 0.0)
     freedom = Coordinates(own.effect).freedom
     rivals = [
@@ -60,7 +60,7 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
     ours = held_out(inquiry.problem, final, noise, blocks)
     members: list[tuple[int, float, Term]] = [(freedom, final.cost, own)]
     for rival in rivals:
-        trial = inquiry.trial(base, rival, noise)
+        trial = place.trial(rival, final.cost + _ALIKE)
         fitted = trial.fit
         if not np.isfinite(trial.criterion):
             continue

@@ -58,7 +58,7 @@ def fit(problem: Problem, start: Hypothesis, weight: Array, most: int | None = N
     cost = _cost(residual, weight)
     damping = 1e-6
     jacobian = problem.jacobian(x, start)
-    for _ in range((most or _iterations(start)) if len(x) else 0):
+    for _ in range((_iterations(start) if most is None else most) if len(x) else 0):
         step, promised = _step(
             jacobian * weight[:, None], residual * weight, damping, x, (low, high)
         )

@@ -291,3 +291,7 @@ class Inquiry:
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """Fit a hypothesis under a given noise."""
         return fit(self.problem, hypothesis, noise.weight(self.problem))
+
+    def held(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
+        """A hypothesis as it is, fitted no further."""
+        return fit(self.problem, hypothesis, noise.weight(self.problem), 0)

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.diagnosis.exchange import Exchange
 from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.gate import confidence, held_out, held_out_rms
+from winchkit.diagnosis.holding import best_that_holds, holds
 from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
@@ -16,7 +17,6 @@ from winchkit.diagnosis.recouple import recoupled
 from winchkit.diagnosis.score import Score, chance_level
 from winchkit.diagnosis.shapes import elsewhere
 from winchkit.effects.bind import Term
-from winchkit.effects.coordinates import Coordinates
 
 __all__ = ["Found", "search", "with_a_pair", "without_term"]
 
@@ -28,10 +28,7 @@ _RECONSIDERED = 3
 _COUPLES = 3
 _PRESENCE_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
-_GATE_LEVEL = 0.02
 _BETTER = 2.0
-_NO_WORSE = 1.02
-_MATTERS = 0.98
 
 
 @dataclass(frozen=True)
@@ -98,7 +95,7 @@ def _grown(
         if scores and scores[0].value > threshold:
             trials = _short_list(inquiry, present, noise, scores)
             tried = tried or _fits(trials)
-            grown = _grow(inquiry, present, noise, trials)
+            grown = best_that_holds(inquiry, present, noise, trials)
         grown = grown or _coupled(inquiry, present, noise)
         if grown is None:
             break
@@ -156,18 +153,33 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
 def _coupled(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
-    To begin with, or in exchange for a first addition: pairs upon what is there already would
-    piece together what nobody knows.
+    In exchange for a first addition, or to begin with in outputs that no addition acts on: pairs
+    upon what is there already would piece together what nobody knows.
     """
     added = len(present.hypothesis.terms) - inquiry.given
-    if added > 1 or not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
+    if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
         return None
-    if added:
-        return _exchanged(inquiry, present, noise, present)
+    better = _exchanged(inquiry, present, noise, present) if added == 1 else None
+    if better is not None or _acts_on_what_lacks(inquiry, present, noise):
+        return better
     pairs = inquiry.couples(present, noise)
-    hidden = [pair.scores for pair in pairs if pair.hidden][:_COUPLES]
-    trials = [inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise) for a, b in hidden]
-    return _grow(inquiry, present, noise, trials)
+    # Two may also fail alone since each is wrong where the other acts: a drag one way only.
+    best = [pair for pair in pairs if pair.hidden][:_COUPLES]
+    best += [pair for pair in pairs[:_COUPLES] if not pair.hidden]
+    trials = [
+        inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise)
+        for a, b in (pair.scores for pair in best)
+    ]
+    return best_that_holds(inquiry, present, noise, trials)
+
+
+def _acts_on_what_lacks(inquiry: Inquiry, present: Fit, noise: Noise) -> bool:
+    """Whether an addition acts on an output in which something is missing still."""
+    problem = inquiry.problem
+    rejected = np.flatnonzero(inquiry.presence(present, noise).rejected).tolist()
+    lacking = {problem.bands[band][0] for band in rejected}
+    added = present.hypothesis.terms[inquiry.given :]
+    return any(problem.outputs_of(term.effect.stage) & lacking for term in added)
 
 
 def _exchanged(inquiry: Inquiry, present: Fit, noise: Noise, against: Fit) -> Fit | None:
@@ -177,54 +189,13 @@ def _exchanged(inquiry: Inquiry, present: Fit, noise: Noise, against: Fit) -> Fi
     two did, with other values.
     """
     better = recoupled(inquiry, present, noise, 1)
-    holds = better is not present and _holds(inquiry, against, better, noise, matters=1.0)
-    return better if holds else None
+    if better is present or not holds(inquiry, against, better, noise, matters=1.0):
+        return None
+    return better
 
 
 def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
     return tuple(trial.fit for trial in trials)
-
-
-def _grow(inquiry: Inquiry, present: Fit, noise: Noise, trials: list[Trial]) -> Fit | None:
-    """The best of the short list that passes the gate, all refitted; None where none does."""
-    before = inquiry.criterion(present)
-    for trial in sorted(trials, key=lambda t: t.criterion):
-        if trial.criterion < before - _BETTER and _holds(inquiry, present, trial.fit, noise):
-            return trial.fit
-    return None
-
-
-def _holds(
-    inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise, matters: float = _MATTERS
-) -> bool:
-    """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
-
-    An effect that shows in few blocks, such as those of one kind of move, cannot be certain by
-    rank; that it pays for itself in every single group, none of which it was fitted on, can.
-    """
-    problem = inquiry.problem
-    blocks = inquiry.blocks
-    before = held_out(problem, present, noise, blocks)
-    after = held_out(problem, grown, noise, blocks)
-    groups = inquiry.folds(grown, noise)
-    gain = held_out(problem, present, noise, groups) - held_out(problem, grown, noise, groups)
-    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _added(present, grown))
-    if np.sum(before - after) <= 0 or (confidence(before, after) > _GATE_LEVEL and not pays):
-        return False
-    was = held_out_rms(problem, present, noise, groups)
-    now = held_out_rms(problem, grown, noise, groups)
-    ratios = [now[output] / was[output] for output in problem.dataset.outputs]
-    # What is certain and changes nothing, such as a clock a millisecond off, is not worth a name.
-    return bool(np.sum(gain) > 0 and min(ratios) < matters and max(ratios) < _NO_WORSE)
-
-
-def _added(present: Fit, grown: Fit) -> int:
-    """Degrees of freedom that a grown model has more than the present model, one at least."""
-    after, before = (
-        sum(Coordinates(term.effect).freedom for term in fitted.hypothesis.terms)
-        for fitted in (grown, present)
-    )
-    return max(1, after - before)
 
 
 def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
@@ -248,10 +219,9 @@ def _replaced(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
     for index in range(inquiry.given, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
             break  # A rival stood for two.
-        own = present.hypothesis.terms[index]
-        base = inquiry.refit(present.hypothesis.without(index), noise)
-        rivals = _rivals_of(own, inquiry.scores(base, noise))
-        trials = [inquiry.trial(base, item, noise) for item in rivals]
+        place = Exchange(inquiry, present, noise, index)
+        rivals = _rivals_of(place.own, place.scores)
+        trials = [place.trial(item, present.cost) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
         if best is not None and best.criterion < inquiry.criterion(present) - _BETTER:
             present = best.fit
