@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from diagnosis_runs import GROOVED, Ride, made, term
 
 from winchkit.diagnosis.admissible import best_of_each
@@ -9,6 +10,7 @@ from winchkit.diagnosis.couples import couples
 from winchkit.diagnosis.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.search import _coupled
+from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import load_catalogue
 
 RIDE = Ride(samples=600, stroke=400.0)
@@ -49,3 +51,43 @@ def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() ->
     exchanged = _coupled(inquiry, begun, noise)
     assert exchanged is not None
     assert set(exchanged.labels) == {"cell-gain", "cell-offset"}
+
+
+ONE_WAY = (
+    term("motor-viscous", viscosity=2e-4),
+    term("motor-viscous-asymmetry", viscosity_difference=2e-4),
+)
+"""A drag in one direction only: each of the two alone is wrong in the other direction."""
+
+
+@pytest.mark.parametrize("also", [(), (term("cable-elongation-linear", axial_stiffness=2e5),)])
+def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term, ...]) -> None:
+    """Also beside an effect that acts on the length only, where these two do nothing."""
+    runs = [
+        made(10 * i + k, GROOVED, (*ONE_WAY, *also), load_mass=mass, ride=RIDE)
+        for i, mass in enumerate(MASSES)
+        for k in range(2)
+    ]
+    inquiry = inquire(prepare(runs, GROOVED), load_catalogue())
+    start = inquiry.begin
+    for own in also:
+        start = start.with_term(own, inquiry.problem.runs)
+    present, noise = inquiry.settle(start)
+    grown = _coupled(inquiry, present, noise)
+    assert grown is not None
+    assert set(grown.labels) == {t.label for t in (*ONE_WAY, *also)}
+    values = {t.label: t.values for t in grown.hypothesis.terms}
+    assert values["motor-viscous"]["viscosity"] == pytest.approx(2e-4, rel=0.1)
+
+
+def test_pairs_are_not_pieced_together_upon_what_acts_on_the_same_output() -> None:
+    runs = [
+        made(10 * i + k, GROOVED, ONE_WAY, load_mass=mass, ride=RIDE)
+        for i, mass in enumerate(MASSES)
+        for k in range(2)
+    ]
+    inquiry = inquire(prepare(runs, GROOVED), load_catalogue())
+    start = inquiry.begin
+    for own in (term("motor-coulomb", torque=1e-3), term("cell-gain", gain_error=1e-4)):
+        start = start.with_term(own, inquiry.problem.runs)
+    assert _coupled(inquiry, *inquiry.settle(start)) is None
