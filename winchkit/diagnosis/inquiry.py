@@ -23,6 +23,7 @@ from winchkit.diagnosis.gate import (
 )
 from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.last import Last
+from winchkit.diagnosis.moments import placed
 from winchkit.diagnosis.noise import (
     Noise,
     Presence,
@@ -34,7 +35,7 @@ from winchkit.diagnosis.points import missing_needs
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.resolution import without_rounding
 from winchkit.diagnosis.score import Projected, Score, score
-from winchkit.diagnosis.shapes import by_coefficients, gap, in_disguise, starting_values
+from winchkit.diagnosis.shapes import by_coefficients, in_disguise
 from winchkit.diagnosis.signature import Signatures, redrawn, signatures
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -44,7 +45,6 @@ __all__ = ["Inquiry", "Trial"]
 
 Array = NDArray[np.float64]
 _UNSURE = 0.2
-_HALVINGS = 7
 _WILD = 1.0
 """Of what the differences round: more of it is not rounding."""
 
@@ -71,6 +71,7 @@ class Inquiry:
         self._candidates = tuple(candidates)
         self._last_folds: Last[Folds] = Last()
         self._last_presence: Last[Presence] = Last()
+        self._last_projected: Last[Projected] = Last()
         self.signatures = self._signatures(begin)
 
     def _signatures(self, present: Hypothesis) -> Signatures:
@@ -80,6 +81,7 @@ class Inquiry:
 
     def look_again(self, present: Hypothesis) -> None:
         """Draw the signatures anew beside a grown model: a lag acts on what is there."""
+        self._last_projected = Last()
         grown = redrawn(self.problem, present, self.signatures)
         if grown is None:
             del self.signatures  # Both at once would be the most memory of a whole diagnosis.
@@ -174,7 +176,11 @@ class Inquiry:
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
         """Signatures with a fit's unknowns projected out."""
-        return Projected(self.problem, self.signatures, present.jacobian, noise)
+
+        def compute() -> Projected:
+            return Projected(self.problem, self.signatures, present.jacobian, noise)
+
+        return self._last_projected.of(present, noise, compute)
 
     def scores(self, present: Fit, noise: Noise) -> list[Score]:
         """Candidates beside a fit, best first, one point of its grid each; none that is there."""
@@ -215,7 +221,7 @@ class Inquiry:
         for law in by_coefficients(effect):
             if best is None:
                 own = replace(item, atom=item.atom.of_law(law))
-                places = self._placed(hypothesis, present, own, weight)
+                places = placed(self.problem, hypothesis, present, own, weight)
                 terms = [Term(law, values) for values in places]
                 starts = [hypothesis.with_term(term, self.problem.runs) for term in terms]
                 starts += [anew for start in starts for anew in self._less_rounded(start)]
@@ -247,39 +253,6 @@ class Inquiry:
         ):
             price = np.inf
         return float(price)
-
-    def _placed(
-        self, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array
-    ) -> list[dict[str, float]]:
-        """Where fits begin; a moment is first sought between the points of its grid.
-
-        A step far from its moment has no gradient towards it, but its gain rises all the way.
-        """
-        begun = starting_values(item)
-        places = [p for p in Coordinates(item.atom.effect).shapes if p.grid and p.low == 0.0]
-        if not places or len(begun) > 1:
-            return begun
-        place, values = places[0], begun[0]
-        here = self.problem.change(hypothesis)
-        residual, jacobian = present.residual * weight, present.jacobian * weight[:, None]
-
-        def gain(at: float) -> float:
-            term = Term(item.atom.effect, {**values, place.name: at})
-            column = self.problem.change(hypothesis.with_term(term, self.problem.runs)) - here
-            column = column * weight
-            column = column - jacobian @ np.linalg.lstsq(jacobian, column)[0]
-            size = float(column @ column)
-            return float((column @ residual) ** 2) / size if size else 0.0
-
-        at, step = values[place.name], gap(place.grid, values[place.name])
-        best = gain(at)
-        for _ in range(_HALVINGS):
-            step /= 2
-            tried = {gain(x): x for x in (at - step, at + step) if place.low <= x <= place.high}
-            if tried and max(tried) > best:
-                best = max(tried)
-                at = tried[best]
-        return [{**values, place.name: at}]
 
     def _rests_on_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
         """Whether the last term explains mainly by the states in which the runs began."""
