@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from functools import cached_property
 
+import numpy as np
+
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.inquiry import Inquiry, Trial
-from winchkit.diagnosis.noise import Noise
+from winchkit.diagnosis.noise import Noise, orthonormal
 from winchkit.diagnosis.score import Score
 
 __all__ = ["Exchange"]
+
+_NEARLY = 0.1
+"""Of what the term explains, as far as straight lines foretell."""
 
 
 class Exchange:
@@ -30,18 +35,29 @@ class Exchange:
         """Of all candidates beside that."""
 
     @cached_property
-    def _held(self) -> tuple[Fit, dict[str, Score]]:
-        """The others as they stand beside the term, and what scores beside them."""
+    def _held(self) -> tuple[Fit, float, dict[str, Score]]:
+        """The others as they stand beside the term; the least squares about there; the scores."""
         held = self._inquiry.held(self._others, self._noise)
-        return held, {s.atom.effect.id: s for s in self._inquiry.scores(held, self._noise)}
+        weight = self._noise.weight(self._inquiry.problem)
+        whitened, residual = held.jacobian * weight[:, None], held.residual * weight
+        basis = orthonormal(whitened)
+        least = held.cost - float(np.sum((basis.T @ residual) ** 2))
+        scores = self._inquiry.scores(held, self._noise)
+        return held, least, {item.atom.effect.id: item for item in scores}
 
     def trial(self, rival: Score, enough: float) -> Trial:
-        """A rival in the term's place; begun anew unless its squares fall to ``enough``."""
+        """A rival in the term's place.
+
+        It is begun anew where its squares do not fall to ``enough``, yet nearly would beside the
+        others as they stand.
+        """
         found = self._inquiry.trial(self.base, rival, self._noise)
         if found.fit.cost < enough or not self._others.terms:
             return found
-        held, scores = self._held
-        if rival.atom.effect.id not in scores:
+        held, least, scores = self._held
+        beside = scores.get(rival.atom.effect.id)
+        nearly = enough + _NEARLY * (self.base.cost - enough)
+        if beside is None or least - beside.gain > nearly:
             return found
-        again = self._inquiry.trial(held, scores[rival.atom.effect.id], self._noise)
+        again = self._inquiry.trial(held, beside, self._noise)
         return min(found, again, key=lambda trial: (trial.criterion, trial.fit.cost))

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.diagnosis.exchange import Exchange
 from winchkit.diagnosis.fit import Fit
 from winchkit.diagnosis.holding import best_that_holds, holds
 from winchkit.diagnosis.hypothesis import Hypothesis
@@ -219,9 +218,10 @@ def _replaced(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
     for index in range(inquiry.given, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
             break  # A rival stood for two.
-        place = Exchange(inquiry, present, noise, index)
-        rivals = _rivals_of(place.own, place.scores)
-        trials = [place.trial(item, present.cost) for item in rivals]
+        own = present.hypothesis.terms[index]
+        base = inquiry.refit(present.hypothesis.without(index), noise)
+        rivals = _rivals_of(own, inquiry.scores(base, noise))
+        trials = [inquiry.trial(base, item, noise) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
         if best is not None and best.criterion < inquiry.criterion(present) - _BETTER:
             present = best.fit
