@@ -26,7 +26,7 @@ class Exchange:
     """
 
     def __init__(self, inquiry: Inquiry, present: Fit, noise: Noise, index: int) -> None:
-        self._inquiry, self._present, self._noise = inquiry, present, noise
+        self._inquiry, self._noise = inquiry, noise
         self.own = present.hypothesis.terms[index]
         self._others = present.hypothesis.without(index)
         self.base = inquiry.refit(self._others, noise)
