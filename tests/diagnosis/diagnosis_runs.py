@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from winchkit.catalog import find
 from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.diagnose import inquire
+from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.problem import Problem
 from winchkit.effects.bind import Term, modifiers_of
 from winchkit.effects.catalogue import load_catalogue
@@ -98,6 +100,18 @@ def made(
             channels[output] = Channel(values, UNITS[output])
     known = {} if load_mass is None else {"load_mass": f"{load_mass!r} kg"}
     return Run(f"run-{seed}", time, channels, known | metadata)
+
+
+def inquiry_into(
+    hidden: Sequence[Term], ride: Ride, masses: Sequence[float] = (10.0, 25.0)
+) -> Inquiry:
+    """An inquiry into two runs under each load, with terms hidden in them."""
+    runs = [
+        made(10 * i + k, GROOVED, hidden, load_mass=mass, ride=ride)
+        for i, mass in enumerate(masses)
+        for k in range(2)
+    ]
+    return inquire(prepare(runs, GROOVED), CATALOGUE)
 
 
 def with_channel(run: Run, name: str, values: Array, unit: str = "N") -> Run:

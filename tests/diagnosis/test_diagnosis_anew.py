@@ -6,12 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
+from diagnosis_runs import CATALOGUE, Ride, inquiry_into, term
 
 from winchkit.diagnosis.confusion import confusion_of
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.recouple import recoupled
 from winchkit.diagnosis.search import _replaced
 from winchkit.diagnosis.signature import Signatures, redrawn
@@ -20,18 +17,9 @@ from winchkit.effects.bind import Term
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
 
 
-def inquiry_into(*hidden: Term) -> Inquiry:
-    runs = [
-        made(int(mass) + seed, GROOVED, hidden, load_mass=mass, ride=RIDE)
-        for mass in (10.0, 25.0)
-        for seed in range(2)
-    ]
-    return inquire(prepare(runs, GROOVED), CATALOGUE)
-
-
 def test_a_slip_that_came_to_rest_at_another_moment_is_found_where_it_was() -> None:
     late = term("length-time-offset", delay=0.01)
-    inquiry = inquiry_into(term("encoder-slip", step=0.01, time=14.7), late)
+    inquiry = inquiry_into([term("encoder-slip", step=0.01, time=14.7), late], RIDE)
     runs = inquiry.problem.runs
     wrong = inquiry.begin.with_term(term("encoder-slip", step=0.008, time=20.5), runs)
     present, noise = inquiry.settle(wrong.with_term(late, runs))
@@ -50,7 +38,7 @@ def test_what_stood_for_two_is_fitted_beside_the_second() -> None:
         term("cable-creep", creep_stiffness=3e5, time_constant=6.0),
         term("encoder-slip", step=-0.04, time=14.7),
     )
-    inquiry = inquiry_into(*hidden)
+    inquiry = inquiry_into(hidden, RIDE)
     alone = term("cable-creep", creep_stiffness=2e5, time_constant=20.0)
     present, noise = inquiry.settle(inquiry.begin.with_term(alone, inquiry.problem.runs))
     terms = {t.label: t.values for t in recoupled(inquiry, present, noise, 1).hypothesis.terms}
@@ -63,9 +51,9 @@ def test_what_stood_for_two_is_fitted_beside_the_second() -> None:
 def test_a_stribeck_speed_that_no_run_passes_stands_beside_coulombs_friction(
     share: float, alone: bool
 ) -> None:
-    fastest = max(abs(at.motor_rate).max() for at in inquiry_into().problem.dataset.motions)
+    fastest = max(abs(at.motor_rate).max() for at in inquiry_into([], RIDE).problem.dataset.motions)
     wide = term("motor-stribeck", torque=0.1, stribeck_speed=share * fastest)
-    inquiry = inquiry_into(wide)
+    inquiry = inquiry_into([wide], RIDE)
     present, noise = inquiry.settle(inquiry.begin.with_term(wide, inquiry.problem.runs))
     told = confusion_of(inquiry, present, noise, 0).effects
     assert "motor-stribeck" in told
@@ -87,7 +75,7 @@ def test_signatures_beside_a_grown_model_are_those_that_are_drawn_anew() -> None
         term("gear-ratio", ratio_error=0.02),
         term("cable-elongation-linear", axial_stiffness=3e5),
     ):
-        inquiry = inquiry_into()
+        inquiry = inquiry_into([], RIDE)
         before = {name: column.copy() for name, column in columns_of(inquiry.signatures).items()}
         present = inquiry.begin.with_term(grown, inquiry.problem.runs)
         again = redrawn(inquiry.problem, present, inquiry.signatures)
@@ -113,7 +101,7 @@ def test_signatures_beside_a_grown_model_are_those_that_are_drawn_anew() -> None
 def test_a_candidate_that_had_no_signature_and_has_one_now_has_all_drawn_anew(
     grown: Term, anew: bool
 ) -> None:
-    inquiry = inquiry_into()
+    inquiry = inquiry_into([], RIDE)
     lag = CATALOGUE["cell-lag"]
     silent = replace(inquiry.signatures, silent=((lag, {"time_constant": 0.05}),))
     present = inquiry.begin.with_term(grown, inquiry.problem.runs)

@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 import pytest
-from diagnosis_runs import GROOVED, Ride, made, term
+from diagnosis_runs import Ride, inquiry_into, term
 
 from winchkit.diagnosis.admissible import best_of_each
 from winchkit.diagnosis.couples import couples
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.search import _coupled
 from winchkit.effects.bind import Term
-from winchkit.effects.catalogue import load_catalogue
 
 RIDE = Ride(samples=600, stroke=400.0)
 MASSES = (18.0, 20.0, 22.0)
 HIDDEN = (term("cell-gain", gain_error=-0.05), term("cell-offset", offset=0.05 * 20 * 9.80665))
 """Under about 20 kg the cell reads right."""
-RUNS = [
-    made(10 * i + k, GROOVED, HIDDEN, load_mass=mass, ride=RIDE)
-    for i, mass in enumerate(MASSES)
-    for k in range(2)
-]
 
 
 def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
-    inquiry = inquire(prepare(RUNS, GROOVED), load_catalogue())
+    inquiry = inquiry_into(HIDDEN, RIDE, MASSES)
     present, noise = inquiry.settle(inquiry.begin)
     scores = inquiry.every_score(present, noise)
     alone = {s.atom.effect.id: s.gain for s in best_of_each(scores)}
@@ -38,7 +30,7 @@ def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
 
 
 def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() -> None:
-    inquiry = inquire(prepare(RUNS, GROOVED), load_catalogue())
+    inquiry = inquiry_into(HIDDEN, RIDE, MASSES)
     present, noise = inquiry.settle(inquiry.begin)
     grown = _coupled(inquiry, present, noise)
     assert grown is not None
@@ -63,12 +55,7 @@ ONE_WAY = (
 @pytest.mark.parametrize("also", [(), (term("cable-elongation-linear", axial_stiffness=2e5),)])
 def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term, ...]) -> None:
     """Also beside an effect that acts on the length only, where these two do nothing."""
-    runs = [
-        made(10 * i + k, GROOVED, (*ONE_WAY, *also), load_mass=mass, ride=RIDE)
-        for i, mass in enumerate(MASSES)
-        for k in range(2)
-    ]
-    inquiry = inquire(prepare(runs, GROOVED), load_catalogue())
+    inquiry = inquiry_into((*ONE_WAY, *also), RIDE, MASSES)
     start = inquiry.begin
     for own in also:
         start = start.with_term(own, inquiry.problem.runs)
@@ -81,12 +68,7 @@ def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term
 
 
 def test_pairs_are_not_pieced_together_upon_what_acts_on_the_same_output() -> None:
-    runs = [
-        made(10 * i + k, GROOVED, ONE_WAY, load_mass=mass, ride=RIDE)
-        for i, mass in enumerate(MASSES)
-        for k in range(2)
-    ]
-    inquiry = inquire(prepare(runs, GROOVED), load_catalogue())
+    inquiry = inquiry_into(ONE_WAY, RIDE, MASSES)
     start = inquiry.begin
     for own in (term("motor-coulomb", torque=1e-3), term("cell-gain", gain_error=1e-4)):
         start = start.with_term(own, inquiry.problem.runs)

@@ -4,25 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
+from diagnosis_runs import Ride, inquiry_into, term
 
 from winchkit.diagnosis.confusion import confusion_of
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.effects.bind import Term
 
 ONE_WAY = Ride(samples=1500, rate=25.0, period=100.0)
 """Wound in once and not quite out again: a creep can look like a wrong length of rope."""
-
-
-def inquiry_into(*hidden: Term) -> Inquiry:
-    runs = [
-        made(int(mass) + seed, GROOVED, hidden, load_mass=mass, ride=ONE_WAY)
-        for mass in (10.0, 25.0)
-        for seed in range(2)
-    ]
-    return inquire(prepare(runs, GROOVED), CATALOGUE)
 
 
 @pytest.mark.parametrize("radius_error", [-1e-3, -5e-4, 1e-3])
@@ -34,7 +21,7 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
         term("drum-radius", radius_error=radius_error),
         term("cable-creep", creep_stiffness=7e5, time_constant=20.0),
     )
-    inquiry = inquiry_into(*hidden)
+    inquiry = inquiry_into(hidden, ONE_WAY)
     start = inquiry.begin
     for own in hidden:
         start = start.with_term(own, inquiry.problem.runs)
@@ -45,7 +32,8 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
 
 
 def test_held_as_it_is_a_hypothesis_keeps_its_values() -> None:
-    inquiry = inquiry_into(term("cable-creep", creep_stiffness=7e5, time_constant=20.0))
+    creep = term("cable-creep", creep_stiffness=7e5, time_constant=20.0)
+    inquiry = inquiry_into([creep], ONE_WAY)
     begin, noise = inquiry.settle(inquiry.begin)
     other = begin.hypothesis.with_term(
         term("cable-creep", creep_stiffness=1e6, time_constant=5.0), inquiry.problem.runs
