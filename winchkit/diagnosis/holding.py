@@ -10,12 +10,14 @@ from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise
 from winchkit.effects.coordinates import Coordinates
 
-__all__ = ["best_that_holds", "holds"]
+__all__ = ["BETTER", "MATTERS", "best_that_holds", "holds"]
 
 _GATE_LEVEL = 0.02
-_BETTER = 2.0
+BETTER = 2.0
+"""By how much a criterion must fall for a change to be worth it."""
 _NO_WORSE = 1.02
-_MATTERS = 0.98
+MATTERS = 0.98
+"""Of some held-out error, what may be left for a change to matter to anyone."""
 
 
 def best_that_holds(
@@ -24,13 +26,13 @@ def best_that_holds(
     """The best of the short list that passes the gate, all refitted; None where none does."""
     before = inquiry.criterion(present)
     for trial in sorted(trials, key=lambda t: t.criterion):
-        if trial.criterion < before - _BETTER and holds(inquiry, present, trial.fit, noise):
+        if trial.criterion < before - BETTER and holds(inquiry, present, trial.fit, noise):
             return trial.fit
     return None
 
 
 def holds(
-    inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise, matters: float = _MATTERS
+    inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise, matters: float = MATTERS
 ) -> bool:
     """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
 

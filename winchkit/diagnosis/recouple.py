@@ -9,12 +9,12 @@ from __future__ import annotations
 from itertools import combinations
 
 from winchkit.diagnosis.fit import Fit
+from winchkit.diagnosis.holding import BETTER
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
 
 __all__ = ["recoupled"]
 
-_BETTER = 2.0
 _TRIED = 2
 _MOST = 3
 
@@ -37,7 +37,7 @@ def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ..
     for index in reversed(indices):
         hypothesis = hypothesis.without(index)
     base = inquiry.refit(hypothesis, noise)
-    pays = inquiry.criterion(base) - inquiry.criterion(present) + _BETTER
+    pays = inquiry.criterion(base) - inquiry.criterion(present) + BETTER
     leave = {present.hypothesis.terms[index].effect.id for index in indices}
     promising = [
         pair for pair in inquiry.couples(base, noise) if pair.pays > pays and pair.ids != leave
@@ -46,6 +46,6 @@ def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ..
         # Newcomers first: what stood for both alone would keep the values that it had.
         first, second = sorted(pair.scores, key=lambda item: item.atom.effect.id in leave)
         trial = inquiry.trial(inquiry.trial(base, first, noise).fit, second, noise)
-        if trial.criterion < inquiry.criterion(present) - _BETTER:
+        if trial.criterion < inquiry.criterion(present) - BETTER:
             return trial.fit
     return None

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.holding import best_that_holds, holds
+from winchkit.diagnosis.holding import BETTER, best_that_holds, holds
 from winchkit.diagnosis.hypothesis import Hypothesis
 from winchkit.diagnosis.inquiry import Inquiry, Trial
 from winchkit.diagnosis.noise import Noise, Presence
@@ -27,7 +27,6 @@ _RECONSIDERED = 3
 _COUPLES = 3
 _PRESENCE_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
-_BETTER = 2.0
 
 
 @dataclass(frozen=True)
@@ -223,7 +222,7 @@ def _replaced(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
         rivals = _rivals_of(own, inquiry.scores(base, noise))
         trials = [inquiry.trial(base, item, noise) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
-        if best is not None and best.criterion < inquiry.criterion(present) - _BETTER:
+        if best is not None and best.criterion < inquiry.criterion(present) - BETTER:
             present = best.fit
     return present
 

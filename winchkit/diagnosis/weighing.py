@@ -15,13 +15,13 @@ import numpy as np
 
 from winchkit.diagnosis.fit import Fit, fit
 from winchkit.diagnosis.gate import held_out_rms
+from winchkit.diagnosis.holding import MATTERS
 from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.noise import Noise
 from winchkit.diagnosis.problem import Problem
 
 __all__ = ["Weighed", "weighed"]
 
-_BETTER = 0.98
 _NO_WORSE = 1.01
 
 
@@ -52,12 +52,12 @@ def weighed(inquiry: Inquiry, fitted: Fit, noise: Noise) -> Weighed:
         return refitted, even, {o: now[o] / was[o] for o in was if was[o]}
 
     *_, ratios = evenly(problem.dataset.outputs)
-    better = [output for output, ratio in ratios.items() if ratio < _BETTER]
+    better = [output for output, ratio in ratios.items() if ratio < MATTERS]
     if not better:
         return own
     refitted, even, ratios = evenly(better)
     gained = 1 - max(ratios[output] for output in better)
-    if gained < 1 - _BETTER or max(ratios.values()) > _NO_WORSE:
+    if gained < 1 - MATTERS or max(ratios.values()) > _NO_WORSE:
         return own
     told = " and ".join(output.replace("_", " ") for output in better)
     note = (
