@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -160,3 +161,24 @@ def test_outputs_that_contradict_each_other_widen_an_interval() -> None:
     found, noise = _settled(problem, start)
     ((_, sure),) = estimates(problem, found, spread_of(problem, found, noise, blocks))
     assert sure["radius_error"].std < 0.5 * told["radius_error"].std
+
+
+def test_what_no_output_shows_is_unknown_and_raises_no_warning() -> None:
+    """Which share of the torque is held within the play, where the length alone was recorded."""
+    play = term("gear-backlash", gap=0.02, held=1.0)
+    noise = {"cable_length": 3e-4}
+    runs = [made(seed, GROOVED, (play,), noise, ride=RIDE) for seed in range(2)]
+    problem = Problem(prepare(runs, GROOVED))
+    start = Hypothesis().with_term(play, 2)
+    first = fit(problem, start, np.ones(problem.rows))
+    known = noise_from_repeats(problem, first.residual, np.zeros((problem.rows, 0)))
+    found = fit(problem, start, known.weight(problem))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        spread = spread_of(problem, found, known, blocks_of(problem))
+        ((_, values),) = estimates(problem, found, spread)
+    assert np.isnan(values["held"].std)
+    assert values["held"].interval is None
+    low, high = values["gap"].interval or (np.nan, np.nan)
+    assert low < 0.02 < high
+    assert values["gap"].std < 0.01

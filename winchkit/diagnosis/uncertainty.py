@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 _95 = 1.959964
 _CONTRADICTS = 3.5
 _LEAST_SAY = 1e-3
+_NOTHING = 1e6
+"""Of its usual size: an unknown that may be off by as much is not known at all."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,9 @@ def spread_of(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Spread
     covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     statistical = np.maximum(likelihood, _jackknife(problem, fit, noise, blocks))
+    unknown = (statistical > _NOTHING) | (np.diag(normal) == 0.0)
+    covariance[unknown] = covariance[:, unknown] = likelihood[unknown] = 0.0
+    statistical[unknown] = _NOTHING
     shift = covariance @ (whitened.T @ (rounded(problem, fit.hypothesis) * weight))
     contradiction = _contradiction(problem, whitened, fit.residual * weight, covariance)
     systematic = np.hypot(shift, contradiction)
@@ -62,10 +67,13 @@ def spread_of(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Spread
         statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
     )
     low, high = profile_ends(problem, fit, weight, covariance, _95 * wider)
+    below, above = (
+        np.where(unknown, _NOTHING, way) for way in (fit.vector - low, high - fit.vector)
+    )
     return Spread(
         np.hypot(statistical, systematic),
-        fit.vector - np.hypot(fit.vector - low, _95 * systematic),
-        fit.vector + np.hypot(high - fit.vector, _95 * systematic),
+        fit.vector - np.hypot(below, _95 * systematic),
+        fit.vector + np.hypot(above, _95 * systematic),
     )
 
 

@@ -105,15 +105,19 @@ class Coordinates:
         return np.array(low), np.array(high)
 
     def deviations(self, vector: Array, std: Array, base: Mapping[str, float]) -> dict[str, float]:
-        """Standard deviations of values from those of coordinates, by the delta method."""
+        """Standard deviations of values from those of coordinates, by the delta method.
+
+        To the side that moves a value more: at a bound it can move one way only.
+        """
         here, out = self.values(vector, base), {p.name: 0.0 for p in self._fitted}
         for index, step in enumerate(std):
-            moved = vector.copy()
-            nudge = 1e-3 * step
-            moved[index] += nudge
-            there = self.values(moved, base)
+            sides = []
+            for nudge in (1e-3 * step, -1e-3 * step):
+                moved = vector.copy()
+                moved[index] += nudge
+                sides.append(self.values(moved, base))
             for name, so_far in out.items():
-                change = (there[name] - here[name]) / 1e-3 if nudge else 0.0
+                change = max(abs(side[name] - here[name]) for side in sides) / 1e-3
                 out[name] = hypot(so_far, change)
         return out
 
