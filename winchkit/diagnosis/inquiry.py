@@ -186,19 +186,15 @@ class Inquiry:
         """Candidates beside a fit, best first, one point of its grid each; none that is there."""
         return best_of_each(self.every_score(present, noise))
 
-    def every_score(
-        self, present: Fit, noise: Noise, projected: Projected | None = None
-    ) -> list[Score]:
+    def every_score(self, present: Fit, noise: Noise) -> list[Score]:
         """The same at every point of their grids."""
-        projected = projected or self.projected(present, noise)
-        ranked = score(projected, present.residual, self.problem.rows)
+        ranked = score(self.projected(present, noise), present.residual, self.problem.rows)
         return admissible(ranked, present.hypothesis, self.problem.rows)
 
     def couples(self, present: Fit, noise: Noise) -> list[Couple]:
         """Pairs of candidates that pay beside a fit, best first."""
-        projected = self.projected(present, noise)
-        scores = self.every_score(present, noise, projected)
-        return couples(projected, present.residual, scores, self.price)
+        scores = self.every_score(present, noise)
+        return couples(self.projected(present, noise), present.residual, scores, self.price)
 
     def criterion(self, fitted: Fit) -> float:
         """Whitened squares and the price of everything that was added."""

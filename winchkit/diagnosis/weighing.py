@@ -51,11 +51,12 @@ def weighed(inquiry: Inquiry, fitted: Fit, noise: Noise) -> Weighed:
         now = held_out_rms(problem, refitted, even, folds)
         return refitted, even, {o: now[o] / was[o] for o in was if was[o]}
 
-    *_, ratios = evenly(problem.dataset.outputs)
+    refitted, even, ratios = evenly(problem.dataset.outputs)
     better = [output for output, ratio in ratios.items() if ratio < MATTERS]
     if not better:
         return own
-    refitted, even, ratios = evenly(better)
+    if len(better) < len(problem.dataset.outputs):
+        refitted, even, ratios = evenly(better)
     gained = 1 - max(ratios[output] for output in better)
     if gained < 1 - MATTERS or max(ratios.values()) > _NO_WORSE:
         return own
