@@ -21,7 +21,7 @@ from robot_poses.truth import turn
 
 from winchkit.cli import main
 from winchkit.diagnosis.confusion import pairs_of
-from winchkit.diagnosis.next_run import power_of, separation
+from winchkit.diagnosis.next_run import APART, power_of, separation
 from winchkit.diagnosis.robot.diagnose import diagnose_robot
 from winchkit.diagnosis.robot.next_poses import pose_offers
 from winchkit.runs import read_run
@@ -106,7 +106,7 @@ def test_the_power_is_that_of_all_rows_at_once(flat: tuple[Path, Path]) -> None:
     (pair,) = pairs_of(answer.sets)
     problem, final = answer.robot_problem, answer.found.final.hypothesis
     whole = separation(problem, *pair, dict.fromkeys(problem.dataset.outputs, 1.0))
-    offers = pose_offers(problem, final, [pair], count=3)
+    offers = pose_offers(problem, final, [pair], [APART], count=3)
     assert offers[0].so_far[0] == pytest.approx(power_of(whole), abs=0.01)
     assert all(len(offer.pose.position) == 3 for offer in offers)
     (run_offered,) = json.loads(call("diagnose", run, "-p", profile, "--json").stdout)["next_runs"]

@@ -17,7 +17,7 @@ from winchkit.diagnosis.kinds import KINDS, seen
 from winchkit.diagnosis.next_run import next_runs, power_of, separation, so_far
 from winchkit.diagnosis.plan import hopeless
 from winchkit.diagnosis.plan import offers as plan_offers
-from winchkit.diagnosis.power import detectable
+from winchkit.diagnosis.power import Bar, detectable
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import Detectable, NextRun
 from winchkit.diagnosis.score import chance_level
@@ -25,6 +25,7 @@ from winchkit.diagnosis.score import chance_level
 RIDE = Ride(samples=400)
 ROPE = term("cable-elongation-linear", axial_stiffness=3e5)
 FRAME = term("frame-compliance", stiffness=1.2e5)
+BAR = Bar(price=9.0, threshold=3.0)
 NAMES = {kind.name for kind in KINDS}
 
 
@@ -68,6 +69,18 @@ def test_rope_and_frame_are_told_apart_by_loads_over_the_stroke() -> None:
     assert found[0].power > 0.9
 
 
+def test_a_plan_offers_what_a_diagnosis_could_not_name_yet() -> None:
+    """λ of 16 is no chance, but too little to be named among forty: three loads show more of it."""
+    problem = Problem(dataset())
+    frame = [CATALOGUE["frame-compliance"]]
+    strength = separation(problem, _usual("frame-compliance"), None, NOISE)
+    noise = {output: size * np.sqrt(strength / 16) for output, size in NOISE.items()}
+    for bar, shown in ((BAR, ("frame-compliance",)), (Bar(0.0, 3.84), ())):
+        shows = {o.kind.name: o.shows for o in plan_offers(problem, [], noise, frame, bar=bar)}
+        assert shows["full stroke, three loads"] == shown
+    assert BAR.power((np.sqrt(BAR.squares(1)) + norm.ppf(0.9)) ** 2, 1) == pytest.approx(0.9, 0.01)
+
+
 def test_less_noise_is_more_power() -> None:
     best = [
         max(o.power for o in offers("cable-elongation-linear", "frame-compliance", noise))
@@ -82,7 +95,7 @@ def test_warmth_is_told_apart_by_warming_up_and_by_waiting() -> None:
     sizes = {output: 0.05 * size for output, size in NOISE.items()}
     pair = _usual("cable-thermal"), _usual("cable-creep")
     problem = Problem(dataset(warm=True))
-    power = {o.kind.name: o.powers[0] for o in plan_offers(problem, [pair], sizes, [])}
+    power = {o.kind.name: o.powers[0] for o in plan_offers(problem, [pair], sizes, [], bar=BAR)}
     assert power["full stroke, warmed up by 15 K"] > 0.9
     assert power["one load at five lengths, with holds"] > 0.9
 
@@ -141,7 +154,7 @@ def test_the_plan_says_what_no_motion_separates() -> None:
     radius, ratio = _usual("drum-radius"), _usual("gear-ratio")
     problem = inquire(grooved, CATALOGUE).problem
     pairs = [(radius, ratio), (ROPE, FRAME)]
-    found = plan_offers(problem, pairs, NOISE, [])
+    found = plan_offers(problem, pairs, NOISE, [], bar=BAR)
     assert hopeless(found, pairs) == [(radius, ratio)]
     # The best is the one that separates the other pair.
     assert found[0].powers[1] > 0.9
@@ -164,7 +177,7 @@ def smallest(noise: float, masses: tuple[float, ...] = (10.0,)) -> dict[str, Det
     scores = tuple(inquiry.scores(present, known))
     chance = chance_level(inquiry.projected(present, known), inquiry.problem.rows)
     threshold = float(np.quantile(chance, 0.99))
-    return {d.effect: d for d in detectable(scores, inquiry.price, threshold)}
+    return {d.effect: d for d in detectable(scores, Bar(inquiry.price, threshold))}
 
 
 def test_half_the_noise_shows_half_the_size() -> None:

@@ -81,7 +81,8 @@ def _plan_winch(
     answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
     problem, pairs = answer.inquiry.problem, answer.pairs
     room = seen(problem.dataset) if limits is None else allowed(problem.dataset, limits)
-    found = offers(problem, pairs, answer.found.noise.rms, list(catalogue), room)
+    noise = answer.found.noise.rms
+    found = offers(problem, pairs, noise, list(catalogue), bar=answer.bar, room=room)
     if output:
         path = Path(output)
         write_programme(programme_of(problem.dataset, found[0].kind, path.stem, room), path)

@@ -19,7 +19,7 @@ from winchkit.diagnosis.inquiry import Inquiry
 from winchkit.diagnosis.limits import what_runs_cannot_show
 from winchkit.diagnosis.next_run import next_runs
 from winchkit.diagnosis.noise import Noise
-from winchkit.diagnosis.power import detectable
+from winchkit.diagnosis.power import Bar, detectable
 from winchkit.diagnosis.problem import Problem
 from winchkit.diagnosis.result import (
     Candidate,
@@ -66,6 +66,11 @@ class Answer:
         self.pairs = tuple(pairs)
         """Effects to be told apart by a next run, of these sets or of what came closest."""
         self.diagnosis = diagnosis
+
+    @property
+    def bar(self) -> Bar:
+        """What an effect had to bring to be named."""
+        return Bar(self.inquiry.price, self.found.threshold)
 
     @property
     def filed(self) -> Inquiry:
@@ -123,7 +128,7 @@ def _answer(inquiry: Inquiry, found: Found) -> Answer:
         outputs=judgement.outputs,
         steps=steps_of(inquiry, shown, sets) if sets else (),
         candidates=candidates_of(inquiry, found),
-        detectable=detectable(found.scores, inquiry.price, found.threshold),
+        detectable=detectable(found.scores, Bar(inquiry.price, found.threshold)),
         unexplained_share=judgement.share,
         where=_where(inquiry.problem, found) if judgement.verdict in _LOCATED else (),
         next_runs=next_runs(inquiry.problem, pairs, found.noise.rms),

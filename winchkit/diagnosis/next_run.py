@@ -21,10 +21,11 @@ from winchkit.diagnosis.result import NextRun
 from winchkit.effects.bind import Term
 from winchkit.effects.effect import told_apart
 
-__all__ = ["SoFar", "next_runs", "power_of", "separation", "so_far"]
+__all__ = ["APART", "SoFar", "next_runs", "power_of", "separation", "so_far"]
 
 Array = NDArray[np.float64]
-_CHI2 = 3.841
+APART = 3.841
+"""Squares that a difference of two effects must bring: the 5 % level of chance."""
 _OFFERED = 2
 _WORTHWHILE = 0.2
 
@@ -66,9 +67,9 @@ def next_runs(
     return tuple(out)
 
 
-def power_of(strength: float) -> float:
-    """Chance that a difference of noncentrality λ shows at the 5 % level."""
-    return float(ncx2.sf(_CHI2, 1, strength)) if strength > 0 else 0.05
+def power_of(strength: float, needed: float = APART) -> float:
+    """Chance that a difference of noncentrality λ brings the squares that are needed."""
+    return float(ncx2.sf(needed, 1, max(strength, 0.0)))
 
 
 def separation(

@@ -10,6 +10,7 @@ from winchkit.diagnosis.dataset import Dataset
 from winchkit.diagnosis.kinds import KINDS, Kind, Room, imagined, seen, usual_temperature
 from winchkit.diagnosis.next_run import power_of, separation, so_far
 from winchkit.diagnosis.points import missing_needs
+from winchkit.diagnosis.power import Bar
 from winchkit.diagnosis.problem import Problem
 from winchkit.effects.bind import Term
 from winchkit.effects.coordinates import Coordinates
@@ -70,13 +71,18 @@ def offers(
     pairs: Sequence[tuple[Term, Term]],
     noise: Mapping[str, float],
     effects: Sequence[Effect],
+    *,
+    bar: Bar,
     room: Room | None = None,
 ) -> list[Offer]:
-    """Every kind of programme within a room, else within what was seen; the most telling first."""
+    """Every kind of programme within a room, else within what was seen; the most telling first.
+
+    An effect shows where it takes what a diagnosis wants for its name, the ``bar``.
+    """
     dataset = problem.dataset
     room = room or seen(dataset)
     usual = [(term, so_far(problem, term, None, noise)) for term in _usual(effects, problem)]
-    hidden = [(t, known) for t, known in usual if known and power_of(known.left) < _SURE]
+    hidden = [(t, known) for t, known in usual if known and not _sees(bar, t, known.left)]
     known_pairs = [(a, b, so_far(problem, a, b, noise)) for a, b in pairs]
     out = []
     for kind in KINDS:
@@ -90,13 +96,19 @@ def offers(
         shows = tuple(
             term.effect.id
             for term, known in hidden
-            if power_of(
-                known.left + separation(tried, term, None, noise, known=known, repeats=_REPEATS)
+            if _sees(
+                bar,
+                term,
+                known.left + separation(tried, term, None, noise, known=known, repeats=_REPEATS),
             )
-            >= _SURE
         )
         out.append(Offer(kind, minutes, powers, shows))
     return sorted(out, key=lambda offer: offer.worth, reverse=True)
+
+
+def _sees(bar: Bar, term: Term, strength: float) -> bool:
+    """Whether an effect of noncentrality λ would most probably be named."""
+    return bar.power(strength, Coordinates(term.effect).freedom) >= _SURE
 
 
 def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list[tuple[Term, Term]]:

@@ -2,18 +2,39 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from winchkit.diagnosis.next_run import power_of
 from winchkit.diagnosis.result import Detectable
 from winchkit.diagnosis.score import Score
 from winchkit.effects.coordinates import Coordinates
 
-__all__ = ["detectable"]
+__all__ = ["Bar", "detectable"]
 
 _POWER_QUANTILE = 1.2816
 
 
-def detectable(scores: tuple[Score, ...], price: float, threshold: float) -> tuple[Detectable, ...]:
+@dataclass(frozen=True)
+class Bar:
+    """What an effect must bring to be named."""
+
+    price: float
+    """Whitened squares that one degree of freedom must save."""
+    threshold: float
+    """What noise alone may score beyond that."""
+
+    def squares(self, freedom: int) -> float:
+        """Whitened squares that an effect of so many unknowns must take."""
+        return max(self.threshold, 0.0) + self.price * freedom
+
+    def power(self, strength: float, freedom: int) -> float:
+        """Chance that an effect of noncentrality λ takes as much."""
+        return power_of(strength, self.squares(freedom))
+
+
+def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
     """Smallest main parameter per effect, found with 90 % power against what noise alone scores.
 
     NaN where no size within the parameter's bounds would be found.
@@ -23,8 +44,7 @@ def detectable(scores: tuple[Score, ...], price: float, threshold: float) -> tup
         effect = item.atom.effect
         if item.strength <= 0:
             continue
-        needed = max(threshold, 0.0) + price * item.atom.freedom
-        size = (np.sqrt(needed) + _POWER_QUANTILE) / np.sqrt(item.strength)
+        size = (np.sqrt(bar.squares(item.atom.freedom)) + _POWER_QUANTILE) / np.sqrt(item.strength)
         secant = item.atom.secants[0]
         name = next(iter(secant))
         parameter = effect.parameter(name)

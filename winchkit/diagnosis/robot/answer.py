@@ -8,7 +8,7 @@ from functools import cached_property
 
 from winchkit.diagnosis.confusion import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.diagnose import Answer, candidates_of, steps_of
-from winchkit.diagnosis.power import detectable
+from winchkit.diagnosis.power import Bar, detectable
 from winchkit.diagnosis.result import Estimate, OutputFit, Step, Where
 from winchkit.diagnosis.robot.figures import Errors, Shown, errors_of, figures, rms
 from winchkit.diagnosis.robot.inquiry import RobotInquiry
@@ -114,7 +114,7 @@ def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
         outputs=outputs,
         steps=steps,
         candidates=candidates_of(inquiry, seen.found),
-        detectable=detectable(seen.found.scores, inquiry.price, seen.found.threshold),
+        detectable=detectable(seen.found.scores, Bar(inquiry.price, seen.found.threshold)),
         unexplained_share=judgement.share,
         where=_places(seen) if seen.found.still else (),
         next_runs=next_pose_runs(inquiry.robot_problem, shown.final.hypothesis, pairs_of(sets)),

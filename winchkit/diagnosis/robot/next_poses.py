@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.next_run import power_of
+from winchkit.diagnosis.next_run import APART, power_of
 from winchkit.diagnosis.result import NextRun
 from winchkit.diagnosis.robot.next_kinds import KINDS, PoseKind, imagined, usable
 from winchkit.diagnosis.robot.problem import RobotProblem
@@ -33,8 +33,8 @@ POSES = 12
 """Of an offer."""
 _SURE, WORTHWHILE = 0.9, 0.2
 _OFFERED = 2
-_ENOUGH = 25.0
-"""λ beyond which more is of no use: a power of 99.9 %."""
+_ENOUGH = 3.04
+"""Deviations beyond what is needed where more is of no use: a power of 99.9 %."""
 _RIDGE = 1e-9
 
 
@@ -63,7 +63,7 @@ def next_pose_runs(
     """
     out: list[NextRun] = []
     for first, second in pairs:
-        offers = pose_offers(problem, final, [(first, second)])
+        offers = pose_offers(problem, final, [(first, second)], [APART])
         names = (first.effect.id, second.effect.id)
         sure = [o for o in offers if o.powers[0] >= _SURE][:1]
         fair = sorted(offers, key=lambda o: -o.powers[0])
@@ -76,9 +76,16 @@ def next_pose_runs(
 
 
 def pose_offers(
-    problem: RobotProblem, final: Hypothesis, questions: Sequence[Question], count: int = POSES
+    problem: RobotProblem,
+    final: Hypothesis,
+    questions: Sequence[Question],
+    needed: Sequence[float],
+    count: int = POSES,
 ) -> list[PoseOffer]:
-    """Every kind of poses with the ``count`` that answer the questions best, least effort first."""
+    """Every kind of poses with the ``count`` that answer the questions best, least effort first.
+
+    ``needed`` are the whitened squares that answer each question.
+    """
     robot = problem.standing.robot(final.terms)
     kinds = [kind for kind in KINDS if usable(kind, problem.dataset)]
     tried = [(kind, *imagined(problem, robot, kind)) for kind in kinds]
@@ -87,18 +94,23 @@ def pose_offers(
     parts = [_information(wide, final, question) for question in questions]
     begin = len(problem.dataset.measured)
     base = [part[-1] + part[:begin].sum(axis=0) for part in parts]
-    so_far = tuple(power_of(float(_left_over(own))) for own in base)
+    so_far = _powers([float(_left_over(own)) for own in base], needed)
     out = []
     for kind, seen, pose in tried:
         own = slice(begin, begin + len(seen))
         begin = own.stop
-        chosen, strength = _chosen([part[own] for part in parts], base, count)
+        chosen, strength = _chosen([part[own] for part in parts], base, needed, count)
         at = Pose(pose.position[chosen], pose.rotation[chosen])
-        powers = tuple(power_of(value) for value in strength)
+        powers = _powers(strength, needed)
         out.append(
             PoseOffer(kind, at, seen.motor_angle[chosen], seen.tension[chosen], powers, so_far)
         )
     return out
+
+
+def _powers(strength: Sequence[float], needed: Sequence[float]) -> tuple[float, ...]:
+    """Chance of an answer to each question."""
+    return tuple(power_of(*both) for both in zip(strength, needed, strict=True))
 
 
 def reach(offer: PoseOffer) -> tuple[float, float]:
@@ -169,15 +181,16 @@ def _left_over(information: Array) -> Array:
 
 
 def _chosen(
-    parts: Sequence[Array], base: Sequence[Array], count: int
+    parts: Sequence[Array], base: Sequence[Array], needed: Sequence[float], count: int
 ) -> tuple[list[int], list[float]]:
     """Poses chosen one after another for what they add to λ of all questions, and λ with them."""
     sums, left = list(base), np.ones(len(parts[0]), dtype=bool)
+    enough = (np.sqrt(needed) + _ENOUGH) ** 2
     chosen: list[int] = []
     while len(chosen) < count and np.any(left):
         gains = sum(
-            np.minimum(_left_over(total + part), _ENOUGH)
-            for total, part in zip(sums, parts, strict=True)
+            np.minimum(_left_over(total + part), most)
+            for total, part, most in zip(sums, parts, enough, strict=True)
         )
         best = int(np.argmax(np.where(left, gains, -np.inf)))
         left[best] = False

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from winchkit.diagnosis.confusion import pairs_of
-from winchkit.diagnosis.next_run import power_of
+from winchkit.diagnosis.next_run import APART
 from winchkit.diagnosis.robot.answer import RobotAnswer
 from winchkit.diagnosis.robot.next_poses import POSES, WORTHWHILE, PoseOffer, Question, pose_offers
 from winchkit.effects.bind import Term
 from winchkit.effects.card import usual_values
+from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.placed import base_of
 from winchkit.model.robot import angles_of
 from winchkit.runs.run import Channel, Run
@@ -105,8 +106,9 @@ def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
     pairs = tuple(pairs_of(answer.sets))
     hidden = _hidden(answer)
     questions: list[Question] = [*pairs, *((term, None) for term in hidden)]
-    offers = pose_offers(problem, final, questions, count) if questions else []
-    many = len(pairs)
+    many, bar = len(pairs), answer.bar
+    needed = [APART] * many + [bar.squares(Coordinates(t.effect).freedom) for t in hidden]
+    offers = pose_offers(problem, final, questions, needed, count) if questions else []
 
     def worth(offer: PoseOffer) -> tuple[float, ...]:
         sure = sum(power >= _SURE for power in offer.powers[:many])
@@ -128,7 +130,8 @@ def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
     there = {term.effect.id for term in answer.found.final.hypothesis.terms}
     for score in answer.found.scores:
         effect = score.atom.effect
-        if not score.strength > 0 or power_of(score.strength) >= _SURE or effect.id in there:
+        seen = answer.bar.power(score.strength, score.atom.freedom) >= _SURE
+        if not score.strength > 0 or seen or effect.id in there:
             continue
         known = faint.get(base_of(effect))
         if known is None or score.strength < known[0]:
