@@ -26,19 +26,21 @@ _BY_ITSELF = 0.5
 def rests_on_states(problem: Problem, base: Fit, fitted: Fit, weight: Array, price: float) -> bool:
     """Whether the last term of a fit, which ``base`` lacks, needs its states too much.
 
-    It does not where it explains half of what it does from rest in every run; nor, as on a bench
-    under a load that hangs for long, where it pays for all its numbers by more than levels do.
+    It does not where it explains half of what it does from rest in every run, and no less than a
+    level per run would: a ramp from zero is three quarters level. Nor, as on a bench under a load
+    that hangs for long, where it pays for all its numbers by more than levels do.
     """
     known, left = base.jacobian * weight[:, None], base.residual * weight
     gain = base.cost - fitted.cost
     column = _beyond(known, _from_rest(problem, fitted.hypothesis) * weight)
     alone = (column @ left) ** 2 / max(float(column @ column), 1e-300)
-    if alone >= _BY_ITSELF * gain:
-        return False
+    by_itself = bool(alone >= _BY_ITSELF * gain)
     levels = _levels(problem, fitted.hypothesis)
     if levels is None:
-        return True
+        return not by_itself
     flat = _beyond(np.column_stack([known, levels * weight[:, None]]), left)
+    if by_itself and alone >= left @ left - flat @ flat:
+        return False
     hypothesis = fitted.hypothesis
     owed = Coordinates(hypothesis.terms[-1].effect).freedom + len(hypothesis.starts[-1])
     return float(flat @ flat) - fitted.cost < price * owed
