@@ -14,7 +14,7 @@ from winchkit.effects.empirical import EMPIRICAL, KNOTS, empirical_id, knots, pl
 from winchkit.effects.own_file import write_own, write_wave_on_drum
 from winchkit.errors import FileError
 from winchkit.model.line import Line, Motion
-from winchkit.model.variables import ANGLES, VARIABLES
+from winchkit.model.variables import ANGLES, COMPOUND, VARIABLES
 
 
 def motion_of(drum: str) -> Motion:
@@ -26,7 +26,11 @@ def predicted_with(drum: str, term: Term | None, motion: Motion) -> dict[str, np
     return Line(profile_with(drum), modifiers).predict(motion)
 
 
-SIZES = {f"value_{index}": 0.1 * index for index in range(1, KNOTS + 1)}
+def sizes(count: int) -> dict[str, float]:
+    return {f"value_{index}": 0.1 * index for index in range(1, count + 1)}
+
+
+SIZES = sizes(KNOTS)
 
 
 def test_they_are_known_by_name_and_stand_in_no_list() -> None:
@@ -53,9 +57,10 @@ def test_at_null_nothing_changes_and_a_curve_is_added_where_it_says(effect_id: s
         expected = 0.5 * np.sin(3 * x + 0.3)
     else:
         low, high = float(np.min(x)), float(np.max(x)) + 1e-9
-        values = {"low": low, "high": high, **SIZES}
-        assert knots(values) == pytest.approx(np.linspace(low, high, KNOTS))
-        expected = 0.1 * (1 + (KNOTS - 1) * (x - low) / (high - low))
+        count = 2 * KNOTS if variable_of(effect) in COMPOUND else KNOTS
+        values = {"low": low, "high": high, **sizes(count)}
+        assert knots(values) == pytest.approx(np.linspace(low, high, count))
+        expected = 0.1 * (1 + (count - 1) * (x - low) / (high - low))
     found = predicted_with("spiral", Term(effect, values), motion)
     assert found[output] - bare[output] == pytest.approx(expected, abs=1e-9, nan_ok=True)
     for other in set(bare) - {output}:

@@ -15,7 +15,7 @@ from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.follows import variables_of
 from winchkit.diagnosis.predictor import masked
 from winchkit.diagnosis.problem import Problem
-from winchkit.model.variables import ANGLES
+from winchkit.model.variables import ANGLES, COMPOUND
 
 __all__ = ["PLACES", "Columns", "Law", "columns_of", "curves", "hats_over", "laws_over"]
 
@@ -25,8 +25,8 @@ _TAILS = 0.001
 _DEGREES = (1, 2, 3, 4)
 _COARSE = (6, 12)
 _POWERS = (1.5, 2.0, 3.0)
-_TAKEN = (*ANGLES, "direction")
-"""Variables of which any curve has a name already."""
+_TAKEN = (*ANGLES, *COMPOUND, "direction")
+"""Variables of which any curve has a name already, or is tried as a product."""
 _WARMER = 1.0
 """Less is noise of the thermometer rather than a change, K."""
 Law = tuple[Array, int]

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.dataset import Recording
 from winchkit.diagnosis.problem import Problem
-from winchkit.model.variables import ANGLES, VARIABLES
+from winchkit.model.variables import ANGLES, COMPOUND, VARIABLES
 
 __all__ = [
     "BINS",
@@ -20,6 +22,7 @@ __all__ = [
     "harmonics",
     "kept_rows",
     "quantile_bins",
+    "ranked",
     "variables_of",
 ]
 
@@ -28,6 +31,8 @@ BINS = 16
 """Over a variable."""
 _ORDERS = 40
 _WORTH = 0.02
+_CLEARLY = 0.05
+"""Share that two variables at once must tell beyond either of them."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,16 @@ class Followed:
     frequency: float | None = None
     line: str | None = None
     """Of a robot, or the axis of its platform's position, where one alone has most of it."""
+
+
+class _Shared(Protocol):
+    @property
+    def variable(self) -> str: ...
+    @property
+    def share(self) -> float: ...
+
+
+_S = TypeVar("_S", bound=_Shared)
 
 
 def variables_of(recording: Recording) -> dict[str, Array]:
@@ -74,8 +89,19 @@ def follows(problem: Problem, residual: Array) -> list[Followed]:
             share = binned_share(np.concatenate(values), error, kept)
             if share > by_chance(BINS, kept):
                 found.append(Followed(output, name, share))
-        out += sorted(found, key=lambda f: -f.share)
+        out += ranked(found)
     return out
+
+
+def ranked(found: Iterable[_S]) -> list[_S]:
+    """Largest share first; two variables at once only where they tell clearly more than either."""
+    shares = {item.variable: item.share for item in found}
+
+    def needless(item: _S) -> bool:
+        parts = COMPOUND.get(item.variable, ())
+        return any(item.share < shares.get(part, 0.0) + _CLEARLY for part in parts)
+
+    return sorted((item for item in found if not needless(item)), key=lambda item: -item.share)
 
 
 def harmonics(problem: Problem, residual: Array) -> list[Followed]:

@@ -16,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.compare import Compared
-from winchkit.diagnosis.follows import BINS, by_chance, kept_rows, quantile_bins, variables_of
+from winchkit.diagnosis.follows import (
+    BINS,
+    by_chance,
+    kept_rows,
+    quantile_bins,
+    ranked,
+    variables_of,
+)
 
 __all__ = ["SharedError", "SharedFollowed", "WinchErrors", "errors_of", "shared_errors"]
 
@@ -127,7 +134,7 @@ def _follows(own: Mapping[str, WinchErrors]) -> tuple[SharedFollowed, ...]:
                 over[name] = quantile_bins(values)
     found = [_followed(name, bins, errors, own) for name, bins in over.items()]
     worth = by_chance(BINS * len(own), _kept(own))
-    return tuple(sorted((f for f in found if f.share > worth), key=lambda f: -f.share))
+    return tuple(ranked([f for f in found if f.share > worth]))
 
 
 def _followed(

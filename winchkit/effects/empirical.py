@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from winchkit.effects.effect import Effect, Need, Output, Parameter, Values
 from winchkit.effects.order import order_per_turn
 from winchkit.model.stages import At, Stage
-from winchkit.model.variables import ANGLES, VARIABLE_UNITS, VARIABLES
+from winchkit.model.variables import ANGLES, COMPOUND, VARIABLE_UNITS, VARIABLES
 
 __all__ = ["EMPIRICAL", "KNOTS", "empirical_id", "knots", "placed", "variable_of"]
 
 Array = NDArray[np.float64]
 KNOTS = 9
+"""Of a curve over one variable; over two at once twice as many."""
+_VALUE = "value_"
 _ORDERS = tuple(float(order) for order in range(1, 41))
 _BOUND = 1e6
 _AT: Mapping[Output, tuple[Stage, str, float]] = {
@@ -47,8 +49,9 @@ def variable_of(effect: Effect) -> str:
 
 
 def knots(values: Values) -> Array:
-    """Where the curve's values stand, (KNOTS,)."""
-    return np.linspace(values["low"], values["high"], KNOTS)
+    """Where the curve's values stand, (knots,)."""
+    count = sum(name.startswith(_VALUE) for name in values)
+    return np.linspace(values["low"], values["high"], count)
 
 
 def placed(effect: Effect, low: float, high: float) -> Effect:
@@ -80,7 +83,8 @@ def _over_turns(output: Output, variable: str) -> Effect:
 
 def _spline(output: Output, variable: str) -> Effect:
     _, unit, typical = _AT[output]
-    names = [f"value_{index}" for index in range(1, KNOTS + 1)]
+    count = 2 * KNOTS if variable in COMPOUND else KNOTS
+    names = [f"{_VALUE}{index}" for index in range(1, count + 1)]
 
     def apply(value: Array, at: At, values: Values) -> Array:
         curve = np.array([values[name] for name in names])
@@ -97,7 +101,7 @@ def _spline(output: Output, variable: str) -> Effect:
     sizes = tuple(
         Parameter(name, unit, null=0.0, typical=typical, low=-_BOUND, high=_BOUND) for name in names
     )
-    plain = _plain(output, variable, f"straight lines between {KNOTS} values from low to high")
+    plain = _plain(output, variable, f"straight lines between {count} values from low to high")
     return replace(plain, apply=apply, parameters=(*ends, *sizes))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from winchkit.model.recurrence import play
 from winchkit.model.stages import At
 
-__all__ = ["ANGLES", "VARIABLES", "VARIABLE_UNITS"]
+__all__ = ["ANGLES", "COMPOUND", "VARIABLES", "VARIABLE_UNITS"]
 
 Array = NDArray[np.float64]
 _CREEP = 1e-4
@@ -39,13 +39,18 @@ VARIABLES: Mapping[str, Callable[[At], Array]] = {
     "speed": lambda at: at.speed,
     "direction": _direction,
     "cable_length": lambda at: at.free_length,
+    "directed_length": lambda at: at.free_length * _direction(at),
     "time": lambda at: at.time,
     "reversal_distance": _reversal_distance,
     "load": lambda at: at.tension,
     "tension": lambda at: at.tension,
     "temperature": lambda at: at.temperature,
 }
-"""Arrays (n,) along a run; ``load`` and ``tension`` are the rope's force, whichever is known."""
+"""Arrays (n,) along a run; ``load`` and ``tension`` are the rope's force, whichever is known.
+
+``directed_length`` is the free length while winding in, its negative while paying out, and zero at
+rest: what rubs at one place of the stroke is a curve over it.
+"""
 
 VARIABLE_UNITS: Mapping[str, str] = {
     "drum_angle": "rad",
@@ -53,6 +58,7 @@ VARIABLE_UNITS: Mapping[str, str] = {
     "speed": "m/s",
     "direction": "1",
     "cable_length": "m",
+    "directed_length": "m",
     "time": "s",
     "reversal_distance": "1",
     "load": "N",
@@ -61,3 +67,5 @@ VARIABLE_UNITS: Mapping[str, str] = {
 }
 ANGLES = ("drum_angle", "motor_angle")
 """What repeats every turn."""
+COMPOUND: Mapping[str, tuple[str, ...]] = {"directed_length": ("cable_length", "direction")}
+"""What two variables tell at once."""

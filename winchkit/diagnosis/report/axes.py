@@ -38,6 +38,12 @@ class Reading:
         return 10.0**values if self.logarithmic else values / self.worth
 
 
+_WITH_A_SIGN = {
+    "direction": Reading("direction (1 winds in, −1 pays out)", ""),
+    "directed_length": Reading("free length, winding in; negative: paying out [m]", "m"),
+}
+
+
 def reading(variable: str, *, within_turn: bool = False) -> Reading:
     """How to write a variable; an angle within its turn in degrees, else in turns."""
     name = VARIABLE_NAMES.get(variable, variable.replace("_", " "))
@@ -47,8 +53,8 @@ def reading(variable: str, *, within_turn: bool = False) -> Reading:
         return Reading(f"{name} [turns]", "turns", _TURN)
     if variable == "reversal_distance":
         return Reading(f"{name} [m]", "m", logarithmic=True)
-    if variable == "direction":
-        return Reading("direction (1 winds in, −1 pays out)", "")
+    if variable in _WITH_A_SIGN:
+        return _WITH_A_SIGN[variable]
     if variable in _OF_PLATFORM:
         unit, worth = _OF_PLATFORM[variable]
         return Reading(f"{name} [{unit}]", unit, worth)

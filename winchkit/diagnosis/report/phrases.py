@@ -39,6 +39,7 @@ VARIABLE_NAMES = {
     "speed": "speed",
     "direction": "direction",
     "cable_length": "free length",
+    "directed_length": "free length and direction",
     "load": "load",
     "tension": "tension",
     "temperature": "temperature",
