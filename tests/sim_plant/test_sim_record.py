@@ -32,6 +32,13 @@ def plans(motion: Programme, start: float = 4.0) -> list:
     return schedule(motion, LIMITS, {"A": start}, {"A": 10.0})
 
 
+@pytest.mark.parametrize("steps", [(Step(to=2.0),), (Step(by=0.0),), (Step(ask="hang"),)])
+def test_a_programme_that_leaves_nothing_to_record_is_told(steps: tuple[Step, ...]) -> None:
+    """Its repeats end where they begin: no file would be written, and nobody would know why."""
+    with pytest.raises(FileError, match="nothing moves and nothing is held"):
+        plans(programme(*steps, repeat=2))
+
+
 def test_every_load_and_repeat_is_a_run() -> None:
     found = plans(programme(*TWO_LOADS, repeat=2))
     assert [plan.load_mass["A"] for plan in found] == [10.0, 20.0, 10.0, 20.0]
@@ -53,7 +60,8 @@ def test_speed_is_limited_by_the_bench() -> None:
 
 
 def test_a_move_to_where_it_stands_takes_no_time() -> None:
-    assert plans(programme(Step(to=4.0, speed=0.1))) == []
+    (found,) = plans(programme(Step(to=4.0, speed=0.1), Step(hold=0.5)))
+    assert found.duration == 0.5
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,10 @@ __all__ = ["Leg", "RunPlan", "schedule"]
 
 _JERK_TIME = 0.4
 """Over which an acceleration builds up where nothing else limits the jerk, s."""
+_NOTHING = (
+    "nothing moves and nothing is held: a repeat starts where it ends, so that repeats are equal; "
+    "add a step to another length, or a hold"
+)
 ASK_PAUSE = 20.0
 """How long an operator takes to hang a load, s."""
 
@@ -127,7 +131,7 @@ def schedule(
 
     ``length`` and ``load_mass`` hold at its start by winch. The first run starts where a
     repeat ends, so that all repeats are the same motion. Raises FileError for a step of an
-    unknown winch, or one that leaves a winch's length limits.
+    unknown winch, one that leaves a winch's length limits, or where nothing is left to record.
     """
     _check_names(programme, list(limits))
     layout = _Layout(limits, dict(length), dict(load_mass))
@@ -140,6 +144,8 @@ def schedule(
         for step in programme.step:
             layout.take(step, _winches(step, limits))
         layout.end_run()
+    if not layout.plans:
+        raise FileError(Fault(_NOTHING, programme.name, key="step"))
     return layout.plans
 
 
