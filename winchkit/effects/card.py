@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.effects.bind import Term
-from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
 from winchkit.effects.standard_robot import robot_changes
 from winchkit.model.line import Line
 
 __all__ = [
+    "UNITS",
     "Signature",
     "card",
     "card_data",
@@ -30,7 +31,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 _PLACES = {"all": "all lines alike", "one": "one line", "platform": "the platform"}
-_UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
+UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 36
 _SAMPLES = 400
@@ -57,15 +58,17 @@ def usual_values(effect: Effect) -> dict[str, float]:
     return effect.null | sizes | dict(effect.probes[-1] if effect.probes else {})
 
 
-def signature(effect: Effect) -> Signature:
-    """Signature of an effect on the standard motion; of a robot's on the standard poses."""
+def signature(effect: Effect, values: Values | None = None) -> Signature:
+    """Signature of an effect on the standard motion; of a robot's on the standard poses.
+
+    Of a usual size unless ``values`` say otherwise.
+    """
+    values = usual_values(effect) if values is None else values
     if effect.of_robots:
-        values = usual_values(effect)
-        length, changed = robot_changes(effect, values)
+        length, changed = robot_changes(effect, dict(values))
         poses = np.arange(len(length), dtype=float)
         return Signature(values, poses, length, changed)
     motion = standard_motion()
-    values = usual_values(effect)
     bare = Line(STANDARD_PROFILE).predict(motion)
     changed = Line(STANDARD_PROFILE, (Term(effect, values).modifier(),)).predict(motion)
     changes = {name: changed[name] - bare[name] for name in bare}
@@ -150,7 +153,7 @@ def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
             "time": _listed(drawn.time, width),
             "cable_length": _listed(drawn.cable_length, width),
             "changes": {
-                name: {"unit": _UNITS[name], "values": _listed(change, width)}
+                name: {"unit": UNITS[name], "values": _listed(change, width)}
                 for name, change in drawn.changes.items()
             },
         },
@@ -212,7 +215,7 @@ def _drawing(effect: Effect) -> list[str]:
     ]
     for name, change in drawn.changes.items():
         low, high = float(np.nanmin(change)), float(np.nanmax(change))
-        lines.append(f"  {name:<13}{sparkline(change)}  {low:+.3g} to {high:+.3g} {_UNITS[name]}")
+        lines.append(f"  {name:<13}{sparkline(change)}  {low:+.3g} to {high:+.3g} {UNITS[name]}")
     return lines if drawn.changes else [*lines, "  no change on this motion"]
 
 

@@ -50,7 +50,8 @@ class Catalogue:
 def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:
     """All effects: the package's own, entry points ``winchkit.effects``, then ``files``.
 
-    Raises FileError where a user's file cannot be loaded or holds no effect.
+    Raises FileError where a user's file cannot be loaded, holds no effect, or one that does
+    something at its null or gives no numbers.
     """
     found: list[Effect] = []
     for room in _ROOMS:
@@ -81,7 +82,18 @@ def _from_file(path: Path) -> list[Effect]:
     except Exception as error:
         line = getattr(error, "lineno", None)
         raise FileError(Fault(f"cannot be run: {error!r}", str(path), line)) from error
-    return _effects_in(module, str(path))
+    effects = _effects_in(module, str(path))
+    # Cards are drawn with effects that are bound, and binding wants a catalogue.
+    from winchkit.effects.probe import broken_promises
+
+    faults = [
+        Fault(f"effect '{effect.id}' {broken}", str(path))
+        for effect in effects
+        for broken in broken_promises(effect)
+    ]
+    if faults:
+        raise FileError(faults)
+    return effects
 
 
 def _effects_in(thing: object, where: str) -> list[Effect]:
