@@ -20,15 +20,13 @@ _MOST = 3
 
 
 def recoupled(inquiry: Inquiry, present: Fit, noise: Noise, exchanged: int) -> Fit:
-    """The present fit, or one with a better pair in the place of ``exchanged`` additions."""
+    """The present fit, or the best with a better pair in the place of ``exchanged`` additions."""
     added = range(inquiry.given, len(present.hypothesis.terms))
     if len(added) > _MOST:
         return present  # So many stand for something that no pair is.
-    for indices in combinations(added, exchanged):
-        better = _better(inquiry, present, noise, indices)
-        if better is not None:
-            return better
-    return present
+    exchanges = [_better(inquiry, present, noise, own) for own in combinations(added, exchanged)]
+    better = [fitted for fitted in exchanges if fitted is not None]
+    return min(better, key=inquiry.criterion, default=present)
 
 
 def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ...]) -> Fit | None:

@@ -24,6 +24,8 @@ _MOST_STEPS = 6
 _SHORT_LIST = 5
 _RIVALS = 2
 _RECONSIDERED = 3
+_EXCHANGED = 2
+"""Additions of which one may be exchanged for a pair."""
 _COUPLES = 3
 _PRESENCE_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
@@ -151,13 +153,13 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
 def _coupled(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
-    In exchange for a first addition, or to begin with in outputs that no addition acts on: pairs
+    In exchange for one of the first additions, or to begin with in outputs that no addition acts on: pairs
     upon what is there already would piece together what nobody knows.
     """
     added = len(present.hypothesis.terms) - inquiry.given
     if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
         return None
-    better = _exchanged(inquiry, present, noise, present) if added == 1 else None
+    better = _exchanged(inquiry, present, noise, present) if 0 < added <= _EXCHANGED else None
     if better is not None or _acts_on_what_lacks(inquiry, present, noise):
         return better
     pairs = inquiry.couples(present, noise)
