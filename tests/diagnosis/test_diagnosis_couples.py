@@ -70,6 +70,26 @@ def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term
 def test_pairs_are_not_pieced_together_upon_what_acts_on_the_same_output() -> None:
     inquiry = inquiry_into(ONE_WAY, RIDE, MASSES)
     start = inquiry.begin
-    for own in (term("motor-coulomb", torque=1e-3), term("cell-gain", gain_error=1e-4)):
+    for own in (
+        term("motor-coulomb", torque=1e-3),
+        term("cell-gain", gain_error=1e-4),
+        term("drum-radius", radius_error=1e-6),
+    ):
         start = start.with_term(own, inquiry.problem.runs)
     assert _coupled(inquiry, *inquiry.settle(start)) is None
+
+
+def test_one_of_two_that_stands_for_a_pair_is_exchanged_for_it() -> None:
+    """Another stays beside it; what is there already need not be the first that was taken."""
+    hidden = (
+        term("pulley-inertia", equivalent_mass=6.5),
+        term("cell-gain", gain_error=-0.05),
+        term("cell-offset", offset=0.05 * 20 * 9.80665),
+    )
+    inquiry = inquiry_into(hidden, RIDE, MASSES)
+    start = inquiry.begin
+    for own in (hidden[0], term("motor-coulomb-asymmetry", offset=1e-3)):
+        start = start.with_term(own, inquiry.problem.runs)
+    grown = _coupled(inquiry, *inquiry.settle(start))
+    assert grown is not None
+    assert set(grown.labels) == {t.label for t in hidden}

@@ -142,7 +142,8 @@ def _fitted(inquiry: Inquiry, effect_id: str) -> tuple[tuple[Fit, Noise], tuple[
     trials = [inquiry.trial(begin, item, noise) for item in _atoms(inquiry, effect_id, noise)]
     if not trials:
         raise UsageError(
-            f"effect '{effect_id}' changes nothing that these runs measured, or gives no number there"
+            f"effect '{effect_id}' changes nothing that these runs measured, or gives no number "
+            "there"
         )
     best = min(trials, key=lambda trial: trial.fit.cost)
     return (begin, noise), inquiry.settle(best.fit.hypothesis, noise)

@@ -153,8 +153,8 @@ def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score
 def _coupled(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
-    In exchange for one of the first additions, or to begin with in outputs that no addition acts on: pairs
-    upon what is there already would piece together what nobody knows.
+    In exchange for one of the first additions, or to begin with in outputs that no addition acts
+    on: pairs upon what is there already would piece together what nobody knows.
     """
     added = len(present.hypothesis.terms) - inquiry.given
     if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
