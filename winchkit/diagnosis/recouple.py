@@ -24,12 +24,18 @@ def recoupled(inquiry: Inquiry, present: Fit, noise: Noise, exchanged: int) -> F
     added = range(inquiry.given, len(present.hypothesis.terms))
     if len(added) > _MOST:
         return present  # So many stand for something that no pair is.
-    exchanges = [_better(inquiry, present, noise, own) for own in combinations(added, exchanged)]
+    # An exchange for more than was there is dear to try: as often, whatever may be exchanged.
+    tried = _TRIED if exchanged > 1 else max(1, _TRIED // max(1, len(added)))
+    exchanges = [
+        _better(inquiry, present, noise, own, tried) for own in combinations(added, exchanged)
+    ]
     better = [fitted for fitted in exchanges if fitted is not None]
     return min(better, key=inquiry.criterion, default=present)
 
 
-def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ...]) -> Fit | None:
+def _better(
+    inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ...], tried: int
+) -> Fit | None:
     """A fit with a pair that pays more than the terms at ``indices`` do; None where none does."""
     hypothesis = present.hypothesis
     for index in reversed(indices):
@@ -40,7 +46,7 @@ def _better(inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ..
     promising = [
         pair for pair in inquiry.couples(base, noise) if pair.pays > pays and pair.ids != leave
     ]
-    for pair in promising[:_TRIED]:
+    for pair in promising[:tried]:
         # Newcomers first: what stood for both alone would keep the values that it had.
         first, second = sorted(pair.scores, key=lambda item: item.atom.effect.id in leave)
         trial = inquiry.trial(inquiry.trial(base, first, noise).fit, second, noise)
