@@ -22,10 +22,10 @@ _MOST = 3
 def recoupled(inquiry: Inquiry, present: Fit, noise: Noise, exchanged: int) -> Fit:
     """The present fit, or the best with a better pair in the place of ``exchanged`` additions."""
     added = range(inquiry.given, len(present.hypothesis.terms))
-    if len(added) > _MOST:
+    if not 0 < len(added) <= _MOST:
         return present  # So many stand for something that no pair is.
     # An exchange for more than was there is dear to try: as often, whatever may be exchanged.
-    tried = _TRIED if exchanged > 1 else max(1, _TRIED // max(1, len(added)))
+    tried = _TRIED if exchanged > 1 else max(1, _TRIED // len(added))
     exchanges = [
         _better(inquiry, present, noise, own, tried) for own in combinations(added, exchanged)
     ]

@@ -17,7 +17,7 @@ from winchkit.effects.order import order_per_turn
 from winchkit.model.stages import At, Stage
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLE_UNITS, VARIABLES
 
-__all__ = ["EMPIRICAL", "KNOTS", "empirical_id", "knots", "placed", "variable_of"]
+__all__ = ["EMPIRICAL", "KNOTS", "empirical_id", "heights", "knots", "placed", "variable_of"]
 
 Array = NDArray[np.float64]
 KNOTS = 9
@@ -50,8 +50,12 @@ def variable_of(effect: Effect) -> str:
 
 def knots(values: Values) -> Array:
     """Where the curve's values stand, (knots,)."""
-    count = sum(name.startswith(_VALUE) for name in values)
-    return np.linspace(values["low"], values["high"], count)
+    return np.linspace(values["low"], values["high"], len(heights(values)))
+
+
+def heights(values: Values) -> list[float]:
+    """The curve's values at its knots."""
+    return [value for name, value in values.items() if name.startswith(_VALUE)]
 
 
 def placed(effect: Effect, low: float, high: float) -> Effect:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
-from winchkit.effects.empirical import knots, variable_of
+from winchkit.effects.empirical import heights, knots, variable_of
 from winchkit.effects.own_templates import CURVE, DRUM, FOOT, HEAD, WAVE
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
@@ -88,8 +88,8 @@ def _wave(effect: Effect, values: Mapping[str, float]) -> tuple[str, dict[str, o
 
 def _curve(term: Term) -> tuple[str, dict[str, object]]:
     """The curve through the values that data determined; one that none touched stays at zero."""
-    y = [value for name, value in term.values.items() if name.startswith("value_")]
-    points = [(x, v) for x, v in zip(knots(term.values), y, strict=True) if v != 0.0]
+    curve = zip(knots(term.values), heights(term.values), strict=True)
+    points = [(x, v) for x, v in curve if v != 0.0]
     facts: dict[str, object] = {
         "x": [float(f"{x:.6g}") for x, _ in points],
         "y": [float(f"{v:.6g}") for _, v in points],
