@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
+import signal
 import subprocess
 import sys
 import tempfile
@@ -23,8 +25,9 @@ from math import pi
 from pathlib import Path
 from statistics import median
 
+from winchkit.bench.owner import owner_process
 from winchkit.catalog import find
-from winchkit.schema.read import read_simbench
+from winchkit.schema.read import read_bench, read_simbench
 from winchkit.sim.live import LiveBench
 from winchkit.sim.wire import Carried
 
@@ -85,8 +88,9 @@ class Bench:
             return self.drive.state.name, self.plant.motor_velocity
 
     def owner(self, speed: float) -> subprocess.Popen[bytes]:
-        """A process that jogs for longer than it will live."""
-        options = ["--bench", str(self.bench_file), "--speed", f"{speed} m/s", "--for", "60s"]
+        """A command that jogs for longer than its bench process will live."""
+        way = "--wind-in" if speed > 0 else "--pay-out"
+        options = ["--bench", str(self.bench_file), way, f"{abs(speed)} m/s", "--for", "60s"]
         return subprocess.Popen(
             [*JOG, *options],
             stdin=subprocess.DEVNULL,
@@ -95,13 +99,15 @@ class Bench:
         )
 
     def trial(self, speed: float, moment: float) -> Stop:
-        """Let an owner jog, kill it a while after the rope has its speed, and watch the drive."""
+        """Kill the bench process of a jog once the cable has its speed; watch the drive."""
         owner = self.owner(speed)
         try:
             self._until_moving(owner)
             time.sleep(moment)
             self.live.worst_lateness = 0.0
-            owner.kill()
+            process = owner_process(read_bench(self.bench_file))
+            assert process is not None, "the jog's bench process has written it"
+            os.kill(process, signal.SIGKILL)
             killed = time.monotonic()
         finally:
             owner.kill()

@@ -1,33 +1,80 @@
-"""Writes docs/devices.md from the instruments' device files: ``python docs/make_devices.py``."""
+"""Writes docs/devices.md from device files and their schema: ``python docs/make_devices.py``."""
 
 from __future__ import annotations
 
+import ast
+import inspect
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from winchkit.catalog import find, names
 from winchkit.schema.device import DeviceSpec
+from winchkit.schema.device_quirks import QuirkSpec
+from winchkit.schema.device_servo import OptionSpec, PdoSpec, ServoSpec
+from winchkit.schema.host_loss import VendorObject, VendorWatchdog
 from winchkit.schema.read import read_device
 
 PAGE = Path(__file__).with_name("devices.md")
+_DRIVES = Path(__file__).with_name("drives.txt")
+"""The part on drives, with a line ``<keys of CLASS>`` for each table of keys."""
 _BEGIN = """\
 # Instruments
 
 Written by `python docs/make_devices.py` from the device files; do not edit it by hand. The same
 files drive the readers and the simulated instruments. None has been tried on the device yet.
 """
+_TABLES = {item.__name__: item for item in (ServoSpec, PdoSpec, OptionSpec, QuirkSpec)}
+_TABLES |= {item.__name__: item for item in (VendorWatchdog, VendorObject)}
 _TRUST = {
     "manual": "read in its manual",
     "interoperability": "tried with another program",
     "hardware": "tried on the device",
     "generic": "not the word of any manual",
+    "eds": "written from its EDS alone",
 }
 
 
 def page(devices: Sequence[DeviceSpec]) -> str:
     """The page: each instrument with what its file declares."""
     instruments = [device for device in devices if device.servo is None]
-    return "\n".join([_BEGIN, *("\n".join(_section(device)) + "\n" for device in instruments)])
+    sections = ("\n".join(_section(device)) + "\n" for device in instruments)
+    return "\n".join([*_drives(), "", _BEGIN, *sections])
+
+
+def _drives() -> Iterator[str]:
+    """The part on drives, with every key as the schema has it."""
+    for line in _DRIVES.read_text(encoding="utf-8").rstrip("\n").split("\n"):
+        name = line.removeprefix("<keys of ")
+        if name == line:
+            yield line
+        else:
+            yield "| key | default | is |"
+            yield "|---|---|---|"
+            yield from _keys(_TABLES[name.removesuffix(">")])
+
+
+def _keys(kind: type) -> Iterator[str]:
+    """Rows of a table: the fields of a dataclass of the schema with their docstrings."""
+    (tree,) = ast.parse(inspect.getsource(kind)).body
+    assert isinstance(tree, ast.ClassDef)
+    for item, after in zip(tree.body, [*tree.body[1:], None], strict=True):
+        if not isinstance(item, ast.AnnAssign):
+            continue
+        words = ""
+        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+            words = " ".join(str(after.value.value).replace("``", "`").split())
+        literal = ast.unparse(item.annotation)
+        if "Literal" in literal:
+            choices = ", ".join(literal.partition("[")[2].rpartition("]")[0].split(", "))
+            words += f" One of {choices}." if "Mode" not in literal else ""
+        default = "needed" if item.value is None else f"`{_default(item.value)}`"
+        yield f"| `{ast.unparse(item.target)}` | {default} | {words.strip()} |"
+
+
+def _default(value: ast.expr) -> str:
+    text = ast.unparse(value)
+    known = {"None": "left out", "()": "[]", "True": "true", "False": "false"}
+    return known.get(text, "empty" if text.startswith("field(") else text)
 
 
 def _section(device: DeviceSpec) -> Iterator[str]:

@@ -18,6 +18,16 @@ and `--html FILE` makes a page of one card, or without ID of all, with the signa
 Symbols: θ motor angle, φ drum angle since the reference, Φ total wound angle, ℓ unstrained free
 length, ℓ_s = ℓ + dead length, T tension in the rope, v its winding-in speed, s = sgn v (smooth at
 standstill). Each term vanishes exactly at its null; stiffnesses are fitted as compliances.
+
+## Effects of your own are code
+
+An effect of your own is a Python file. It is executed with your rights, in two cases only: you
+name it with `--effects FILE.py` (in Python `effects=[...]`), or you open a bench whose bench file
+names it under `effects`, to move it, log it or watch it. Open a bench file of somebody else only
+where you would run a program of theirs. Nothing that a file names is executed by what only reads:
+`check`, `info`, `scan`, `busload`, `compare`, `diagnose`, `log info` and `export`. `check
+bench.toml` warns of each such file, and does not check the effects that stand in it; `check
+bench.toml --effects FILE.py` does.
 """
 _OUTPUTS = ("cable_length", "tension", "motor_torque")
 

@@ -22,8 +22,8 @@ from winchkit.diagnosis.diagnose import diagnose
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_programme, read_simbench, read_winch
 from winchkit.schema.simbench import SimBench
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
 from winchkit.sim.record import record
 
 LENGTHS = (3.0, 1.0, 2.0)
@@ -32,14 +32,13 @@ LENGTHS = (3.0, 1.0, 2.0)
 
 def position_errors(bench: SimBench, profile: str | Path, load: float | None = None) -> list[float]:
     """True less wanted cable length (m) after a move to each of ``LENGTHS``."""
-    clock = PacedClock()
+    clock = SimulatedClock()
     errors = []
-    with LiveBench(bench, clock=clock.simulation) as simulated:
+    with LiveBench(bench, simulated_time=clock) as simulated:
         if load is not None:
             simulated.hang("A", load)
         spec = _with_profile(simulated.bench_spec, str(profile))
         with open_bench(spec, clock) as opened:
-            opened.on_cycle(clock.control)
             winch = opened.winch["A"]
             for length in LENGTHS:
                 winch.move_to(length, speed=0.4)

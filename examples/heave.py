@@ -4,7 +4,6 @@ On a real bench only the first lines differ: ``with open_bench("bench.toml") as 
 """
 
 import math
-from functools import partial
 from pathlib import Path
 
 from winchkit import Bench, open_bench, read_run
@@ -12,8 +11,8 @@ from winchkit.bench.snapshot import BenchSnapshot
 from winchkit.catalog import find
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_simbench
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
 
 PERIOD = 2.0
 """Of the waves, s."""
@@ -37,18 +36,13 @@ def heave(bench: Bench, duration: float) -> None:
 
 def main(path: str | Path = "heave.csv", duration: float = 2 * PERIOD) -> Run:
     """Heave for a while, log it, and say what the instruments saw."""
-    clock = PacedClock()  # keeps bench and simulation in step, however busy the machine is
-
-    def keep_pace(_: BenchSnapshot) -> None:
-        clock.beat("control")
-
+    clock = SimulatedClock()  # time advances as fast as the computer can
     declared = read_simbench(find("sim", "spiral-bench"))
     with (
-        LiveBench(declared, clock=partial(clock.beat, "simulation")) as simulated,
+        LiveBench(declared, simulated_time=clock) as simulated,
         open_bench(simulated.bench_spec, clock) as bench,
         bench.log(path),
     ):
-        bench.on_cycle(keep_pace)
         heave(bench, duration)
     run = read_run(path)
     length, tension = run["cable_length"], run["tension"]

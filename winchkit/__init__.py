@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench, open_bench
+    from winchkit.bench.session import attach
     from winchkit.runs import read_run
 
 __version__ = "0.1.0"
-__all__ = ["Bench", "__version__", "open_bench", "read_run"]
+__all__ = ["Bench", "__version__", "attach", "open_bench", "read_run"]
 
 _HOME = {
     "Bench": "winchkit.bench.bench",
+    "attach": "winchkit.bench.session",
     "open_bench": "winchkit.bench.bench",
     "read_run": "winchkit.runs",
 }

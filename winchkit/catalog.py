@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from winchkit.errors import FileError, suggest
+from winchkit.regular_file import file_kind
 
 __all__ = ["Kind", "find", "folder", "names"]
 
@@ -42,6 +43,8 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
     shipped = folder(kind) / name / leaf if leaf else folder(kind) / f"{name}.toml"
     if shipped.is_file():
         return shipped
+    if Path(name).exists() and (special := file_kind(Path(name).stat().st_mode)):
+        raise FileError(f"{name}: is {special}, not a regular file")
     known = names(kind)
     singular = {"devices": "device", "profiles": "profile", "sim": "simulated bench"}[kind]
     raise FileError(

@@ -17,11 +17,13 @@ A message says what, where, the value, the limit, and what to do.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
 __all__ = [
+    "CONTROL_CHARACTERS",
     "ConnectionLost",
     "DeviceRefused",
     "DriveFault",
@@ -34,8 +36,17 @@ __all__ = [
     "RunError",
     "UsageError",
     "WinchkitError",
+    "one_line",
+    "printable",
     "suggest",
 ]
+
+CONTROL_CHARACTERS = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u0600-\u0605\u061c\u06dd\u070f\u180e\u200b-\u200f"
+    "\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff\ufff9-\ufffb\U000e0000-\U000e007f]"
+)
+"""Control and format characters of Unicode (Cc, Cf, Zl, Zp) and lone surrogates, but for line feed
+and tab: what steers a terminal, or makes a text look like another."""
 
 
 class WinchkitError(Exception):
@@ -61,7 +72,8 @@ class Fault:
 
     def __str__(self) -> str:
         place = self.path if self.line is None else f"{self.path}:{self.line}"
-        return ": ".join(part for part in (place, self.key, self.message) if part)
+        parts = (one_line(place), one_line(self.key), printable(self.message))
+        return ": ".join(part for part in parts if part)
 
 
 class FileError(WinchkitError, ValueError):
@@ -110,6 +122,20 @@ class LimitTripped(MotionError):
 
 class NotPermitted(MotionError):
     """A condition for motion is not met, e.g. no drive-side watchdog."""
+
+
+def printable(text: str) -> str:
+    """A text with its control characters escaped (``\\x1b``); line feeds and tabs stay."""
+    return CONTROL_CHARACTERS.sub(_escaped, text)
+
+
+def one_line(text: str) -> str:
+    """A name or value in one line: line feeds and tabs are escaped as well."""
+    return printable(text).replace("\n", "\\n").replace("\t", "\\t")
+
+
+def _escaped(found: re.Match[str]) -> str:
+    return found[0].encode("unicode_escape").decode("ascii")
 
 
 def suggest(word: str, known: list[str]) -> str:

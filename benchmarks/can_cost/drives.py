@@ -1,4 +1,4 @@
-"""Many drives on one virtual bus that cost next to nothing: they answer, and follow speeds."""
+"""Many drives on one bus that cost next to nothing: they answer, and follow speeds."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import can
-
-from winchkit.schema.bench import BusSpec
+from can_cost.wire import Wire
 from winchkit.schema.device import DeviceSpec
 from winchkit.sim.drive import SimDrive
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
@@ -43,14 +41,14 @@ class Idle:
 class Commissionable:
     """Simulated drives that answer SDO on a bus until closed: for setting axes up."""
 
-    def __init__(self, spec: BusSpec, device: DeviceSpec, nodes: range) -> None:
+    def __init__(self, wire: Wire, device: DeviceSpec, nodes: range) -> None:
         assert device.servo is not None
-        self._bus = can.Bus(interface="virtual", channel=spec.channel)
+        self._wire = wire
         dictionary = Path(device.path).parent / device.servo.eds
         now = time.monotonic()
         self._drives = [
             SimDrive(
-                self._send,
+                wire.send,
                 node,
                 device.servo,
                 ObjectDictionary(read_eds(dictionary, node)),
@@ -70,26 +68,22 @@ class Commissionable:
         """Fall silent."""
         self._over.set()
         self._thread.join()
-        self._bus.shutdown()
-
-    def _send(self, identifier: int, data: bytes) -> None:
-        self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
     def _run(self) -> None:
         while not self._over.is_set():
-            message = self._bus.recv(0.002)
+            frame = self._wire.receive(0.002)
             now = time.monotonic()
             for drive in self._drives:
-                if message is not None:
-                    drive.receive(message.arbitration_id, bytes(message.data), now)
+                if frame is not None:
+                    drive.receive(*frame, now)
                 drive.tick(now)
 
 
 class Drives:
     """Commissioned drives in CSV, as frames alone."""
 
-    def __init__(self, spec: BusSpec, nodes: range, cycle: float) -> None:
-        self._bus = can.Bus(interface="virtual", channel=spec.channel)
+    def __init__(self, wire: Wire, nodes: range, cycle: float) -> None:
+        self._wire = wire
         self._cycle = cycle
         self._status = dict.fromkeys(nodes, 0x0250)
         self._speed = dict.fromkeys(nodes, 0)
@@ -104,20 +98,16 @@ class Drives:
 
     def serve(self, timeout: float) -> bool:
         """Take one frame and answer it; whether there was one."""
-        message = self._bus.recv(timeout)
-        if message is None:
+        frame = self._wire.receive(timeout)
+        if frame is None:
             return False
         self.received += 1
-        identifier = message.arbitration_id
+        identifier, data = frame
         if identifier == 0x080:
             self._answer()
         elif 0x200 < identifier < 0x280:
-            self._command(identifier - 0x200, *_COMMAND.unpack(message.data))
+            self._command(identifier - 0x200, *_COMMAND.unpack(data))
         return True
-
-    def close(self) -> None:
-        """Let the bus go."""
-        self._bus.shutdown()
 
     def _command(self, node: int, word: int, speed: int) -> None:
         status = _NEXT.get((self._status[node] & 0x7F, word & 0x0F), self._status[node])
@@ -135,5 +125,5 @@ class Drives:
                 self._send(0x700 + node, b"\x05")
 
     def _send(self, identifier: int, data: bytes) -> None:
-        self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+        self._wire.send(identifier, data)
         self.sent += 1

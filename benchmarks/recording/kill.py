@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -11,15 +13,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from mcap.exceptions import McapError
+from mcap.records import Channel, Message
+from mcap.stream_reader import StreamReader
 
-from recording.synthetic import GIVEN, REMEMBERED, TOLD, WINCHES
+from recording.synthetic import CYCLE, EVERY, GIVEN, REMEMBERED, TOLD, WINCHES
+from winchkit.errors import RunError
 from winchkit.runs.log import Log
-from winchkit.runs.read import read_log
+from winchkit.runs.read import read_log, read_run
 from winchkit.runs.recover import recover
+from winchkit.runs.rotation import parts_beside
 
 __all__ = ["Killed", "kill_once"]
 
 _START_TIME = 60.0
+_LEAST_ROWS = 2
+"""A run has at least so many."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +48,15 @@ class Killed:
     """Cycles missing before the newest in the file, all winches."""
     recovered: bool
     """Whether the recovered file holds what the cut one holds, and is closed."""
+    whole: bool
+    """Whether reading gives what an independent reader finds whole: mcap's, or Python's csv."""
 
 
-def kill_once(folder: Path, moment: float, rotate: str | None = None) -> Killed:
+def kill_once(
+    folder: Path, moment: float, rotate: str | None = None, suffix: str = "mcap"
+) -> Killed:
     """Record for ``moment`` seconds from the first cycle on, SIGKILL, read, recover."""
-    path, told = folder / "killed.mcap", folder / "told"
+    path, told = folder / f"killed.{suffix}", folder / "told"
     for old in folder.glob("killed*"):
         old.unlink()
     told.write_bytes(bytes(TOLD.size + REMEMBERED * GIVEN.size))
@@ -61,6 +74,8 @@ def kill_once(folder: Path, moment: float, rotate: str | None = None) -> Killed:
         end = time.monotonic()
         process.send_signal(signal.SIGKILL)
         process.wait()
+    if suffix == "csv":
+        return _rows_judged(path, folder, moment, told, end)
     log = read_log(path)
     kept = min(len(log.samples[f"/W{n}/drive"]) for n in range(1, WINCHES + 1))
     given, newest = _told(told)
@@ -71,7 +86,74 @@ def kill_once(folder: Path, moment: float, rotate: str | None = None) -> Killed:
         held=end - _given_at(told, kept) if kept < given else 0.0,
         gaps=_gaps(log),
         recovered=_is_recovered(log, path, folder),
+        whole=sum(map(_messages, _files(path))) == sum(map(len, log.samples.values())),
     )
+
+
+def _rows_judged(path: Path, folder: Path, moment: float, told: Path, end: float) -> Killed:
+    """The same of a log of rows: one for each reading, in which the motor angle is the cycle."""
+    given, _ = _told(told)
+    lines = [line for file in _files(path) for line in _whole_lines(file)]
+    try:
+        angles = read_run(path)["W1.motor_angle"]
+    except RunError:  # killed before there were two rows
+        angles = np.empty(0)
+    last = int(angles[-1]) if len(angles) else 0
+    return Killed(
+        moment=moment,
+        given=given,
+        lost=(given - 1 - last) * CYCLE,
+        held=end - _given_at(told, last + 1) if last + 1 < given else 0.0,
+        gaps=int(np.sum(np.round(np.diff(angles)) != EVERY)),
+        recovered=_rows_are_recovered(path, folder, angles),
+        whole=len(lines) == len(angles) or len(lines) < _LEAST_ROWS,
+    )
+
+
+def _files(path: Path) -> list[Path]:
+    """The log's files, in order."""
+    return [path] if path.exists() else parts_beside(path)
+
+
+def _whole_lines(path: Path) -> list[list[str]]:
+    """Rows that end with a line feed, by Python's own reader; each has every column."""
+    data = path.read_bytes()
+    lines = data[: data.rfind(b"\n") + 1].decode().splitlines()
+    rows = list(csv.reader(line for line in lines if not line.startswith("#")))
+    assert len({len(row) for row in rows}) <= 1, "a line that ends has every column"
+    return rows[1:]
+
+
+def _rows_are_recovered(path: Path, folder: Path, angles: np.ndarray) -> bool:
+    """Recover every part, and compare."""
+    saved = _emptied(folder / "saved")
+    for file in _files(path):
+        recover(file, saved / file.name)
+    if not len(angles):
+        return True
+    return np.array_equal(read_run(saved / path.name)["W1.motor_angle"], angles)
+
+
+def _messages(path: Path) -> int:
+    """Messages of instruments and drives in a file, by the reader of the package ``mcap``."""
+    count = 0
+    topics: dict[int, str] = {}
+    try:
+        with path.open("rb") as stream:
+            for record in StreamReader(stream).records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                count += isinstance(record, Message) and topics[record.channel_id].count("/") > 1
+    except (McapError, struct.error, EOFError):
+        pass
+    return count
+
+
+def _emptied(folder: Path) -> Path:
+    folder.mkdir(exist_ok=True)
+    for old in folder.iterdir():
+        old.unlink()
+    return folder
 
 
 def _lost(log: Log, newest: float) -> float:
@@ -93,10 +175,7 @@ def _gaps(log: Log) -> int:
 
 def _is_recovered(log: Log, path: Path, folder: Path) -> bool:
     """Recover every part, and compare."""
-    saved = folder / "saved"
-    saved.mkdir(exist_ok=True)
-    for old in saved.iterdir():
-        old.unlink()
+    saved = _emptied(folder / "saved")
     for file in folder.glob("killed*"):
         recover(file, saved / file.name)
     again = read_log(saved / path.name)

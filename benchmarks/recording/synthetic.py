@@ -45,6 +45,7 @@ class Cell:
     problem: ConnectionLost | None = None
     counters: Counters = field(default_factory=Counters)
     tared: bool | None = None
+    host_tare: float = 0.0
     listeners: list[Callable[[Reading], None]] = field(default_factory=list)
 
     def read(self, value: float, now: float) -> None:
@@ -97,7 +98,7 @@ class SyntheticBench:
                 motor_velocity=noise(),
                 motor_torque=noise(),
                 cable_length=3.0,
-                speed=0.06,
+                cable_speed=-0.06,
             )
             for name in self.cells
         }

@@ -28,7 +28,7 @@ gain times mass is not well below this time would answer its own movements."""
 
 
 def speed_for(tension: float, wanted: float) -> float:
-    """Rope speed (m/s, positive winds in) at a tension; zero where there is none to go by."""
+    """Winding speed (m/s, positive winds in) at a tension; zero where there is none to go by."""
     error = tension - wanted
     if math.isnan(error) or abs(error) < DEAD_BAND:
         return 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from winchkit.bench.control.observation import Supervised
 from winchkit.bench.controller import Controller
 from winchkit.bench.loop import ControlLoop
 from winchkit.bench.parts import WinchParts
@@ -56,6 +57,16 @@ class FakeAxis:
     mode_kept: bool = True
     fault_text: str = ""
     alive: bool = True
+    hears_pdos: bool = True
+    hears_sdos: bool = True
+    moves_alone: bool = False
+    stops_on_nmt: bool = False
+    nmt_text: str = "operational"
+    alarms: tuple[int, ...] = ()
+    alarm_text: str = ""
+    sdo_refused: bool = False
+    sdo_state: State | None = None
+    sdo_stops: int = 0
     torque: float = 0.0
     feedback: AxisFeedback | None = None
     _sync: tuple[int, float] = (0, 0.0)
@@ -64,6 +75,12 @@ class FakeAxis:
     @property
     def at_rest(self) -> bool:
         return abs(self.velocity) < 0.05
+
+    silent: bool = False
+
+    def fall_silent(self) -> bool:
+        self.silent = True
+        return False
 
     def begin_cycle(self, sync: int, now: float) -> None:
         """The fake has answered the SYNC before this one by now."""
@@ -102,7 +119,7 @@ class FakeAxis:
             self.feedback.state, wish, previous=previous, fresh=fresh, at_rest=self.at_rest
         )
         self.words.append(word)
-        if not self.alive:
+        if not self.alive or not self.hears_pdos:
             return word
         if word == 0x02 and self.state is State.OPERATION_ENABLED:
             self.state = State.QUICK_STOP_ACTIVE
@@ -112,6 +129,29 @@ class FakeAxis:
             if self.position_mode and angle is not None:
                 self.velocity = 25.0 * (angle - self.angle)
         return word
+
+    def stop_by_sdo(self) -> None:
+        """It takes the write in this cycle, and tells its state in the next."""
+        self.sdo_stops += 1
+        if self.hears_sdos:
+            if self.sdo_stops > 1:
+                self.sdo_state = self.state
+            if self.state is State.OPERATION_ENABLED:
+                self.state = State.QUICK_STOP_ACTIVE
+
+    def stop_by_nmt(self) -> None:
+        raise AssertionError("it was not seen to leave operation enabled on that")
+
+    def end_stop(self) -> None:
+        self.sdo_state, self.sdo_stops = None, 0
+
+    def emergency_stop(self, *, sdo: bool) -> None:
+        """Prepared frames: no feedback is needed."""
+        self.words.append(0x02)
+        if self.hears_pdos and self.state is State.OPERATION_ENABLED:
+            self.state = State.QUICK_STOP_ACTIVE
+        if sdo:
+            self.stop_by_sdo()
 
 
 @dataclass
@@ -164,8 +204,10 @@ class Rig:
             own = rope or RopeMap(StraightLine())
             sensors = {"cell": self.cells[name]} if cell else {}
             parts[name] = WinchParts(axis, own, Controller(axis, own, limits), sensors)
-        self.supervisor = Supervisor(dict.fromkeys(names, limits), 0.05)
-        self.loop = ControlLoop([(self.bus, 127, 0.05)], parts, self.supervisor, self, CYCLE)
+        self.supervisor = Supervisor(dict.fromkeys(names, Supervised(limits, 0.05, CYCLE)))
+        self.loop = ControlLoop(
+            [(self.bus, 127, 0.05)], parts, self.supervisor, self, CYCLE, longest_gap=0.1
+        )
         self.tension: dict[str, float | None] = dict.fromkeys(names, 100.0)
         self.speeds: list[float] = []
         self.step(3)

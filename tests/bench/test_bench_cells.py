@@ -71,9 +71,9 @@ def test_every_cell_command_works_at_the_owner(bench: Bench, wiring: Path) -> No
 
 
 def test_no_zero_and_no_tare_while_the_winch_moves(bench: Bench, wiring: Path) -> None:
-    bench.winch["A"].move_by(-1.5, 0.1, wait=False)
+    bench.winch["A"].move_by(wind_in=1.5, speed=0.1, wait=False)
     end = time.monotonic() + 10
-    while abs(bench.winch["A"].snapshot.speed) < 0.02:
+    while abs(bench.winch["A"].snapshot.cable_speed) < 0.02:
         assert time.monotonic() < end
         time.sleep(0.01)
     for words in (["zero"], ["tare"], ["tare", "--device"], ["store", "--yes"]):

@@ -31,7 +31,7 @@ def search(
     for cycle in range(1, cycles):
         target = motion.target(cycle * CYCLE, speed * cycle * CYCLE, 0.0)
         assert target.start, "bit 4 stays set"
-        assert target.speed == pytest.approx(speed * ARM)
+        assert target.winding_speed == pytest.approx(speed * ARM)
         if target.done:
             return motion, cycle
     return motion, cycles
@@ -66,5 +66,5 @@ def test_the_new_zero_is_no_motion(jump: float) -> None:
     motion = HomingMotion(axis, RopeMap(StraightLine()), 0.5)
     motion.start(0.0, 0.0, 0.0)
     motion.target(CYCLE, 0.01, 0.0)
-    assert motion.target(2 * CYCLE, jump, 0.0).speed == 0.0
+    assert motion.target(2 * CYCLE, jump, 0.0).winding_speed == 0.0
     assert not motion.failure

@@ -14,10 +14,8 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.device_servo import OptionSpec
 from winchkit.schema.read import read_bench, read_simbench
 from winchkit.schema.simbench import SimBench
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
-
-pytestmark = pytest.mark.realtime
 
 
 def declared(**changes: object) -> SimBench:
@@ -33,9 +31,9 @@ def test_the_drive_keeps_the_limits_that_it_is_given() -> None:
     limits = declared().bench.winch["A"].limits
     limits = replace(limits, in_drive=True, following_error=0.05, torque=1.5)
     sim = declared(limits=limits, options=OptionSpec(quick_stop=6))
-    clock = PacedClock()
+    clock = SimulatedClock()
     with (
-        LiveBench(sim, clock=clock.simulation) as live,
+        LiveBench(sim, simulated_time=clock) as live,
         open_bench(live.bench_spec, clock) as bench,
     ):
         objects, winch = live.winches["A"].drive.objects, bench.winch["A"]
@@ -53,8 +51,8 @@ def test_the_drive_keeps_the_limits_that_it_is_given() -> None:
 
 
 def test_a_bench_without_them_leaves_the_drive_alone() -> None:
-    clock = PacedClock()
-    with LiveBench(declared(), clock=clock.simulation) as live:
+    clock = SimulatedClock()
+    with LiveBench(declared(), simulated_time=clock) as live:
         objects = live.winches["A"].drive.objects
         keys = [(0x607D, 1), (0x607D, 2), (0x6065, 0), (0x6072, 0), (0x605A, 0)]
         before = [objects.number(*key) for key in keys]
@@ -64,9 +62,9 @@ def test_a_bench_without_them_leaves_the_drive_alone() -> None:
 
 def test_a_coasting_code_is_refused_without_a_brake() -> None:
     sim = declared(options=OptionSpec(quick_stop=0), brake=False)
-    clock = PacedClock()
+    clock = SimulatedClock()
     with (
-        LiveBench(sim, clock=clock.simulation) as live,
+        LiveBench(sim, simulated_time=clock) as live,
         pytest.raises(NotPermitted, match="hanging load falls"),
     ):
         open_bench(live.bench_spec, clock)

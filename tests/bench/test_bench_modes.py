@@ -18,8 +18,8 @@ from winchkit.errors import NotPermitted
 from winchkit.runs import read_run
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import SimBench
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
 
 
 def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:
@@ -48,12 +48,11 @@ def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:
 @contextmanager
 def paced(declaration: SimBench) -> Iterator[tuple[LiveBench, Bench]]:
     """A live bench and its owner, whose time stands still while this machine is busy."""
-    clock = PacedClock()
+    clock = SimulatedClock()
     with (
-        LiveBench(declaration, clock=clock.simulation) as live,
+        LiveBench(declaration, simulated_time=clock) as live,
         open_bench(live.bench_spec, clock) as bench,
     ):
-        bench.on_cycle(clock.control)
         yield live, bench
 
 
@@ -65,7 +64,7 @@ def test_the_same_motion_in_another_mode(mode: str, tmp_path: Path) -> None:
         winch.move_to(3.7, 0.3)
         with live.up_to_date():
             assert live.winches["A"].plant.cable_length == pytest.approx(3.7, abs=5e-3)
-        winch.jog(-0.2, 0.5)
+        winch.jog(pay_out=0.2, duration=0.5)
         assert 3.73 < winch.cable_length < 3.81
         assert not bench.snapshot.tripped
 

@@ -20,9 +20,9 @@ from winchkit.errors import FileError
 from winchkit.estimation.rope_now import RopeNow, Sample
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.read import read_bench, read_simbench, read_winch
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live import LiveBench
 from winchkit.sim.live_file import write_bench
-from winchkit.sim.pace import PacedClock
 
 OWN = """\
 from winchkit.effects import Effect, Parameter
@@ -180,12 +180,11 @@ def test_a_winch_ends_where_the_own_effect_says(tmp_path: Path) -> None:
     missed = {}
     for name, effects, files in (("bare", "", ()), ("own", MINE, (tmp_path / "mine.py",))):
         _, profile = write(tmp_path, effects)
-        clock = PacedClock()
-        with LiveBench(soft, clock=clock.simulation) as live:
+        clock = SimulatedClock()
+        with LiveBench(soft, simulated_time=clock) as live:
             wired = replace(live.bench_spec.winch["A"], profile=str(profile))
             spec = replace(live.bench_spec, winch={"A": wired})
             with open_bench(spec, clock, effects=files) as bench:
-                bench.on_cycle(clock.control)
                 bench.winch["A"].move_to(3.0, speed=0.4)
                 with live.up_to_date():
                     missed[name] = live.winches["A"].plant.cable_length - 3.0

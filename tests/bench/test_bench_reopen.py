@@ -10,10 +10,8 @@ from winchkit import catalog, open_bench
 from winchkit.bench.snapshot import Phase
 from winchkit.errors import ConnectionLost, LimitTripped
 from winchkit.schema.read import read_simbench
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
-
-pytestmark = pytest.mark.realtime
 
 
 def test_a_reset_opens_a_bus_that_went_down(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -21,15 +19,14 @@ def test_a_reset_opens_a_bus_that_went_down(monkeypatch: pytest.MonkeyPatch) -> 
     winch = replace(sim.bench.winch["A"], cell=None, length=None, temperature=None)
     buses = {"can": sim.bench.bus["can"]}
     sim = replace(sim, bench=replace(sim.bench, winch={"A": winch}, bus=buses))
-    clock = PacedClock()
+    clock = SimulatedClock()
     with (
-        LiveBench(sim, seed=1, clock=clock.simulation) as live,
+        LiveBench(sim, seed=1, simulated_time=clock) as live,
         open_bench(live.bench_spec, clock) as bench,
     ):
-        bench.on_cycle(clock.control)
         bus = bench._wired.buses["can"]
         bench.winch["A"].move_to(3.0, 0.1, wait=False)
-        while abs(bench.winch["A"].snapshot.speed) < 0.05:
+        while abs(bench.winch["A"].snapshot.cable_speed) < 0.05:
             bench.raise_trouble()
             clock.sleep(0.02)
 
@@ -48,4 +45,4 @@ def test_a_reset_opens_a_bus_that_went_down(monkeypatch: pytest.MonkeyPatch) -> 
         bench.reset()
         assert bus.reopened == 1
         assert bench.winch["A"].snapshot.phase is Phase.DISABLED
-        bench.winch["A"].move_by(0.05)
+        bench.winch["A"].move_by(pay_out=0.05)

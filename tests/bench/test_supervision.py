@@ -54,7 +54,8 @@ def test_a_reboot_is_latched_even_while_nothing_moves() -> None:
     rig.axes["B"].heartbeat.receive(b"\x00", rig.now)
     rig.step()
     assert kinds(rig) == {"boot-up"}
-    rig.supervisor.reset({"A": 0, "B": 1})
+    rig.supervisor.acknowledge({"A": 0, "B": 1})
+    rig.supervisor.clear()
     rig.run(0.1)
     assert not kinds(rig)
 
@@ -181,7 +182,8 @@ def test_a_trip_stays_until_it_is_reset() -> None:
     rig.tension["A"] = 100.0
     rig.run(2.0)
     assert kinds(rig) == {"tension high"}
-    rig.supervisor.reset({"A": 0, "B": 0})
+    rig.supervisor.acknowledge({"A": 0, "B": 0})
+    rig.supervisor.clear()
     rig.run(0.5)
     assert not kinds(rig)
 

@@ -231,7 +231,7 @@ def test_a_bench_that_somebody_owns_is_left_alone(cell: Served, tmp_path: Path) 
     owner = Ownership(read_bench(bench))
     try:
         result = run("info", "-b", bench, error=NotPermitted)
-        assert "owned by process" in str(result.exception)
+        assert "is owned by process" in str(result.exception)
     finally:
         owner.close()
     run("info", "-b", bench)

@@ -16,8 +16,8 @@ from cell_faults import plans
 
 from winchkit.drivers.modbus.consistency import Consistency
 from winchkit.drivers.modbus.decoder import Decoder
-from winchkit.drivers.modbus.distrust import Distrust
 from winchkit.drivers.modbus.frames import AnswerGate
+from winchkit.drivers.modbus.late_replies import LateReplies
 from winchkit.drivers.reading import Counters
 
 DEVICES = modbus_devices()
@@ -42,6 +42,15 @@ RISES: dict[str, Callable[[Counters], int]] = {
     "nan": lambda c: c.readings,
 }
 """The counter that says what went wrong."""
+ON_TCP: dict[str, Callable[[Counters], int]] = {
+    "late": lambda c: c.timeouts and c.reconnects,
+    "wrong unit": lambda c: c.malformed,
+    "garbage": lambda c: c.malformed,
+    "garbage behind": lambda c: c.malformed,
+    "damaged": lambda c: c.malformed + c.timeouts,
+}
+"""After a timeout the connection is a new one, and a late answer is never heard; a frame that does
+not begin where it should is no frame."""
 
 
 def test_every_fault_has_its_counter() -> None:
@@ -59,7 +68,8 @@ def test_each_fault_is_counted_and_tells_no_wrong_number(device: str, rtu: bool)
         assert outcome.wrong == [], fault
         if fault not in outcome.faults:
             continue
-        assert RISES[fault](outcome.counters) > 0, (fault, outcome.counters)
+        rises = RISES[fault] if rtu else ON_TCP.get(fault, RISES[fault])
+        assert rises(outcome.counters) > 0, (fault, outcome.counters)
         assert outcome.numbers > 0, fault
         assert outcome.bystander > 25, fault
 
@@ -147,6 +157,6 @@ def test_random_sequences_tell_no_wrong_number() -> None:
 def test_without_the_gate_there_are_wrong_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     """The campaign would notice: whatever decodes as an answer is let through here."""
     monkeypatch.setattr(AnswerGate, "received", lambda _self, data: data)
-    monkeypatch.setattr(Distrust, "unanswered", lambda _self, _now: None)
+    monkeypatch.setattr(LateReplies, "unanswered", lambda _self, _count, _now: None)
     outcomes = [play(Plan("laumas-tlb", True, str(k), ("late",))) for k in range(3)]
     assert sum(len(o.wrong) for o in outcomes) > 0

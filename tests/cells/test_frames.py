@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.drivers.modbus.frames import AnswerGate, crc16
+from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 
 
 def rtu(*parts: int) -> bytes:
@@ -30,7 +31,7 @@ ANSWER = rtu(1, 3, 4, 0x12, 0x34, 0x56, 0x78)
 
 
 def asked(packet: bytes = ASK) -> AnswerGate:
-    gate = AnswerGate("rtu")
+    gate = AnswerGate()
     gate.sent(packet)
     return gate
 
@@ -113,19 +114,93 @@ def test_a_line_that_echoes_does_not_confirm_what_is_written() -> None:
     assert gate.received(write) == write
 
 
+READ = (1, 3, 0, 6, 0, 2)
+BODY = (1, 3, 4, 0x12, 0x34, 0x56, 0x78)
+
+
+def asked_tcp(transaction: int = 7) -> TcpAnswerGate:
+    gate = TcpAnswerGate()
+    gate.sent(tcp(transaction, *READ))
+    return gate
+
+
 def test_over_tcp_the_transaction_decides() -> None:
-    gate = AnswerGate("tcp")
-    body = (1, 3, 4, 0x12, 0x34, 0x56, 0x78)
-    gate.sent(tcp(7, 1, 3, 0, 6, 0, 2))
-    assert gate.received(tcp(6, *body)) == b""
-    assert gate.received(tcp(7, *body)) == tcp(7, *body)
-    assert kinds(gate) == [(1, "late", 1)]
+    gate = asked_tcp(6)
+    assert gate.received(tcp(6, *BODY)) == tcp(6, *BODY)
+    gate.sent(tcp(7, *READ))
+    assert gate.received(tcp(6, *BODY)) == b""
+    assert gate.received(tcp(7, *BODY)) == tcp(7, *BODY)
+    assert [(event.unit, event.kind) for event in gate.events()] == [(1, "late")]
+    assert gate.broken, "a connection with a reply too many is not used again"
+
+
+@pytest.mark.parametrize(
+    "came",
+    [
+        tcp(8, *BODY),
+        tcp(7, 9, *BODY[1:]),
+        tcp(7, 1, 4, *BODY[2:]),
+        tcp(7, 1, 3, 2, 0x12, 0x34),
+        tcp(7, 1, 3, 4, 0x12, 0x34),
+        tcp(7, 1, 3, 2, *BODY[3:]),
+        tcp(7, *BODY, 0),
+        tcp(7, *BODY) + b"\0",
+        b"\0" + tcp(7, *BODY),
+        b"\0\7\0\1" + tcp(7, *BODY)[4:],
+        tcp(7, 1, 0x83, 2, 0),
+    ],
+    ids=[
+        "transaction", "unit", "function", "short", "length", "byte count", "long",
+        "a byte behind", "a byte before", "protocol", "long refusal",
+    ],
+)  # fmt: skip
+def test_over_tcp_everything_must_agree(came: bytes) -> None:
+    gate = asked_tcp()
+    assert gate.received(came) == b""
+    gate.expire()
+    assert gate.broken
+
+
+def test_over_tcp_a_refusal_passes_and_an_answer_in_pieces() -> None:
+    refusal = tcp(7, 1, 0x83, 2)
+    assert asked_tcp().received(refusal) == refusal
+    answer = tcp(7, *BODY)
+    for at in range(1, len(answer)):
+        gate = asked_tcp()
+        assert gate.received(answer[:at]) == b""
+        assert gate.received(answer[at:]) == answer
+        assert not gate.broken
+
+
+@pytest.mark.parametrize("cut", range(1, 11))
+@pytest.mark.parametrize("other", [6, 7])
+@pytest.mark.parametrize("pieces", ["one", "two", "by byte"])
+def test_a_cut_reply_and_another_reply_never_join(cut: int, other: int, pieces: str) -> None:
+    """The reply of 47 of 47 injections: its head is right, its registers are of two frames."""
+    gate = asked_tcp(6)
+    gate.received(tcp(6, *BODY))
+    gate.sent(tcp(7, *READ))
+    begin, then = tcp(7, *BODY)[:-cut], tcp(other, *BODY)
+    joined = begin + then
+    for part in {
+        "one": [joined],
+        "two": [begin, then],
+        "by byte": [begin, *(then[k : k + 1] for k in range(len(then)))],
+    }[pieces]:
+        assert gate.received(part) == b""
+    gate.expire()
+    assert gate.broken
+
+
+def test_what_was_not_answered_in_time_ends_the_connection() -> None:
+    gate = asked_tcp()
+    assert not gate.expire()
+    assert gate.broken
 
 
 @given(st.lists(st.binary(max_size=20), max_size=5), st.sampled_from(["rtu", "tcp"]))
 def test_noise_never_passes_and_never_raises(noise: list[bytes], framing: str) -> None:
-    gate = AnswerGate(framing)  # type: ignore[arg-type]
-    gate.sent(ASK if framing == "rtu" else tcp(7, 1, 3, 0, 6, 0, 2))
+    gate = asked() if framing == "rtu" else asked_tcp()
     for part in noise:
         assert gate.received(part) == b""
     assert gate.expire() == any(noise)

@@ -11,6 +11,7 @@ from served import spec_of
 from winchkit import catalog
 from winchkit.drivers.modbus.decoder import Decoder
 from winchkit.drivers.modbus.frames import AnswerGate, crc16
+from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.drivers.modbus.words import words_of
 from winchkit.drivers.reading import Quality
 from winchkit.schema.read import read_device
@@ -35,7 +36,7 @@ def test_the_pt113_manuals_zero_command() -> None:
 
 def test_the_pt113_manuals_tcp_exchange_passes_the_gate() -> None:
     """Page 40: unit 17 is asked for one register, 33, and answers 119."""
-    gate = AnswerGate("tcp")
+    gate = TcpAnswerGate()
     gate.sent(bytes.fromhex("000100000006110300210001"))
     answer = bytes.fromhex("0001000000051103020077")
     assert gate.received(answer) == answer
@@ -43,7 +44,7 @@ def test_the_pt113_manuals_tcp_exchange_passes_the_gate() -> None:
 
 def test_the_pt113_manuals_serial_answer_passes_the_gate() -> None:
     """Page 40: 01,03,00,21,00,01,D4,00 is answered 01,03,02,00,EB,F8,0B."""
-    gate = AnswerGate("rtu")
+    gate = AnswerGate()
     gate.sent(bytes.fromhex("010300210001d400"))
     answer = bytes.fromhex("01030200ebf80b")
     assert gate.received(answer) == answer

@@ -77,6 +77,8 @@ def test_check_in_json_is_complete(programme: Path, tmp_path: Path) -> None:
         "ok": True,
         "kind": "programme",
         "name": "short",
+        "details": [],
+        "drive": None,
         "faults": [],
         "warnings": [],
     }
@@ -126,7 +128,7 @@ def test_check_of_a_file_of_no_kind(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("hello")
     result = invoke("check", tmp_path / name)
     assert result.exit_code == 3
-    assert "is none of .toml, .csv, .mcap" in result.stderr
+    assert "is none of .toml, .eds, .dcf, .csv, .mcap" in result.stderr
 
 
 def test_everything_that_ships_is_without_fault() -> None:

@@ -16,7 +16,7 @@ STATUS = {
     "winch": {
         "A": {
             "cable_length": 4.0,
-            "speed": None,
+            "cable_speed": None,
             "rope_tension": 98.1,
             "length": None,
             "phase": "disabled",
@@ -25,17 +25,26 @@ STATUS = {
 }
 
 
+def standing(phase: str) -> dict[str, Any]:
+    """The status with winch A in a phase."""
+    return {"winch": {"A": {**STATUS["winch"]["A"], "phase": phase}}}
+
+
 class Station:
     """Writes down what it is asked; may refuse to jog."""
 
     def __init__(self, refusal: Exception | None = None) -> None:
         self.calls: list[tuple[Any, ...]] = []
         self._refusal = refusal
+        self.shown = STATUS
 
-    def jog(self, winch: str | None, speed: float, hold: float) -> None:
-        self.calls.append(("jog", round(speed, 6), hold))
+    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
+        self.calls.append(("jog", round(winding_speed, 6), hold))
         if self._refusal is not None:
             raise self._refusal
+
+    def step(self, winch: str | None, change: float, speed: float | None) -> None:
+        self.calls.append(("step", change, speed))
 
     def stop(self) -> None:
         self.calls.append(("stop",))
@@ -44,7 +53,7 @@ class Station:
         self.calls.append(("reset",))
 
     def status(self) -> dict[str, Any]:
-        return STATUS
+        return self.shown
 
 
 def press(
@@ -104,3 +113,42 @@ def test_what_forbids_a_motion_is_shown_and_the_hand_stays(
 def test_a_lost_owner_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ConnectionLost):
         press(monkeypatch, Station(ConnectionLost("gone")), [(0.0, ["up"])])
+
+
+def steps(station: Station) -> list[float]:
+    """Changes of the cable length that the taps asked for, m."""
+    return [call[1] for call in station.calls if call[0] == "step"]
+
+
+def test_inch_mode_makes_one_step_a_tap_of_the_length_that_is_shown(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    station = Station()
+    taps = [(0.0, ["i"]), (1.0, ["up"]), (2.0, ["i", "down"]), (3.0, ["i", "up"]), (4.0, ["i"])]
+    press(monkeypatch, station, [*taps, (5.0, ["up"])])
+    assert steps(station) == [-0.001, 0.01, -0.1], "up winds in: the cable gets shorter"
+    moved = [call for call in station.calls if call[0] == "jog" and call[1] != 0.0]
+    assert moved == [("jog", 0.1, 0.7)], "a jog only after the mode went back to hold"
+    shown = capsys.readouterr().err
+    for words in ("1 mm a tap", "10 mm a tap", "100 mm a tap", "hold, 0.100 m/s"):
+        assert words in shown
+
+
+def test_a_key_that_is_held_is_one_tap_and_the_other_arrow_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    station = Station()
+    held = [(1.0 + 0.03 * n, ["up"]) for n in (0, 17, 18, 19, 20, 21)]
+    press(monkeypatch, station, [(0.0, ["i"]), *held, (1.7, ["down"]), (2.6, ["down"])])
+    assert steps(station) == [-0.001, 0.001, 0.001]
+
+
+@pytest.mark.parametrize("phase", ["enabling", "moving", "running down", "stopping"])
+def test_a_tap_before_the_last_step_has_ended_is_ignored_and_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], phase: str
+) -> None:
+    station = Station()
+    station.shown = standing(phase)
+    press(monkeypatch, station, [(0.0, ["i"]), (1.0, ["up"])])
+    assert steps(station) == []
+    assert f"winch A is still {phase}; this tap was ignored" in capsys.readouterr().err

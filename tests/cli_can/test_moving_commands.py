@@ -41,7 +41,8 @@ def test_move_to_and_by(bench: Served) -> None:
     assert length(bench) == pytest.approx(3.8, abs=5e-3)
     status = json.loads(done.stdout)
     assert status["winch"]["A"]["phase"] == "disabled"
-    assert invoke("move", "A", "--by", "0.1 m", "-b", bench.file).exit_code == 0
+    back = invoke("move", "A", "--pay-out", "0.1 m", "-b", bench.file)
+    assert back.exit_code == 0, back.output
     assert length(bench) == pytest.approx(3.9, abs=5e-3)
     assert length(bench, "B") == pytest.approx(before, abs=1e-3)
 
@@ -56,8 +57,12 @@ def test_move_all(bench: Served) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("A",), 2, "give either --to LENGTH or --by LENGTH"),
-        (("A", "--to", "1m", "--by", "1m"), 2, "give either"),
+        (("A",), 2, "give one of --to, --pay-out and --wind-in"),
+        (("A", "--to", "1m", "--pay-out", "1m"), 2, "give one of"),
+        (("A", "--pay-out", "1m", "--wind-in", "1m"), 2, "opposite directions"),
+        (("A", "--pay-out", "-50mm"), 2, "must be above zero"),
+        (("A", "--wind-in", "0.1m/s"), 2, "is a speed here and must be a length"),
+        (("A", "--wind-in", "3kg"), 2, "is no speed or length"),
         (("A", "--to", "1"), 2, "has no unit"),
         (("--to", "1 m"), 2, "which winch?"),
         (("C", "--to", "1 m"), 2, "no winch 'C'"),
@@ -74,6 +79,45 @@ def test_moves_that_cannot_be_meant(
     assert words in result.stderr
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--speed", "-0.1 m/s", "--for", "1s"), "--for needs --pay-out SPEED or --wind-in SPEED"),
+        (("--wind-in", "0.1 m/s"), "--wind-in SPEED needs --for TIME"),
+        (("--wind-in", "50 mm", "--for", "1s"), "is a length here and must be a speed"),
+        (("--pay-out", "-0.1 m/s", "--for", "1s"), "must be above zero"),
+        (("--pay-out", "50mm", "--speed", "-0.1m/s"), "--speed -0.1m/s: must be above zero"),
+        (("--pay-out", "0.1m/s", "--for", "1s", "--speed", "1m/s"), "does not belong to --for"),
+        (("--pay-out", "0.1m/s", "--wind-in", "0.1m/s", "--for", "1s"), "opposite directions"),
+    ],
+)
+def test_a_jog_without_one_direction_is_refused(
+    bench: Served, arguments: tuple[str, ...], words: str
+) -> None:
+    result = invoke("jog", "A", *arguments, "-b", bench.file)
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+
+
+@pytest.mark.parametrize("option", ["--step", "--by"])
+def test_signed_options_are_gone(bench: Served, option: str) -> None:
+    for command in ("jog", "move"):
+        result = invoke(command, "A", option, "0.05 m", "-b", bench.file)
+        assert result.exit_code == 2
+        assert "No such option" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["jog", "move"])
+@pytest.mark.parametrize(("option", "sign"), [("--pay-out", 1), ("--wind-in", -1)])
+def test_jog_and_move_agree_on_each_direction(
+    bench: Served, command: str, option: str, sign: int
+) -> None:
+    before = length(bench)
+    done = invoke(command, "A", option, "30mm", "--speed", "0.2 m/s", "-b", bench.file)
+    assert done.exit_code == 0, done.output
+    assert length(bench) - before == pytest.approx(0.03 * sign, abs=3e-3)
+
+
 def test_home_here_defines_the_length_and_moves_nothing(bench: Served) -> None:
     before = length(bench, "B")
     done = invoke("home", "B", "--here", "2.5 m", "-b", bench.file, "--json")
@@ -82,7 +126,7 @@ def test_home_here_defines_the_length_and_moves_nothing(bench: Served) -> None:
     assert shown == pytest.approx(2.5, abs=2e-3)
     assert length(bench, "B") == pytest.approx(before, abs=1e-3)
     # The drive keeps it: the bench, opened anew, still sees it, and so does a move.
-    assert invoke("move", "B", "--by", "-0.1 m", "-b", bench.file).exit_code == 0
+    assert invoke("move", "B", "--wind-in", "0.1 m", "-b", bench.file).exit_code == 0
     assert length(bench, "B") == pytest.approx(before - 0.1, abs=0.01)
 
 
@@ -125,18 +169,20 @@ def test_a_homing_that_fails_leaves_the_drive_disabled_in_its_mode(bench: Served
 
 def test_reset_clears_a_fault_and_enables_nothing(bench: Served) -> None:
     bench.live.inject("A.servo", "over-current")
-    tripped = invoke("move", "A", "--by", "0.1 m", "-b", bench.file)
+    tripped = invoke("move", "A", "--pay-out", "0.1 m", "-b", bench.file)
     assert tripped.exit_code == 5, tripped.output
     done = invoke("reset", "-b", bench.file)
     assert done.exit_code == 0, done.output
-    assert done.stdout == "reset: nothing is tripped\n"
+    *cleared, last = done.stdout.splitlines()
+    assert last == "reset: nothing is tripped"
+    assert any("winch A: drive fault: error 2310h" in line for line in cleared)
     assert bench.live.winches["A"].drive.objects.number(0x6041) & 0x4F == 0x40
-    assert invoke("move", "A", "--by", "0.05 m", "-b", bench.file).exit_code == 0
+    assert invoke("move", "A", "--pay-out", "0.05 m", "-b", bench.file).exit_code == 0
 
 
 def test_a_rehearsed_move_touches_no_drive(bench: Served) -> None:
     before = length(bench)
-    done = invoke("move", "A", "--by", "0.1 m", "-b", bench.file, "--dry-run", "--json")
+    done = invoke("move", "A", "--pay-out", "0.1 m", "-b", bench.file, "--dry-run", "--json")
     assert done.exit_code == 0, done.output
     frames = json.loads(done.stdout)["frames"]
     words = [f["values"]["6040h"] for f in frames if f["kind"] == "RPDO" and f["node"] == 1]
@@ -150,7 +196,9 @@ def test_a_rehearsed_move_touches_no_drive(bench: Served) -> None:
 
 
 def test_a_rehearsal_in_words(bench: Served) -> None:
-    shown = invoke("jog", "A", "--for", "0.2s", "-b", bench.file, "--dry-run")
+    shown = invoke(
+        "jog", "A", "--for", "0.2s", "--wind-in", "50mm/s", "-b", bench.file, "--dry-run"
+    )
     assert shown.exit_code == 0, shown.output
     assert "winch A: 6040h Controlword 0Fh enable operation" in shown.stdout
     assert "dry run: nothing was sent" in shown.stderr

@@ -42,11 +42,11 @@ def syncs_after(frames: list[Seen], begin: float) -> int:
 def test_a_jog_moves_and_ends_by_its_dead_man(rig: Rig, bench: Bench) -> None:
     winch = bench.winch["A"]
     before = winch.cable_length
-    winch.jog(-0.2, hold=1.0)
+    winch.jog(pay_out=0.2, hold=1.0)
     rig.until(lambda: abs(rig.drive.see()["velocity"]) > 20)
     rig.forget()
     begin = bench.clock.now()
-    winch.jog(-0.2, hold=DEAD_MAN)
+    winch.jog(pay_out=0.2, hold=DEAD_MAN)
     winch.wait()
     frames = rig.witness.frames
     sent = targets(frames)
@@ -67,7 +67,7 @@ def test_a_jog_moves_and_ends_by_its_dead_man(rig: Rig, bench: Bench) -> None:
 
 
 def test_the_ramp_of_a_jog_keeps_the_limits(rig: Rig, bench: Bench) -> None:
-    bench.winch["A"].jog(-0.3, 0.5)
+    bench.winch["A"].jog(pay_out=0.3, duration=0.5)
     sent = targets(rig.witness.frames)
     counts_per_speed = 65536 / 6.283185307 / ARM
     assert min(sent) >= -0.3 * counts_per_speed * 1.02
@@ -77,7 +77,7 @@ def test_the_ramp_of_a_jog_keeps_the_limits(rig: Rig, bench: Bench) -> None:
 
 def test_a_stop_takes_effect_within_two_cycles(rig: Rig, bench: Bench) -> None:
     winch = bench.winch["A"]
-    winch.jog(-0.3, hold=1.0)
+    winch.jog(pay_out=0.3, hold=1.0)
     rig.until(lambda: abs(rig.drive.see()["velocity"]) > 50)
     rig.forget()
     begin = bench.clock.now()
@@ -100,7 +100,7 @@ def test_a_stop_takes_effect_within_two_cycles(rig: Rig, bench: Bench) -> None:
 
 def test_a_fault_trips_the_bench_and_a_reset_enables_nothing(rig: Rig, bench: Bench) -> None:
     winch = bench.winch["A"]
-    winch.jog(-0.1, hold=1.0)
+    winch.jog(pay_out=0.1, hold=1.0)
     rig.until(lambda: rig.state() == "OPERATION_ENABLED")
     rig.drive.inject("following error")
     with pytest.raises(DriveFault, match="8611h following error"):
@@ -109,28 +109,28 @@ def test_a_fault_trips_the_bench_and_a_reset_enables_nothing(rig: Rig, bench: Be
     bench.reset()
     assert rig.states()[-1] == "SWITCH_ON_DISABLED"
     assert not {0x06, 0x07, 0x0F} & set(rig.witness.words())
-    winch.jog(-0.1, 0.2)
+    winch.jog(pay_out=0.1, duration=0.2)
 
 
 def test_a_restart_is_latched_and_commissioned_again_by_a_reset(rig: Rig, bench: Bench) -> None:
     winch = bench.winch["A"]
-    winch.jog(-0.1, hold=1.0)
+    winch.jog(pay_out=0.1, hold=1.0)
     rig.until(lambda: rig.state() == "OPERATION_ENABLED")
     rig.drive.inject("reboot")
     with pytest.raises(LimitTripped, match="reset"):
         winch.wait()
     rig.until(lambda: rig.state() == "SWITCH_ON_DISABLED")
     with pytest.raises(LimitTripped, match="latched"):
-        winch.jog(-0.1)
+        winch.jog(pay_out=0.1)
     bench.reset()
     assert rig.drive.number(0x1A00) == 3
-    winch.jog(-0.1, 0.2)
+    winch.jog(pay_out=0.1, duration=0.2)
     assert not bench.snapshot.tripped
 
 
 def test_the_end_of_the_loop_stops_the_drive(rig: Rig, bench: Bench) -> None:
     """The host's heartbeat comes from the control loop, and from nothing that outlives it."""
-    bench.winch["A"].jog(-0.2, hold=1.0)
+    bench.winch["A"].jog(pay_out=0.2, hold=1.0)
     rig.until(lambda: abs(rig.drive.see()["velocity"]) > 30)
     bench.loop.close()
     rig.until(lambda: rig.state() == "SWITCH_ON_DISABLED")

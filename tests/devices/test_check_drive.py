@@ -98,3 +98,116 @@ def test_faults_of_the_eds_are_the_device_s(tmp_path: Path) -> None:
     assert code == 3
     assert "generic-cia402.eds:" in output
     assert "DataType 'U32' is no number" in output
+
+
+BENCH = """\
+schema = 1
+kind = "bench"
+[bus.can]
+kind = "can"
+interface = "virtual"
+channel = "x"
+[winch.A]
+profile = "bench-spiral"
+servo = { device = "mine", bus = "can", node = 1 }
+limits = { speed = "0.5 m/s" }
+[winch.B]
+profile = "bench-spiral"
+servo = { device = "mine", bus = "can", node = 2 }
+limits = { speed = "0.5 m/s" }
+"""
+
+
+def bench_of(folder: Path) -> Path:
+    path = folder / "bench.toml"
+    path.write_text(BENCH, encoding="utf-8")
+    return path
+
+
+def test_a_bench_is_told_the_faults_of_its_device_files(tmp_path: Path) -> None:
+    device = drive(tmp_path, device=('"0x6041", ', '"0x605A", '))
+    code, output = check(bench_of(tmp_path))
+    assert code == 3
+    told = [row for row in output.split("\n") if "its PDOMapping is 0 in the EDS" in row]
+    assert len(told) == 1, "the file is wired twice and told once"
+    assert told[0].startswith(f"{device}:{line_of(device, '0x605A')}: ")
+
+
+def test_a_bench_is_told_how_each_drive_notices_a_dead_host(tmp_path: Path) -> None:
+    drive(tmp_path)
+    code, output = check(bench_of(tmp_path))
+    assert code == 0
+    for winch in "AB":
+        assert f"winch {winch}: loss of the host by heartbeat: as 6007h says" in output
+
+
+def test_a_bench_is_refused_where_a_drive_notices_no_dead_host(tmp_path: Path) -> None:
+    eds = _between("[1016]", "[1017]")
+    path = drive(tmp_path, eds=(eds, ""))
+    text = (path.parent / "generic-cia402.eds").read_text(encoding="utf-8")
+    for section in ("[100C]", "[1006]"):
+        begin = text.index(f"{section}\n")
+        text = text[:begin] + text[text.index("[", begin + 1) :]
+    (path.parent / "generic-cia402.eds").write_text(text, encoding="utf-8")
+    bench = bench_of(tmp_path)
+    code, output = check(bench)
+    assert code == 3
+    for winch in "AB":
+        assert f"{bench}: winch {winch}, device 'generic-cia402': the EDS has no way" in output
+    assert check(path)[0] == 0, "hardware may stop it: that is the bench file's to say"
+
+
+def test_an_option_code_that_the_eds_lacks_is_told(tmp_path: Path) -> None:
+    path = drive(tmp_path, eds=(_between("[605D]", "[605E]"), ""))
+    path.write_text(path.read_text(encoding="utf-8") + "[servo.options]\nhalt = 1\n")
+    code, output = check(path)
+    assert code == 3
+    assert f"{path}:{line_of(path, 'halt = 1')}: " in output
+    assert "the EDS lacks 605Dh; the drive has no such option code" in output
+
+
+def test_a_fixed_mapping_is_taken_as_it_is(tmp_path: Path) -> None:
+    count = _between("[1A01sub0]", "[1A01sub1]")
+    path = drive(tmp_path, eds=(count, count.replace("AccessType=rw", "AccessType=const")))
+    assert check(path)[0] == 0, "the device file has the mapping of the EDS"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('"0x606C", "0x6077"', '"0x6077", "0x606C"'), encoding="utf-8")
+    code, output = check(path)
+    assert code == 3
+    assert 'fixed mapping in the EDS: objects = ["0x606C", "0x6077", "0x603F"]' in output
+
+
+def test_a_device_file_may_rest_on_its_eds_alone(tmp_path: Path) -> None:
+    path = drive(tmp_path, device=('trust = "generic"', 'trust = "eds"'))
+    assert check(path)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ('host_loss = "rpdo-timeout"', "which lacks a writable event timer of an RPDO"),
+        ('host_loss = "sync-loss"\nmotion_mode = "PV"', "needs a cyclic mode"),
+    ],
+)
+def test_a_way_to_notice_a_dead_host_has_to_fit_the_file(
+    tmp_path: Path, lines: str, said: str
+) -> None:
+    path = drive(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    text = text.replace('motion_mode = "CSV"\n', "", 1)
+    path.write_text(text.replace("[servo]\n", f"[servo]\n{lines}\n", 1), encoding="utf-8")
+    code, output = check(path)
+    assert code == 3
+    assert said in output
+
+
+def test_guarding_is_refused_where_the_adapter_sends_no_remote_frames(tmp_path: Path) -> None:
+    path = drive(tmp_path, device=("[servo]\n", '[servo]\nhost_loss = "guarding"\n'))
+    bench = bench_of(tmp_path)
+    assert check(path)[0] == 0
+    assert check(bench)[0] == 0
+    text = bench.read_text(encoding="utf-8").replace('"virtual"', '"socketcand"')
+    bench.write_text(text, encoding="utf-8")
+    code, output = check(bench)
+    assert code == 3
+    assert "winch A: guarding needs remote frames, which 'socketcand' does not send" in output

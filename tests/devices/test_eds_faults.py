@@ -67,6 +67,9 @@ MENDED: list[tuple[str, str, str, str]] = [
     ("[6064]", "[6064sub1]\nDataType=5\n[6064]", "[6064sub1]", "[6064] is one value"),
     ("[6064]", "[6064Name]\n1=x\n[6064]", "[6064Name]", "names no compact array's entries"),
     ("[6064]", "[DummyUsage]\nDummy0001=2\n[6064]", "Dummy0001", "neither 0 nor 1"),
+    ("NrOfTXPDO=4", "NrOfTXPDO=4\nNrOfTXPDO=8", "NrOfTXPDO=8", "not used, the first counts"),
+    ("2=0x1001", "2=0x1001\n2=0x1008", "2=0x1008", "has number 2 twice"),
+    ("[1000]", "[Comments]\nLines=1\n[Comments]\nLines=2\n[1000]", "[Comm", "a second time"),
 ]
 
 
@@ -130,12 +133,82 @@ def test_bits_of_a_negative_default_are_a_negative_number(tmp_path: Path) -> Non
     assert entries[0x6064, 0].default == -2
 
 
+def test_an_object_twice_under_two_names_is_one_object(tmp_path: Path) -> None:
+    """Names are not used: the first section counts."""
+    section = GOOD[GOOD.index("[1001]") : GOOD.index("[1018]")]
+    dictionary, warnings = read_eds(written(tmp_path, GOOD + section.replace("Error", "An")), 5)
+    assert dictionary[0x1001].name == "Error register"
+    assert "what differs is not used" in warnings[0].message
+
+
+def test_a_makers_object_that_is_two_things_is_left_out(tmp_path: Path) -> None:
+    own = "[2001]\nParameterName=Own\nDataType={}\nAccessType=ro\n"
+    text = GOOD + own.format(4) + own.format(7)
+    dictionary, warnings = read_eds(written(tmp_path, text), 5)
+    assert 0x2001 not in dictionary
+    assert "the object is left out" in warnings[0].message
+
+
+def test_both_lists_of_one_name_count(tmp_path: Path) -> None:
+    """6064h stands in the second list only; both lists number their entry 1."""
+    text = GOOD.replace("1=0x1014\n2=0x6064", "1=0x1014")
+    text += "[OptionalObjects]\nSupportedObjects=1\n1=0x6064\n"
+    _, warnings = read_eds(written(tmp_path, text), 5)
+    assert [item.message for item in warnings] == [
+        "[OptionalObjects] stands a second time; its entries are added to those of line 40"
+    ]
+
+
+def test_keys_count_in_any_spelling(tmp_path: Path) -> None:
+    text = GOOD.replace("DataType=0x0004", "datatype=0x0004").replace(
+        "ParameterName", "PARAMETERNAME"
+    )
+    dictionary, warnings = read_eds(written(tmp_path, text), 5)
+    assert (dictionary[0x6064].data_type, warnings) == (4, ())
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "value"),
+    [
+        # data types of CiA 301: 2, 3, 4, 15h are signed of 8, 16, 32, 64 bits; 7 is UNSIGNED32
+        (0x4, "0xFFFFFFFE", -2),
+        (0x4, "0x7FFFFFFF", 2**31 - 1),
+        (0x4, "0x80000000", -(2**31)),
+        (0x4, "-2", -2),
+        (0x2, "0xFD", -3),
+        (0x3, "0xFFFF", -1),
+        (0x15, "0xFFFFFFFFFFFFFFFF", -1),
+        (0x7, "0xFFFFFFFE", 2**32 - 2),
+        (0x7, "-1", 2**32 - 1),
+        (0x4, "010", 8),
+    ],
+)
+@pytest.mark.parametrize("key", ["DefaultValue", "ParameterValue"])
+def test_hexadecimal_values_are_the_bits_of_their_type(
+    tmp_path: Path, kind: int, text: str, value: int, key: str
+) -> None:
+    """CiA 306 writes a negative number as the hexadecimal digits of its two's complement."""
+    eds = GOOD.replace("DataType=0x0004", f"DataType={kind:#x}\n{key}={text}")
+    eds = eds.replace("LowLimit=-5\n", "").replace("HighLimit=0x7FFFFFFF\n", "")
+    dictionary, warnings = read_eds(written(tmp_path, eds), 5)
+    variable = dictionary[0x6064]
+    assert (variable.default if key == "DefaultValue" else variable.value) == value
+    assert warnings == ()
+
+
+def test_the_node_number_counts_in_any_spelling(tmp_path: Path) -> None:
+    text = GOOD.replace("$NODEID+0x80", "$NodeID+0x80")
+    dictionary, warnings = read_eds(written(tmp_path, text), 5)
+    assert (dictionary[0x1014].default, dictionary[0x1014].relative, warnings) == (0x85, True, ())
+
+
 REFUSED: list[tuple[str, str, str, str]] = [
     ("DataType=0x0004", "DataType=INT32", "DataType=INT32", "'INT32' is no number"),
     ("DataType=0x0004\n", "", "[6064]", "has no DataType"),
     ("[1001]", "[1001", "[1001", "is no section; it should read [name]"),
     ("ObjectType=0x9", "ObjectType=record", "ObjectType=record", "'record' is no number"),
-    ("NrOfTXPDO=4", "NrOfTXPDO=4\nNrOfTXPDO=8", "NrOfTXPDO=8", "'8' here and '4' on line 7"),
+    ("ProductNumber=3", "ProductNumber=3\nProductNumber=8", "ProductNumber=8", "'8' here and '3'"),
+    ("DataType=0x0004", "DataType=0x0004\nDataType=7", "DataType=7", "'7' here and '0x0004'"),
     ("[OptionalObjects]", "[1001]\nDataType=7\n[OptionalObjects]", "[1001]", "differs from line"),
 ]
 

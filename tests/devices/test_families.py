@@ -57,7 +57,7 @@ def test_its_simulated_drive_is_commissioned_and_jogged(live: LiveBench, clock: 
         winch = bench.winch["A"]
         start, plant = winch.cable_length, live.winches["A"].plant
         turned, wound = plant.motor_angle, plant.cable_length
-        winch.jog(0.2, 0.5)
+        winch.jog(wind_in=0.2, duration=0.5)
         assert winch.snapshot.phase is Phase.DISABLED
         gone = start - winch.cable_length
         # The ramp at its end makes up for that at its begin.
@@ -65,5 +65,5 @@ def test_its_simulated_drive_is_commissioned_and_jogged(live: LiveBench, clock: 
         assert wound - plant.cable_length == pytest.approx(gone, abs=2e-3)
         assert plant.motor_angle - turned > 10.0
         snapshot = winch.snapshot
-        assert math.isfinite(snapshot.speed)
+        assert math.isfinite(snapshot.cable_speed)
     assert abs(plant.motor_velocity) < 1e-3

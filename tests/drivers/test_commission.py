@@ -78,7 +78,7 @@ def test_watchdogs_and_cycle_are_in_the_drive_afterwards(rig: Rig) -> None:
     drive, bus = rig
     axis_on(bus, cycle=0.005).commission()
     number = drive.drive.objects.number
-    assert number(0x1016, 1) == 127 << 16 | 200
+    assert number(0x1016, 1) == 127 << 16 | 125
     assert number(0x1017) == 50
     assert number(0x60C2, 1) * 10.0 ** number(0x60C2, 2) == pytest.approx(0.005)
     assert number(0x6061) == 9

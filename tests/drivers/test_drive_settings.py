@@ -211,10 +211,36 @@ def test_a_homing_is_written_in_the_drive_s_units() -> None:
         (0x607C, 0, -1500),
     ]
     del objects.values[0x607C, 0]
-    with pytest.raises(NotPermitted, match="no home offset"):
+    objects.written.clear()
+    with pytest.raises(NotPermitted, match=r"607C.*no such object.*home_offset"):
         set_homing(objects, SERVO, SCALE, HomingSpec(18, 5.0, 0.5, 30.0, offset=1.0))  # type: ignore[arg-type]
     with pytest.raises(NotPermitted, match="no homing method 300"):
         set_homing(objects, SERVO, SCALE, HomingSpec(300, 5.0, 0.5, 30.0))  # type: ignore[arg-type]
+    assert objects.written == [], "what is missing is read before anything is written"
+    set_homing(objects, SERVO, SCALE, HomingSpec(18, 5.0, 0.5, 30.0))  # type: ignore[arg-type]
+    assert objects.written[0] == (0x6098, 0, 18), "without 607Ch it homes without an offset"
+
+
+@pytest.mark.parametrize(
+    ("method", "missing", "said"),
+    [(18, (0x6098, 0), "6098"), (18, (0x6099, 1), "6099.*1"), (18, (0x6099, 2), "6099.*2")],
+)
+def test_a_homing_names_what_the_drive_lacks(
+    method: int, missing: tuple[int, int], said: str
+) -> None:
+    objects = Objects({0x6098: 0, (0x6099, 1): 0, (0x6099, 2): 0, 0x609A: 0})
+    del objects.values[missing]
+    with pytest.raises(NotPermitted, match=said):
+        set_homing(objects, SERVO, SCALE, HomingSpec(method, 5.0, 0.5, 30.0))  # type: ignore[arg-type]
+    assert objects.written == []
+
+
+def test_a_homing_here_needs_no_speeds_and_takes_a_makers_home_position() -> None:
+    """The EPOS4 has no 607Ch; its home position is 30B0h."""
+    servo = ServoSpec("x.eds", ("CSV",), home_offset="0x30B0")
+    objects = Objects({0x6098: 0, 0x30B0: 0})
+    set_homing(objects, servo, SCALE, HomingSpec(37, 5.0, 0.5, 30.0, offset=2.0))  # type: ignore[arg-type]
+    assert objects.written == [(0x6098, 0, 37), (0x30B0, 0, 2000)]
 
 
 @pytest.mark.parametrize("code", [-1, -3])

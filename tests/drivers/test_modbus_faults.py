@@ -88,8 +88,9 @@ def test_a_late_reply_is_never_taken_for_the_next_request() -> None:
         weigh(peer, 1000)
         readings = collected(instrument)
         with polled(peer, instrument, timeout=0.05):
-            until(lambda: instrument.counters.late >= 3, within=6.0)
-    assert instrument.counters.timeouts >= 3
+            until(lambda: instrument.counters.timeouts >= 5, within=6.0)
+        assert peer.connections > 5, "after each timeout the connection is a new one"
+    assert instrument.counters.reconnects >= 4
     assert {reading.raw for reading in readings} == {1000}
 
 
@@ -140,7 +141,8 @@ def test_one_dead_device_does_not_stop_the_others() -> None:
             until(lambda: dead.counters.timeouts >= 2, within=5.0)
             before = alive.counters.readings
             until(lambda: alive.counters.readings > before + 30, within=5.0)
-        assert peer.connections == 1
+        assert peer.connections > 1
+    assert alive.counters.timeouts == alive.counters.drops == 0
     assert isinstance(dead.problem, NoReply)
     assert "unit 2" in str(dead.problem)
 

@@ -29,6 +29,7 @@ class Records(Objects):
     """Four PDOs of each direction, as a drive of node 1 has them."""
 
     node = 1
+    dictionary: frozenset[int] = frozenset()
 
     def __init__(self) -> None:
         records: dict[int | tuple[int, int], int] = {}

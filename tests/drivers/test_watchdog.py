@@ -60,7 +60,7 @@ def test_a_drive_that_watches_is_operational_and_disabled_again(
     assert drive.drive.state.name == "SWITCH_ON_DISABLED"
     assert drive.drive.nmt.name == "OPERATIONAL"
     assert drive.drive.error_code == 0
-    assert drive.drive.objects.number(0x1016, 1) == HOST << 16 | 200
+    assert drive.drive.objects.number(0x1016, 1) == HOST << 16 | 125
     assert list(axis.emergencies) == []
     enabling = [w for w in control_words(drive) if w & 0x0F in (0x06, 0x07, 0x0F)]
     assert enabling == [], "nothing climbs while the watchdog is proved"

@@ -79,7 +79,7 @@ def test_every_fault_in_one_go(file: Path) -> None:
         (f'kind = "spiral"\n{SIZES}', f'kind = "squared"\n{RADIUS}', 4, "drum.build_up", "missing"),
         ('kind = "spiral"', 'kind = "spiral"\nbuild_up = "1 mm"', 6, "drum.build_up", "squared"),
         ('layer_growth = "0.5 mm"\n', "", 4, "drum.layer_growth", "cable.diameter"),
-        ("ratio = 20", "ratio = 0", 9, "gearbox.ratio", "above 0"),
+        ("ratio = 20", "ratio = 0", 9, "gearbox.ratio", "at least 0.001"),
         ("ratio = 20", "ratio = true", 9, "gearbox.ratio", "bool"),
         ("ratio = 20", "ratio = 20\nefficiency = 1.2", 10, "gearbox.efficiency", "at most 1"),
         ('"60 mm"', '"inf mm"', 6, "drum.winding_radius", "finite"),

@@ -16,8 +16,6 @@ from winchkit.errors import FileError, LimitTripped, UsageError
 from winchkit.testing.opened import OpenedBench
 from winchkit.testing.plugin import SimBench
 
-pytestmark = pytest.mark.realtime
-
 ROOT = Path(__file__).parents[2]
 WEIGHT = 10 * 9.80665
 STALLED = ("no complete feedback", "no load cell reading", "heartbeat is gone")
@@ -30,7 +28,7 @@ def sim(sim_bench: SimBench) -> OpenedBench:
 
 
 def test_a_bench_by_name_moves_and_its_truth_is_asserted(sim: OpenedBench) -> None:
-    sim.bench.winch["A"].move_by(-0.1, 0.3)
+    sim.bench.winch["A"].move_by(wind_in=0.1, speed=0.3)
     sim.assert_moved("A", -0.1, 2e-3)
     sim.assert_tension("A", WEIGHT, 1.0)
     sim.assert_state("A", "switch on disabled")
@@ -63,7 +61,7 @@ def test_winches_declared_in_the_test(sim_bench: SimBench) -> None:
     assert [wiring.servo.node for wiring in sim.spec.winch.values()] == [1, 2]
     sim.assert_tension("left", 5 * 9.80665, 1.0)
     sim.assert_tension("right", 15 * 9.80665, 1.0)
-    sim.bench.winch["right"].jog(-0.1, 0.3)
+    sim.bench.winch["right"].jog(pay_out=0.1, duration=0.3)
     sim.assert_moved("left", 0.0, 1e-6)
     assert sim.length("right") > 4.01
 
@@ -81,14 +79,14 @@ def test_declarations_with_faults_are_refused_like_files(sim_bench: SimBench) ->
 
 def test_two_benches_do_not_hear_each_other(sim_bench: SimBench) -> None:
     first, second = sim_bench("spiral-bench"), sim_bench("spiral-bench")
-    first.bench.winch["A"].jog(0.1, 0.3)
+    first.bench.winch["A"].jog(wind_in=0.1, duration=0.3)
     second.assert_moved("A", 0.0, 1e-6)
     assert not [frame for frame in second.frames_of("A.rpdo1") if frame.values["60FFh"]]
 
 
 def test_frames_have_names_and_values(sim: OpenedBench) -> None:
     begin = sim.clock.now()
-    sim.bench.winch["A"].jog(-0.1, 0.2)
+    sim.bench.winch["A"].jog(pay_out=0.1, duration=0.2)
     words = [frame.values["6040h"] for frame in sim.frames_of("A.rpdo1", begin)]
     assert list(dict.fromkeys(word for word in words if word & 4)) == [0x06, 0x07, 0x0F]
     targets = [frame.values["60FFh"] for frame in sim.frames_of("A.rpdo1", begin)]
@@ -110,7 +108,7 @@ def test_frames_have_names_and_values(sim: OpenedBench) -> None:
 
 
 def test_dropped_frames_never_arrive(sim: OpenedBench) -> None:
-    sim.bench.winch["A"].jog(-0.1, hold=1.0)
+    sim.bench.winch["A"].jog(pay_out=0.1, hold=1.0)
     sim.assert_state("A", "operation enabled")
     begin = sim.clock.now()
     mend = sim.drop("A.tpdo2")
@@ -121,7 +119,7 @@ def test_dropped_frames_never_arrive(sim: OpenedBench) -> None:
     sim.assert_state("A", "switch on disabled")
     mend()
     sim.bench.reset()
-    sim.bench.winch["A"].jog(-0.1, 0.2)
+    sim.bench.winch["A"].jog(pay_out=0.1, duration=0.2)
 
 
 def test_delayed_frames_come_late(sim: OpenedBench) -> None:
@@ -158,13 +156,13 @@ def test_a_frozen_and_a_silent_cell(sim: OpenedBench) -> None:
     sim.silence_cell("A")
     assert sim.wait_until(lambda: sim.bench.snapshot.winch["A"].quality["cell"] == "stale")  # type: ignore[index]
     with pytest.raises(Exception, match="no load cell reading"):
-        sim.bench.winch["A"].jog(0.1)
+        sim.bench.winch["A"].jog(wind_in=0.1)
 
 
 @pytest.mark.parametrize("kind", ["lose_heartbeat", "reboot", "drive_fault"])
 def test_faults_of_the_drive_trip_the_bench(sim: OpenedBench, kind: str) -> None:
     expected = {"lose_heartbeat": "heartbeat", "reboot": "boot-up", "drive_fault": "fault"}[kind]
-    sim.bench.winch["A"].jog(-0.1, hold=1.0)
+    sim.bench.winch["A"].jog(pay_out=0.1, hold=1.0)
     sim.assert_state("A", "operation enabled")
     getattr(sim, kind)("A")
     assert sim.wait_until(
@@ -173,13 +171,13 @@ def test_faults_of_the_drive_trip_the_bench(sim: OpenedBench, kind: str) -> None
     sim.recover()
     sim.clock.sleep(1.0 if kind == "reboot" else 0.2)
     with pytest.raises(LimitTripped if kind != "drive_fault" else Exception, match="latched"):
-        sim.bench.winch["A"].jog(-0.1)
+        sim.bench.winch["A"].jog(pay_out=0.1)
     sim.bench.reset()
-    sim.bench.winch["A"].jog(-0.1, 0.2)
+    sim.bench.winch["A"].jog(pay_out=0.1, duration=0.2)
 
 
 def test_a_drive_that_hears_nothing_of_the_host_stops_itself(sim: OpenedBench) -> None:
-    sim.bench.winch["A"].jog(-0.2, hold=1.0)
+    sim.bench.winch["A"].jog(pay_out=0.2, hold=1.0)
     sim.assert_state("A", "operation enabled")
     begin = sim.clock.now()
     sim.lose_host()
@@ -187,7 +185,7 @@ def test_a_drive_that_hears_nothing_of_the_host_stops_itself(sim: OpenedBench) -
     assert sim.frames_of("A.emergency", begin)[0].values["code"] == 0x8130
     sim.recover()
     sim.bench.reset()
-    sim.bench.winch["A"].jog(-0.2, 0.2)
+    sim.bench.winch["A"].jog(pay_out=0.2, duration=0.2)
 
 
 def test_hung_loads_are_weighed(sim: OpenedBench) -> None:
@@ -217,7 +215,7 @@ def test_nothing_is_left_running(sim_bench: SimBench) -> None:
     before = set(threading.enumerate())
     sim = sim_bench("spiral-bench")
     assert set(threading.enumerate()) > before
-    sim.bench.winch["A"].jog(-0.1, hold=1.0)
+    sim.bench.winch["A"].jog(pay_out=0.1, hold=1.0)
     sim.close()
     deadline = time.monotonic() + 5
     while left := set(threading.enumerate()) - before:
@@ -256,11 +254,11 @@ def test_parallel_workers_do_not_clash(tmp_path: Path) -> None:
     """Two workers, the same bench in each test, and each sees its own motion only."""
     (tmp_path / "test_own.py").write_text(
         "import pytest\n"
-        "@pytest.mark.parametrize('change', [-0.03, 0.05])\n"
-        "def test_own(sim_bench, change):\n"
+        "@pytest.mark.parametrize('way, sign', [('wind_in', -1), ('pay_out', 1)])\n"
+        "def test_own(sim_bench, way, sign):\n"
         "    sim = sim_bench('spiral-bench')\n"
-        "    sim.bench.winch['A'].move_by(change, 0.2)\n"
-        "    sim.assert_moved('A', change, 2e-3)\n",
+        "    sim.bench.winch['A'].move_by(**{way: 0.04}, speed=0.2)\n"
+        "    sim.assert_moved('A', sign * 0.04, 2e-3)\n",
         encoding="utf-8",
     )
     done = run_pytest(tmp_path, "-n", "2")
@@ -268,6 +266,7 @@ def test_parallel_workers_do_not_clash(tmp_path: Path) -> None:
     assert "2 passed" in done.stdout
 
 
+@pytest.mark.realtime
 def test_the_example_passes_its_own_tests() -> None:
     """Its last test moves a bench in another process, in real time: a stall stops that, rightly."""
     for _ in range(3):

@@ -54,7 +54,7 @@ def test_plotjuggler_can_read_every_datagram(listener: socket.socket) -> None:
         assert isinstance(picture["timestamp"], float)
         names |= {f"/{winch}/{key}" for winch in "AB" for key in picture[winch]}
     sink.close()
-    drive = ("motor_angle", "motor_velocity", "motor_torque", "cable_length", "speed")
+    drive = ("motor_angle", "motor_velocity", "motor_torque", "cable_length", "cable_speed")
     assert {f"/{winch}/{name}" for winch in "AB" for name in drive} <= names
     assert all(name.count("/") == 2 for name in names), "no key of ours may look like a level"
 

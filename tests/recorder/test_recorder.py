@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import logging
 import os
 import re
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fed import BENCHMARKS, CYCLE, DELAY, Fed, SetClock, angle, give, recording, tension
+from small_disk import run_on_small_disk
 
 from winchkit.bench.recorder import Recorder
 from winchkit.bench.snapshot import Phase
@@ -38,6 +40,7 @@ def test_rows_stand_at_readings_and_have_every_channel_at_that_moment(
         "motor_velocity",
         "motor_torque",
         "tension",
+        "tension_gross",
         "temperature",
     ]
     assert run.metadata["programme"] == "up"
@@ -114,7 +117,7 @@ def test_a_bench_without_instruments_has_rows_every_hundredth(tmp_path: Path, su
     with recording(path, "A") as (fed, recorder):
         pass
     fed.sensors["A"].clear()
-    with Recorder(path, fed.sensors, fed.clock, {}) as recorder:
+    with Recorder(path, fed.sensors, fed.clock, {}, replace=True) as recorder:
         fed.run(recorder, 1.0)
     run = read_run(path)
     assert list(run) == ["motor_angle", "motor_velocity", "motor_torque"]
@@ -137,13 +140,28 @@ def test_a_log_in_parts_reads_as_one(tmp_path: Path) -> None:
     assert log.closed
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+FULL_AT_ONCE = """
+import sys
+sys.path[:0] = [{tests!r}, {benchmarks!r}]
+from fed import Fed, SetClock
+from winchkit.bench.recorder import Recorder
+(disk / "other").write_bytes(bytes(60_000))
+fed = Fed(SetClock())
+try:
+    Recorder(disk / "a.{suffix}", fed.sensors, fed.clock, {{"profile": "x" * 20_000}})
+except Exception as error:
+    print(type(error).__name__, error)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a tmpfs of its own")
 @pytest.mark.parametrize("suffix", ["csv", "mcap"])
 def test_a_disk_that_is_full_from_the_start(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"a.{suffix}"
-    path.symlink_to("/dev/full")
-    with pytest.raises(FileError, match="No space left"), recording(path):
-        pytest.fail("it opened")
+    folder = str(Path(__file__).parent)
+    script = FULL_AT_ONCE.format(tests=folder, benchmarks=BENCHMARKS, suffix=suffix)
+    done = run_on_small_disk(tmp_path, script, "64k")
+    assert "FileError" in done.stdout, done.stderr
+    assert "No space left" in done.stdout
     (tmp_path / f"folder.{suffix}").mkdir()
     with (
         pytest.raises(FileError, match="cannot be written"),
@@ -165,9 +183,9 @@ from fed import Fed, SetClock
 from winchkit.bench.recorder import Recorder
 from winchkit.errors import FileError
 logging.basicConfig(format="%(message)s")
-resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
+{limit}
 fed = Fed(SetClock())
-recorder = Recorder({path!r}, fed.sensors, fed.clock, {{}})
+recorder = Recorder({path}, fed.sensors, fed.clock, {{}})
 cycles = 0
 while True:
     fed.run(recorder, 0.5)
@@ -193,7 +211,8 @@ except FileError as error:
 def test_a_disk_that_fills_ends_the_log_and_nothing_else(tmp_path: Path, suffix: str) -> None:
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 150_000
     path = tmp_path / f"a.{suffix}"
-    script = FILLING.format(tests=str(Path(__file__).parent), path=str(path))
+    limit = "resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))"
+    script = FILLING.format(tests=str(Path(__file__).parent), path=repr(str(path)), limit=limit)
     done = subprocess.run(
         [sys.executable, "-c", script],
         capture_output=True,
@@ -211,6 +230,28 @@ def test_a_disk_that_fills_ends_the_log_and_nothing_else(tmp_path: Path, suffix:
     run = read_run(path)
     assert len(run) > 100
     assert run["A.motor_angle"] == pytest.approx(run["A.motor_angle"][0] + 3 * run.time, abs=1e-5)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a tmpfs of its own")
+@pytest.mark.parametrize("suffix", ["csv", "mcap"])
+def test_the_rows_up_to_a_full_disk_can_be_read(tmp_path: Path, suffix: str) -> None:
+    """ENOSPC of a real file system; CSV also by Python's own reader."""
+    place = f"disk / 'a.{suffix}'"
+    script = FILLING.format(tests=str(Path(__file__).parent), path=place, limit="")
+    done = run_on_small_disk(tmp_path, script, "160k", os.environ | {"PYTHONPATH": BENCHMARKS})
+    assert f"a.{suffix}: cannot be written: No space left on device" in done.stdout, done.stderr
+    assert re.search("the loop goes on [01]$", done.stdout, re.MULTILINE)
+    assert "the log has ended, the bench goes on" in done.stderr
+    path = tmp_path / f"a.{suffix}"
+    run = read_run(path)
+    assert len(run) > 100
+    assert run["A.motor_angle"] == pytest.approx(run["A.motor_angle"][0] + 3 * run.time, abs=1e-5)
+    if suffix == "csv":
+        with path.open(newline="") as file:
+            rows = list(csv.reader(line for line in file if not line.startswith("#")))
+        assert len(rows) == len(run) + 1
+        assert {len(row) for row in rows} == {len(rows[0])}
+        assert path.read_bytes().endswith(b"\n")
 
 
 def test_an_event_is_told_when_a_log_ends(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -67,7 +67,6 @@ def test_ones_own_effect_vanishes_at_its_null_and_carries_its_derivative() -> No
         assert wave.arm(angle) == pytest.approx(-change / (2 * step), rel=1e-4)
 
 
-@pytest.mark.realtime
 def test_the_heave_follows_the_waves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     module = runpy.run_path(str(EXAMPLES / "heave.py"))
     run = module["main"](tmp_path / "heave.csv", duration=3.0)
@@ -82,7 +81,6 @@ def test_the_heave_follows_the_waves(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert f"heave.csv: {len(run)} rows" in capsys.readouterr().out
 
 
-@pytest.mark.realtime
 @pytest.mark.parametrize(
     ("bench", "effect", "before"),
     [

@@ -77,12 +77,33 @@ def test_parts_by_size(tmp_path: Path) -> None:
 
 
 def test_a_last_part_that_was_never_begun_is_left_out(tmp_path: Path) -> None:
-    for suffix, bare in (("mcap", b"\x89MCAP0\r\n\x01\x18"), ("csv", b"# a: b\ntime [s],x\n0,")):
+    for suffix, bare in (("mcap", b"\x89MCAP0\r\n\x01\x18"), ("csv", b"# a: b\ntime [s],x")):
         parts = written(tmp_path / f"many.{suffix}", 2.5, SECOND)
         whole = read_run(tmp_path / f"many.{suffix}")
         for data in (b"", bare):
             part_path(tmp_path / f"many.{suffix}", len(parts) + 1).write_bytes(data)
             assert len(read_run(tmp_path / f"many.{suffix}")) == len(whole)
+
+
+def test_a_last_part_cut_anywhere_costs_nothing_but_itself(tmp_path: Path) -> None:
+    *others, last = written(tmp_path / "many.csv", 2.5, SECOND)
+    data = last.read_bytes()
+    before = sum(len(read_run(part)) for part in others)
+    for length in range(0, len(data), 41):
+        last.write_bytes(data[:length])
+        rows = max(data[:length].count(b"\n") - data.count(b"#") - 1, 0)
+        assert len(read_run(tmp_path / "many.csv")) == before + rows
+
+
+def test_a_part_without_rows_is_a_part(tmp_path: Path) -> None:
+    """A part that ended before an instrument gave its first reading."""
+    parts = written(tmp_path / "many.csv", 3.0, SECOND)
+    whole = read_run(tmp_path / "many.csv")
+    kept = len(read_run(parts[0])), len(read_run(parts[2]))
+    head = [line for line in parts[1].read_bytes().splitlines(keepends=True) if line[:1] in b"#t"]
+    parts[1].write_bytes(b"".join(head))
+    run = read_run(tmp_path / "many.csv")
+    assert len(run) == sum(kept) < len(whole)
 
 
 def test_parts_of_different_logs_are_not_joined(tmp_path: Path) -> None:

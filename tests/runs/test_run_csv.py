@@ -175,7 +175,7 @@ def test_whichever_program_wrote_it(file: Path, encode: object) -> None:
         (PLAIN.replace("[N]", "[kN]").replace(",11", ",1e308"), 3, "'tension' is infinite"),
         (PLAIN.replace("0.2,", "1e400,"), 4, "column 'time' is infinite"),
         (PLAIN.replace("0.1,1", "0.1,1,1"), 3, "4 cells in this row, 3 columns"),
-        (PLAIN.replace(",2,12\n", ",2"), 4, "is the file cut off?"),
+        (PLAIN.replace(",2,12\n", ",2\n"), 4, "is the file cut off?"),
         (PLAIN.replace("0.1,", ","), 3, "time is missing here"),
         (PLAIN.replace("0.2,", "0.1,"), 4, "time stands still at 0.1 s"),
         (PLAIN.replace("0.2,", "0.05,"), 4, "time goes back from 0.1 s to 0.05 s"),

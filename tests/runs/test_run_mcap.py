@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from small_disk import run_on_small_disk
 
 from winchkit.errors import FileError, RunError, UsageError
 from winchkit.runs import Run, open_writer, read_run, write_mcap, write_run
@@ -94,7 +95,7 @@ def test_a_file_cut_anywhere_keeps_every_whole_row(tmp_path: Path) -> None:
         cut.write_bytes(data[:length])
         run = read_run(cut)
         assert len(run) == sum(end <= length for end in ends)
-        assert f"its {len(run)} whole rows were recovered" in run.notes[0]
+        assert f"its {len(run)} whole rows are read" in run.notes[0]
 
 
 def test_a_file_cut_before_its_rows_is_no_run(tmp_path: Path) -> None:
@@ -240,10 +241,41 @@ def test_what_a_writer_refuses(tmp_path: Path, suffix: str) -> None:
         open_writer(tmp_path / "nowhere" / path.name, COLUMNS)
 
 
+FULL = """
+from winchkit.runs import open_writer
+from winchkit.errors import FileError
+rows = 0
+writer = open_writer(disk / "a.{suffix}", [("time", "s"), ("motor_angle", "rad")])
+try:
+    while True:
+        writer.append({{"time": rows * 0.01, "motor_angle": rows / 3}})
+        rows += 1
+        if rows % 50 == 0:
+            writer.flush()
+            flushed = rows
+except FileError as error:
+    print(flushed, error)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a tmpfs of its own")
+@pytest.mark.parametrize("suffix", ["csv", "mcap"])
+def test_a_full_disk_is_told_and_keeps_what_was_flushed(tmp_path: Path, suffix: str) -> None:
+    done = run_on_small_disk(tmp_path, FULL.format(suffix=suffix), "64k")
+    assert os.strerror(errno.ENOSPC) in done.stdout, done.stderr
+    run = read_run(tmp_path / f"a.{suffix}")
+    assert len(run) == int(done.stdout.split()[0])
+    assert run["motor_angle"].tolist() == [n / 3 for n in range(len(run))]
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
 @pytest.mark.parametrize("suffix", ["csv", "mcap"])
-def test_a_full_disk_is_told(tmp_path: Path, suffix: str) -> None:
+def test_a_run_is_written_to_a_regular_file_only(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a.{suffix}"
     path.symlink_to("/dev/full")
-    with pytest.raises(FileError, match=os.strerror(errno.ENOSPC)):
+    with pytest.raises(FileError, match="a character device, not a regular file"):
+        written(path, 5)
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(FileError, match="a FIFO, not a regular file"):
         written(path, 5)

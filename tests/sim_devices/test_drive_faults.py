@@ -99,6 +99,19 @@ def test_a_lost_map_leaves_the_drive_without_pdos_and_tells_nobody() -> None:
     assert rig.status & 0x6F == 0x27
 
 
+def test_an_open_enable_input_takes_the_torque_until_it_closes() -> None:
+    rig = moving()
+    rig.drive.inject("enable input open")
+    assert rig.status & 0x4F == 0x40
+    rig.control(0x06, 0x07, 0x0F)
+    assert rig.status & 0x6F == 0x23
+    rig.run(0.1)
+    rig.drive.inject("recover")
+    assert rig.status & 0x6F == 0x23, "it does not enable itself"
+    rig.control(0x0F)
+    assert rig.status & 0x6F == 0x27
+
+
 def test_a_tpdo_stop_leaves_heartbeat_and_sdo() -> None:
     rig = moving()
     rig.write(0x1017, 0, 10)

@@ -45,7 +45,7 @@ def test_a_serial_cell_measures_fails_and_comes_back(live: LiveBench, tmp_path: 
     with open_bench(live.write_bench_file(tmp_path / "bench.toml")) as bench:
         winch = bench.winch["A"]
         assert comes(lambda: abs(winch.tension - 10 * 9.80665) < 5.0)
-        winch.move_by(-0.1)
+        winch.move_by(wind_in=0.1)
         assert comes(lambda: abs(winch.tension - 10 * 9.80665) < 5.0)
         live.inject("A.cell", "overload")
         assert comes(lambda: math.isnan(winch.tension))

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import threading
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from winchkit.bench.cell_desk import CellDesk
+from winchkit.bench.commissioning.validity import require_commissioned, trust_record
+from winchkit.bench.control.latch import LatchFile
+from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
+from winchkit.bench.control.release import NotReleased, ReleaseGuard
 from winchkit.bench.loop import Callback, ControlLoop
 from winchkit.bench.origin import origin
 from winchkit.bench.owner import Ownership
 from winchkit.bench.recorder import Recorder
+from winchkit.bench.remote.commander import Client, Commanders, NotCommander, client_name
+from winchkit.bench.remote.handover import own
 from winchkit.bench.resetting import reset
 from winchkit.bench.server import StationServer
 from winchkit.bench.snapshot import BenchSnapshot, Direction
@@ -44,7 +51,6 @@ from winchkit.units import suggest
 
 __all__ = ["Bench", "open_bench"]
 
-_RELEASE = 0.5
 _LISTEN = 1.1
 """For heartbeats of nodes that are no winch, s."""
 
@@ -52,33 +58,72 @@ _LISTEN = 1.1
 class Bench:
     """An open bench; this process owns it until it is closed."""
 
-    def __init__(self, spec: BenchSpec, clock: Clock) -> None:
-        """Use :func:`open_bench`. Raises every error of opening, with nothing left open."""
+    def __init__(
+        self,
+        spec: BenchSpec,
+        clock: Clock,
+        name: str = "",
+        ownership: Ownership | None = None,
+        *,
+        realtime: Request = False,
+        commissioning: bool = False,
+    ) -> None:
+        """Use :func:`open_bench`. Raises every error of opening, with nothing left open.
+
+        With ``commissioning`` the opening thread, and no other, may move it without a record.
+        """
         self.spec = spec
         self.clock = clock
+        self.not_commissioned = ""
+        """Why nothing may move before it is commissioned; empty where it is."""
         self._recorders: list[Recorder] = []
-        self._released = float("-inf")
+        self._release = ReleaseGuard()
+        self._commissioner = threading.get_ident() if commissioning else None
         with ExitStack() as stack:
-            stack.callback(Ownership(spec).close)
-            self._wired: Wired = wire(spec, clock, stack)
+            stack.callback((ownership or own(spec, name or client_name())).close)
+            latch = LatchFile(spec.latch_file)
+            stack.callback(latch.close)
+            trips = latch.open()
+            self._wired: Wired = wire(spec, clock, stack, latch)
             self.loop: ControlLoop = self._wired.loop
+            self.loop.restore(trips)
             self.axes: Mapping[str, Cia402Axis] = self._wired.axes
+            self._look_at_record()
             self.winch: dict[str, Winch] = {
                 name: Winch(self, name, spec.winch[name], parts, dict(self._wired.sensors[name]))
                 for name, parts in self.loop.winches.items()
             }
-            wired = self._wired
-            self.cells = CellDesk(
-                spec, clock, wired.lines, wired.slow, wired.sensors, permit=self._require_rest
+            self.commanders = Commanders(
+                self.loop.winches,
+                clock,
+                Client(name or client_name()),
+                lambda winch: self.winch[winch].run_down(),
             )
+            """Who commands each winch."""
+            self.stopped_by = ""
+            """Who gave the last quick stop."""
+            self.cells = self._cell_desk()
             """Its instruments by name, for commands and whoever looks at them one by one."""
             self.loop.on_jog = self._jog_from_callback
+            self.realtime: RealTime = acquire(realtime, self._urgent_threads())
+            """What the control loop was granted of real-time settings, and what was refused."""
+            stack.callback(self.realtime.close)
+            if realtime:
+                self.loop.samplers.append(RestCollector())
             stack.callback(self.loop.close)
             self.loop.start()
             await_feedback(self.loop, self.axes, clock)
+            self.realtime.cover(self._urgent_threads())
             await_sensors((s for one in self.winch.values() for s in one.sensors.values()), clock)
-            self._server = StationServer(self)
+            self.stations = StationServer(self)
+            """Where other processes take part."""
             self._stack = stack.pop_all()
+
+    def _cell_desk(self) -> CellDesk:
+        wired, permit = self._wired, self._require_rest
+        return CellDesk(
+            self.spec, self.clock, wired.lines, wired.slow, wired.sensors, permit=permit
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -107,8 +152,8 @@ class Bench:
     def on_cycle(self, callback: Callback) -> Callable[[], None]:
         """Call a function with every cycle's snapshot, on the control thread.
 
-        It may return rope speeds by winch (m/s, positive winds in), which move these winches for
-        as long as it keeps returning them. Should it raise, everything stops and the exception
+        It may return a ``winding_speed`` (m/s, positive winds in) by winch, which moves it for
+        as long as it keeps returning one. Should it raise, everything stops and the exception
         comes out of the ``with`` block. Returns a function that takes it off again.
         """
         self.loop.callbacks.append(callback)
@@ -127,9 +172,20 @@ class Bench:
         """Ramp this winch to rest, and with it all others unless ``stop_together`` is false."""
         self._run_down(self.winch if self.spec.stop_together else (name,), wait=wait)
 
+    def stop_commanded(self, names: Collection[str]) -> None:
+        """Ramp these winches to rest for the client that commands them; returns at rest.
+
+        The others stop with them unless ``stop_together`` is false, or another client commands
+        them.
+        """
+        held = self.commanders.holder
+        others = [name for name in self.winch if held(name) is None or name in names]
+        self._run_down(others if self.spec.stop_together else names, wait=True)
+
     def stop_now(self, *, wait: bool = True) -> None:
         """Quick-stop every winch. Whoever still holds a jog must let go before the next one."""
-        self._released = self.clock.now() + _RELEASE
+        self._release.close(set(self.winch))
+        self.stopped_by = self.commanders.actor.name
         with self.loop.ordering:
             for parts in self.loop.winches.values():
                 parts.controller.stop()
@@ -155,13 +211,24 @@ class Bench:
         if wait:
             wait_together(self.loop, tuple(targets), self.clock)
 
-    def reset(self) -> None:
+    def reset(self) -> list[str]:
         """Clear trips and drive faults; drives that lost their set-up are commissioned again.
 
-        A bus that went down is opened again. Nothing is enabled by any of it. Raises LimitTripped
-        naming what still forbids any motion, ConnectionLost.
+        A bus that went down is opened again. Nothing is enabled by any of it, and a command that
+        was held before has to be released first. Returns what was cleared, in words. Raises
+        LimitTripped naming what still forbids any motion, with the latch as it was, NotPermitted,
+        ConnectionLost.
         """
-        reset(self._wired, self.spec, self.clock)
+        self._release.close(set(self.winch))
+        begun = self.clock.now()
+        try:
+            cleared = reset(self._wired, self.spec, self.clock)
+        finally:
+            self._release.resume(begun, self.clock.now())
+            # A bus that was opened again has a new receive thread.
+            self.realtime.cover(self._urgent_threads())
+        self._look_at_record()
+        return cleared
 
     def scan(self) -> list[Found]:
         """Who is on the CAN buses; reads only. Raises ConnectionLost."""
@@ -177,10 +244,14 @@ class Bench:
         path: str | Path,
         metadata: Mapping[str, str] | None = None,
         rotate: str | None = None,
+        *,
+        replace: bool = False,
     ) -> Recorder:
         """Start logging to a file; ``with bench.log("lift.csv"):`` ends it.
 
-        With ``rotate`` (``"100MB"`` or ``"10min"``) it goes on in ``lift.002.csv`` and so on.
+        With ``rotate`` (``"100MB"`` or ``"10min"``) it goes on in ``lift.002.csv`` and so on. An
+        earlier log of that name is removed with ``replace`` only. Raises UsageError for one that is
+        there without ``replace``, or that is being written; FileError.
         """
         recorder = Recorder(
             path,
@@ -189,6 +260,7 @@ class Bench:
             {**self._wired.metadata, **origin(self.spec), **(metadata or {})},
             self._stop_feeding,
             rotation=None if rotate is None else Rotation.parse(rotate),
+            replace=replace,
         )
         self._recorders.append(recorder)
         self.loop.samplers.append(recorder.feed)
@@ -197,7 +269,7 @@ class Bench:
     def close(self) -> None:
         """Stop every winch in a controlled way and let the buses go. Twice does no harm."""
         with self._stack:
-            self._server.close()
+            self.stations.close()
             if self.loop.alive:
                 # A function that still asks for motion is no longer heard.
                 self.loop.on_jog = lambda _name, _speed: None
@@ -207,20 +279,44 @@ class Bench:
                 recorder.close()
         self._stack = ExitStack()
 
-    def permit(self, winch: str, direction: Direction) -> None:
-        """Raise what forbids this motion now; returns when it is allowed."""
+    def permit(self, winch: str, direction: Direction, *, held: bool = False) -> None:
+        """Raise what forbids this motion to who asks now; returns when it is allowed.
+
+        ``held``: the command is repeated for as long as somebody holds on (a jog).
+        """
+        self.commanders.require(winch)
         if not direction:
             return
+        self._require_commissioned()
+        refused: NotReleased | None = None
+        if held:
+            try:
+                self._release.ask(winch, self.clock.now())
+            except NotReleased as error:
+                refused = error
         self.raise_trouble()
-        now = self.clock.now()
-        if now < self._released:
-            self._released = now + _RELEASE
-            raise NotPermitted(
-                f"winch {winch} was stopped by an operator; let go before moving it again"
-            )
+        if refused is not None:
+            raise refused
         for trip in self.snapshot.blocked:
             if trip.blocks is Direction.BOTH or (trip.winch == winch and trip.blocks & direction):
                 raise NotPermitted(str(trip))
+
+    def _look_at_record(self) -> None:
+        """Compare the commissioning record with the files, and with the drives as they are now."""
+        trust_record(self.spec, self.axes)
+        try:
+            require_commissioned(self.spec, self.axes)
+        except NotPermitted as error:
+            self.not_commissioned = str(error)
+        else:
+            self.not_commissioned = ""
+
+    def _require_commissioned(self) -> None:
+        if self._commissioner is not None:
+            if threading.get_ident() != self._commissioner:
+                raise NotPermitted(f"bench '{self.spec.name}' is being commissioned by another")
+        elif self.not_commissioned:
+            raise NotPermitted(self.not_commissioned)
 
     def raise_trouble(self) -> None:
         """Raise what has stopped the bench, if anything has."""
@@ -232,7 +328,10 @@ class Bench:
         if tripped:
             words = "; ".join(map(str, tripped))
             kind = DriveFault if tripped[0].kind == "fault" else LimitTripped
-            raise kind(f"{words} (latched: all winches were stopped; reset to go on)")
+            raise kind(
+                f"{words} (latched: all winches were stopped; reset to go on, e.g. with "
+                "`winchkit reset`)"
+            )
 
     def wait_at_rest(self, names: Iterable[str]) -> None:
         """Return when these winches are disabled and stand still; raises MotionError if not."""
@@ -252,6 +351,11 @@ class Bench:
             raise UsageError(f"{what}; it has {', '.join(known)}" + suggest(name or "", known))
         return self.winch[name]
 
+    def _urgent_threads(self) -> list[int]:
+        """Native ids of the control thread and the receive threads, as far as they run."""
+        ids = [self.loop.thread_id, *(bus.thread_id for bus in self._wired.buses.values())]
+        return [number for number in ids if number]
+
     def _run_down(self, names: Iterable[str], *, wait: bool) -> None:
         with self.loop.ordering:
             for name in names:
@@ -263,9 +367,11 @@ class Bench:
         """Raise NotPermitted while the winch of an instrument (``A.cell``) is enabled."""
         self.winch[instrument.rpartition(".")[0]].require_rest()
 
-    def _jog_from_callback(self, name: str, speed: float) -> None:
+    def _jog_from_callback(self, name: str, winding_speed: float) -> None:
         try:
-            self.named(name).jog(speed)
+            self.named(name).keep_jogging(winding_speed)
+        except (NotReleased, NotCommander):
+            pass  # it goes on asking for what was stopped: nothing moves before it ceases to
         except MotionError:
             if not self.snapshot.tripped:
                 raise
@@ -273,7 +379,8 @@ class Bench:
     def _stop_feeding(self, recorder: Recorder) -> None:
         if recorder in self._recorders:
             self._recorders.remove(recorder)
-            self.loop.samplers.remove(recorder.feed)
+            with suppress(ValueError):  # the loop has let go of one that failed
+                self.loop.samplers.remove(recorder.feed)
 
     def _come_to_rest(self) -> None:
         """Ramp down; what does not come to rest gets a quick stop."""
@@ -285,16 +392,26 @@ class Bench:
 
 
 def open_bench(
-    bench: str | Path | BenchSpec, clock: Clock | None = None, effects: Iterable[str | Path] = ()
+    bench: str | Path | BenchSpec,
+    clock: Clock | None = None,
+    effects: Iterable[str | Path] = (),
+    *,
+    name: str = "",
+    realtime: Request = False,
 ) -> Bench:
     """Open a bench by its wiring file: buses, drives commissioned and disabled, sensors polled.
 
     ``effects``: Python files with effects of your own that its profiles have, besides those that
     the file names. Use it in a ``with`` block: leaving it, by any exception, stops the winches.
+    Others see this program as ``name``, and as its file and process where that is empty. A bench
+    process that serves nobody but ``monitor`` and ``log`` hands the bench over.
+    ``realtime="try"`` takes what this computer permits of real-time settings for the whole
+    process until the bench is closed, ``True`` demands them; ``bench.realtime`` says what was
+    granted. Nothing of the process is changed without it.
     Raises FileError, ConnectionLost (NoReply, DeviceRefused), NotPermitted.
     """
     if not isinstance(bench, BenchSpec):
         from winchkit.schema.read import read_bench
 
         bench = read_bench(bench)
-    return Bench(bench.with_effects(effects), clock or MonotonicClock())
+    return Bench(bench.with_effects(effects), clock or MonotonicClock(), name, realtime=realtime)

@@ -10,7 +10,8 @@ from winchkit.bench.cell_desk import CellDesk
 from winchkit.bench.cell_tasks import Cells, LocalCells
 from winchkit.bench.client import RemoteCells, attach
 from winchkit.bench.instruments import can_buses, instruments
-from winchkit.bench.owner import Ownership
+from winchkit.bench.remote.commander import client_name
+from winchkit.bench.remote.handover import own
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.slow import SlowDevices
 from winchkit.schema.bench import BenchSpec
@@ -35,7 +36,7 @@ def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[Cel
             remote.close()
         return
     with ExitStack() as stack:
-        stack.callback(Ownership(spec).close)
+        stack.callback(own(spec, client_name("cell")).close)
         yield LocalCells(_opened(spec, clock or MonotonicClock(), stack))
 
 
@@ -48,6 +49,6 @@ def _opened(spec: BenchSpec, clock: Clock, stack: ExitStack) -> CellDesk:
         buses[name] = CanBus(spec.bus[name], name, clock)
         stack.callback(buses[name].close)
     sensors, lines = instruments(spec, clock, buses)
-    slow = SlowDevices(lines)
+    slow = SlowDevices(lines, clock)
     stack.callback(slow.close)
     return CellDesk(spec, clock, lines, slow, sensors)

@@ -45,7 +45,10 @@ def clear_tare(desk: CellDesk, name: str) -> dict[str, Any]:
     """Take the host's tare of an instrument away; raises UsageError where it has none."""
     book, removed = tares_of(desk.spec), desk.publisher(name).scale.tare
     if name not in book.tare and not removed:
-        raise UsageError(f"{name} has no tare of the host; nothing to clear")
+        raise UsageError(
+            f"{name} has no tare of the host; a tare of the device itself, which `winchkit tare` "
+            "sets where the device has one, is cleared by `winchkit cell tare --device --clear`"
+        )
     desk.permit(name)
     _keep(desk, book, {other: tare for other, tare in book.tare.items() if other != name})
     _apply(desk, name, 0.0)

@@ -5,41 +5,97 @@ from __future__ import annotations
 import json
 import socket
 import threading
-from typing import Any
+from contextlib import suppress
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 from winchkit import errors
 from winchkit.bench.owner import connect_to_owner
-from winchkit.drivers.can.fitting import Identity
-from winchkit.drivers.can.scan import Found
+from winchkit.bench.remote.commander import client_name
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["RemoteCells", "RemoteStation", "attach"]
+if TYPE_CHECKING:
+    from winchkit.drivers.can.scan import Found
+
+__all__ = ["OwnerGone", "RemoteCells", "RemoteStation", "attach"]
 
 _ANSWER_TIME = 10.0
 _CELL_TIME = 20.0
 """Longer than any command to an instrument with the readings before and after it, s."""
 
 
-def attach(spec: BenchSpec, patience: float = _ANSWER_TIME) -> RemoteStation | None:
+class OwnerGone(ConnectionLost):
+    """The process that owned the bench has ended, or does not answer any more."""
+
+
+def attach(
+    spec: BenchSpec,
+    patience: float = _ANSWER_TIME,
+    *,
+    name: str = "",
+    observer: bool = False,
+) -> RemoteStation | None:
     """A station at the bench's owner; None when nobody owns it.
 
-    ``patience`` (s) is how long it waits for an answer. Raises ConnectionLost when the owner
-    does not take it.
+    ``patience`` (s) is how long it waits for an answer, ``name`` what others see of this client;
+    an ``observer`` never keeps another program from owning the bench. Raises ConnectionLost when
+    the owner does not take it.
     """
     connection = connect_to_owner(spec)
-    return None if connection is None else RemoteStation(connection, patience)
+    if connection is None:
+        return None
+    return RemoteStation(connection, patience, name=name, observer=observer)
 
 
 class RemoteStation:
-    """Calls the owner for everything; its errors are raised here."""
+    """Calls the owner for everything; its errors are raised here. A context manager."""
 
-    def __init__(self, connection: socket.socket, patience: float) -> None:
+    def __init__(
+        self,
+        connection: socket.socket,
+        patience: float = _ANSWER_TIME,
+        *,
+        name: str = "",
+        observer: bool = False,
+    ) -> None:
+        """Take a place at the owner; raises ConnectionLost where it takes nobody in."""
         connection.settimeout(patience)
         self._patience = patience
         self._connection = connection
         self._stream = connection.makefile("rwb")
         self._lock = threading.Lock()
+        self._gone = self._owed = False
+        try:
+            told = self._call("introduce", name or client_name(), observer)
+        except BaseException:
+            self._hang_up()
+            raise
+        self.owner = str(told["owner"])
+        """Name of the process that owns the bench."""
+        self.lends = bool(told["lends"])
+        """Whether the owner is a bench process, which ends with its last client."""
+        self.digest = str(told["digest"])
+        """Of the files that the owner opened the bench with."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def hand_over(self) -> str:
+        """Ask the owner to end for this client's sake; raises NotPermitted where it does not."""
+        return str(self._call("hand_over"))
+
+    def take_over(self, winch: str | None) -> None:
+        """Command a winch that another client commands."""
+        self._call("take_over", winch)
 
     def names(self) -> list[str]:
         """Winches there are."""
@@ -49,9 +105,9 @@ class RemoteStation:
         """Newest snapshot as JSON has it."""
         return dict(self._call("status"))
 
-    def jog(self, winch: str | None, speed: float, hold: float) -> None:
+    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
         """Keep moving for ``hold`` seconds."""
-        self._call("jog", winch, speed, hold)
+        self._call("jog", winch, winding_speed, hold)
 
     def step(self, winch: str | None, change: float, speed: float | None) -> None:
         """Start to change the cable length."""
@@ -75,6 +131,9 @@ class RemoteStation:
 
     def scan(self) -> list[Found]:
         """Who is on the buses."""
+        from winchkit.drivers.can.fitting import Identity
+        from winchkit.drivers.can.scan import Found
+
         return [
             Found(**{**item, "identity": Identity(**item["identity"])})
             for item in self._call("scanned")
@@ -98,17 +157,17 @@ class RemoteStation:
         """Quick-stop every winch."""
         self._call("stop")
 
-    def reset(self) -> None:
-        """Clear trips and faults."""
-        self._call("reset")
+    def reset(self) -> list[str]:
+        """Clear trips and faults; returns what was cleared, in words."""
+        return [str(item) for item in self._call("reset")]
 
     def tare(self, winch: str | None) -> float:
         """Tare a load cell."""
         return float(self._call("tare", winch))
 
-    def start_log(self, path: str, rotate: str | None = None) -> None:
+    def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
         """Log to a file in the owner's process."""
-        self._call("start_log", path, rotate)
+        self._call("start_log", path, rotate, replace)
 
     def log_rows(self) -> int:
         """Rows written so far."""
@@ -132,26 +191,57 @@ class RemoteStation:
             self._connection.settimeout(self._patience)
 
     def close(self) -> None:
-        """Go away; the owner ends what was started here."""
+        """Leave; returns when what was started here has ended and stands still.
+
+        Raises MotionError where it does not come to rest. Twice does no harm.
+        """
+        try:
+            if not self._gone:
+                self._call("leave")
+        except OwnerGone:
+            pass  # it stops everything when it ends
+        finally:
+            self._hang_up()
+
+    def _hang_up(self) -> None:
         with self._lock:
-            self._stream.close()
+            self._gone = True
+            with suppress(OSError):
+                self._stream.close()
             self._connection.close()
 
     def _call(self, operation: str, *arguments: Any) -> Any:
         request = json.dumps({"op": operation, "args": arguments}).encode() + b"\n"
         with self._lock:
-            try:
-                self._stream.write(request)
-                self._stream.flush()
-                line = self._stream.readline()
-            except OSError as error:
-                raise ConnectionLost(f"the bench's owner does not answer: {error}") from error
-        if not line:
-            raise ConnectionLost("the process that owned the bench has ended; its drives stop")
-        answer = json.loads(line)
+            if self._gone:
+                raise OwnerGone("this station at the bench was left; attach again")
+            answer = self._exchange(request)
         if "error" in answer:
             raise _error(answer["error"], answer["message"])
         return answer["ok"]
+
+    def _exchange(self, request: bytes) -> dict[str, Any]:
+        """Send a request, and wait for its answer; an earlier one that was interrupted comes first.
+
+        Raises OwnerGone.
+        """
+        try:
+            if self._owed:
+                self._stream.readline()
+            self._stream.write(request)
+            self._stream.flush()
+            self._owed = True
+            line = self._stream.readline()
+            self._owed = False
+            if line:
+                return dict(json.loads(line))
+        except ConnectionError:
+            pass
+        except (OSError, ValueError) as error:
+            self._gone = True
+            raise OwnerGone(f"the bench's owner does not answer: {error}") from error
+        self._gone = True
+        raise OwnerGone("the process that owned the bench has ended; its drives stop") from None
 
 
 class RemoteCells:

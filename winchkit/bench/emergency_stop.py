@@ -10,9 +10,11 @@ from winchkit import catalog
 from winchkit.drivers.can.bus import CanBus
 from winchkit.drivers.can.cia402 import QUICK_STOP, State, state_of
 from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.standstill import PolledStandstill
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec, WinchWiring
+from winchkit.schema.device_servo import ServoSpec
 
 __all__ = ["Stopped", "stop_on_bus"]
 
@@ -43,18 +45,23 @@ def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
             buses[name] = CanBus(spec.bus[name], name, clock)
             stack.callback(buses[name].close)
         nodes = {name: _node(spec, winch, buses) for name, winch in spec.winch.items()}
-        problems = {name: _tell(node) for name, node in nodes.items()}
-        return [_confirm(name, node, problems[name], clock) for name, node in nodes.items()]
+        problems = {name: _tell(node) for name, (node, _) in nodes.items()}
+        return [
+            _confirm(name, node, servo, problems[name], clock)
+            for name, (node, servo) in nodes.items()
+        ]
 
 
-def _node(spec: BenchSpec, winch: WinchWiring, buses: dict[str, CanBus]) -> SdoNode:
+def _node(
+    spec: BenchSpec, winch: WinchWiring, buses: dict[str, CanBus]
+) -> tuple[SdoNode, ServoSpec]:
     from winchkit.schema.read import read_device
 
     ref = winch.servo
     device = read_device(catalog.find("devices", ref.device, spec.path or None))
     assert device.servo is not None, "the reader has checked it"
     eds = Path(device.path).parent / device.servo.eds
-    return SdoNode(buses[ref.bus], ref.node or 1, eds)
+    return SdoNode(buses[ref.bus], ref.node or 1, eds), device.servo
 
 
 def _tell(node: SdoNode) -> WinchkitError | None:
@@ -65,17 +72,19 @@ def _tell(node: SdoNode) -> WinchkitError | None:
     return None
 
 
-def _confirm(winch: str, node: SdoNode, problem: WinchkitError | None, clock: Clock) -> Stopped:
-    """Ask until the drive is disabled or stands in quick stop."""
+def _confirm(
+    winch: str, node: SdoNode, servo: ServoSpec, problem: WinchkitError | None, clock: Clock
+) -> Stopped:
+    """Ask until the drive is disabled or stands still in quick stop."""
     deadline = clock.now() + _STOP_TIME
-    state, speed = State.UNKNOWN, 0
+    state, standstill = State.UNKNOWN, None
     while clock.now() < deadline:
         try:
             state = state_of(node.read(0x6041))
-            speed = node.read_if_there(0x606C) or 0
+            standstill = standstill or PolledStandstill(node, servo, clock)
+            at_rest = standstill.poll() and state is State.QUICK_STOP_ACTIVE
         except ConnectionLost as error:
             return Stopped(winch, False, str(problem or error))
-        at_rest = state is State.QUICK_STOP_ACTIVE and speed == 0
         if at_rest or (state not in _MOVING and state is not State.UNKNOWN):
             return Stopped(winch, True, f"{state}, at rest" if at_rest else str(state))
         if state is State.OPERATION_ENABLED:

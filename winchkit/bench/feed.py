@@ -16,7 +16,7 @@ from winchkit.bench.snapshot import BenchSnapshot, Phase
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
 
-__all__ = ["CHANNELS", "Feed"]
+__all__ = ["CHANNELS", "TARED", "Feed"]
 
 CHANNELS: dict[str, tuple[str, str]] = {
     "cell": ("tension", "N"),
@@ -25,9 +25,11 @@ CHANNELS: dict[str, tuple[str, str]] = {
     "temperature": ("temperature", "degC"),
 }
 """Channel and unit by role of the sensor."""
+TARED = ("cell", "load", "length")
+"""Roles whose instruments can be tared; a row holds the gross value beside the net one."""
 
 _DRIVE = {"motor_angle": "rad", "motor_velocity": "rad/s", "motor_torque": "N m"}
-_OF_PROFILE = {"cable_length": "m", "speed": "m/s"}
+_OF_PROFILE = {"cable_length": "m", "cable_speed": "m/s"}
 """Of the rope, from the motor angle; a log keeps what the bench showed, a run does not."""
 _of_drive = attrgetter("time", *_DRIVE, *_OF_PROFILE, "phase")
 _TORQUE = 1 + list(_DRIVE).index("motor_torque")
@@ -124,11 +126,14 @@ def _drive_source(topic: str, prefix: str) -> Source:
 def _sensor_source(topic: str, prefix: str, role: str, instrument: Sensor) -> Source:
     channel, unit = CHANNELS[role]
     units = {"value": unit, "gross": unit, "raw": "1"}
+    columns = {"value": prefix + channel}
+    if role in TARED:
+        columns["gross"] = f"{prefix}{channel}_gross"
     signals = [
         Signal(
             channel if name == "value" else name,
             units.get(name, "s" if name in _TIMES else unit),
-            prefix + channel if name == "value" else "",
+            columns.get(name, ""),
         )
         for name in _NUMBERS
     ]

@@ -12,7 +12,7 @@ from winchkit.bench.rope import RopeMap
 from winchkit.bench.snapshot import Direction
 from winchkit.drivers.can.axis import Cia402Axis
 from winchkit.drivers.can.modes import Homing
-from winchkit.drivers.can.profile import HomingSpec
+from winchkit.drivers.can.profile import HERE, HomingSpec, check_homing
 from winchkit.errors import DeviceRefused, DriveFault, NotPermitted, UsageError
 
 if TYPE_CHECKING:
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["HomingMotion", "HomingRequest", "homing"]
 
-_HERE = (37, 35)
-"""Methods that take the present position for the zero: the present number and the old one."""
 _SHARE = 0.1
 """Of the winch's speed limit, at which it searches unless told otherwise."""
 _SLOWER = 0.2
@@ -68,7 +66,7 @@ class HomingMotion:
         self._axis, self._rope, self._left = axis, rope, farthest
         self._begun = self._time = self._angle = math.nan
 
-    def start(self, time: float, angle: float, _speed: float) -> None:
+    def start(self, time: float, angle: float, _winding_speed: float) -> None:
         """Begin; the drive is enabled in the mode HM."""
         self._begun = self._time = time
         self._angle = angle
@@ -97,6 +95,7 @@ def homing(bench: Bench, winch: Winch, asked: HomingRequest) -> Generator[None]:
     """
     axis = bench.axes[winch.name]
     _check(winch, asked)
+    _check_drive(axis, asked)
     bench.permit(winch.name, Direction.BOTH)
     try:
         zero = 0.0
@@ -124,6 +123,13 @@ def _check(winch: Winch, asked: HomingRequest) -> None:
         )
     if asked.at is not None and not math.isfinite(asked.at):
         raise UsageError("a cable length must be a finite number of metres")
+
+
+def _check_drive(axis: Cia402Axis, asked: HomingRequest) -> None:
+    """Refuse before anything moves what the drive lacks, named."""
+    method = HERE[0] if asked.method is None else asked.method
+    spec = HomingSpec(method, 1.0, 1.0, 1.0)
+    check_homing(axis.objects, axis.servo, spec, defines=asked.at is not None)
 
 
 def _define(bench: Bench, winch: Winch, angle: float) -> Generator[None]:
@@ -156,7 +162,7 @@ def _run(
         axis,
         [
             HomingSpec(number, fast, _SLOWER * fast, ramp, offset)
-            for number in (_HERE if method is None else (method,))
+            for number in (HERE if method is None else (method,))
         ],
     )
     span = math.inf if limits.length is None else limits.length[1] - limits.length[0]

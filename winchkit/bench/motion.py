@@ -1,14 +1,14 @@
 """Motion sources: what asks a winch to move, evaluated once a cycle and free of any bus.
 
-Speeds are of the rope in m/s, positive winding in; angles are of the motor.
+A ``winding_speed`` is of the cable in m/s, positive winding in; angles are of the motor.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
+from winchkit.bench.dead_man import DEAD_MAN, FIRST_PRESS
 from winchkit.bench.rope import LineModel, RopeMap
 from winchkit.bench.trim import Trim
 from winchkit.errors import NotPermitted
@@ -16,11 +16,6 @@ from winchkit.model.trajectory import plan
 from winchkit.schema.bench import LimitSpec
 
 __all__ = ["DEAD_MAN", "FIRST_PRESS", "Jog", "MotionSource", "Move", "Ramp", "RunDown", "Target"]
-
-DEAD_MAN = 0.2
-"""A jog ends this long after its last refresh, s."""
-FIRST_PRESS = 0.7
-"""Hold of the first press of a key, whose repeat starts late, s."""
 
 JERK_TIME = 0.3
 """Time in which a move's acceleration builds up, s."""
@@ -34,16 +29,15 @@ _SETTLE_TIME = 1.0
 """A move counts as done this long after its end at the latest, s."""
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(NamedTuple):
     """What a drive is to do in this cycle."""
 
     velocity: float
     """Of the motor, rad/s."""
     angle: float | None
     """Of the motor, for a position-controlled drive, rad."""
-    speed: float
-    """Of the rope, m/s."""
+    winding_speed: float
+    """Of the cable, m/s, positive winding in."""
     done: bool = False
     start: bool = False
     """Whether the drive is to make a motion of its own, a homing."""
@@ -57,8 +51,8 @@ class MotionSource(Protocol):
     joins: bool
     """Whether it can take over a rope that moves."""
 
-    def start(self, time: float, angle: float, speed: float) -> None:
-        """Begin at a motor angle (rad) and a rope speed (m/s)."""
+    def start(self, time: float, angle: float, winding_speed: float) -> None:
+        """Begin at a motor angle (rad) and a winding speed (m/s)."""
 
     def target(self, time: float, angle: float, now: float) -> Target:
         """Target at ``time`` (s), the motor being at ``angle`` (rad).
@@ -97,14 +91,14 @@ class Jog:
         self._expires = -math.inf
         self._angle = self._last = 0.0
 
-    def refresh(self, speed: float, expires: float) -> None:
-        """Keep going at ``speed`` until ``expires`` (s on the bench's clock)."""
-        self._wish = max(-self._limits.speed, min(self._limits.speed, speed))
+    def refresh(self, winding_speed: float, expires: float) -> None:
+        """Keep going at ``winding_speed`` (m/s) until ``expires`` (s on the bench's clock)."""
+        self._wish = max(-self._limits.speed, min(self._limits.speed, winding_speed))
         self._expires = expires
 
-    def start(self, time: float, angle: float, speed: float) -> None:
-        """Begin with the speed that the rope has."""
-        self._ramp = Ramp(self._limits.acceleration, speed)
+    def start(self, time: float, angle: float, winding_speed: float) -> None:
+        """Begin with the speed that the cable has."""
+        self._ramp = Ramp(self._limits.acceleration, winding_speed)
         self._angle, self._last = angle, time
 
     def target(self, time: float, angle: float, now: float) -> Target:
@@ -140,11 +134,11 @@ class RunDown:
         self._ramp = Ramp(self._acceleration)
         self._angle = self._last = 0.0
 
-    def start(self, time: float, angle: float, speed: float) -> None:
+    def start(self, time: float, angle: float, winding_speed: float) -> None:
         """Begin from the target angle and the speed that were in force."""
-        self._ramp = Ramp(self._acceleration, speed)
+        self._ramp = Ramp(self._acceleration, winding_speed)
         self._ramp.follow(0.0, time)
-        self.duration = abs(speed) / self._acceleration
+        self.duration = abs(winding_speed) / self._acceleration
         self._angle, self._last = angle, time
 
     def target(self, time: float, angle: float, _now: float) -> Target:
@@ -214,7 +208,7 @@ class Move:
         """Take ``duration`` (s) where the plan is quicker; slower in the same proportion."""
         self._stretched = duration
 
-    def start(self, time: float, angle: float, _speed: float) -> None:
+    def start(self, time: float, angle: float, _winding_speed: float) -> None:
         """Begin at rest; plans anew where the winch has moved since ``prepare``."""
         if not self._knots or abs(self._knots[0] - angle) > 0.5:
             self.prepare(angle)

@@ -10,7 +10,8 @@ from typing import Any
 
 from winchkit.bench.client import RemoteStation, attach
 from winchkit.bench.instruments import device_of
-from winchkit.bench.owner import Ownership
+from winchkit.bench.remote.commander import client_name
+from winchkit.bench.remote.handover import own
 from winchkit.drivers.can.bus import CanBus
 from winchkit.drivers.can.fitting import fitting_device
 from winchkit.drivers.can.node import SdoNode, read_dictionary
@@ -103,6 +104,10 @@ def drive_at(
     bitrate = spec.bus[bus_name].bitrate
     name = f"winch {winch}" if winch else f"node {node}"
     remote = attach(spec)
+    if remote is not None and writes and remote.lends:
+        # A bench process ends for whoever wants to own the bench, unless somebody works there.
+        remote.close()
+        remote = None
     if remote is None:
         with _owning(spec), _open(spec, bus_name, clock or MonotonicClock()) as bus:
             found = device_of(spec, wiring.servo) if wiring else _recognised(bus, node, device)
@@ -237,7 +242,7 @@ def _can_buses(spec: BenchSpec) -> list[str]:
 
 @contextmanager
 def _owning(spec: BenchSpec) -> Iterator[None]:
-    ownership = Ownership(spec)
+    ownership = own(spec, client_name())
     try:
         yield
     finally:

@@ -9,6 +9,7 @@ import tomllib
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from winchkit.regular_file import read_text
 from winchkit.schema.bench import BenchSpec
 
 __all__ = ["git_state", "origin"]
@@ -75,6 +76,6 @@ def _calibrations(spec: BenchSpec) -> dict[str, str]:
 
 def _content(path: Path) -> str:
     try:
-        return json.dumps(tomllib.loads(path.read_text(encoding="utf-8")), default=str)
+        return json.dumps(tomllib.loads(read_text(path)), default=str)
     except (OSError, ValueError) as error:
         return f"{path.name} cannot be read: {error}"

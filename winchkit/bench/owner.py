@@ -8,14 +8,51 @@ import os
 import socket
 import sys
 import tempfile
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
-from winchkit.errors import ConnectionLost, NotPermitted
+from winchkit import catalog
+from winchkit.errors import ConnectionLost, NotPermitted, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["Ownership", "connect_to_owner", "listen"]
+__all__ = ["Ownership", "connect_to_owner", "digest_of", "listen", "log_path", "owner_process"]
 
 _CONNECT_TIME = 2.0
+
+
+def digest_of(spec: BenchSpec) -> str:
+    """Changes with everything that the bench's files say: wiring, profiles, devices, effects."""
+    absolute = replace(spec, path=os.path.abspath(spec.path), latch_file="")
+    parts = [repr(absolute).encode()]
+    for winch in spec.winch.values():
+        with suppress(WinchkitError, OSError):
+            parts.append(catalog.find("profiles", winch.profile, spec.path or None).read_bytes())
+        with suppress(WinchkitError, OSError):
+            parts.append(
+                catalog.find("devices", winch.servo.device, spec.path or None).read_bytes()
+            )
+    for file in spec.effect_files:
+        with suppress(OSError):
+            parts.append(file.read_bytes())
+    return hashlib.sha1(b"\0".join(parts), usedforsecurity=False).hexdigest()
+
+
+def log_path(spec: BenchSpec) -> Path:
+    """Where a bench process writes what it has to say."""
+    return _folder() / f"{_key(spec)}.log"
+
+
+def owner_process(spec: BenchSpec) -> int | None:
+    """Number of the process that opened the bench last; it may have ended since."""
+    try:
+        return int(_owner_file(spec).read_text().splitlines()[0])
+    except (OSError, ValueError, IndexError):
+        return None
+
+
+def _owner_file(spec: BenchSpec) -> Path:
+    return _folder() / f"{_key(spec)}.owner"
 
 
 def _folder() -> Path:
@@ -39,6 +76,14 @@ def _key(spec: BenchSpec) -> str:
     return hashlib.sha1("|".join(buses).encode(), usedforsecurity=False).hexdigest()[:16]
 
 
+def _owner_name(spec: BenchSpec) -> str:
+    try:
+        number, _, name = _owner_file(spec).read_text().partition("\n")
+    except OSError:
+        return "another process"
+    return name or f"process {number}"
+
+
 def _lock(descriptor: int) -> bool:
     """Take the lock if it is free; the system lets it go when the process ends."""
     try:
@@ -58,19 +103,17 @@ def _lock(descriptor: int) -> bool:
 class Ownership:
     """Holds a bench's lock until closed."""
 
-    def __init__(self, spec: BenchSpec) -> None:
-        """Raise NotPermitted, naming the owner, when another process holds it."""
+    def __init__(self, spec: BenchSpec, name: str = "") -> None:
+        """Own it as ``name``; raise NotPermitted, naming the owner, when another one does."""
         path = _folder() / f"{_key(spec)}.lock"
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
         if not _lock(self._descriptor):
             os.close(self._descriptor)
-            who = path.with_suffix(".owner")
-            pid = who.read_text() if who.is_file() else "another process"
             raise NotPermitted(
-                f"bench '{spec.name}' is owned by process {pid}; one process owns a bench, "
+                f"bench '{spec.name}' is owned by {_owner_name(spec)}; one process owns a bench, "
                 "use `winchkit stop`, `monitor`, `log` beside it or end it first"
             )
-        path.with_suffix(".owner").write_text(str(os.getpid()))
+        _owner_file(spec).write_text(f"{os.getpid()}\n{name}")
 
     def close(self) -> None:
         """Let it go."""

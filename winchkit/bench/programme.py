@@ -35,6 +35,7 @@ def run_programme(
     suffix: str = ".csv",
     progress: Progress = lambda _repeat, _number, _step: None,
     again: Again = lambda _error: False,
+    replace: bool = False,
 ) -> list[Path]:
     """Run every step of every repeat; returns the files written, in order.
 
@@ -43,9 +44,13 @@ def run_programme(
     question about a load that this programme has hung already is not asked again. At a question
     the winches are disabled. Raises whatever stops a motion, and what was logged until then is
     kept, unless ``again`` says to try that run once more: then the bench is reset, its file
-    dropped, and the winches go back to where the run began.
+    dropped, and the winches go back to where the run began. Earlier runs of a programme of this
+    name are written over with ``replace`` only; without it they raise UsageError before any motion.
     """
-    execution = _Execution(bench, programme, Path(folder), ask, suffix)
+    if not replace and (held := earlier_runs(programme, folder, suffix)):
+        earlier = f"{held[0]} holds an earlier run of '{programme.name}'"
+        raise UsageError(f"{earlier}; name another folder, or replace=True")
+    execution = _Execution(bench, programme, Path(folder), ask, suffix, replace=replace)
     execution.folder.mkdir(parents=True, exist_ok=True)
     numbered = list(enumerate(programme.step, start=1))
     try:
@@ -88,10 +93,18 @@ class _Execution:
     """State of a programme under way."""
 
     def __init__(
-        self, bench: Bench, programme: Programme, folder: Path, ask: Ask, suffix: str
+        self,
+        bench: Bench,
+        programme: Programme,
+        folder: Path,
+        ask: Ask,
+        suffix: str,
+        *,
+        replace: bool,
     ) -> None:
         self.folder = folder
         self.written: list[Path] = []
+        self._replace = replace
         self._bench, self._programme, self._ask, self._suffix = bench, programme, ask, suffix
         self._recorder: Recorder | None = None
         self._approached = False
@@ -191,7 +204,8 @@ class _Execution:
             name = f"{name}-{self._hanging:g}kg"
             about["load_mass"] = f"{self._hanging:g} kg"
         about["repeat"] = str(repeat)
-        self._recorder = self._bench.log(self._free(f"{name}-{repeat}"), about)
+        path = self._free(f"{name}-{repeat}")
+        self._recorder = self._bench.log(path, about, replace=self._replace)
         self._hold(_LEAD)
 
     def _free(self, name: str) -> Path:

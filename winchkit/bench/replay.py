@@ -22,7 +22,7 @@ __all__ = ["Replay", "open_replay"]
 Array = NDArray[np.float64]
 _LEAST_WAIT = 2e-3
 _MEASURED = ("motor_angle", "motor_velocity", "motor_torque", "tension", "load", "temperature")
-_SHOWN = ("cable_length", "speed")
+_SHOWN = ("cable_length", "cable_speed")
 _PHASES = {phase.value: phase for phase in Phase}
 _UNTOLD: Mapping[str, Any] = {}
 
@@ -143,10 +143,11 @@ def _picture(moment: float, values: Mapping[str, float], told: Mapping[str, Any]
         motor_velocity=known["motor_velocity"],
         motor_torque=known["motor_torque"],
         cable_length=known["cable_length"],
-        speed=known["speed"],
+        cable_speed=known["cable_speed"],
         tension=known["tension"],
         load=known["load"],
         rope_tension=known["load"] if math.isfinite(known["load"]) else known["tension"],
         length=known["length"],
         temperature=known["temperature"],
+        commander=str(told.get("commander", "")),
     )

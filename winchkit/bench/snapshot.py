@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import Enum, Flag
-from typing import Any
+from typing import Any, NamedTuple
 
 __all__ = ["BenchSnapshot", "Direction", "Phase", "Trip", "WinchSnapshot", "to_dict"]
 
@@ -46,8 +46,7 @@ class Trip:
         return f"winch {self.winch}: {self.message}" if self.winch else self.message
 
 
-@dataclass(frozen=True, slots=True)
-class WinchSnapshot:
+class WinchSnapshot(NamedTuple):
     """One winch; SI, NaN where there is no valid value."""
 
     phase: Phase
@@ -60,8 +59,8 @@ class WinchSnapshot:
     motor_torque: float
     cable_length: float
     """From the motor angle and the tension, by the profile and its effects, m."""
-    speed: float
-    """Of the rope, positive winds in, m/s."""
+    cable_speed: float
+    """Derivative of the cable length (positive pays out), m/s."""
     tension: float = math.nan
     """The load cell's reading, N."""
     load: float = math.nan
@@ -72,6 +71,10 @@ class WinchSnapshot:
     temperature: float = math.nan
     quality: Mapping[str, str] | None = None
     """Flags of each sensor's newest reading, ``stale`` included."""
+    turns_known: bool = True
+    """Whether the motor angle counts every turn; if not, the cable length is NaN until homed."""
+    commander: str = ""
+    """Who commands it, by name; empty for nobody."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +90,8 @@ class BenchSnapshot:
     blocked: tuple[Trip, ...] = ()
     """True now, and forbidding motion."""
     overruns: int = 0
+    warnings: tuple[Trip, ...] = ()
+    """What holds and forbids nothing."""
 
     @property
     def at_rest(self) -> bool:
@@ -97,7 +102,7 @@ class BenchSnapshot:
 def to_dict(snapshot: BenchSnapshot) -> dict[str, Any]:
     """The snapshot as JSON has it: null for what is not a number."""
     winches = {
-        name: {key: _plain(value) for key, value in asdict(item).items()}
+        name: {key: _plain(value) for key, value in item._asdict().items()}
         for name, item in snapshot.winch.items()
     }
     return {
@@ -108,6 +113,7 @@ def to_dict(snapshot: BenchSnapshot) -> dict[str, Any]:
         "winch": winches,
         "tripped": [str(trip) for trip in snapshot.tripped],
         "blocked": [str(trip) for trip in snapshot.blocked],
+        "warnings": [str(trip) for trip in snapshot.warnings],
     }
 
 

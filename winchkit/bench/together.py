@@ -48,20 +48,21 @@ def wait_together(loop: ControlLoop, winches: Sequence[Winch], clock: Clock) -> 
     """Return when all are done; where one ends early the others are stopped and it is raised."""
     while any(winch.moving for winch in winches):
         for winch in winches:
-            if not winch.moving:
-                _check(loop, winch, winches)
-        winches[0].raise_trouble()
+            _check(loop, winch, winches)
         clock.sleep(_POLL)
     for winch in winches:
         winch.wait()
 
 
-def _check(loop: ControlLoop, ended: Winch, winches: Sequence[Winch]) -> None:
-    """Stop all where one that has ended did not arrive."""
+def _check(loop: ControlLoop, winch: Winch, winches: Sequence[Winch]) -> None:
+    """Stop all where one that has ended did not arrive, or was taken over."""
     try:
-        ended.raise_end()
+        if winch.moving:
+            winch.raise_trouble()
+        else:
+            winch.raise_end()
     except MotionError:
         with loop.ordering:
-            for winch in winches:
-                loop.winches[winch.name].controller.stop()
+            for each in (one for one in winches if one.commanded_here):
+                loop.winches[each.name].controller.stop()
         raise

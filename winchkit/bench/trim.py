@@ -37,7 +37,7 @@ class Trim:
         self.done = False
 
     def at(self, time: float, angle: float) -> tuple[float, float, float]:
-        """Motor angle (rad), its velocity (rad/s) and the rope's speed (m/s, winding in).
+        """Motor angle (rad), its velocity (rad/s) and the winding speed (m/s).
 
         ``time`` in s, ``angle`` (rad) where the move has ended; they are evaluated once a cycle.
         """

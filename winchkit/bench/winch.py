@@ -6,6 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from winchkit.bench.cell_tares import host_tare
+from winchkit.bench.device_tare import await_device_tare
+from winchkit.bench.direction import no_positional, paid_out
 from winchkit.bench.homing import HomingRequest, homing
 from winchkit.bench.motion import DEAD_MAN, Jog, MotionSource, Move
 from winchkit.bench.parts import WinchParts
@@ -15,7 +17,7 @@ from winchkit.bench.start_gate import StartGate
 from winchkit.bench.supervisor import direction_of
 from winchkit.bench.trim import Trim
 from winchkit.drivers.reading import Sensor
-from winchkit.errors import DriveFault, MotionError, NoReply, NotPermitted, UsageError
+from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
 from winchkit.schema.bench import WinchWiring
 
 if TYPE_CHECKING:
@@ -25,7 +27,6 @@ __all__ = ["Winch"]
 
 _POLL = 0.01
 _TARE_TIME = 2.0
-_SETTLING = 3
 
 
 class Winch:
@@ -84,34 +85,61 @@ class Winch:
         """Whether a motion is under way."""
         return not self._controller.done
 
-    def jog(self, speed: float, duration: float | None = None, *, hold: float = DEAD_MAN) -> None:
-        """Move the rope at ``speed`` (m/s, positive winds in) for ``hold`` seconds.
+    @property
+    def commanded_here(self) -> bool:
+        """Whether the client for whom this thread acts commands it."""
+        commanders = self._bench.commanders
+        return commanders.holder(self.name) is commanders.actor
+
+    def jog(
+        self,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        duration: float | None = None,
+        hold: float = DEAD_MAN,
+    ) -> None:
+        """Move the cable at a speed (m/s, positive), out or in, for ``hold`` seconds.
 
         Call it again within that time to keep going; without another call it ramps to rest and
         disables. With ``duration`` it does so itself for that many seconds and returns at rest.
-        Raises UsageError, NotPermitted, LimitTripped, DriveFault.
+        Raises TypeError for a speed without a name, UsageError, NotPermitted, LimitTripped,
+        DriveFault.
         """
-        if not math.isfinite(speed) or not 0 < hold <= 1:
-            raise UsageError(f"a jog at {speed} m/s held for {hold} s cannot be meant")
-        limit = self.wiring.limits.speed
-        if abs(speed) > limit:
-            raise UsageError(
-                f"winch {self.name}: {abs(speed):g} m/s exceeds limits.speed {limit:g} m/s;"
-                " jog slower"
-            )
+        no_positional("jog", "m/s", unnamed)
+        winding_speed = -paid_out("jog", pay_out, wind_in)
         if duration is None:
-            self._refresh(speed, hold)
+            self.keep_jogging(winding_speed, hold)
             return
         clock = self._bench.clock
         end = clock.now() + duration
-        self._refresh(speed, hold)
+        self.keep_jogging(winding_speed, hold, held=False)
         mine = self._jog
         while mine is self._jog and self.moving and (left := end - clock.now()) > 0:
-            self._bench.permit(self.name, direction_of(speed))
+            self._bench.permit(self.name, direction_of(winding_speed))
             if mine is not None:
-                mine.refresh(speed, clock.now() + min(hold, left))
+                mine.refresh(winding_speed, clock.now() + min(hold, left))
             clock.sleep(min(hold / 4, left))
         self.wait()
+
+    def keep_jogging(
+        self, winding_speed: float, hold: float = DEAD_MAN, *, held: bool = True
+    ) -> None:
+        """Begin or refresh a jog at a winding speed (m/s, positive winds in), zero ends it.
+
+        What stations and ``on_cycle`` callbacks call; for a person :meth:`jog` names the
+        direction. Raises as that does. ``held``: the call is one of those that go on while
+        somebody holds on, and has to cease for a moment after a stop.
+        """
+        if not math.isfinite(winding_speed) or not 0 < hold <= 1:
+            raise UsageError(f"a jog at {winding_speed} m/s held for {hold} s cannot be meant")
+        limit = self.wiring.limits.speed
+        if abs(winding_speed) > limit:
+            raise UsageError(
+                f"winch {self.name}: {abs(winding_speed):g} m/s exceeds limits.speed "
+                f"{limit:g} m/s; jog slower"
+            )
+        self._refresh(winding_speed, hold, held=held)
 
     def move_to(
         self,
@@ -132,9 +160,20 @@ class Winch:
             self.wait()
 
     def move_by(
-        self, change: float, speed: float | None = None, *, wait: bool = True, hold: bool = False
+        self,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        speed: float | None = None,
+        wait: bool = True,
+        hold: bool = False,
     ) -> None:
-        """Change the cable length by ``change`` (m, positive pays out); else as ``move_to``."""
+        """Pay out or wind in a length (m, positive) of cable; else as :meth:`move_to`.
+
+        Raises TypeError for a length without a name, UsageError unless exactly one is given.
+        """
+        no_positional("move_by", "m", unnamed)
+        change = paid_out("move_by", pay_out, wind_in)
         self.move_to(self.cable_length + change, speed, wait=wait, hold=hold)
 
     def home(
@@ -177,6 +216,11 @@ class Winch:
         hold: bool = False,
     ) -> Move:
         """The move that ``move_to`` would make; nothing begins. Raises as that does."""
+        if not self.snapshot.turns_known:
+            raise NotPermitted(
+                f"winch {self.name}: its cable length is not known, the drive's position counter "
+                "(6064h) may have wrapped while it was not heard; home it: `winchkit home`"
+            )
         rope = self._parts.rope
         move = Move(
             rope,
@@ -188,14 +232,16 @@ class Winch:
             trim=Trim(rope, length, self.wiring.limits) if rope.yields else None,
         )
         here = self.snapshot
+        self._bench.axes[self.name].permit_angle(rope.motor_angle(length))
         self._bench.permit(self.name, direction_of(here.cable_length - length))
         move.prepare(here.motor_angle)
         return move
 
     def begin(self, source: MotionSource, gate: StartGate | None = None) -> None:
         """Begin a planned motion; with a gate not before that opens."""
-        self._jog = None
-        self._controller.begin(source, gate)
+        with self._bench.commanders.claimed(self.name):
+            self._jog = None
+            self._controller.begin(source, gate)
 
     def ready_for(self, move: Move) -> bool:
         """Whether the drive is enabled and waits for nothing but this move's gate."""
@@ -207,8 +253,9 @@ class Winch:
         self._controller.run_down()
 
     def raise_trouble(self) -> None:
-        """Raise what has stopped the bench, if anything has."""
+        """Raise what has stopped the bench, or who has taken the winch over, if anybody has."""
         self._bench.raise_trouble()
+        self._bench.commanders.raise_taken(self.name)
 
     def raise_end(self) -> None:
         """Raise what ended the last motion before its end, if anything did."""
@@ -220,14 +267,15 @@ class Winch:
         if self._controller.stopped and self._controller.reason:
             raise DriveFault(f"winch {self.name} was stopped with {self._controller.reason}")
         if self._controller.stopped:
-            raise MotionError(f"winch {self.name}: somebody stopped it before the motion's end")
+            who = self._bench.stopped_by or "somebody"
+            raise MotionError(f"winch {self.name}: {who} stopped it before the motion's end")
 
     def tare(self) -> float:
         """Tare the load cell at rest; returns the tension that it then reads, N.
 
         By its own volatile command where it has one, else the host subtracts what hangs there
         (:func:`~winchkit.bench.cell_tares.host_tare`). Its EEPROM is not touched. Raises
-        NotPermitted, NoReply, DeviceRefused.
+        NotPermitted, DeviceRefused.
         """
         cell = self.sensors.get("cell")
         if cell is None:
@@ -238,7 +286,7 @@ class Winch:
         if writes_eeprom is None or writes_eeprom:
             return float(host_tare(cells, name, _TARE_TIME)["after"])
         self._bench.command(cell, "tare")
-        return self._tared(cell)
+        return await_device_tare(self._bench.clock, self.name, cell)
 
     def require_rest(self) -> None:
         """Raise NotPermitted while the drive is enabled: no moment to change a cell's zero."""
@@ -247,32 +295,15 @@ class Winch:
                 f"winch {self.name} is {self._controller.phase.value}; stop it first"
             )
 
-    def _tared(self, cell: Sensor) -> float:
-        """Wait for readings after the tare and make sure that the device took it."""
-        clock = self._bench.clock
-        sent, seen, deadline = clock.now(), 0, clock.now() + _TARE_TIME
-        last = sent
-        while clock.now() < deadline:
-            clock.sleep(_POLL)
-            reading = cell.latest
-            if reading is None or reading.t_request <= last:
-                continue
-            last, seen = reading.t_request, seen + 1
-            if seen >= _SETTLING and cell.tared is not False and reading.quality.usable:
-                return reading.value
-        raise NoReply(
-            f"winch {self.name}: {cell.name} did not confirm the tare within {_TARE_TIME:g} s; "
-            "check that the reading is stable and within the device's tare range"
-        )
-
-    def _refresh(self, speed: float, hold: float) -> None:
-        self._bench.permit(self.name, direction_of(speed))
+    def _refresh(self, winding_speed: float, hold: float, *, held: bool) -> None:
+        self._bench.permit(self.name, direction_of(winding_speed), held=held)
         expires = self._bench.clock.now() + hold
-        jog = self._jog
-        if jog is None or not self.moving or self._controller.source not in (jog, None):
-            jog = self._jog = Jog(self._parts.rope, self.wiring.limits)
-            jog.refresh(speed, expires)
-            if speed != 0:
-                self._controller.begin(jog)
-        else:
-            jog.refresh(speed, expires)
+        with self._bench.commanders.claimed(self.name):
+            jog = self._jog
+            if jog is None or not self.moving or self._controller.source not in (jog, None):
+                jog = self._jog = Jog(self._parts.rope, self.wiring.limits)
+                jog.refresh(winding_speed, expires)
+                if winding_speed != 0:
+                    self._controller.begin(jog)
+            else:
+                jog.refresh(winding_speed, expires)

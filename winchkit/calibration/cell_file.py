@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.errors import Fault, FileError, UsageError
+from winchkit.regular_file import regular
 from winchkit.runs.whole_file import write_whole
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
 from winchkit.units import convert, format_quantity, suggest
@@ -76,7 +77,7 @@ def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
     direction follows from the order of the loads. Raises FileError with every fault.
     """
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
+        with open(path, newline="", encoding="utf-8-sig", opener=regular) as file:
             table = csv.reader(file)
             rows = [(table.line_num, row) for row in table if row and row[0][:1] != "#"]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -34,6 +34,7 @@ COMMANDS: dict[str, At] = {
     "export": At("winchkit.cli.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
     "sim": At("winchkit.cli.sim", "Simulated benches: record, serve, list."),
     "jog": At("winchkit.cli.jog", "Move a winch by hand."),
+    "commission": At("winchkit.cli.commission", "Commission a bench: try, confirm, record."),
     "move": At("winchkit.cli.move", "Move a winch, or all as one, to a cable length."),
     "home": At("winchkit.cli.home", "Find the drive's zero, or define the present length."),
     "run": At("winchkit.cli.run", "Execute a motion programme and log it."),

@@ -20,6 +20,7 @@ __all__ = [
     "bus_options",
     "dry_run_option",
     "effects_option",
+    "take_over_option",
     "winch_argument",
 ]
 
@@ -41,6 +42,11 @@ effects_option: Decorator = click.option(
     help="Python file with effects of your own that a profile has; may be given several times.",
 )
 winch_argument: Decorator = click.argument("winch", required=False, shell_complete=complete_winch)
+take_over_option: Decorator = click.option(
+    "--take-over",
+    is_flag=True,
+    help="Command the winch even where another client does; its motion ends by a ramp.",
+)
 dry_run_option: Decorator = click.option(
     "--dry-run", is_flag=True, help="Print the frames that it would send; send nothing."
 )

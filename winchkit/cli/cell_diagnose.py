@@ -25,6 +25,7 @@ _MEANINGS = {
     "underload": "below the cell's or the converter's range; check the wires",
     "fault": "the device reports a fault of its own; check cell and cable",
     "stale": "the device says that it has no new value",
+    "ambiguous": "it may be the late reply to an earlier request; check the line and longest_reply",
     "frozen": "the counts stand still while they should not; switch the amplifier off and on",
 }
 

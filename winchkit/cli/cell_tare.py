@@ -32,6 +32,9 @@ def command(
 
     The host subtracts the mean; the number stands in BENCH.tares.toml and holds for everything
     that opens the bench from now on. The device knows nothing of it.
+
+    `winchkit tare` does this where the device has no volatile tare of its own, else what --device
+    does: --clear takes the first away, --device --clear the second.
     """
     from winchkit.cli.duration import quantity
 
@@ -51,10 +54,16 @@ def command(
 def _told(task: str, result: dict[str, Any], unit: str) -> str:
     """What was done, for people."""
     if task == "clear tare":
-        return f"the host's tare of {shown(result['removed'], unit)} is gone"
+        return (
+            f"the host's tare of {shown(result['removed'], unit)} is gone; "
+            "`winchkit tare` sets one again"
+        )
     before, after = (shown(result[key], unit) for key in ("before", "after"))
     if task == "clear device tare":
-        return f"the device's own tare is gone: it read {before}; it reads {after}"
+        return (
+            f"the device's own tare is gone: it read {before}; it reads {after}; "
+            "`winchkit tare` sets one again"
+        )
     by = "the device" if task == "device tare" else "the host"
     return (
         f"tared by {by}: {before} ± {shown(result['std'], unit, 2)} is zero now "

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.bench_option import effects_option
+from winchkit.cli.check_computer import about_computer, refusals
 from winchkit.cli.output import echo_json
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, one_line
 
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.read import Declared
-    from winchkit.schema.winch import WinchProfile
 
 __all__ = ["command"]
 
 RUNS = (".csv", ".mcap")
+EDS = (".eds", ".dcf")
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,10 @@ class Verdict:
     summary: str = ""
     faults: tuple[Fault, ...] = ()
     warnings: tuple[Fault, ...] = ()
+    details: tuple[str, ...] = ()
+    """What is worth knowing before the file is used."""
+    drive: object = None
+    """Of an EDS or DCF: what it says of the drive."""
 
     @property
     def ok(self) -> bool:
@@ -42,24 +47,39 @@ class Verdict:
 
 
 @click.command()
-@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@click.argument("files", nargs=-1, metavar="FILE...")
 @effects_option
+@click.option("--computer", is_flag=True, help="Check this computer: real-time settings.")
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
 @click.pass_context
 def command(
-    ctx: click.Context, files: tuple[str, ...], effects: Sequence[str], as_json: bool
+    ctx: click.Context,
+    files: tuple[str, ...],
+    effects: Sequence[str],
+    *,
+    computer: bool,
+    as_json: bool,
 ) -> None:
     """Check files of any kind: profiles, benches, programmes, devices (.toml), runs (.csv, .mcap).
 
-    Every fault of a file is told with its line. Exits with 3 when a file has one.
+    Of a drive's EDS or DCF it tells what matters for winchkit; of a device file and of a bench
+    whether the drives do it by their EDS, and how each notices a dead host. Every fault of
+    a file is told with its line. Exits with 3 when a file has one. ``--computer`` says what this
+    computer permits a control loop (docs/realtime.md).
     """
+    if not files and not computer:
+        raise click.UsageError("Missing argument 'FILE...'; or --computer.", ctx)
     verdicts = [_verdict(file, effects) for file in files]
+    lines = about_computer() if computer else ()
     for verdict in verdicts:
         for warning in verdict.warnings:
             click.echo(f"{warning} (warning)", err=True)
     if as_json:
-        echo_json({"schema": 1, "files": [_entry(verdict) for verdict in verdicts]})
+        told = {"computer": lines} if computer else {}
+        echo_json({"schema": 1, "files": [_entry(verdict) for verdict in verdicts], **told})
     else:
+        for line in lines:
+            click.echo(line)
         for verdict in verdicts:
             _show(verdict)
     ctx.exit(0 if all(verdict.ok for verdict in verdicts) else FileError.exit_code)
@@ -70,9 +90,11 @@ def _verdict(file: str, effects: Sequence[str]) -> Verdict:
         suffix = Path(file).suffix.lower()
         if suffix in RUNS:
             return _run(file)
+        if suffix in EDS:
+            return _eds(file)
         if suffix == ".toml" or not Path(file).is_file():
             return _declaration(file, effects)
-        known = ", ".join((".toml", *RUNS))
+        known = ", ".join((".toml", *EDS, *RUNS))
         return Verdict(file, "", faults=(Fault(f"'{suffix}' is none of {known}", file),))
     except FileError as error:
         return Verdict(file, "", faults=error.faults)
@@ -87,79 +109,86 @@ def _run(file: str) -> Verdict:
     return Verdict(file, "run", run.name, summary_of(run).text, warnings=notes)
 
 
+def _eds(file: str) -> Verdict:
+    from winchkit.cli.check_eds import describe_eds, lines_of
+
+    drive, warnings = describe_eds(Path(file))
+    name = " ".join(filter(None, (drive.maker, drive.product)))
+    kind = Path(file).suffix.lower()[1:]
+    return Verdict(
+        file,
+        kind,
+        name,
+        str(drive.identity),
+        warnings=warnings,
+        details=tuple(lines_of(drive)),
+        drive=drive,
+    )
+
+
 def _declaration(file: str, effects: Sequence[str]) -> Verdict:
-    from winchkit.cli.check_drives import faults_and_warnings
+    from winchkit.cli.check_drives import report_of
     from winchkit.cli.check_drums import stroke_of, warnings_of_drums
+    from winchkit.cli.check_effects import bench_of
+    from winchkit.cli.check_effects import faults_and_warnings as of_effects
     from winchkit.cli.check_robots import faults_and_warnings as of_robots
     from winchkit.schema.read import load
 
     declaration = load(file)
-    drive_faults, drive_warnings = faults_and_warnings(declaration.value)
+    drives = report_of(declaration.value)
     robot_faults, robot_warnings = of_robots(file, declaration.value)
-    effect_faults = dict.fromkeys(_effect_faults(declaration.value, effects))
-    faults = (*effect_faults, *drive_faults, *robot_faults)
+    effect_faults, effect_warnings = of_effects(file, declaration.value, effects)
+    faults = (*effect_faults, *drives.faults, *robot_faults)
     warnings = (
         *declaration.warnings,
+        *effect_warnings,
+        *_doubts(file, declaration.value),
         *warnings_of_drums(file, declaration.value),
-        *drive_warnings,
+        *drives.warnings,
         *robot_warnings,
     )
-    said = stroke_of(declaration.value)
-    return Verdict(file, declaration.kind, declaration.value.name, said, faults, warnings)
+    said, bench = stroke_of(declaration.value), bench_of(declaration.value)
+    return Verdict(
+        file,
+        declaration.kind,
+        declaration.value.name,
+        said,
+        faults,
+        warnings,
+        details=(*drives.details, *(() if bench is None else refusals(bench))),
+    )
 
 
-def _profiles(value: Declared) -> list[WinchProfile]:
-    """The winch profiles of a declaration; those that a bench names are read as well."""
-    from winchkit.catalog import find
-    from winchkit.schema.read import read_winch
-    from winchkit.schema.robot import RobotProfile
-    from winchkit.schema.winch import WinchProfile
+def _doubts(file: str, value: Declared) -> list[Fault]:
+    """Limits of a bench that are possible and rarely meant."""
+    from winchkit.schema.plausible import doubts
+    from winchkit.schema.read_source import open_source
+    from winchkit.schema.simbench import SimBench
 
-    if isinstance(value, WinchProfile):
-        return [value]
-    if isinstance(value, RobotProfile):
-        return [line.winch for line in value.line if isinstance(line.winch, WinchProfile)]
-    bench = _bench(value)
-    if bench is None:
+    bench = value.bench if isinstance(value, SimBench) else _bench(value)
+    if bench is None or not (found := list(doubts(bench))):
         return []
-    named = dict.fromkeys(wiring.profile for wiring in bench.winch.values())
-    return [read_winch(find("profiles", name, beside=bench.path)) for name in named]
+    source = open_source(file)
+    return [source.fault(key, message) for key, message in found]
 
 
 def _bench(value: Declared) -> BenchSpec | None:
-    """The bench that a declaration is, if it is one."""
+    """The bench of a bench file; None for any other declaration."""
     from winchkit.schema.bench import BenchSpec
-    from winchkit.schema.simbench import SimBench
 
-    bench = value.bench if isinstance(value, SimBench) else value
-    return bench if isinstance(bench, BenchSpec) else None
-
-
-def _effect_faults(value: Declared, effects: Sequence[str]) -> list[Fault]:
-    """What is wrong with the effects that profiles declare, a robot's own among them."""
-    from winchkit.schema.robot import RobotProfile
-
-    profiles, bench = _profiles(value), _bench(value)
-    files: list[str | Path] = [*effects, *(bench.effect_files if bench is not None else ())]
-    robot = value if isinstance(value, RobotProfile) and value.effect else None
-    if not (files or robot or any(profile.effect for profile in profiles)):
-        return []
-    from winchkit.effects import check_profile, load_catalogue
-    from winchkit.effects.bind_robot import check_robot
-
-    catalogue = load_catalogue(files)
-    faults = [fault for profile in profiles for fault in check_profile(profile, catalogue)]
-    return faults if robot is None else [*faults, *check_robot(robot, catalogue)]
+    return value if isinstance(value, BenchSpec) else None
 
 
 def _show(verdict: Verdict) -> None:
     for fault in verdict.faults:
         click.echo(str(fault), err=True)
     if verdict.ok:
-        called = f"{verdict.kind} '{verdict.name}'" + (
+        called = f"{verdict.kind} '{one_line(verdict.name)}'" + (
             f", {verdict.summary}" if verdict.summary else ""
         )
-        click.echo(f"{verdict.path}: ok ({called})")
+        click.echo(f"{one_line(verdict.path)}: ok ({called})")
+        for line in verdict.details:
+            click.echo(f"  {line}")
 
 
 def _entry(verdict: Verdict) -> dict[str, object]:
@@ -170,4 +199,6 @@ def _entry(verdict: Verdict) -> dict[str, object]:
         "name": verdict.name or None,
         "faults": verdict.faults,
         "warnings": verdict.warnings,
+        "details": verdict.details,
+        "drive": verdict.drive,
     }

@@ -10,6 +10,8 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
+from winchkit.regular_file import regular
+
 __all__ = ["complete_bench", "complete_device", "complete_programme", "complete_winch"]
 
 _KIND = re.compile(r'^kind\s*=\s*"([\w-]+)"', re.MULTILINE)
@@ -47,7 +49,7 @@ def complete_winch(ctx: click.Context, param: click.Parameter, typed: str) -> li
     if not bench:
         return []
     try:
-        with Path(bench).open("rb") as file:
+        with open(bench, "rb", opener=regular) as file:
             winches = tomllib.load(file).get("winch", {})
     except (OSError, tomllib.TOMLDecodeError):
         return []
@@ -87,7 +89,7 @@ def _files(typed: str, kinds: tuple[str, ...]) -> list[CompletionItem]:
 def _kind(path: Path) -> str:
     """Kind of a declaration by its first lines; empty where it has none."""
     try:
-        with path.open(encoding="utf-8", errors="replace") as file:
+        with open(path, encoding="utf-8", errors="replace", opener=regular) as file:
             found = _KIND.search(file.read(_HEAD))
     except OSError:
         return ""

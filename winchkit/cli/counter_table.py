@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from winchkit.cli.core.terminal import cell
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -48,7 +50,7 @@ def counter_table(counters: Mapping[str, Mapping[str, Any]]) -> Table:
     for head, _ in HEADS.values():
         table.add_column(head, justify="right", no_wrap=True)
     for row in counter_rows(counters):
-        table.add_row(*row)
+        table.add_row(*map(cell, row))
     return table
 
 

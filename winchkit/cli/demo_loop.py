@@ -1,11 +1,9 @@
-"""The stations of the demonstration: record on a live simulated bench, diagnose, add, compare."""
+"""The stations of the demonstration: record on a simulated bench, diagnose, add, compare."""
 
 from __future__ import annotations
 
 import shutil
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,21 +14,18 @@ if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
     from winchkit.diagnosis.add import Addition
     from winchkit.diagnosis.diagnose import Answer
-    from winchkit.errors import MotionError
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme, Step
     from winchkit.schema.simbench import SimBench
 
 __all__ = ["Findings", "Told", "learn", "programmes", "record", "truth_of"]
 
-Told = Callable[[str], None]
-"""Told what is being done."""
+Told = Callable[[str, float], None]
+"""Told what is being done, and the recorded time so far, s."""
 
 PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
 _AT_NOISE = 1.3
-_TURN = 5e-4
 _APPROACH = 0.5
-_TRIES = 4
 
 
 @dataclass(frozen=True)
@@ -77,30 +72,38 @@ def truth_of(bench: SimBench) -> tuple[str, ...]:
 
 
 def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
-    """Run the programmes on a live simulated bench: real CAN frames, real Modbus transactions."""
+    """Run the programmes on a simulated bench, with CAN frames and Modbus transactions.
+
+    Time is simulated: it advances as fast as this computer can. Raises MotionError where the
+    control loop was late nevertheless: such runs are not valid.
+    """
     from winchkit.bench.bench import open_bench
     from winchkit.bench.programme import run_programme
+    from winchkit.errors import MotionError
+    from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live import LiveBench
-    from winchkit.sim.pace import PacedClock
 
     written: list[Path] = []
-    patience = _Patience(told)
-    clock = PacedClock()
-    with _quick_turns(), LiveBench(bench, seed=seed, clock=clock.simulation) as live:
-        told("commissioning the drive")
+    clock = SimulatedClock()
+    start = clock.now()
+
+    def progress(repeat: int, _number: int, step: Step) -> None:
+        told(f"repeat {repeat}: {_words(step)}", clock.now() - start)
+
+    with LiveBench(bench, seed=seed, simulated_time=clock) as live:
+        told("commissioning the drive", 0.0)
         with open_bench(live.bench_spec, clock) as opened:
-            opened.on_cycle(clock.control)
             for programme in programmes():
                 _go_to_start(opened, programme)
-
                 written += run_programme(
-                    opened,
-                    programme,
-                    folder,
-                    live.answer,
-                    progress=lambda repeat, _, step: told(f"repeat {repeat}: {_words(step)}"),
-                    again=patience.again,
+                    opened, programme, folder, live.answer, progress=progress, replace=True
                 )
+            late = opened.loop.overruns
+    if late:
+        raise MotionError(
+            f"this computer could not keep the cycle: {late} late, result not valid; "
+            "run the demo again while less else is running"
+        )
     return written
 
 
@@ -121,30 +124,6 @@ def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
     addition = add(answer.diagnosis.steps[0].effects[0], runs, profile)
     write_addition(nominal, addition, [run.name for run in runs], out / "improved.toml")
     return Findings(answer, addition)
-
-
-class _Patience:
-    """Tries a run again when this machine was too busy for a bench in real time."""
-
-    def __init__(self, told: Told) -> None:
-        self._told, self._left = told, _TRIES
-
-    def again(self, error: MotionError) -> bool:
-        """Whether to try once more."""
-        self._left -= 1
-        self._told(f"the machine was too busy ({error}); that run once more")
-        return self._left >= 0
-
-
-@contextmanager
-def _quick_turns() -> Iterator[None]:
-    """Let threads change turns more often: bench and simulation share this interpreter."""
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(_TURN)
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(before)
 
 
 def _go_to_start(opened: Bench, programme: Programme) -> None:

@@ -40,13 +40,21 @@ class Frame:
 
 @contextmanager
 def station_for(
-    bench: str, *, dry_run: bool, as_json: bool = False, effects: Sequence[str] = ()
+    bench: str,
+    *,
+    client: str,
+    dry_run: bool,
+    as_json: bool = False,
+    effects: Sequence[str] = (),
 ) -> Iterator[Station]:
-    """A station at the bench or, for a dry run, at a rehearsal whose frames are then shown."""
+    """A station at the bench or, for a dry run, at a rehearsal whose frames are then shown.
+
+    ``client`` is the command's name, as other clients of the bench see it.
+    """
     from winchkit.bench.session import at_station
 
     if not dry_run:
-        with at_station(bench, effects) as station:
+        with at_station(bench, effects, client=client) as station:
             yield station
         return
     from winchkit.schema.read import read_bench

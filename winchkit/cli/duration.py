@@ -5,19 +5,31 @@ from __future__ import annotations
 import re
 
 from winchkit.errors import UsageError
-from winchkit.units import parse
+from winchkit.schema.plausible import check_size
+from winchkit.units import UNITS, parse
 
-__all__ = ["optional", "quantity", "seconds"]
+__all__ = ["dimension", "optional", "quantity", "seconds"]
 
 _NUMBER = re.compile(r"^\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)$")
 
 
 def quantity(text: str, dimension: str) -> float:
     """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError, also for a time below zero."""
-    value = parse(_NUMBER.sub(r"\1 \2", text).strip(), dimension)
+    value = check_size(parse(_NUMBER.sub(r"\1 \2", text).strip(), dimension), dimension, text)
     if dimension == "time" and value < 0:
         raise UsageError(f"'{text}' is below zero; a duration is not")
     return value
+
+
+def dimension(text: str, among: tuple[str, ...]) -> str:
+    """Which of these dimensions the unit of ``text`` has; raises UsageError for none of them."""
+    found = _NUMBER.match(text)
+    unit = found[2].strip() if found else ""
+    for name in among:
+        if unit in UNITS[name]:
+            return name
+    units = "; ".join(f"{name} {', '.join(UNITS[name])}" for name in among)
+    raise UsageError(f"'{text}' is no {' or '.join(among)} with its unit ({units})")
 
 
 def optional(text: str | None, dimension: str) -> float | None:

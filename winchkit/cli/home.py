@@ -11,6 +11,7 @@ from winchkit.cli.bench_option import (
     bench_option,
     dry_run_option,
     effects_option,
+    take_over_option,
     winch_argument,
 )
 from winchkit.cli.output import echo_json
@@ -35,6 +36,7 @@ _POLL = 0.02
 @click.option(
     "--speed", metavar="SPEED", help="Of the rope.  [default: a tenth of the winch's limit]"
 )
+@take_over_option
 @effects_option
 @dry_run_option
 @click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
@@ -46,6 +48,7 @@ def command(
     method: int | None,
     at: str | None,
     speed: str | None,
+    take_over: bool,
     effects: Sequence[str],
     dry_run: bool,
     as_json: bool,
@@ -64,7 +67,11 @@ def command(
     if at is not None and here is not None:
         raise UsageError("--at belongs to --method; --here names the length already")
     length = optional(here if here is not None else at, "length")
-    with station_for(bench, dry_run=dry_run, as_json=as_json, effects=effects) as station:
+    with station_for(
+        bench, client="home", dry_run=dry_run, as_json=as_json, effects=effects
+    ) as station:
+        if take_over:
+            station.take_over(winch)
         station.home(winch, method, length, optional(speed, "speed"))
         while station.homing():
             time.sleep(_POLL)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
@@ -13,41 +14,39 @@ from winchkit.cli.bench_option import (
     bench_option,
     dry_run_option,
     effects_option,
+    take_over_option,
     winch_argument,
 )
+from winchkit.cli.direction_option import Directed, direction_options, magnitude, read_direction
 from winchkit.cli.output import echo_json
 from winchkit.cli.status_line import status_line
-from winchkit.errors import ConnectionLost, UsageError, WinchkitError
+from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.station import Station
-    from winchkit.cli.keys import HeldKey
 
 __all__ = ["command"]
 
 _REFRESH = 0.05
 _HOLD = 0.2
-_FASTER = 1.25
-_HELP = "hold up: wind in, down: pay out · space: stop · + −: speed · r: reset · q: stop and quit"
+_SPEED = "0.05 m/s"
+_HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
 
 
 @click.command()
 @winch_argument
 @bench_option
+@direction_options("SPEED|LENGTH")
+@click.option(
+    "--for", "duration", metavar="TIME", help="With a SPEED: move for this long, then stop."
+)
 @click.option(
     "--speed",
-    default="0.05 m/s",
-    show_default=True,
     metavar="SPEED",
-    help="Of the rope; positive winds in.",
-)
-@click.option(
-    "--for", "duration", metavar="TIME", help="Without keys: move for this long, then stop."
-)
-@click.option(
-    "--step", metavar="LENGTH", help="Without keys: wind in so much rope (negative pays out)."
+    help=f"With keys, or with a LENGTH: how fast; no direction.  [default: {_SPEED}]",
 )
 @click.option("--reset", is_flag=True, help="First clear trips and drive faults.")
+@take_over_option
 @effects_option
 @dry_run_option
 @click.option(
@@ -57,49 +56,86 @@ def command(
     winch: str | None,
     *,
     bench: str,
-    speed: str,
+    pay_out: str | None,
+    wind_in: str | None,
     duration: str | None,
-    step: str | None,
+    speed: str | None,
     reset: bool,
+    take_over: bool,
     effects: Sequence[str],
     dry_run: bool,
     as_json: bool,
 ) -> None:
     """Move WINCH (the only one where there is one) by hand.
 
-    With the keyboard: hold the up arrow to wind in, the down arrow to pay out; letting go stops
-    it within 0.2 s (0.7 s after a first short press, since a keyboard repeats late).
-    Space stops, q stops and quits. Attaches to the process that owns the bench where there is
-    one. The software is no emergency stop.
+    --pay-out 0.1m/s --for 2s moves at a speed for a time, --wind-in 50mm by a length. Without
+    either, by the keyboard: hold the up arrow to wind in, the down arrow to pay out; letting go
+    stops it within 0.2 s (0.7 s after a first short press, since a keyboard repeats late). Key i:
+    inch mode, 1, 10 or 100 mm a tap; Space stops, q stops and quits. No emergency stop.
     """
     from winchkit.cli.dry_run import station_for
-    from winchkit.cli.duration import quantity, seconds
 
-    velocity, limit = quantity(speed, "speed"), seconds(duration)
-    if limit is None and step is None and (dry_run or not sys.stdin.isatty()):
-        raise UsageError("there is no terminal to hold a key on; use --for TIME or --step LENGTH")
-    with station_for(bench, dry_run=dry_run, as_json=as_json, effects=effects) as station:
+    asked = _read(pay_out, wind_in, duration, speed)
+    if asked.direction is None and (dry_run or not sys.stdin.isatty()):
+        raise UsageError(f"there is no terminal to hold a key on: {_HOW}")
+    with station_for(
+        bench, client="jog", dry_run=dry_run, as_json=as_json, effects=effects
+    ) as station:
         if reset:
             station.reset()
-        if step is not None:
-            station.step(winch, -quantity(step, "length"), abs(velocity))
-            _wait(station, winch)
-        elif limit is not None:
-            _jog_for(station, winch, velocity, limit)
-        else:
-            _jog_by_keys(station, winch, velocity)
+        if take_over:
+            station.take_over(winch)
+        if asked.direction is None:
+            _jog_by_keys(station, winch, asked.speed)
             return
+        if asked.duration is None:
+            station.step(winch, asked.direction.change, asked.speed)
+            _wait(station, winch)
+        else:
+            _jog_for(station, winch, asked.direction.winding_speed, asked.duration)
         if as_json and not dry_run:
             echo_json(station.status())
         elif not dry_run:
             click.echo(status_line(station.status()))
 
 
-def _jog_for(station: Station, winch: str | None, speed: float, duration: float) -> None:
+@dataclass(frozen=True)
+class _Asked:
+    """What the options ask for."""
+
+    direction: Directed | None
+    """None: by keys."""
+    duration: float | None
+    """s; None for a length."""
+    speed: float
+    """Of keys and of a length, m/s."""
+
+
+def _read(
+    pay_out: str | None, wind_in: str | None, duration: str | None, speed: str | None
+) -> _Asked:
+    """The options in SI; raises UsageError for those that do not belong together."""
+    from winchkit.cli.duration import seconds
+
+    direction, limit = read_direction(pay_out, wind_in), seconds(duration)
+    if limit is not None:
+        if direction is None:
+            raise UsageError("which way? --for needs --pay-out SPEED or --wind-in SPEED")
+        if speed is not None:
+            raise UsageError(f"--speed does not belong to --for: {_HOW}")
+        _ = direction.winding_speed
+    elif direction is not None:
+        if direction.dimension == "speed":
+            raise UsageError(f"for how long? {direction.option} SPEED needs --for TIME: {_HOW}")
+        _ = direction.change
+    return _Asked(direction, limit, magnitude("--speed", speed or _SPEED, "speed"))
+
+
+def _jog_for(station: Station, winch: str | None, winding_speed: float, duration: float) -> None:
     """Keep a dead-man alive from here for a time."""
     end = time.monotonic() + duration
     while (left := end - time.monotonic()) > 0:
-        station.jog(winch, speed, min(_HOLD, left + _REFRESH))
+        station.jog(winch, winding_speed, min(_HOLD, left + _REFRESH))
         time.sleep(min(_REFRESH, left))
     station.jog(winch, 0.0, _REFRESH)
     _wait(station, winch)
@@ -111,37 +147,8 @@ def _wait(station: Station, winch: str | None) -> None:
 
 
 def _jog_by_keys(station: Station, winch: str | None, speed: float) -> None:
-    from winchkit.cli.keys import HeldKey, open_keys
+    from winchkit.cli.keyboard_jog import KeyboardJog
+    from winchkit.cli.keys import open_keys
 
-    click.echo(_HELP, err=True)
-    speed, held = abs(speed), HeldKey()
     with open_keys() as keys:
-        while True:
-            for key in keys.read(_REFRESH * 2):
-                if key == "q":
-                    station.stop()
-                    click.echo("\nstopped", err=True)
-                    return
-                if key in "+-":
-                    speed *= _FASTER if key == "+" else 1 / _FASTER
-                else:
-                    _act(station, winch, key, speed, held)
-            click.echo(
-                f"\r{status_line(station.status())}  [{speed:.3f} m/s]\x1b[K", nl=False, err=True
-            )
-
-
-def _act(station: Station, winch: str | None, key: str, speed: float, held: HeldKey) -> None:
-    """Do what a key says; what forbids it is shown, and the operator decides."""
-    try:
-        if key in ("up", "down"):
-            hold = held.hold(key, time.monotonic())
-            station.jog(winch, speed if key == "up" else -speed, hold)
-        elif key == " ":
-            station.stop()
-        elif key == "r":
-            station.reset()
-    except ConnectionLost:
-        raise
-    except WinchkitError as error:
-        click.echo(f"\n{error}", err=True)
+        KeyboardJog(station, winch, speed, time.monotonic).run(keys)

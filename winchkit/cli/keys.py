@@ -6,10 +6,11 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Protocol
 
-from winchkit.bench.motion import DEAD_MAN, FIRST_PRESS
+from winchkit.bench.dead_man import DEAD_MAN, FIRST_PRESS
+from winchkit.bench.remote.interruption import Terminated
 
 __all__ = ["HeldKey", "Keys", "open_keys"]
 
@@ -59,7 +60,8 @@ def open_keys() -> Iterator[Keys]:
         tty.setcbreak(descriptor)
         yield _PosixKeys(descriptor)
     finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # a terminal that was closed has no settings
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
 
 
 class _PosixKeys:
@@ -73,7 +75,13 @@ class _PosixKeys:
         ready, _, _ = select.select([self._descriptor], [], [], timeout)
         if not ready:
             return []
-        return split_keys(os.read(self._descriptor, 256).decode(errors="replace") or "q")
+        try:
+            typed = os.read(self._descriptor, 256).decode(errors="replace")
+        except OSError:  # the terminal was closed
+            typed = ""
+        if not typed:
+            raise Terminated
+        return split_keys(typed)
 
 
 class _WindowsKeys:

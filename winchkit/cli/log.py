@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from winchkit.cli.bench_option import effects_option
 from winchkit.cli.completing import complete_bench
 from winchkit.cli.lazy import At, LazyGroup
 from winchkit.cli.output import echo_json
+from winchkit.errors import WinchkitError
 
 if TYPE_CHECKING:
     from winchkit.bench.live_sinks import LiveSink
@@ -67,7 +68,8 @@ def command(
     """Log every winch of a bench until Ctrl-C, or for a time.
 
     MCAP holds every channel with its own time stamps. In CSV a row stands for each reading of the
-    load cell (else of the length instrument). Attaches to whoever owns the bench; moves nothing.
+    load cell (else of the length instrument). Moves nothing, and keeps no program from owning the
+    bench; when the owner ends, the log goes on in a file of its own, FILE-2 and so on.
     """
     if context.invoked_subcommand is not None:
         return
@@ -75,28 +77,114 @@ def command(
         raise click.UsageError("Missing option '-b' / '--bench'.")
     _refuse(output, rotate, jsonl=jsonl, udp=udp, as_json=as_json)
     _refuse_to_lose(None if replace else output)
-    from winchkit.bench.session import at_station
+    from winchkit.bench.remote.reconnection import watch
     from winchkit.cli.duration import quantity, seconds
     from winchkit.cli.live_output import live_sinks
 
     limit, pause = seconds(duration), quantity(period, "time")
-    with live_sinks(jsonl=jsonl, udp=udp) as sinks, at_station(bench, effects) as station:
-        _begin(station, output, rotate)
-        with _counter_row(station) as show:
-            _follow(station, limit, pause if sinks else _CHECK_PERIOD, sinks, show)
-        counted = station.counters()
-        rows = station.end_log() if output else 0
+    with live_sinks(jsonl=jsonl, udp=udp) as sinks:
+        log = _Log(output, rotate, replace, limit, pause if sinks else _CHECK_PERIOD, sinks)
+        try:
+            watch(bench, "log", log.follow, log.lose, effects)
+        except KeyboardInterrupt:
+            click.echo("ending the log", err=True)
+        except WinchkitError as error:
+            if as_json:
+                echo_json(log.result | {"problem": str(error)})
+            raise
     if as_json:
-        echo_json({"schema": 1, "output": output, "rows": rows, "counters": counted})
+        echo_json(log.result)
     elif output and not jsonl:
-        click.echo(f"{output}: {rows} rows")
+        for file, rows in log.files.items():
+            click.echo(f"{file}: {rows} rows")
 
 
-def _begin(station: Station, output: str | None, rotate: str | None) -> None:
-    """Start the log that was asked for, in the place of an earlier one."""
-    if output:
-        _let_go(output)
-        station.start_log(str(Path(output).absolute()), rotate)
+class _Log:
+    """A log over the life of one or several owners of the bench, each of which writes a file."""
+
+    def __init__(
+        self,
+        output: str | None,
+        rotate: str | None,
+        replace: bool,
+        limit: float | None,
+        pause: float,
+        sinks: list[LiveSink],
+    ) -> None:
+        self.files: dict[str, int] = {}
+        """Rows by file."""
+        self._output, self._rotate, self._replace = output, rotate, replace
+        self._limit, self._pause, self._sinks = limit, pause, sinks
+        self._counted: dict[str, dict[str, Any]] = {}
+        self._start = 0.0
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What was logged, as JSON has it."""
+        return {
+            "schema": 1,
+            "output": self._output,
+            "files": self.files,
+            "counters": self._counted,
+            "rows": sum(self.files.values()),
+        }
+
+    def lose(self, words: str) -> None:
+        """Tell that an owner has gone."""
+        goes_on = f"; the log goes on in {self._next()}" if self._output else ""
+        click.echo(f"winchkit: {words}{goes_on}", err=True)
+
+    def follow(self, station: Station) -> None:
+        """Log at an owner until the time is over, or Ctrl-C."""
+        file = self._next()
+        self._start = self._start or time.monotonic()
+        if file:
+            station.start_log(str(Path(file).absolute()), self._rotate, self._replace)
+            self.files[file], self._replace = 0, False
+        try:
+            with _counter_row(station) as show:
+                self._watch(station, file, show)
+        except KeyboardInterrupt:
+            click.echo("ending the log", err=True)
+        except WinchkitError:
+            self._note_rows(station, file)
+            raise
+        self._counted = station.counters()
+        if file:
+            self.files[file] = station.end_log()
+
+    def _note_rows(self, station: Station, file: str) -> None:
+        """Counters and rows of a log that has failed, where its owner still answers."""
+        with suppress(WinchkitError):
+            self._counted = station.counters()
+            if file:
+                self.files[file] = int(self._counted.get("log", {}).get("rows") or 0)
+
+    def _watch(self, station: Station, file: str, show: Callable[[], None]) -> None:
+        """Look after the log, and show every new picture, until the time is over."""
+        seen = -1
+        while self._limit is None or time.monotonic() - self._start < self._limit:
+            time.sleep(min(self._pause, self._limit or self._pause))
+            rows = station.log_rows()
+            if file:
+                self.files[file] = rows
+            status = station.status() if self._sinks else {"cycle": seen}
+            if status["cycle"] != seen:
+                seen = status["cycle"]
+                for sink in self._sinks:
+                    sink(status)
+            show()
+
+    def _next(self) -> str:
+        """The file for the next owner: ``lift.csv``, then ``lift-2.csv`` and so on."""
+        if not self._output or not self.files:
+            return self._output or ""
+        path, number = Path(self._output), len(self.files) + 1
+        while True:
+            following = path.with_stem(f"{path.stem}-{number}")
+            if not _earlier(str(following)):
+                return str(following)
+            number += 1
 
 
 def _earlier(output: str) -> list[Path]:
@@ -114,17 +202,6 @@ def _refuse_to_lose(output: str | None) -> None:
         raise click.UsageError(f"{held[0]} holds a log already; name another file, or --replace.")
 
 
-def _let_go(output: str) -> None:
-    """Take an earlier log away: parts of it would be read as parts of the new one."""
-    from winchkit.errors import Fault, FileError
-
-    for item in _earlier(output):
-        try:
-            item.unlink()
-        except OSError as error:
-            raise FileError(Fault(f"cannot be replaced: {error.strerror}", str(item))) from None
-
-
 def _refuse(
     output: str | None, rotate: str | None, *, jsonl: bool, udp: str | None, as_json: bool
 ) -> None:
@@ -137,29 +214,6 @@ def _refuse(
         from winchkit.runs.rotation import Rotation
 
         Rotation.parse(rotate)
-
-
-def _follow(
-    station: Station,
-    limit: float | None,
-    pause: float,
-    sinks: list[LiveSink],
-    show: Callable[[], None],
-) -> None:
-    """Watch over the log, and show every new picture, until the time is over."""
-    start, seen = time.monotonic(), -1
-    try:
-        while limit is None or time.monotonic() - start < limit:
-            time.sleep(min(pause, limit or pause))
-            station.log_rows()
-            status = station.status() if sinks else {"cycle": seen}
-            if status["cycle"] != seen:
-                seen = status["cycle"]
-                for sink in sinks:
-                    sink(status)
-            show()
-    except KeyboardInterrupt:
-        click.echo("ending the log", err=True)
 
 
 @contextmanager

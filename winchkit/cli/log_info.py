@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.output import echo_json
+from winchkit.errors import one_line
 
 if TYPE_CHECKING:
     from winchkit.runs.info import LogInfo, SourceInfo
@@ -33,7 +34,7 @@ def command(files: tuple[str, ...], as_json: bool) -> None:
         echo_json({"schema": 1, **vars(info)})
         return
     for line in _lines(info):
-        click.echo(line)
+        click.echo(one_line(line))
 
 
 def _lines(info: LogInfo) -> list[str]:
@@ -45,6 +46,8 @@ def _lines(info: LogInfo) -> list[str]:
     lines += [f"  {note}" for note in info.notes]
     lines += [f"  {_source(item)}" for item in info.sources]
     lines += [f"  trip: {text}" for text in info.events]
+    lines += [f"  tare of {text}" for text in info.tares]
+    lines += [f"  commander of {text}" for text in info.commanders]
     for name, *cells in counter_rows(info.counters):
         counted = zip(HEADS.values(), cells, strict=True)
         lines.append(f"  {name}: " + ", ".join(f"{words} {cell}" for (_, words), cell in counted))
@@ -65,4 +68,5 @@ def _source(item: SourceInfo) -> str:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+    shown = one_line(text)
+    return shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"

@@ -12,8 +12,10 @@ from winchkit.cli.bench_option import (
     bench_option,
     dry_run_option,
     effects_option,
+    take_over_option,
     winch_argument,
 )
+from winchkit.cli.direction_option import direction_options, read_direction
 from winchkit.cli.output import echo_json
 from winchkit.cli.status_line import status_line
 from winchkit.errors import UsageError
@@ -30,9 +32,12 @@ _POLL = 0.05
 @winch_argument
 @bench_option
 @click.option("--to", metavar="LENGTH", help="Cable length to go to.")
-@click.option("--by", metavar="LENGTH", help="Change of cable length; positive pays out.")
-@click.option("--speed", metavar="SPEED", help="Of the rope.  [default: the winch's limit]")
+@direction_options("LENGTH")
+@click.option(
+    "--speed", metavar="SPEED", help="How fast; no direction.  [default: the winch's limit]"
+)
 @click.option("--acceleration", metavar="ACCELERATION", help="[default: the winch's limit]")
+@take_over_option
 @effects_option
 @dry_run_option
 @click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
@@ -41,14 +46,16 @@ def command(
     *,
     bench: str,
     to: str | None,
-    by: str | None,
+    pay_out: str | None,
+    wind_in: str | None,
     speed: str | None,
     acceleration: str | None,
+    take_over: bool,
     effects: Sequence[str],
     dry_run: bool,
     as_json: bool,
 ) -> None:
-    """Move WINCH to a cable length on an S-curve, then disable it.
+    """Move WINCH to a cable length, or by one, on an S-curve; then disable it.
 
     WINCH may be left out where there is one, and be "all": then all winches start in one control
     cycle and arrive together. Ctrl-C stops. Attaches to the process that owns the bench where
@@ -57,11 +64,17 @@ def command(
     from winchkit.cli.dry_run import station_for
     from winchkit.cli.duration import optional
 
-    if (to is None) == (by is None):
-        raise UsageError("where to? give either --to LENGTH or --by LENGTH")
-    target, change = optional(to, "length"), optional(by, "length")
+    direction = read_direction(pay_out, wind_in)
+    if (to is None) == (direction is None):
+        raise UsageError("where to? give one of --to, --pay-out and --wind-in, each a LENGTH")
+    target = optional(to, "length")
+    change = None if direction is None else direction.change
     fastest, ramp = optional(speed, "speed"), optional(acceleration, "acceleration")
-    with station_for(bench, dry_run=dry_run, as_json=as_json, effects=effects) as station:
+    with station_for(
+        bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects
+    ) as station:
+        if take_over:
+            station.take_over(winch)
         station.move(winch, target, change, fastest, ramp)
         _wait(station, winch)
         status = station.status()

@@ -5,17 +5,20 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import NoReturn
 
 import click
 
+from winchkit.bench.remote.interruption import Interruption, Terminated, interrupted_by_signals
+from winchkit.cli.core.terminal import escaped_output
 from winchkit.errors import FileError, WinchkitError
 
 __all__ = ["INTERNAL", "INTERRUPTED", "finish", "threads_abandoned"]
 
 INTERRUPTED = 130
 INTERNAL = 70
+_TERMINATED = 143
 _DEBUG = "WINCHKIT_DEBUG"
 
 
@@ -23,29 +26,49 @@ def finish(call: Callable[[], object]) -> NoReturn:
     """Run a command and leave the process with its exit code.
 
     0 done, 1 the check failed, 2 usage, 3 bad file, 4 bus or device unreachable, 5 drive fault
-    or limit, 130 interrupted, 70 a defect of winchkit itself.
+    or limit, 130 interrupted (143 by SIGTERM, 129 by SIGHUP or a closed terminal, in the same
+    way), 70 a defect of winchkit itself.
     """
+    with escaped_output(), interrupted_by_signals() as interruption:
+        sys.exit(_run(call, interruption))
+
+
+def _run(call: Callable[[], object], interruption: Interruption) -> int:
+    """Run a command; returns its exit code."""
     try:
         result = call()
     except WinchkitError as error:
         _tell(str(error) if isinstance(error, FileError) else f"winchkit: {error}")
-        sys.exit(error.exit_code)
+        return error.exit_code
     except click.ClickException as error:
         error.show()
-        sys.exit(error.exit_code)
+        return error.exit_code
     except (click.Abort, KeyboardInterrupt) as error:
-        interrupted = isinstance(error.__cause__ or error, KeyboardInterrupt)
-        _tell("winchkit: interrupted" if interrupted else "winchkit: the input ended")
-        sys.exit(INTERRUPTED if interrupted else 1)
+        if not interruption.note(_interrupt(error)):
+            _tell("winchkit: the input ended")
+            return 1
     except Exception as error:
-        if os.environ.get(_DEBUG):
-            raise
-        _tell(
-            f"winchkit: internal error: {type(error).__name__}: {error} "
-            f"(a defect of winchkit, please report it; {_DEBUG}=1 shows where)"
-        )
-        sys.exit(INTERNAL)
-    sys.exit(result if type(result) is int else 0)
+        # A terminal that was closed refuses what is still to be said; the stop is done then.
+        if not interruption.note(_interrupt(error)):
+            if os.environ.get(_DEBUG):
+                raise
+            _tell(
+                f"winchkit: internal error: {type(error).__name__}: {error} "
+                f"(a defect of winchkit, please report it; {_DEBUG}=1 shows where)"
+            )
+            return INTERNAL
+    else:
+        return result if type(result) is int else 0
+    _tell(f"winchkit: {interruption.words}")
+    return interruption.exit_code
+
+
+def _interrupt(error: BaseException) -> BaseException | None:
+    """The interrupt that an error came from, or during whose handling it came."""
+    found: BaseException | None = error
+    while found is not None and not isinstance(found, KeyboardInterrupt):
+        found = found.__cause__ or found.__context__
+    return found
 
 
 @contextmanager
@@ -56,12 +79,15 @@ def threads_abandoned() -> Iterator[None]:
     """
     try:
         yield
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         _tell("winchkit: interrupted")
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(INTERRUPTED)
+        with suppress(OSError):
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(_TERMINATED if isinstance(error, Terminated) else INTERRUPTED)
 
 
 def _tell(message: str) -> None:
-    click.echo(message, err=True)
+    """Say it on stderr, where there still is one."""
+    with suppress(OSError):
+        click.echo(message, err=True)

@@ -14,12 +14,18 @@ from typing import Any
 
 import click
 
+from winchkit.errors import CONTROL_CHARACTERS
+
 __all__ = ["echo_each", "echo_json", "plain", "to_json"]
 
 
 def to_json(value: object) -> str:
-    """One line of JSON; NaN and infinity become null, dataclasses and arrays what they hold."""
-    return json.dumps(plain(value), ensure_ascii=False, allow_nan=False)
+    """One line of JSON; NaN and infinity become null, dataclasses and arrays what they hold.
+
+    Characters that steer a terminal are escaped, which JSON reads as themselves.
+    """
+    text = json.dumps(plain(value), ensure_ascii=False, allow_nan=False)
+    return CONTROL_CHARACTERS.sub(lambda found: json.dumps(found[0])[1:-1], text)
 
 
 def echo_json(value: object) -> None:

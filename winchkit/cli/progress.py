@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from winchkit.errors import one_line
+
 __all__ = ["progress_bar"]
 
 
@@ -19,7 +21,7 @@ def progress_bar() -> Iterator[Callable[[str, float], None]]:
         BarColumn(),
         TextColumn("{task.percentage:>3.0f} %"),
         TimeElapsedColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
     )
     with Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal
@@ -27,6 +29,6 @@ def progress_bar() -> Iterator[Callable[[str, float], None]]:
         task = bar.add_task("reading", total=1.0)
 
         def told(what: str, share: float) -> None:
-            bar.update(task, description=what, completed=share)
+            bar.update(task, description=one_line(what), completed=share)
 
         yield told

@@ -13,7 +13,12 @@ __all__ = ["command"]
 @click.command()
 @bench_option
 @dry_run_option
-@click.option("--json", "as_json", is_flag=True, help="Print the bench's state as JSON.")
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print the bench's state, and what was cleared, as JSON.",
+)
 def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
     """Clear latched trips and drive faults of a bench; every winch stays disabled.
 
@@ -22,14 +27,16 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
     """
     from winchkit.cli.dry_run import station_for
 
-    with station_for(bench, dry_run=dry_run, as_json=as_json) as station:
-        station.reset()
+    with station_for(bench, client="reset", dry_run=dry_run, as_json=as_json) as station:
+        cleared = station.reset()
         status = station.status()
     if dry_run:
         return
     if as_json:
-        echo_json(status)
+        echo_json({**status, "cleared": cleared})
         return
-    click.echo("reset: nothing is tripped")
+    for item in cleared:
+        click.echo(f"cleared: {item}")
+    click.echo("reset: nothing is tripped" if cleared else "reset: there was nothing to clear")
     for trip in status["blocked"]:
         click.echo(f"still forbidden: {trip}")

@@ -72,7 +72,7 @@ def command(
     if not replace:
         _refuse_to_lose(declared, out, f".{suffix}")
     ask = partial(_agree, bench) if yes else _ask
-    written = _execute(bench, effects, declared, out, f".{suffix}", ask)
+    written = _execute(bench, effects, declared, out, f".{suffix}", ask, replace=replace)
     if as_json:
         echo_json({"schema": 1, "programme": declared.name, "runs": written})
     else:
@@ -87,17 +87,23 @@ def _execute(
     out: Path,
     suffix: str,
     ask: Callable[[Step], None],
+    *,
+    replace: bool,
 ) -> list[Path]:
     """Run it as the bench's owner; other commands may attach meanwhile."""
     from winchkit.bench.bench import open_bench
     from winchkit.bench.programme import run_programme
+    from winchkit.bench.remote.commander import client_name
 
     def tell(repeat: int, number: int, step: Step) -> None:
         place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
         click.echo(f"{place}: {_words(step)}", err=True)
 
-    with open_bench(bench, effects=effects) as opened:
-        return run_programme(opened, programme, out, ask, suffix=suffix, progress=tell)
+    name = client_name("run")
+    with open_bench(bench, effects=effects, name=name, realtime="try") as opened:
+        return run_programme(
+            opened, programme, out, ask, suffix=suffix, progress=tell, replace=replace
+        )
 
 
 def _refuse_to_lose(programme: Programme, out: Path, suffix: str) -> None:
@@ -115,7 +121,9 @@ def _rehearse(bench: str, programme: Programme, effects: Sequence[str], *, as_js
     """Make the moves of one repeat on simulated drives, leaving out holds and questions."""
     from winchkit.cli.dry_run import station_for
 
-    with station_for(bench, dry_run=True, as_json=as_json, effects=effects) as station:
+    with station_for(
+        bench, client="run", dry_run=True, as_json=as_json, effects=effects
+    ) as station:
         for step in programme.step:
             if step.to is None and step.by is None:
                 continue

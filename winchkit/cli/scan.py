@@ -22,7 +22,8 @@ __all__ = ["command"]
 def command(*, as_json: bool, **bus: Any) -> None:
     """List every node of a CAN bus: identity, heartbeat, the device file that fits.
 
-    Asks each node number for its device type and listens for heartbeats; writes nothing. Ends
+    Asks each node number for its device type and listens for heartbeats; writes nothing. Every
+    node is listed, also one that refuses, falls silent or shares its number with another. Ends
     with 4 when nobody answers.
     """
     from winchkit.bench.node_access import nodes_on
@@ -38,9 +39,13 @@ def command(*, as_json: bool, **bus: Any) -> None:
 
 
 def _line(item: Found) -> str:
+    problem = f"; {item.problem}" if item.problem else ""
     if item.device_type is None:
-        return f"{item.bus} node {item.node}: {item.heartbeat}, does not answer SDO"
+        return f"{item.bus} node {item.node}: {item.heartbeat}{problem}"
     fits = f"fits {item.device}" if item.device else "no device file fits"
     name = f"'{item.name}'" if item.name else "no name"
     winch = f", winch {item.winch}" if item.winch else ""
-    return f"{item.bus} node {item.node}: {name}, {item.identity}, {item.heartbeat}, {fits}{winch}"
+    return (
+        f"{item.bus} node {item.node}: {name}, {item.identity}, {item.heartbeat}, {fits}{winch}"
+        + problem
+    )

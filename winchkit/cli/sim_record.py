@@ -59,17 +59,17 @@ def command(
 ) -> None:
     """Run programmes on a simulated BENCH without buses and write one run per load and repeat."""
     from winchkit.catalog import find
+    from winchkit.cli.duration import quantity
     from winchkit.runs import write_csv, write_mcap
     from winchkit.schema.read import read_programme, read_simbench
     from winchkit.sim.bench import hiding, profiles_of, programme_path
     from winchkit.sim.record import record
-    from winchkit.units import parse
 
     declared = read_simbench(find("sim", bench))
     if hidden:
         declared = hiding(declared, hidden)
     profiles = profiles_of(declared)
-    hertz = parse(rate, "frequency")
+    hertz = quantity(rate, "frequency")
     write = write_csv if suffix == "csv" else write_mcap
     written = []
     for name in programmes:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.output import echo_json
+
 if TYPE_CHECKING:
     from winchkit.sim.buses import Interface
     from winchkit.sim.live import LiveBench
@@ -43,15 +45,25 @@ _TURN = 5e-4
     metavar="PHYSICS",
     help="Hide this instead of what the bench hides, as in 'sim record'.",
 )
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print a line of JSON when it is ready, and per reply."
+)
 def command(
-    *, bench: str, seed: int, bench_file: Path | None, interface: Interface, hidden: tuple[str, ...]
+    *,
+    bench: str,
+    seed: int,
+    bench_file: Path | None,
+    interface: Interface,
+    hidden: tuple[str, ...],
+    as_json: bool,
 ) -> None:
     """Run a simulated BENCH live until Ctrl-C: drives on CAN, instruments on Modbus or serial.
 
     Prints the wiring file to connect to. Takes lines on its input: load A 32 kg, fault A.cell
     silence, recover A.cell, status, quit. While it runs, 'winchkit run --yes' with that wiring
     file lets it hang the loads that a programme asks for; it finds the simulation by the file
-    BENCH-bench.toml.sim beside it.
+    BENCH-bench.toml.sim beside it. With --json the first line on stdout says that others can
+    connect now: {"schema": 1, "bench": FILE, "ready": true}.
     """
     from winchkit.catalog import find
     from winchkit.schema.read import read_simbench
@@ -65,12 +77,11 @@ def command(
     ended = threading.Event()
     with LiveBench(declared, seed=seed, hidden=hidden, interface=interface) as live:
         live.write_bench_file(path)
-        with ControlServer(live, path, ended.set):
-            _introduce(live, path)
-            _listen(live, ended)
-            with _ended_by_signals(ended):
-                while not ended.wait(_CHECK_EVERY):
-                    live.check()
+        with ControlServer(live, path, ended.set), _ended_by_signals(ended):
+            _introduce(live, path, as_json=as_json)
+            _listen(live, ended, as_json=as_json)
+            while not ended.wait(_CHECK_EVERY):
+                live.check()
     click.echo(f"ended; {path} leads nowhere any more", err=True)
 
 
@@ -86,21 +97,25 @@ def _ended_by_signals(ended: threading.Event) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _introduce(live: LiveBench, path: Path) -> None:
+def _introduce(live: LiveBench, path: Path, *, as_json: bool) -> None:
     winch = next(iter(live.winches))
-    click.echo(path)
+    if as_json:
+        echo_json({"schema": 1, "bench": path, "ready": True})
+    else:
+        click.echo(path)
     click.echo(f"{live.sim_bench.name} runs. From another terminal:", err=True)
     click.echo(f"  winchkit monitor --bench {path}", err=True)
     click.echo(f"  winchkit jog {winch} --bench {path}", err=True)
     click.echo("Lines here: load, fault, recover, status, quit, help. Ctrl-C ends it.", err=True)
 
 
-def _listen(live: LiveBench, ended: threading.Event) -> None:
+def _listen(live: LiveBench, ended: threading.Event, *, as_json: bool) -> None:
     """Obey what is typed, on a thread; the end of the input ends nothing."""
-    threading.Thread(target=_obey_input, args=(live, ended), name="sim-input", daemon=True).start()
+    arguments = (live, ended, as_json)
+    threading.Thread(target=_obey_input, args=arguments, name="sim-input", daemon=True).start()
 
 
-def _obey_input(live: LiveBench, ended: threading.Event) -> None:
+def _obey_input(live: LiveBench, ended: threading.Event, as_json: bool) -> None:
     from winchkit.errors import WinchkitError
     from winchkit.sim.live_control import HELP, obey
 
@@ -112,6 +127,10 @@ def _obey_input(live: LiveBench, ended: threading.Event) -> None:
         if not line:
             continue
         try:
-            click.echo(HELP if line == "help" else obey(live, line))
+            reply = HELP if line == "help" else obey(live, line)
+            if as_json:
+                echo_json({"schema": 1, "line": line, "reply": reply})
+            else:
+                click.echo(reply)
         except WinchkitError as error:
             click.echo(f"{error}", err=True)

@@ -8,7 +8,7 @@ __all__ = ["status_line"]
 
 
 def status_line(status: dict[str, Any]) -> str:
-    """Length, speed, tension and phase of each winch of a station's status.
+    """Length, cable speed (positive pays out), tension and phase of each winch of a status.
 
     Beside the length that the profile says, what an instrument shows, where there is one.
     """
@@ -17,7 +17,7 @@ def status_line(status: dict[str, Any]) -> str:
         text = f"{name}: {_number(winch['cable_length'])} m"
         if winch["length"] is not None:
             text += f" (measured {_number(winch['length'], 4)} m)"
-        text += f" {_number(winch['speed'])} m/s"
+        text += f" {_number(winch['cable_speed'])} m/s"
         if winch["rope_tension"] is not None:
             text += f" {_number(winch['rope_tension'], 1)} N"
         parts.append(f"{text} {winch['phase']}")

@@ -35,6 +35,7 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
     """
     from winchkit.bench.client import attach
     from winchkit.bench.emergency_stop import Stopped
+    from winchkit.bench.remote.commander import client_name
     from winchkit.schema.read import read_bench
 
     spec = read_bench(bench)
@@ -42,7 +43,7 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
         _show(spec, as_json=as_json)
         return
     try:
-        station = attach(spec, patience=_PATIENCE)
+        station = attach(spec, patience=_PATIENCE, name=client_name("stop"))
         if station is not None:
             station.stop()
             station.close()

@@ -16,14 +16,20 @@ __all__ = ["command"]
 def command(winch: str | None, bench: str, as_json: bool) -> None:
     """Tare the load cell of WINCH, at rest (the only winch where there is one).
 
-    From then on the cell counts from what hangs on it now. Nothing is written into its EEPROM.
+    Subtracts the present reading: by the device's own volatile tare where it has one, which
+    `winchkit cell tare --device --clear` takes away, else by the host, which `winchkit cell tare
+    --clear` takes away. Nothing is written into its EEPROM.
     """
     from winchkit.bench.session import at_station
 
-    with at_station(bench) as station:
+    with at_station(bench, client="tare") as station:
         name = winch if winch is not None or len(station.names()) > 1 else station.names()[0]
         tension = station.tare(name)
     if as_json:
         echo_json({"schema": 1, "winch": name, "tension": tension})
     else:
         click.echo(f"tared: the cell reads {tension:.2f} N")
+        click.echo(
+            f"  `winchkit cell tare {name} --clear -b {bench}` takes a tare of the host away, with "
+            "--device the device's own"
+        )

@@ -102,6 +102,11 @@ class Publishing:
         return self.publisher.listeners
 
     @property
+    def host_tare(self) -> float:
+        """What the host subtracts from the calibrated value, SI."""
+        return self.publisher.scale.tare
+
+    @property
     def counters(self) -> Counters:
         """What happened since the start."""
         return self.publisher.tally.counters(self._clock.now())

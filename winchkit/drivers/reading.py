@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Flag, auto
+from functools import cache
 from typing import Protocol
 
 from winchkit.drivers.counters import Counters
 from winchkit.errors import ConnectionLost
 
-__all__ = ["Counters", "Quality", "Reading", "Sensor"]
+__all__ = ["REPLY_HORIZON", "Counters", "Quality", "Reading", "Sensor"]
+
+REPLY_HORIZON = 10.0
+"""A reply comes within so many of the device's longest reply times after its time-out, or never.
+The device file's number is from a manual; a converter on the way adds a delay of its own."""
 
 
 class Quality(Flag):
@@ -31,6 +36,8 @@ class Quality(Flag):
     """The raw counts stand still while they should not."""
     MISMATCH = auto()
     """Status and value contradict each other, e.g. for a wrong word order in the device file."""
+    AMBIGUOUS = auto()
+    """It may be the late reply to an earlier request, whose form is that of the answer."""
 
     @property
     def usable(self) -> bool:
@@ -38,7 +45,12 @@ class Quality(Flag):
         return not self & _UNUSABLE
 
     def __str__(self) -> str:
-        return ", ".join(flag.name.lower() for flag in self if flag.name) or "good"
+        return _words(self.value)
+
+
+@cache
+def _words(flags: int) -> str:
+    return ", ".join(flag.name.lower() for flag in Quality(flags) if flag.name) or "good"
 
 
 _UNUSABLE = (
@@ -48,6 +60,7 @@ _UNUSABLE = (
     | Quality.STALE
     | Quality.FROZEN
     | Quality.MISMATCH
+    | Quality.AMBIGUOUS
 )
 
 
@@ -98,3 +111,7 @@ class Sensor(Protocol):
     @property
     def tared(self) -> bool | None:
         """Whether the device says that it shows a net value; None where it does not say."""
+
+    @property
+    def host_tare(self) -> float:
+        """What the host subtracts from the calibrated value, SI."""

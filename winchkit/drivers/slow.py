@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections.abc import Coroutine, Sequence
-from concurrent.futures import TimeoutError as FutureTimeout
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
+from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.reading import Sensor
+from winchkit.drivers.scheduling import event_loop_of, event_of, thread_of
 from winchkit.errors import NoReply
 
 __all__ = ["Identifying", "SlowDevices", "SlowLine"]
@@ -47,13 +47,14 @@ class Identifying(Protocol):
 class SlowDevices:
     """Serves every line from one thread until closed."""
 
-    def __init__(self, lines: Sequence[SlowLine]) -> None:
+    def __init__(self, lines: Sequence[SlowLine], clock: Clock | None = None) -> None:
         """Start serving at once; devices that are silent are tried again."""
-        self._loop = asyncio.new_event_loop()
+        self._clock = clock or MonotonicClock()
+        self._loop = event_loop_of(self._clock)
         self._lines = tuple(lines)
         self._line_of = {id(sensor): line for line in lines for sensor in line.sensors}
         self._failure: Exception | None = None
-        self._thread = threading.Thread(target=self._run, name="slow-devices", daemon=True)
+        self._thread = thread_of(self._clock, self._run, "slow-devices")
         self._thread.start()
 
     def close(self) -> None:
@@ -79,16 +80,15 @@ class SlowDevices:
 
     def _wait(self, coroutine: Coroutine[Any, Any, T], sensor: Sensor) -> T:
         future = asyncio.run_coroutine_threadsafe(coroutine, self._loop)
-        try:
-            return future.result(_COMMAND_TIME)
-        except FutureTimeout:
-            if future.done():
-                raise  # the device's own NoReply, which is a TimeoutError too
+        answered = event_of(self._clock)
+        future.add_done_callback(lambda _: answered.set())
+        if not answered.wait(_COMMAND_TIME):
             future.cancel()
             raise NoReply(
                 f"{sensor.name}: no answer to a command within {_COMMAND_TIME:g} s; "
                 "look at the line's other devices"
-            ) from None
+            )
+        return future.result()
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)

@@ -10,6 +10,7 @@ from tomlkit.exceptions import ParseError
 from tomlkit.items import AoT
 
 from winchkit.errors import Fault, FileError
+from winchkit.regular_file import read_text
 from winchkit.schema.winch import SHORTHANDS
 from winchkit.units import format_quantity
 
@@ -19,7 +20,7 @@ __all__ = ["effect_tables", "read_document", "shorthands", "tables", "write_docu
 def read_document(path: Path) -> Any:
     """Parse a profile with everything a parser usually drops. Raises FileError."""
     try:
-        return tomlkit.parse(path.read_text(encoding="utf-8"))
+        return tomlkit.parse(read_text(path))
     except OSError as error:
         raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from error
     except (ParseError, UnicodeDecodeError) as error:

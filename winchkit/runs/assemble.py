@@ -18,6 +18,8 @@ __all__ = ["Recording", "assemble", "refuse"]
 
 Array = NDArray[np.float64]
 _SHOWN = 20
+_LATEST = 9.2e9
+"""Largest time stamp, s: nanoseconds in 64 bits, as MCAP and most instruments count."""
 
 
 @dataclass
@@ -36,6 +38,8 @@ class Recording:
     notes: Sequence[str] = ()
     faults: Sequence[Fault] = ()
     """What was wrong with single cells."""
+    is_part: bool = False
+    """Whether it is a part of a log, which may have no rows."""
 
     @property
     def rows(self) -> int:
@@ -95,7 +99,7 @@ def _header_faults(recording: Recording, names: list[str]) -> Iterator[Fault]:
         yield _missing("time [s]", names, recording)
     if not any(name.rpartition(".")[2] == "motor_angle" for name in names):
         yield _missing("motor_angle [rad]", names, recording)
-    rows, needed = recording.rows, 1 if is_poses else 2
+    rows, needed = recording.rows, 0 if recording.is_part else 1 if is_poses else 2
     if rows < needed:
         there = "has no rows after its header" if rows == 0 else "has one row only"
         yield Fault(f"the run {there}; it needs at least {needed}", path)
@@ -156,6 +160,12 @@ def _time_faults(recording: Recording, time: Array) -> Iterator[Fault]:
     """Every sample has a time, later than the one before it."""
     for row in np.flatnonzero(np.isnan(time)):
         yield Fault("time is missing here", recording.path, recording.line_of(int(row)))
+    for row in np.flatnonzero(np.isfinite(time) & (np.abs(time) > _LATEST)):
+        message = (
+            f"time {time[row]:.9g} s is beyond ±{_LATEST:g} s (290 years); the column 'time' is in "
+            "seconds: write its unit, e.g. 'time [ms]'"
+        )
+        yield Fault(message, recording.path, recording.line_of(int(row)))
     for row in np.flatnonzero(time[1:] <= time[:-1]) + 1:
         earlier, later = time[row - 1], time[row]
         word = "stands still at" if later == earlier else f"goes back from {earlier:.9g} s to"

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from winchkit.errors import Fault, RunError
 from winchkit.runs.assemble import Recording, assemble, refuse
 from winchkit.runs.columns import column_dimension, header_of
+from winchkit.runs.csv_write import CSV_MARK
 from winchkit.runs.run import Run
-from winchkit.runs.text import read_lines
+from winchkit.runs.text import cut_off, read_lines
 
 __all__ = ["read_csv"]
 
@@ -24,19 +25,27 @@ _BLOCK = 4096
 """Rows whose text is held at a time."""
 
 
-def read_csv(path: str | Path) -> Run:
-    """Read a run; raises RunError with every fault of the file, each with its line."""
+def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
+    """Read a run; raises RunError with every fault of the file, each with its line.
+
+    A last line without a line feed is no row where winchkit wrote the file, whose rows all have
+    one; in a file of another program it is, when it has every column. A part of a log may be
+    without rows.
+    """
     name, lines = str(path), read_lines(Path(path))
     above: list[str] = []
     first = next((line for line in lines if not _is_comment_kept(line, above)), None)
     metadata, metadata_lines, faults = _metadata(name, above)
     if first is None:
         faults.append(Fault("there is no header line; it names the columns, 'time [s],…'", name))
+    is_own = above[:1] == [f"{CSV_MARK}\n"]
+    if is_own and first is not None and not _is_ended(first):
+        faults.append(Fault("was cut off within its header; there is no row to recover", name))
     refuse(faults)
     number = len(above) + 1
     header = _header(name, first or "", number)
-    table = _Table(name, header)
-    for rows, numbers in _blocks(name, lines, number):
+    table, notes = _Table(name, header), _Notes(name, is_own=is_own)
+    for rows, numbers in _blocks(name, notes.whole(lines, len(header)), number):
         table.add(rows, numbers)
     refuse(table.ragged())
     return assemble(
@@ -48,9 +57,50 @@ def read_csv(path: str | Path) -> Run:
             metadata,
             metadata_lines,
             number,
-            faults=faults + table.faults,
+            notes.told,
+            faults + table.faults,
+            is_part,
         )
     )
+
+
+class _Notes:
+    """Judges the last line of a file that ends without a line feed."""
+
+    def __init__(self, path: str, *, is_own: bool) -> None:
+        self.told: list[str] = []
+        self._path, self._is_own = path, is_own
+
+    def whole(self, lines: Iterator[str], width: int) -> Iterator[str]:
+        """The lines that are whole; what is said of a last one that is not, is in ``told``."""
+        for line in lines:
+            if not _is_ended(line) and line.strip():
+                if self._is_own:
+                    self.told.append(cut_off(self._path, "rows before its last line"))
+                    return
+                if (cells := _width(line)) < width:
+                    self.told.append(
+                        f"the last line has {cells} cells of {width} and no line end; it is left "
+                        "out: is the file cut off?"
+                    )
+                    return
+                self.told.append(
+                    "the last row has no line end; if the file was cut off there, its last number "
+                    "may lack digits"
+                )
+            yield line
+
+
+def _is_ended(line: str) -> bool:
+    return line.endswith("\n")
+
+
+def _width(line: str) -> int:
+    """Number of cells in a line."""
+    try:
+        return len(next(csv.reader([line])))
+    except csv.Error:
+        return 0
 
 
 class _Table:

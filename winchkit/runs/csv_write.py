@@ -8,7 +8,13 @@ from collections.abc import Mapping, Sequence
 
 from winchkit.runs.run_writer import RunWriter
 
-__all__ = ["CsvWriter"]
+__all__ = ["CSV_MARK", "CsvWriter"]
+
+CSV_MARK = "# written by winchkit"
+"""First line of a CSV file of winchkit, each of whose lines ends with a line feed.
+
+A run that is written whole and has no metadata begins with its header instead.
+"""
 
 
 class CsvWriter(RunWriter):
@@ -22,6 +28,8 @@ class CsvWriter(RunWriter):
         header = io.StringIO()
         cells = [f"{name} [{unit}]" if unit else name for name, unit in self.columns]
         csv.writer(header, lineterminator="\n").writerow(cells)
+        if metadata or self.is_streamed:
+            lines.insert(0, f"{CSV_MARK}\n")
         self._stream.write("".join([*lines, header.getvalue()]).encode())
 
     def _row(self, values: Sequence[float]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.runs.layout import Samples, Source
-from winchkit.runs.log import Log
+from winchkit.runs.log import Log, Note
 
 __all__ = ["LogInfo", "SourceInfo", "info_of"]
 
@@ -53,6 +53,10 @@ class LogInfo:
     """What was counted at last, by instrument."""
     events: tuple[str, ...]
     """Trips that were latched, in order."""
+    tares: tuple[str, ...]
+    """Every tare in force (``A.cell: …``) and when it changed, in order."""
+    commanders: tuple[str, ...]
+    """Who commanded each winch (``A: …``) and when that changed, in order."""
     metadata: Mapping[str, str]
     notes: tuple[str, ...]
 
@@ -73,9 +77,34 @@ def info_of(log: Log) -> LogInfo:
         tuple(_source_info(item, log.samples[item.topic]) for item in log.layout.sources),
         log.counters[-1].value if log.counters else {},
         tuple(dict.fromkeys(map(str, trips))),
+        tuple(_changes(log.events, first, _tares)),
+        tuple(_changes(log.events, first, _commanders)),
         log.metadata,
         log.notes,
     )
+
+
+def _tares(event: Mapping[str, Any]) -> Mapping[str, str]:
+    tares: Mapping[str, str] = event.get("tare", {})
+    return tares
+
+
+def _commanders(event: Mapping[str, Any]) -> Mapping[str, str]:
+    winches = event.get("winch", {}).items()
+    return {name: str(item.get("commander") or "nobody") for name, item in winches}
+
+
+def _changes(
+    events: Sequence[Note], first: float, told: Callable[[Mapping[str, Any]], Mapping[str, str]]
+) -> Iterator[str]:
+    """What events tell by name: at first, and at every change (s from ``first``)."""
+    known: dict[str, str] = {}
+    for note in events:
+        for name, text in told(note.value).items():
+            if known.get(name) != text:
+                since = f" from {note.time - first:.3f} s on" if name in known else ""
+                known[name] = text
+                yield f"{name}{since}: {text}"
 
 
 def _source_info(source: Source, samples: Samples) -> SourceInfo:

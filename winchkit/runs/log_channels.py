@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,8 @@ from winchkit.runs.mcap_layout import (
     message_name,
 )
 from winchkit.runs.mcap_records import pack_messages
-from winchkit.runs.whole_file import abandoned, open_new
+from winchkit.runs.recording.log_file import require_in_place
+from winchkit.runs.whole_file import abandoned
 
 __all__ = ["ChannelLog"]
 
@@ -39,14 +40,14 @@ class ChannelLog(LogWriter):
 
     _file: McapFile
 
-    def __init__(self, path: Path, layout: Layout, *others: Any) -> None:
+    def __init__(self, path: Path, layout: Layout, *others: Any, replace: bool) -> None:
         self._aligner, self._moments = Aligner(layout), Moments(layout.rule)
         self._numbers = {source.topic: n for n, source in enumerate(layout.sources, start=1)}
         self._notes = {EVENTS: len(self._numbers) + 1, COUNTERS: len(self._numbers) + 2}
         self._sequences = dict.fromkeys([*self._numbers, *self._notes], 0)
         self._waiting: list[bytes] = []
         self._pending: list[NDArray[np.float64]] = []
-        super().__init__(path, layout, *others)
+        super().__init__(path, layout, *others, replace=replace)
 
     def tell(self, time: float, event: Mapping[str, Any]) -> None:
         """Keep an event at a moment (s)."""
@@ -61,9 +62,9 @@ class ChannelLog(LogWriter):
         stamp = self._stamps(np.array([time]))
         self._waiting.append(self._packed(topic, self._notes[topic], stamp, stamp, data))
 
-    def _open_part(self, path: Path, about: Mapping[str, str]) -> None:
+    def _open_part(self, path: Path, stream: BinaryIO, about: Mapping[str, str]) -> None:
         self._whole = 0
-        self._stream = open_new(path)
+        self._stream = stream
         with self._writing():
             self._watch(self._stream.fileno())
             self._file = McapFile(self._stream, PROFILE, "winchkit")
@@ -76,7 +77,7 @@ class ChannelLog(LogWriter):
             self._file.put_schema(note, "winchkit.Note", "jsonschema", b'{"type":"object"}')
             for topic, number in self._notes.items():
                 self._file.put_channel(number, note, topic, "json")
-            self._file.put_metadata(METADATA, {**self._metadata, **about})
+            self._file.put_metadata(METADATA, {**self.metadata, **about})
             rule = replace(self._layout.rule, start=self._aligner.start)
             layout = write_layout(replace(self._layout, rule=rule))
             self._file.put_metadata(LOG, {"layout": layout, **about})
@@ -106,6 +107,10 @@ class ChannelLog(LogWriter):
                 self._file.put_metadata(END, end)
             self._file.finish()
         self._stream.close()
+
+    def require_in_place(self) -> None:
+        """Raise FileError where another program has removed, replaced or cut the file."""
+        require_in_place(self.parts[-1], self._stream, self._whole)
 
     def _size(self) -> int:
         return self._file.size

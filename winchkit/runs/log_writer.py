@@ -5,9 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
+from winchkit.errors import UsageError
 from winchkit.runs.layout import Layout, Samples
+from winchkit.runs.recording.log_file import begin_log, create
 from winchkit.runs.rotation import Rotation, part_path
 
 __all__ = ["LogWriter", "Watch", "open_log"]
@@ -26,15 +28,20 @@ class LogWriter(ABC):
         metadata: Mapping[str, str],
         rotation: Rotation | None,
         watch: Watch,
+        *,
+        replace: bool,
     ) -> None:
         self.rows = 0
         """Of the run so far."""
         self.parts: list[Path] = []
         """Files so far, the last one being written."""
-        self._path, self._layout, self._metadata = path, layout, metadata
+        self._path, self._layout = path, layout
+        self.metadata = metadata
+        """Of the parts that are still to come."""
         self._rotation, self._watch = rotation, watch
         self._began = layout.rule.opened
-        self._next_part()
+        first = part_path(path, 1) if rotation else path
+        self._put_part(1, first, begin_log(path, first, replace=replace))
 
     def write(self, pieces: Mapping[str, Samples], now: float) -> None:
         """Write samples by topic, and hand them to the operating system."""
@@ -57,13 +64,28 @@ class LogWriter(ABC):
         self._close_part(end)
 
     def _next_part(self) -> None:
-        number = len(self.parts) + 1
-        path = part_path(self._path, number) if self._rotation else self._path
+        """Go on in a new file; the number of one that holds something already is left out."""
+        while True:
+            self._number += 1
+            path = part_path(self._path, self._number)
+            try:
+                stream = create(path, replace=False)
+            except UsageError:
+                continue
+            self._put_part(self._number, path, stream)
+            return
+
+    def _put_part(self, number: int, path: Path, stream: BinaryIO) -> None:
+        self._number = number
         self.parts.append(path)
-        self._open_part(path, {"part": str(number)} if self._rotation else {})
+        self._open_part(path, stream, {"part": str(number)} if self._rotation else {})
 
     @abstractmethod
-    def _open_part(self, path: Path, about: Mapping[str, str]) -> None: ...
+    def require_in_place(self) -> None:
+        """Raise FileError where another program has removed, replaced or cut the file."""
+
+    @abstractmethod
+    def _open_part(self, path: Path, stream: BinaryIO, about: Mapping[str, str]) -> None: ...
 
     @abstractmethod
     def _put(self, pieces: Mapping[str, Samples], now: float) -> None: ...
@@ -82,15 +104,21 @@ def open_log(
     metadata: Mapping[str, str],
     rotation: Rotation | None = None,
     watch: Watch = lambda _descriptor: None,
+    *,
+    replace: bool = False,
 ) -> LogWriter:
-    """Start a log in the format of the file's name; a file that is there is replaced.
+    """Start a log in the format of the file's name; its files are locked while they are written.
 
-    Raises FileError where it cannot be written, UsageError for a suffix that is no format.
+    An earlier log of that name, its parts included, is removed with ``replace`` only. Raises
+    FileError where it cannot be written, UsageError for a suffix that is no format, for a file that
+    holds something, and, with ``replace`` as well, for one that is being written.
     """
     if path.suffix.lower() == ".mcap":
         from winchkit.runs.log_channels import ChannelLog
 
-        return ChannelLog(path, layout, metadata, rotation, watch)
+        return ChannelLog(path, layout, metadata, rotation, watch, replace=replace)
     from winchkit.runs.log_rows import RowLog
+    from winchkit.runs.writer import kind_for
 
-    return RowLog(path, layout, metadata, rotation, watch)
+    kind_for(path)
+    return RowLog(path, layout, metadata, rotation, watch, replace=replace)

@@ -18,7 +18,7 @@ from winchkit.runs.mcap_content import McapContent, read_content, samples_of
 from winchkit.runs.mcap_layout import COLUMNS, COUNTERS, END, EVENTS, LOG, MARK, METADATA, TOPIC
 from winchkit.runs.mcap_records import Damage
 from winchkit.runs.run import Run
-from winchkit.runs.text import read_bytes
+from winchkit.runs.text import cut_off, read_bytes
 
 __all__ = ["read_mcap", "read_mcap_log"]
 
@@ -64,7 +64,7 @@ def _run(name: str, content: McapContent) -> Run:
     rows = [bytes(row) for batch in content.messages.get(TOPIC, ()) for row in batch.data]
     notes = []
     if not content.complete:
-        notes.append(f"the file is cut off; its {len(rows)} whole rows were recovered")
+        notes.append(cut_off(name, f"{len(rows)} whole rows"))
     values = _values(name, list(columns), rows)
     metadata = content.metadata.get(METADATA, {})
     header = list(columns.items())
@@ -116,7 +116,7 @@ def _log(name: str, content: McapContent) -> Log:
     notes = []
     if not content.complete:
         count = sum(map(len, samples.values()))
-        notes.append(f"the file is cut off; its {count} whole samples were recovered")
+        notes.append(cut_off(name, f"{count} whole samples"))
     return Log(
         name,
         layout,
@@ -144,11 +144,16 @@ def _notes(
 
 
 def _event(value: dict[str, Any]) -> dict[str, Any]:
-    winches, trips, overruns = (value.get(key) for key in ("winch", "tripped", "overruns"))
+    known = ("winch", "tripped", "overruns", "warnings", "tare")
+    winches, trips, overruns, warnings, tares = (value.get(key) for key in known)
     return {
         "winch": _tables(winches) if isinstance(winches, dict) else {},
         "tripped": [str(text) for text in trips] if isinstance(trips, list) else [],
         "overruns": overruns if isinstance(overruns, int) else 0,
+        "warnings": [str(text) for text in warnings] if isinstance(warnings, list) else [],
+        "tare": {str(name): str(text) for name, text in tares.items()}
+        if isinstance(tares, dict)
+        else {},
     }
 
 

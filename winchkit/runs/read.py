@@ -15,8 +15,6 @@ from winchkit.runs.text import read_bytes
 __all__ = ["SUFFIXES", "read_log", "read_run"]
 
 SUFFIXES = (".csv", ".mcap")
-_BARE = 2
-"""Lines of a CSV file that are not yet a run: its header and one row."""
 
 
 def read_run(path: str | Path) -> Run:
@@ -38,7 +36,7 @@ def read_log(paths: str | Path | Sequence[str | Path]) -> Log:
     files = [file for path in given for file in _files(path)]
     if len(files) > 1 and not _has_begun(files[-1]):
         files.pop()
-    return joined([_read_log(file) for file in files])
+    return joined([_read_log(file, is_part=len(files) > 1) for file in files])
 
 
 def _files(path: str | Path) -> list[Path]:
@@ -50,8 +48,7 @@ def _has_begun(path: Path) -> bool:
     """Whether a part holds anything: a recorder killed in between leaves its last one bare."""
     data = read_bytes(path, may_be_empty=True)
     if _format_of(path) == ".csv":
-        lines = data.split(b"\n")[:-1]
-        return sum(1 for line in lines if line.strip() and not line.startswith(b"#")) > _BARE
+        return any(line.strip() and line[:1] != b"#" for line in data.split(b"\n")[:-1])
     from winchkit.runs.mcap_content import read_content
     from winchkit.runs.mcap_layout import COLUMNS, LOG, MARK
 
@@ -77,9 +74,9 @@ def _read_run(path: Path) -> Run:
     return read_mcap(path)
 
 
-def _read_log(path: Path) -> Log:
+def _read_log(path: Path, *, is_part: bool) -> Log:
     if _format_of(path) == ".csv":
-        return log_of_run(read_csv(path), closed=None)
+        return log_of_run(read_csv(path, is_part=is_part), closed=None)
     from winchkit.runs.mcap_read import read_mcap_log
 
     return read_mcap_log(path)

@@ -20,8 +20,11 @@ CHANNEL_DIMENSIONS: dict[str, str] = {
     "motor_velocity": "angular speed",
     "motor_torque": "torque",
     "tension": "force",
+    "tension_gross": "force",
     "load": "force",
+    "load_gross": "force",
     "cable_length": "length",
+    "cable_length_gross": "length",
     "temperature": "temperature",
     "swivel": "angle",
 }

@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import BinaryIO, Self
 
 from winchkit.errors import UsageError
-from winchkit.runs.whole_file import abandoned, open_new
+from winchkit.runs.recording.log_file import require_in_place
+from winchkit.runs.whole_file import abandoned
 from winchkit.units import suggest
 
 __all__ = ["Clock", "Columns", "RunWriter"]
@@ -27,8 +28,17 @@ class RunWriter(ABC):
     flush_interval: float
 
     def __init__(
-        self, path: Path, columns: Columns, metadata: Mapping[str, str], clock: Clock
+        self,
+        path: Path,
+        columns: Columns,
+        metadata: Mapping[str, str],
+        clock: Clock,
+        begin: Callable[[], BinaryIO],
+        *,
+        is_streamed: bool = True,
     ) -> None:
+        """``begin`` opens the file; one that is streamed may be cut off at any moment."""
+        self.is_streamed = is_streamed
         self.path = path
         self.columns = tuple(columns)
         self._names = [name for name, _ in columns]
@@ -36,10 +46,13 @@ class RunWriter(ABC):
         self._flushed = clock()
         if "time" not in self._names:
             raise UsageError(f"{path}: a run needs a column 'time'")
+        for text in (text for column in columns for text in column):
+            if "\n" in text or "\r" in text:
+                raise UsageError(f"{path}: a line break in the name or unit of a column: {text!r}")
         self._whole = 0
-        self._stream = open_new(path)
+        self._stream = begin()
         with self._writing():
-            self._begin({key: " ".join(value.split()) for key, value in metadata.items()})
+            self._begin({_words(key): _words(value) for key, value in metadata.items()})
         self.flush()
 
     @property
@@ -69,6 +82,10 @@ class RunWriter(ABC):
         now = self._clock()
         if now - self._flushed >= self.flush_interval:
             self.flush()
+
+    def require_in_place(self) -> None:
+        """Raise FileError where the file was removed, replaced or cut since it was begun."""
+        require_in_place(self.path, self._stream, self._whole)
 
     def flush(self) -> None:
         """Hand what was appended to the operating system, so that it outlives this process."""
@@ -119,3 +136,8 @@ class RunWriter(ABC):
     def _end(self) -> None:
         """Write what follows the last row; nothing, unless the format says otherwise."""
         return
+
+
+def _words(text: str) -> str:
+    """A text in one line: its words, whatever stood between them."""
+    return " ".join(text.split())

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from winchkit.errors import Fault, RunError
+from winchkit.regular_file import regular
+from winchkit.runs.recording.log_file import is_written
 
-__all__ = ["read_bytes", "read_lines"]
+__all__ = ["cut_off", "read_bytes", "read_lines"]
 
 _PIECE = 1 << 20
 
@@ -16,7 +18,8 @@ _PIECE = 1 << 20
 def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
     """Content of a file; raises RunError where there is none to read."""
     try:
-        data = path.read_bytes()
+        with open(path, "rb", opener=regular) as file:
+            data = file.read()
     except FileNotFoundError:
         raise RunError(Fault("there is no such file", str(path))) from None
     except IsADirectoryError:
@@ -30,15 +33,25 @@ def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
     return data
 
 
+def cut_off(path: str, whole: str) -> str:
+    """What is said of a log without its end, of which something whole was read."""
+    if is_written(Path(path)):
+        return f"the log is still being written; its {whole} so far are read"
+    return (
+        f"the file is cut off; its {whole} are read, what follows is left out "
+        f"(`winchkit log recover {path}` writes a whole file)"
+    )
+
+
 def read_lines(path: Path) -> Iterator[str]:
     """Lines of a text file in UTF-8, UTF-16 with its mark, or Windows-1252, one after another.
 
+    Each has its line feed, but for a last line that the file ends without one.
     The file is gone through twice and never held whole: an hour of eight winches is gigabytes.
     """
     encoding = _encoding(path)
-    with path.open(encoding=encoding) as file:
-        for line in file:
-            yield line.removesuffix("\n")
+    with open(path, encoding=encoding, opener=regular) as file:
+        yield from file
 
 
 def _encoding(path: Path) -> str:
@@ -56,14 +69,14 @@ def _encoding(path: Path) -> str:
 
 
 def _holds_no_zero(path: Path, encoding: str) -> bool:
-    with path.open(encoding=encoding) as file:
+    with open(path, encoding=encoding, opener=regular) as file:
         return not any("\0" in piece for piece in iter(lambda: file.read(_PIECE), ""))
 
 
 def _beginning(path: Path) -> bytes:
     """First bytes of a file; raises RunError where there is none to read."""
     try:
-        with path.open("rb") as file:
+        with open(path, "rb", opener=regular) as file:
             data = file.read(4)
     except (OSError, ValueError):
         return read_bytes(path)

@@ -8,22 +8,14 @@ from pathlib import Path
 from typing import BinaryIO
 
 from winchkit.errors import Fault, FileError
+from winchkit.runs.recording.log_file import refuse_written
 
-__all__ = ["abandoned", "open_new", "write_whole"]
-
-_BUFFER = 1 << 20
-
-
-def open_new(path: Path) -> BinaryIO:
-    """A new file, or an empty one in place of the old; raises FileError."""
-    try:
-        return path.open("wb", buffering=_BUFFER)
-    except OSError as error:
-        raise _refused(path, error) from None
+__all__ = ["abandoned", "write_whole"]
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file whole, or leave what was there; raises FileError."""
+    """Write a file whole, or leave what was there; raises FileError, UsageError for a live log."""
+    refuse_written([path])
     beside = path.with_name(f".{path.name}.new")
     try:
         beside.write_bytes(data)

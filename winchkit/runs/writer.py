@@ -11,15 +11,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from winchkit.errors import UsageError
 from winchkit.runs.csv_write import CsvWriter
 from winchkit.runs.read import SUFFIXES
+from winchkit.runs.recording.log_file import create
 from winchkit.runs.run import Run
 from winchkit.runs.run_writer import Clock, Columns, RunWriter
 
-__all__ = ["RunWriter", "open_writer", "write_csv", "write_mcap", "write_run"]
+__all__ = ["RunWriter", "kind_for", "open_writer", "write_csv", "write_mcap", "write_run"]
 
 
 def open_writer(
@@ -27,18 +29,26 @@ def open_writer(
     columns: Columns,
     metadata: Mapping[str, str] | None = None,
     clock: Clock = time.monotonic,
+    *,
+    replace: bool = False,
 ) -> RunWriter:
-    """Start a run in a file, in the format of its suffix; a file that is there is replaced.
+    """Start a run in a file, in the format of its suffix; the file is locked until it is closed.
 
-    ``columns`` are names and units in order; values are written as they come, in these units.
-    Raises FileError where the file cannot be written, UsageError for a suffix that is no format.
+    ``columns`` are names and units in order; values are written as they come, in these units. An
+    earlier file is written over with ``replace`` only. Raises FileError where the file cannot be
+    written, UsageError for a suffix that is no format, for a file that holds something, and, with
+    ``replace`` as well, for one that is being written.
     """
-    return _kind_for(path)(Path(path), columns, metadata or {}, clock)
+    begin = partial(create, Path(path), replace=replace)
+    return kind_for(path)(Path(path), columns, metadata or {}, clock, begin)
 
 
 def write_run(run: Run, path: str | Path) -> None:
-    """Write a run in the format of the file's suffix, channels in the units that they have."""
-    _write(run, path, _kind_for(path))
+    """Write a run in the format of the file's suffix, channels in the units that they have.
+
+    An earlier file is replaced, unless a log is being written to it (UsageError).
+    """
+    _write(run, path, kind_for(path))
 
 
 def write_csv(run: Run, path: str | Path) -> None:
@@ -56,12 +66,15 @@ def write_mcap(run: Run, path: str | Path) -> None:
 def _write(run: Run, path: str | Path, kind: type[RunWriter]) -> None:
     columns = [("time", "s"), *((name, channel.unit) for name, channel in run.channels.items())]
     series = [run.time.tolist(), *(channel.values.tolist() for channel in run.channels.values())]
-    with kind(Path(path), columns, run.metadata, time.monotonic) as writer:
+    begin = partial(create, Path(path), replace=True)
+    clock = time.monotonic
+    with kind(Path(path), columns, run.metadata, clock, begin, is_streamed=False) as writer:
         for row in zip(*series, strict=True):
             writer.append_values(row)
 
 
-def _kind_for(path: str | Path) -> type[RunWriter]:
+def kind_for(path: str | Path) -> type[RunWriter]:
+    """The writer of the format that a file's suffix names; raises UsageError."""
     suffix = Path(path).suffix.lower()
     if suffix == ".csv":
         return CsvWriter

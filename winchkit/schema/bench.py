@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -47,7 +48,10 @@ class BusSpec(Table):
     bitrate: WholeNumber = 1_000_000
     node: Annotated[int, Whole(1, 127)] = 127
     """Node id of the host, for its heartbeat."""
-    heartbeat: PositiveDuration = 0.05
+    heartbeat: Annotated[
+        float,
+        Quantity("time", 2e-3, 1.0, why="a drive stops 2.5 heartbeats after its host dies"),
+    ] = 0.05
     # serial, modbus-rtu and modbus-tcp
     port: str | int | None = None
     """Device path of a serial port; TCP or UDP port number for network buses."""
@@ -58,7 +62,10 @@ class BusSpec(Table):
     """Data bits of a character on a serial bus."""
     # modbus-tcp
     host: str | None = None
-    timeout: PositiveDuration = 0.2
+    timeout: Annotated[
+        float,
+        Quantity("time", 1e-3, 10.0, why="a later answer is of no use to control"),
+    ] = 0.2
 
     def rules(self) -> Iterator[Rule]:
         """Each kind of bus needs its own keys."""
@@ -83,6 +90,10 @@ class DeviceRef(Table):
     """At most so many readings a second, Hz; else as many as it converts and its line allows."""
 
 
+_EMERGENCY = re.compile(r"[0-9A-Fa-f]{2}([0-9A-Fa-f]{2}|xx)")
+"""An emergency code of CiA 301, or the family of those with the same first byte."""
+
+
 @dataclass(frozen=True)
 class LimitSpec(Table):
     """What the supervisor enforces on one winch, SI."""
@@ -99,17 +110,27 @@ class LimitSpec(Table):
     """Of rope, at which the drive itself gives up (6065h)."""
     torque: Annotated[float, Quantity("torque", 0.0, above=True)] | None = None
     """Greatest of the motor, kept by the drive (6072h)."""
+    response_time: PositiveDuration = 0.06
+    """By which the measured speed lags behind the commanded one at most, s: twice the time
+    constant of the drive's velocity loop, or more."""
+    emergency_trips: tuple[str, ...] = ()
+    """Emergency codes that trip although the drive reports no fault: ``4210``, ``42xx``."""
 
     def rules(self) -> Iterator[Rule]:
         """Lower limits lie below upper ones."""
         if self.in_drive and self.length is None:
             yield "in_drive", "there is no `length` for the drive to keep"
+        if self.length is not None and self.length[0] < 0:
+            yield "length", f"{self.length[0]:g} m: a cable length is not below 0"
         if self.length is not None and self.length[0] >= self.length[1]:
             low, high = self.length
             yield "length", f"the lower limit {low:g} m is not below the upper limit {high:g} m"
         slack, high_tension = self.tension_slack, self.tension_high
         if slack is not None and high_tension is not None and slack >= high_tension:
             yield "tension_slack", f"{slack:g} N is not below tension_high, {high_tension:g} N"
+        for code in self.emergency_trips:
+            if not _EMERGENCY.fullmatch(code):
+                yield "emergency_trips", f"'{code}' is no code such as '4210' or '42xx'"
 
 
 @dataclass(frozen=True)
@@ -127,9 +148,20 @@ class WinchWiring(Table):
     brake: Flag = False
     options: OptionSpec = field(default_factory=OptionSpec)
     """Option codes of the drive, before those of its device file; written and read back."""
+    host_loss: Literal["hardware"] | None = None
+    """``hardware`` where no object of the drive, but hardware beside it, stops the winch when the
+    host has gone; left out, what the device file declares."""
+    host_loss_description: str = ""
+    """Which hardware that is, and how it stops the winch; told at every start and in every log."""
 
     def rules(self) -> Iterator[Rule]:
         """The tension at the platform end is either measured or known."""
+        if (self.host_loss is None) != (not self.host_loss_description.strip()):
+            yield (
+                "host_loss",
+                '`host_loss = "hardware"` and `host_loss_description`, which says what stops the '
+                "winch when the host has gone, are given together",
+            )
         if self.load is not None and self.load_mass is not None:
             yield "load_mass", "given beside a load cell 'load'; keep one of them"
 
@@ -141,7 +173,10 @@ class BenchSpec(Table):
     name: str
     winch: Mapping[str, WinchWiring]
     bus: Mapping[str, BusSpec]
-    cycle: PositiveDuration = 0.004
+    cycle: Annotated[
+        float,
+        Quantity("time", 1e-4, 0.1, why="limits are tested and targets sent once in a cycle"),
+    ] = 0.004
     stop_together: Flag = True
     """Whether a stop of one winch stops all. Trips stop all in any case."""
     effects: tuple[str, ...] = ()
@@ -149,6 +184,13 @@ class BenchSpec(Table):
     description: str = ""
     path: str = field(default="", compare=False)
     """The file it was read from; profiles and effects by path are found beside it."""
+    latch_file: str = field(default="", compare=False)
+    """Where its trips are kept for later processes; empty for a simulation in this process."""
+
+    @property
+    def record_file(self) -> str:
+        """The commissioning record beside the bench file; empty for a bench without a file."""
+        return f"{Path(self.path).with_suffix('')}.commissioned.json" if self.path else ""
 
     @property
     def effect_files(self) -> tuple[Path, ...]:
@@ -158,3 +200,8 @@ class BenchSpec(Table):
     def with_effects(self, files: Iterable[str | Path]) -> BenchSpec:
         """The bench with more files of effects, their paths as seen from here."""
         return replace(self, effects=(*self.effects, *(str(Path(f).absolute()) for f in files)))
+
+
+def latch_path(bench_path: str) -> str:
+    """Where the trips of a bench are kept: beside its bench file."""
+    return f"{Path(bench_path).resolve().with_suffix('')}.trip.json"

@@ -28,7 +28,9 @@ class DeviceSpec(Table):
     model: str
     source: str
     """Where its numbers come from: a manual's name and page."""
-    trust: Literal["manual", "interoperability", "hardware", "generic"]
+    trust: Literal["manual", "interoperability", "hardware", "generic", "eds"]
+    """Who has confirmed it: the manual, another program, the device itself, nobody (a generic
+    file), or nobody beyond the maker's EDS (``eds``)."""
     servo: ServoSpec | None = None
     modbus: ModbusSpec | None = None
     stream: StreamSpec | None = None

@@ -8,7 +8,14 @@ from typing import Annotated, Literal
 
 from winchkit.schema.device_servo import PdoSpec
 from winchkit.schema.modbus_parts import StatusMeaning
-from winchkit.schema.quantity import Duration, Flag, PositiveDuration, PositiveNumber, Whole
+from winchkit.schema.quantity import (
+    Duration,
+    Flag,
+    Number,
+    PositiveDuration,
+    PositiveNumber,
+    Whole,
+)
 from winchkit.schema.table import Rule, Table
 from winchkit.units import dimension_of
 
@@ -43,9 +50,9 @@ class ProcessSpec(Table):
     type: Literal["f32", "integer"] = "f32"
     """An integer has the size and sign that the EDS gives it."""
     unit: str = "N"
-    scale: float = 1.0
+    scale: Number = 1.0
     """Physical value in ``unit`` of one count."""
-    limit: float | None = None
+    limit: Number | None = None
     """The device never shows more counts than this without a flag."""
     status: str | None = None
     """Object with the status bits; CiA 404 has it in 6150h."""

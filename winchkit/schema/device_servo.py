@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from winchkit.schema.device_quirks import QuirkSpec
+from winchkit.schema.host_loss import VendorWatchdog, unknown_mechanism
 from winchkit.schema.quantity import Duration, Quantity, Whole, WholeNumber
 from winchkit.schema.table import Rule, Table
 
@@ -18,6 +19,8 @@ MotionMode = Literal["CSP", "CSV", "PV", "IP"]
 _ON_REQUEST = (252, 253)
 _RESERVED = range(241, 252)
 _EVENT = (254, 255)
+Count = Annotated[int, Whole(-(2**31), 2**32 - 1)]
+"""Of a position counter."""
 _I16 = Whole(-(2**15), 2**15 - 1)
 
 
@@ -28,6 +31,7 @@ class PdoSpec(Table):
     number: Annotated[int, Whole(1, 4)]
     """Within the predefined connection set; TPDO 1 has its communication record at 1800h."""
     objects: tuple[str, ...]
+    """In the order in which the PDO carries them."""
     transmission: Annotated[int, Whole(0, 255)] = 1
     """CANopen transmission type: 1 every SYNC, n every n-th, 0 with a SYNC after a change, 254
     and 255 by events of the drive."""
@@ -82,10 +86,17 @@ class ServoSpec(Table):
     eds: str
     """Name of the EDS file beside the device file."""
     modes: tuple[Mode, ...]
+    """Modes of operation that it has: PP, PV, PT, HM, IP, CSP, CSV, CST."""
     motion_mode: MotionMode = "CSV"
     """The mode in which the bench moves it."""
     increments_per_turn: WholeNumber = 65_536
     """Position units of one motor turn unless the drive's objects say otherwise."""
+    home_offset: str = "0x607C"
+    """Object that gives the home its position, as ``index`` or ``index:sub``; a maker's own where
+    the drive lacks 607Ch."""
+    position_wraps: tuple[Count, Count] | None = None
+    """Lowest and highest count that 6064h shows before it goes on at the other end, where that is
+    not the range of its own 32 bits."""
     speed_unit: Literal["increments/s", "rpm", "0.1 rpm"] = "increments/s"
     """Of 606Ch, 60FFh, 6081h and, per second, of 6083h to 6085h, where 60A9h does not say."""
     units: Literal["drive", "file"] = "drive"
@@ -94,9 +105,24 @@ class ServoSpec(Table):
     rated_torque: Annotated[float, Quantity("torque", 0.0, above=True)] = 1.0
     """N m, unless object 6076h says otherwise."""
     tpdo: tuple[PdoSpec, ...] = ()
+    """What the drive sends: at least 6041h, 6064h and 606Ch, the first two with every SYNC."""
     rpdo: tuple[PdoSpec, ...] = ()
+    """What the drive is sent: 6040h and the target of ``motion_mode``."""
     options: OptionSpec = field(default_factory=OptionSpec)
     """Written at commissioning and read back."""
     boot_time: Duration = 1.0
     """From power-on or NMT reset to the boot-up message at the latest, s."""
     quirks: QuirkSpec = field(default_factory=QuirkSpec)
+    """Ways in which it departs from CiA 402."""
+    host_loss: str = "heartbeat"
+    """How it notices that the host has gone: ``heartbeat`` (1016h), ``guarding`` (100Ch, 100Dh),
+    ``rpdo-timeout`` (14xxh:05), ``sync-loss`` (1006h) or ``vendor:NAME``."""
+    vendor_watchdog: Mapping[str, VendorWatchdog] = field(default_factory=dict)
+    """Watchdogs of the maker's own, by name."""
+
+    def rules(self) -> Iterator[Rule]:
+        """The way in which it notices a dead host is one that is known."""
+        if self.position_wraps is not None and self.position_wraps[0] >= self.position_wraps[1]:
+            yield "position_wraps", "the lowest count is not below the highest"
+        if wrong := unknown_mechanism(self.host_loss, tuple(self.vendor_watchdog)):
+            yield "host_loss", wrong

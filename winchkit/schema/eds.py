@@ -12,14 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from winchkit.errors import Fault, FileError
+from winchkit.regular_file import regular
 from winchkit.schema.eds_mend import mend
-from winchkit.schema.eds_section import Findings, Section, canonical
+from winchkit.schema.eds_section import Findings, Section, canonical, canonical_key
 
 __all__ = ["EdsText", "read_eds_text"]
 
 _LARGEST = 8_000_000
 _SECTION = re.compile(r"\[\s*(.*?)\s*\]\s*$")
 _INLINE_COMMENT = re.compile(r"\s;.*$")
+_LISTS = ("mandatoryobjects", "optionalobjects", "manufacturerobjects")
+_MAKERS_OWN = range(0x2000, 0x6000)
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ def read_eds_text(path: str | Path) -> EdsText:
 
 def _text(path: Path, findings: Findings) -> str:
     try:
-        with path.open("rb") as stream:
+        with open(path, "rb", opener=regular) as stream:
             data = stream.read(_LARGEST + 1)
     except OSError as error:
         raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
@@ -95,7 +98,7 @@ def _sections(text: str, findings: Findings) -> list[Section]:
         findings.fault(1, "is no EDS: it has no sections")
     for section in sections:
         _keep_first(found, section, findings)
-    return list(found.values())
+    return [section for section in found.values() if not section.contradicts]
 
 
 def _take_key(section: Section, number: int, line: str, findings: Findings) -> None:
@@ -103,31 +106,69 @@ def _take_key(section: Section, number: int, line: str, findings: Findings) -> N
     if not equals or not key:
         findings.warn(number, f"{line!r} is neither a section nor key=value; left out")
         return
+    key = canonical_key(key)
     before = section.values.get(key)
     if before is None:
         section.values[key], section.lines[key] = value, number
     elif before == value:
         findings.warn(number, f"[{section.name}] {key} stands twice; the same both times")
-    else:
-        first = section.lines[key]
-        findings.fault(
-            number, f"[{section.name}] {key} is {value!r} here and {before!r} on line {first}"
+    elif _is_list(section) and key.isdigit():
+        findings.warn(
+            number,
+            f"[{section.name}] has number {key} twice, here and on line "
+            f"{section.lines[key]}; both entries count",
         )
+        _append(section, value, number)
+    else:
+        said = f"[{section.name}] {key} is {value!r} here and {before!r} on line"
+        said += f" {section.lines[key]}"
+        if section.uses(key):
+            findings.fault(number, said)
+        else:
+            findings.warn(number, f"{said}; it is not used, the first counts")
+
+
+def _is_list(section: Section) -> bool:
+    return section.name.casefold() in _LISTS
+
+
+def _append(section: Section, value: str, line: int) -> None:
+    """Add an entry to a list of objects under a number that is free."""
+    if value in (text for key, text in section.values.items() if key.isdigit()):
+        return
+    free = str(1 + max((int(key) for key in section.values if key.isdigit()), default=0))
+    section.values[free], section.lines[free] = value, line
 
 
 def _keep_first(found: dict[str, Section], section: Section, findings: Findings) -> None:
+    """Of two sections with one name the first counts; what would be a guess is a fault."""
     first = found.setdefault(section.name.casefold(), section)
     if first is section:
         return
+    twice = f"[{section.name}] stands a second time"
     if first.values == section.values:
+        findings.warn(section.line, f"{twice}, as on line {first.line}")
+        return
+    if _is_list(section):
+        findings.warn(section.line, f"{twice}; its entries are added to those of line {first.line}")
+        for key, value in section.values.items():
+            if key.isdigit():
+                _append(first, value, section.lines[key])
+        first.values["SupportedObjects"] = str(sum(key.isdigit() for key in first.values))
+        return
+    keys = first.values.keys() | section.values.keys()
+    differing = [key for key in keys if first.values.get(key) != section.values.get(key)]
+    if not any(section.uses(key) for key in differing):
+        findings.warn(section.line, f"{twice}; what differs is not used, line {first.line} counts")
+    elif section.index in _MAKERS_OWN:
         findings.warn(
-            section.line, f"[{section.name}] stands a second time, as on line {first.line}"
+            section.line, f"{twice} and differs from line {first.line}; the object is left out"
         )
+        first.contradicts = True
     else:
         findings.fault(
             section.line,
-            f"[{section.name}] stands a second time and differs from line {first.line}; "
-            "take out one of them",
+            f"{twice} and differs from line {first.line}; take out one of them",
         )
 
 

@@ -33,6 +33,9 @@ _BITS = {
 """Of the whole numbers among the data types of CiA 301."""
 _OTHER_TYPES = {0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0D, 0x0F, 0x11}
 """Real numbers, strings, times and domains."""
+_SIGNED = {0x02, 0x03, 0x04, 0x10, 0x12, 0x13, 0x14, 0x15}
+_OCTAL = re.compile(r"0[0-7]+$")
+_NODE_ID = re.compile(r"\$NODEID", re.IGNORECASE)
 _BYTES = "0x000F"
 _LAST_STANDARD = 0x1B
 _ACCESS = ("ro", "rw", "wo", "const", "rwr", "rww")
@@ -69,8 +72,10 @@ def _whole(section: Section) -> bool:
 
 
 def _number(text: str) -> int | None:
+    """A number of CiA 306: decimal, hexadecimal after 0x, octal after 0; None for no number."""
+    bare = text.replace(" ", "")
     try:
-        return int(text.replace(" ", ""), 0)
+        return int(bare, 8) if _OCTAL.match(bare) else int(bare, 0)
     except ValueError:
         return None
 
@@ -172,7 +177,7 @@ def _mend_variable(section: Section, findings: Findings) -> None:
         )
         section.values["PDOMapping"] = "0"
     if kind in _BITS:
-        _mend_numbers(section, _BITS[kind], findings)
+        _mend_numbers(section, _BITS[kind], kind in _SIGNED, findings)
 
 
 def _mend_type(section: Section, findings: Findings) -> int:
@@ -193,19 +198,35 @@ def _mend_type(section: Section, findings: Findings) -> int:
     return kind
 
 
-def _mend_numbers(section: Section, bits: int, findings: Findings) -> None:
-    """Default and limits of a whole number; hexadecimal ones may be a negative number's bits."""
+def _mend_numbers(section: Section, bits: int, signed: bool, findings: Findings) -> None:
+    """Default, value and limits of a whole number, as a number of the object's own type.
+
+    Hexadecimal numbers of signed objects may be the bits of a negative one (CiA 306).
+    """
     for key in ("DefaultValue", "ParameterValue", "LowLimit", "HighLimit"):
         text = section.values.get(key)
         if not text:
             section.values.pop(key, None)
             continue
+        relative = _NODE_ID.search(text) is not None
         bare = re.sub(r"\+?\$NODEID\+?", "", text.replace(" ", "").upper()) or "0"
         value = _number(bare)
         if value is None or not -(1 << bits - 1) <= value < 1 << bits:
             reason = "is no number" if value is None else f"does not fit into {bits} bits"
             findings.warn(section.lines[key], f"[{section.name}] {key} {text!r} {reason}; left out")
             del section.values[key]
+        elif relative:
+            section.values[key] = _NODE_ID.sub("$NODEID", text)
+        else:
+            kept = _of_type(value, bits, signed)
+            if kept != value or _OCTAL.match(bare):
+                section.values[key] = str(kept)
+
+
+def _of_type(value: int, bits: int, signed: bool) -> int:
+    """The number of a type whose bits are those of ``value``."""
+    value &= (1 << bits) - 1
+    return value - (1 << bits) if signed and value >> bits - 1 else value
 
 
 def _names(sections: dict[str, Section], owner: Section, findings: Findings) -> list[Section]:

@@ -7,9 +7,34 @@ from dataclasses import dataclass, field
 
 from winchkit.errors import Fault
 
-__all__ = ["Findings", "Section", "canonical"]
+__all__ = ["Findings", "Section", "canonical", "canonical_key"]
 
 _OBJECT = re.compile(r"([0-9A-F]{4})(?:SUB([0-9A-F]{1,2})|(NAME))?$", re.IGNORECASE)
+_OBJECT_KEYS = (
+    "ObjectType",
+    "DataType",
+    "AccessType",
+    "PDOMapping",
+    "DefaultValue",
+    "ParameterValue",
+    "LowLimit",
+    "HighLimit",
+    "CompactSubObj",
+)
+"""Keys of an object that winchkit reads (CiA 306); names and flags it does not need."""
+_OTHER_KEYS = ("ParameterName", "SubNumber", "SupportedObjects", "NrOfEntries", "StorageLocation")
+_DEVICE_KEYS = (
+    "VendorName",
+    "VendorNumber",
+    "ProductName",
+    "ProductNumber",
+    "RevisionNumber",
+    "NrOfRXPDO",
+    "NrOfTXPDO",
+    "LSS_Supported",
+)
+_IDENTITY = ("VendorNumber", "ProductNumber")
+_SPELLING = {key.casefold(): key for key in (*_OBJECT_KEYS, *_OTHER_KEYS, *_DEVICE_KEYS)}
 
 
 @dataclass
@@ -20,6 +45,14 @@ class Section:
     line: int
     values: dict[str, str] = field(default_factory=dict)
     lines: dict[str, int] = field(default_factory=dict)
+    contradicts: bool = False
+    """Whether the file says two things of it, so that it cannot be used."""
+
+    def uses(self, key: str) -> bool:
+        """Whether winchkit reads a key of this section."""
+        if self.index is not None and not self.names_subs:
+            return key in _OBJECT_KEYS
+        return self.name.casefold() == "deviceinfo" and key in _IDENTITY
 
     @property
     def index(self) -> int | None:
@@ -68,3 +101,8 @@ def canonical(name: str) -> str:
         return name
     tail = f"sub{int(found[2], 16):X}" if found[2] else "Name" if found[3] else ""
     return found[1].upper() + tail
+
+
+def canonical_key(key: str) -> str:
+    """The spelling of CiA 306 for a key, which counts in upper and lower case alike."""
+    return _SPELLING.get(key.casefold(), key)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from winchkit.schema.quantity import Flag, PositiveDuration, Whole, WholeNumber
+from winchkit.schema.quantity import Flag, Number, PositiveDuration, Whole, WholeNumber
 from winchkit.schema.table import Rule, Table
 
 __all__ = [
@@ -33,6 +33,13 @@ Order = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 
 REGISTERS: dict[str, int] = {"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2}
 """Registers that a value of each type takes."""
+_RANGES: dict[str, tuple[float, float]] = {
+    "u16": (0, 0xFFFF),
+    "i16": (-0x8000, 0x7FFF),
+    "u32": (0, 0xFFFFFFFF),
+    "i32": (-0x80000000, 0x7FFFFFFF),
+    "f32": (-3.4e38, 3.4e38),
+}
 
 
 @dataclass(frozen=True)
@@ -56,11 +63,11 @@ class FieldSpec(Table):
     type: ValueType
     order: Order = "ABCD"
     unit: str = "1"
-    scale: float = 1.0
+    scale: Number = 1.0
     """Physical value in ``unit`` of one count."""
     sign_bit: int | None = None
     """Bit of the status word that makes this magnitude negative."""
-    limit: float | None = None
+    limit: Number | None = None
     """The device never shows more counts than this without a flag; what is beyond contradicts
     its status, and is no number."""
     decimals: DecimalsSpec | None = None
@@ -97,7 +104,7 @@ class CommandSpec(Table):
     """A command (tare, zero): the value written to a register (wire address, from 0)."""
 
     register: int
-    value: float
+    value: Number
     type: ValueType = "u16"
     order: Order = "ABCD"
     function: Literal[6, 16] = 6
@@ -119,9 +126,12 @@ class CommandSpec(Table):
         return self.function == 16 or REGISTERS[self.type] > 1
 
     def rules(self) -> Iterator[Rule]:
-        """A whole number, unless it is a float."""
+        """A number that the type holds: a whole one, unless it is a float."""
         if self.type != "f32" and self.value != int(self.value):
             yield "value", f"{self.value:g} is no whole number, as {self.type} is"
+        low, high = _RANGES[self.type]
+        if not low <= self.value <= high:
+            yield "value", f"{self.value:g} is beyond what {self.type} holds, {low:g} to {high:g}"
 
 
 @dataclass(frozen=True)

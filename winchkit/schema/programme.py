@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 from winchkit.schema.quantity import (
     Length,
@@ -11,8 +12,9 @@ from winchkit.schema.quantity import (
     PositiveDuration,
     PositiveMass,
     PositiveSpeed,
+    Quantity,
     Temperature,
-    WholeNumber,
+    Whole,
 )
 from winchkit.schema.table import Rule, Table
 
@@ -28,7 +30,7 @@ class Step(Table):
     """One step: exactly one of ``to``, ``by``, ``hold`` and ``ask`` is given."""
 
     winch: str = "all"
-    to: Length | None = None
+    to: Annotated[float, Quantity("length", 0.0, why="a cable length is not below 0")] | None = None
     """Cable length to go to, m."""
     by: Length | None = None
     """Change of cable length, m."""
@@ -78,7 +80,7 @@ class Programme(Table):
 
     name: str
     step: tuple[Step, ...]
-    repeat: WholeNumber = 1
+    repeat: Annotated[int, Whole(1, 1_000_000)] = 1
     description: str = ""
 
     def approach(self, winch: str) -> tuple[float, ...]:

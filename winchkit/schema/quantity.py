@@ -7,13 +7,13 @@ checked when code builds a dataclass from SI numbers.
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from winchkit.errors import UsageError
+from winchkit.schema.plausible import check_size
 from winchkit.units import UNITS, article, parse
 
 if TYPE_CHECKING:
@@ -75,26 +75,27 @@ class Marker(ABC):
 class Quantity(Marker):
     """Marks a float field as a quantity of ``dimension`` within ``[low, high]`` (SI).
 
-    With ``above`` the low end itself is excluded.
+    With ``above`` the low end itself is excluded; ``why`` tells the reason of the range. No
+    quantity may be beyond its dimension's bound (``plausible``).
     """
 
     dimension: str
     low: float = float("-inf")
     high: float = float("inf")
     above: bool = False
+    why: str = ""
 
     def read(self, raw: object) -> float:
         """Turn a value of a file into SI; raises UsageError with the reason."""
         value = parse(raw, self.dimension)
         unit = next(iter(UNITS[self.dimension])) if self.dimension != "ratio" else ""
-        if math.isinf(value):
-            raise UsageError(f"'{raw}' must be finite; leave the key out where there is no value")
+        reason = f": {self.why}" if self.why else ""
         if value < self.low or (self.above and value == self.low):
             word = "above" if self.above else "at least"
-            raise UsageError(f"'{raw}' must be {word} {self.low:g} {unit}".rstrip())
+            raise UsageError(f"'{raw}' must be {word} {self.low:g} {unit}".rstrip() + reason)
         if value > self.high:
-            raise UsageError(f"'{raw}' must be at most {self.high:g} {unit}".rstrip())
-        return value
+            raise UsageError(f"'{raw}' must be at most {self.high:g} {unit}".rstrip() + reason)
+        return check_size(value, self.dimension, raw)
 
     @property
     def wanted(self) -> str:

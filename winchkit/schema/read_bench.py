@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from winchkit.errors import FileError
-from winchkit.schema.bench import BenchSpec
+from winchkit.schema.bench import BenchSpec, latch_path
 from winchkit.schema.device import DeviceSpec
 from winchkit.schema.read_lines import Key
 from winchkit.schema.read_parts import Reading
@@ -32,10 +33,11 @@ _FITTING = {
 
 def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> BenchSpec | None:
     """Read a bench and check what it refers to."""
-    if "path" in tree:
-        reading.fault(("path",), "unknown key")
+    for key in tree.keys() & {"path", "latch_file"}:
+        reading.fault((key,), "unknown key")
     _check_references(reading, tree, read_device)
-    named = {"name": reading.stem, **tree, "path": reading.source.path}
+    path = reading.source.path
+    named = {"name": reading.stem, **tree, "path": path, "latch_file": latch_path(path)}
     spec = reading.table(BenchSpec, named)
     for index, file in enumerate(spec.effect_files if spec is not None else ()):
         if not file.is_file():
@@ -64,6 +66,8 @@ def sim_bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader)
     if wired is None or noise is None or None in truths.values():
         return None
     known = {name: truth for name, truth in truths.items() if truth is not None}
+    # A simulation dies with its process, and its trips with it.
+    wired = replace(wired, latch_file="")
     return SimBench(wired.name, wired, known, noise, faults, wired.description)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.errors import Fault, FileError
+from winchkit.regular_file import regular
 from winchkit.schema.read_lines import Key, line_of, lines_of_keys
 from winchkit.units import suggest
 
@@ -66,7 +67,7 @@ def open_source(path: str | Path) -> Source:
 
 def _text(path: Path) -> str:
     try:
-        with path.open("rb") as stream:
+        with open(path, "rb", opener=regular) as stream:
             data = stream.read(_LARGEST + 1)
     except FileNotFoundError:
         raise FileError(Fault("there is no such file", str(path))) from None

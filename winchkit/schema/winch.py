@@ -107,7 +107,9 @@ class PathSpec(Table):
 class GearboxSpec(Table):
     """The gearbox between motor and drum."""
 
-    ratio: PositiveNumber
+    ratio: Annotated[
+        float, Quantity("ratio", 1e-3, 1e5, why="gearboxes of winches have 1 to some thousands")
+    ]
     """Motor turns per drum turn."""
     direction: Literal[1, -1] = 1
     efficiency: Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)] | None = None

@@ -9,6 +9,7 @@ from random import Random
 
 from winchkit.catalog import find, folder, names
 from winchkit.errors import FileError
+from winchkit.regular_file import file_kind
 from winchkit.schema.simbench import HiddenSpec, SimBench
 from winchkit.schema.winch import WinchProfile
 from winchkit.sim.physics.table import build, scaled
@@ -47,6 +48,8 @@ def programme_path(name: str) -> Path:
     for path in (Path(name), folder("sim") / f"{name}.toml"):
         if path.is_file():
             return path
+    if Path(name).exists() and (special := file_kind(Path(name).stat().st_mode)):
+        raise FileError(f"{name}: is {special}, not a regular file")
     known = [shipped for shipped in names("sim") if shipped.startswith(_PROGRAMME)]
     raise FileError(
         f"there is no motion programme '{name}', neither as a file nor shipped "

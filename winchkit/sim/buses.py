@@ -20,6 +20,9 @@ Interface = Literal["udp_multicast", "virtual"]
 
 _GROUP = "239.74.163.2"
 """The group of python-can's own default."""
+_BETWEEN_PROCESSES = 0.2
+"""Least heartbeat period of a bench that is served to other processes, s: its drives are a program
+without priority, which stands still for 0.25 s now and then while other programs start."""
 _PROBE = can.Message(arbitration_id=0x7FF, is_extended_id=False)
 _ROUTE = (
     "this machine has no route for multicast; add one with: ip route add 239.0.0.0/8 dev lo "
@@ -36,7 +39,13 @@ def wired(spec: BusSpec, name: str, interface: Interface) -> BusSpec:
             channel=f"{name}-{os.getpid()}-{os.urandom(4).hex()}",
             port=None,
         )
-    return replace(spec, interface="udp_multicast", channel=_GROUP, port=_free_udp_port())
+    return replace(
+        spec,
+        interface="udp_multicast",
+        channel=_GROUP,
+        port=_free_udp_port(),
+        heartbeat=max(spec.heartbeat, _BETWEEN_PROCESSES),
+    )
 
 
 class CanPort:

@@ -44,6 +44,10 @@ class Converter:
         self._last = nan
         """What was measured last; one that is frozen says it again."""
 
+    def deviate(self, share: float) -> None:
+        """Let its clock run slower by a share of the declared period."""
+        self._step *= 1.0 + share
+
     def convert(self, faults: set[str]) -> None:
         """Sample at the instant ``next_conversion``, which then moves on by one period."""
         now = self.next_conversion

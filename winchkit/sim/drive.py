@@ -68,7 +68,7 @@ class SimDrive:
         self._servo, self._shaft, self._quirks = servo, shaft, servo.quirks
         self._booted_at = now
         self._error = 0
-        self._sdo_refuses = False
+        self._sdo_refuses = self._inhibited = False
         self._line = Line(send, self._emergency)
         self._sdo = SdoServer(objects)
         short = partial(self._emergency, _PDO_TOO_SHORT)
@@ -183,12 +183,15 @@ class SimDrive:
             self._sdo_refuses = True
         elif kind == "emergency storm":
             self._line.storm = True
+        elif kind == "enable input open":
+            self._inhibited = True
+            self._power.disable_voltage()
         elif kind == "silence":
             self._line.cut = True
         else:
             self._line.recover()
             self._heartbeats.producing = True
-            self._pdos.mute = self._sdo_refuses = False
+            self._pdos.mute = self._sdo_refuses = self._inhibited = False
 
     # Network.
 
@@ -266,7 +269,8 @@ class SimDrive:
     # Power and motion.
 
     def _may_enable(self) -> bool:
-        return not self._quirks.needs_mode or self._motion.mode is not Mode.NONE
+        chosen = not self._quirks.needs_mode or self._motion.mode is not Mode.NONE
+        return chosen and not self._inhibited
 
     def _fault(self, kind: FaultKind) -> None:
         if self.state in (State.FAULT, State.FAULT_REACTION, State.NOT_READY):

@@ -39,6 +39,7 @@ CONDITIONS = {
     "slow sdo": "answers every SDO late",
     "sdo abort": "answers every SDO with an abort",
     "emergency storm": "sends an emergency message with every tick",
+    "enable input open": "has no torque and cannot be enabled, as with STO",
     "silence": "neither hears nor sends anything, as with a cut cable",
     "recover": "ends the lasting ones",
 }

@@ -43,6 +43,10 @@ class SimulatedInstrument:
         """What it shows before any tare; NaN where it can measure nothing."""
         return self._shown.value - self._zero
 
+    def deviate(self, share: float) -> None:
+        """Let its clock run slower by a share of the declared period."""
+        self._converter.deviate(share)
+
     def convert(self) -> None:
         """Sample at the instant ``next_conversion``, which then moves on by one period."""
         self._converter.convert(self.faults)

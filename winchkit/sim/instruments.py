@@ -38,15 +38,18 @@ class Instruments:
             )
             for name in _NOISY
         }
-        self._read_at = 0.0
+        self._sampled_at = dict.fromkeys(_NOISY, 0.0)
+
+    def noise(self, name: str, time: float) -> float:
+        """Noise of one quantity at a time (s)."""
+        interval, self._sampled_at[name] = time - self._sampled_at[name], time
+        return self._noise[name].sample(interval)
 
     def read(
         self, state: State, *, motor_torque: float, tension: float, cable_length: float
     ) -> Measurement:
         """Read now; the arguments are what drive, cell and length instrument make of the truth."""
-        interval = state.time - self._read_at
-        self._read_at = state.time
-        noise = {name: source.sample(interval) for name, source in self._noise.items()}
+        noise = {name: self.noise(name, state.time) for name in _NOISY}
         return Measurement(
             state.time,
             state.motor_angle,

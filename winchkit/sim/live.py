@@ -1,14 +1,15 @@
-"""A simulated bench in real time: plants, drives and instruments behind real buses."""
+"""A simulated bench: plants, drives and instruments behind CAN buses and serial lines."""
 
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
 
 from winchkit.errors import UsageError
@@ -17,20 +18,21 @@ from winchkit.schema.programme import Step
 from winchkit.schema.simbench import FaultSpec, SimBench
 from winchkit.sim.bench import hiding, profiles_of
 from winchkit.sim.buses import CanPort, Interface, wired
+from winchkit.sim.clock.can_bus import SimulatedCanBus
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live_file import write_bench
 from winchkit.sim.live_lines import Line, Placed, open_line
+from winchkit.sim.live_real_time import TICK, serve
 from winchkit.sim.live_winch import LiveWinch
 from winchkit.sim.wire import Wire
 from winchkit.units import suggest
 
 __all__ = ["LiveBench"]
 
-_TICK = 2e-3
 _OVERRUN = 0.02
 """A tick later than this is counted, s."""
 _SUSPENDED = 1.0
 """After a longer gap the process was suspended, and simulated time stood still with it, s."""
-_FRAMES_AT_ONCE = 500
 
 
 class LiveBench:
@@ -42,6 +44,9 @@ class LiveBench:
     ``udp_multicast`` (between processes); Modbus instruments are reached over TCP on
     127.0.0.1, serial ones at a pseudo-terminal. Raises FileError for a declaration that
     does not hold together, ConnectionLost where a bus cannot be opened.
+
+    With ``simulated_time`` it runs on that clock instead of in real time: everything stays within
+    the process, and whoever opens ``bench_spec`` on the same clock is connected to it.
     """
 
     def __init__(
@@ -51,17 +56,19 @@ class LiveBench:
         seed: int = 0,
         hidden: Sequence[str] = (),
         interface: Interface = "virtual",
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = monotonic,
+        simulated_time: SimulatedClock | None = None,
     ) -> None:
         self.sim_bench = hiding(sim_bench, hidden) if hidden else sim_bench
         self.seed = seed
         self._interface = interface
-        self._clock = clock
+        self._simulated = simulated_time
+        self._clock = clock = clock if simulated_time is None else simulated_time.now
         self._lock = threading.RLock()
         self._stopping = threading.Event()
         self._pool: ThreadPoolExecutor | None = None
         self._loops: list[Future[None]] = []
-        self._ports: dict[str, CanPort] = {}
+        self._ports: dict[str, CanPort | SimulatedCanBus] = {}
         self._lines: dict[str, Line] = {}
         self.wire: dict[str, Wire] = {}
         """Cables of the CAN buses, by bus."""
@@ -161,20 +168,36 @@ class LiveBench:
             if bus.kind == "can":
                 buses[name] = wired(bus, f"{declared.name}-{name}", self._interface)
                 self.wire[name] = Wire(self._clock, seed=self.seed)
-                self._ports[name] = CanPort(buses[name], self.wire[name])
+                self._ports[name] = self._can_port(name, buses[name])
         self._make_winches()
         for fault in self._faults:
             winch, _, role = fault.target.partition(".")
             self._winch(winch).check_fault(role, fault.kind)
+        time = self._simulated or self._now
         for name in declared.bus:
             if name not in buses:
                 self._lines[name], buses[name] = open_line(
-                    declared.bus[name], self._placed(name), self.up_to_date, self._now
+                    declared.bus[name], self._placed(name), self.up_to_date, time
                 )
         self.bench_spec = replace(declared, bus=buses)
         self._started_at = self._now()
-        self._pool = ThreadPoolExecutor(max(1, len(self._ports)), "sim-can")
-        self._loops = [self._pool.submit(self._run, name) for name in self._ports]
+        if self._simulated is not None:
+            self._tick_simulated(self._simulated)
+            return
+        ports = {name: port for name, port in self._ports.items() if isinstance(port, CanPort)}
+        self._pool = ThreadPoolExecutor(max(1, len(ports)), "sim-can")
+        self._loops = [self._pool.submit(self._serve, name, port) for name, port in ports.items()]
+
+    def _can_port(self, name: str, spec: BusSpec) -> CanPort | SimulatedCanBus:
+        if self._simulated is None:
+            return CanPort(spec, self.wire[name])
+
+        def deliver(identifier: int, data: bytes) -> None:
+            self._deliver(self._on_bus(name), identifier, data)
+
+        bus = SimulatedCanBus(self._simulated, self.wire[name], spec.bitrate, deliver)
+        self._simulated.serve_can(spec.channel or "", bus.connect)
+        return bus
 
     def _make_winches(self) -> None:
         sim, now = self.sim_bench, self._now()
@@ -195,6 +218,7 @@ class LiveBench:
                 send=port.send,
                 beside=sim.bench.path,
                 now=now,
+                clocks_deviate=self._simulated is not None,
             )
 
     def _placed(self, bus: str) -> Iterator[Placed]:
@@ -213,9 +237,24 @@ class LiveBench:
         if self._pool is not None:
             self._pool.shutdown()
         for port in self._ports.values():
-            port.close()
+            if isinstance(port, CanPort):
+                port.close()
 
-    # Real time.
+    def _on_bus(self, bus: str) -> list[LiveWinch]:
+        wiring = self.sim_bench.bench.winch
+        return [one for name, one in self.winches.items() if wiring[name].servo.bus == bus]
+
+    # Time.
+
+    def _tick_simulated(self, clock: SimulatedClock) -> None:
+        """A tick of everything, and the next one scheduled."""
+        if self._stopping.is_set():
+            return
+        for port in self._ports.values():
+            if isinstance(port, SimulatedCanBus):
+                port.tick()
+        self._tick(list(self.winches.values()))
+        clock.call_at(clock.now() + TICK, lambda: self._tick_simulated(clock))
 
     def _now(self) -> float:
         """Simulated time; it stands still while the process is suspended."""
@@ -226,34 +265,21 @@ class LiveBench:
         self._last = max(self._last, now)
         return self._last
 
-    def _run(self, bus: str) -> None:
-        """Serve one CAN bus: frames as they come, and a tick every two milliseconds.
-
-        Frames that wait are taken before the tick, so that a stall of this process is not
-        mistaken for a master that fell silent.
-        """
-        port = self._ports[bus]
-        wiring = self.sim_bench.bench.winch
-        winches = [one for name, one in self.winches.items() if wiring[name].servo.bus == bus]
-        due = self._clock()
-        while not self._stopping.is_set():
-            frame = port.receive(max(0.0, due - self._clock()))
-            for _ in range(_FRAMES_AT_ONCE):
-                if frame is None:
-                    break
-                self._deliver(winches, *frame)
-                frame = port.receive(0.0)
-            late = self._clock() - due
-            if late >= 0:
-                self._tick(winches)
-                due = max(due + _TICK, self._clock())
-                self._note_lateness(late)
+    def _serve(self, bus: str, port: CanPort) -> None:
+        winches = self._on_bus(bus)
+        serve(
+            port,
+            self._clock,
+            self._stopping.is_set,
+            deliver=partial(self._deliver, winches),
+            tick=lambda: self._tick(winches),
+            late=self._note_lateness,
+        )
 
     def _deliver(self, winches: list[LiveWinch], identifier: int, data: bytes) -> None:
         with self._lock:
             now = self._now()
             for winch in winches:
-                winch.advance(now)
                 winch.receive(identifier, data, now)
 
     def _tick(self, winches: list[LiveWinch]) -> None:

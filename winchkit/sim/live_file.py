@@ -16,7 +16,7 @@ from winchkit.units import UNITS
 
 __all__ = ["bench_toml", "write_bench"]
 
-_NOT_IN_FILES = ("path",)
+_NOT_IN_FILES = ("path", "latch_file")
 
 
 def write_bench(bench: BenchSpec, path: Path) -> Path:

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BusSpec, DeviceRef
+from winchkit.sim.clock.serial_line import SimulatedSerialLine
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live_instruments import Instrument
 from winchkit.sim.modbus import ModbusLine
 from winchkit.sim.modbus_instrument import ModbusInstrument
@@ -17,7 +19,7 @@ from winchkit.sim.stream_line import StreamLine
 
 __all__ = ["Line", "Placed", "open_line"]
 
-Line = ModbusLine | StreamLine
+Line = ModbusLine | StreamLine | SimulatedSerialLine
 
 
 class Placed(NamedTuple):
@@ -33,11 +35,12 @@ def open_line(
     bus: BusSpec,
     placed: Iterable[Placed],
     up_to_date: Callable[[], AbstractContextManager[None]],
-    now: Callable[[], float],
+    time: Callable[[], float] | SimulatedClock,
 ) -> tuple[Line, BusSpec]:
     """Serve the instruments of one bus; the line, and the bus as a user reaches it.
 
-    Modbus is served over TCP whatever the declaration names, a serial line at a pseudo-terminal.
+    Modbus is served over TCP whatever the declaration names, a serial line at a pseudo-terminal;
+    in simulated time, where ``time`` is such a clock, both stay within the process.
     Raises UsageError where two share an address, ConnectionLost where it cannot be served.
     """
     instruments = list(placed)
@@ -46,7 +49,11 @@ def open_line(
         streams = [
             one.instrument for one in instruments if isinstance(one.instrument, StreamInstrument)
         ]
-        stream_line = StreamLine(streams, up_to_date, now)
+        stream_line = (
+            SimulatedSerialLine(streams, up_to_date, time)
+            if isinstance(time, SimulatedClock)
+            else StreamLine(streams, up_to_date, time)
+        )
         stream_line.start()
         return stream_line, replace(bus, port=stream_line.port)
     units = {
@@ -54,7 +61,8 @@ def open_line(
         for one in instruments
         if isinstance(one.instrument, ModbusInstrument) and one.ref.unit is not None
     }
-    modbus_line = ModbusLine(units, up_to_date)
+    clock = time if isinstance(time, SimulatedClock) else None
+    modbus_line = ModbusLine(units, up_to_date, clock=clock)
     modbus_line.start()
     host, port = modbus_line.address
     return modbus_line, BusSpec("modbus-tcp", host=host, port=port, timeout=bus.timeout)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from math import inf
 from pathlib import Path
+from random import Random
 
 from winchkit.errors import FileError, NotPermitted, UsageError
 from winchkit.schema.bench import DeviceRef, WinchWiring
@@ -15,21 +17,26 @@ from winchkit.sim.drive import SimDrive
 from winchkit.sim.drive_faults import known
 from winchkit.sim.live_instruments import device_of, instruments_of
 from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
-from winchkit.sim.plant import Measurement, WinchPlant
+from winchkit.sim.plant import WinchPlant
 from winchkit.sim.process import ProcessInstrument
 from winchkit.units import suggest
 
 __all__ = ["LiveWinch"]
 
-_QUANTITIES: dict[str, Callable[[Measurement], float]] = {
-    "cell": lambda reading: reading.tension,
-    "load": lambda reading: reading.load,
-    "length": lambda reading: reading.cable_length,
-    "temperature": lambda reading: reading.temperature,
+_QUANTITIES = {
+    "cell": "tension",
+    "load": "load",
+    "length": "cable_length",
+    "temperature": "temperature",
 }
 """What the instrument in each role of a wiring file measures."""
 _SMOOTHING = 0.024
 """Set-point filter of the drives, s: an ordinary computer's cycle jitters by a millisecond."""
+_TO_ALL, _NODE = 0x080, 0x07F
+"""Identifiers up to SYNC concern every node, others mostly the node in their lower bits."""
+_DEVIATION = (1e-3, 3e-3)
+"""Of an instrument's clock in simulated time: without it its conversions would stay in step with
+the host's polls, at one age, which no time stamp can know."""
 _AT_REST = 0.5
 """rad/s of the motor, below which a load can be changed."""
 
@@ -49,6 +56,7 @@ class LiveWinch:
         send: Callable[[int, bytes], None],
         beside: str,
         now: float,
+        clocks_deviate: bool = False,
     ) -> None:
         self.name = name
         self.plant = WinchPlant(profile, truth, seed=f"{seed}/{name}", noise=noise)
@@ -68,19 +76,18 @@ class LiveWinch:
             now=now,
         )
         self.drive.power_on(now, boot_time=0.0)
-        measuring = {role: self._measuring(quantity) for role, quantity in _QUANTITIES.items()}
+        read = self.plant.read
+        measuring = {role: partial(read, quantity) for role, quantity in _QUANTITIES.items()}
         self.instruments = instruments_of(wiring, beside, measuring, send, now=now)
-
-    def _measuring(self, quantity: Callable[[Measurement], float]) -> Callable[[], float]:
-        return lambda: quantity(self.plant.measure())
+        if clocks_deviate:
+            for role, one in self.instruments.items():
+                random = Random(f"{seed}/{name}/{role}/clock")
+                one.deviate(random.choice((-1.0, 1.0)) * random.uniform(*_DEVIATION))
 
     def advance(self, now: float) -> None:
         """Move everything up to ``now``, each conversion at its own instant."""
         instruments = list(self.instruments.values())
-        while True:
-            due = min((one.next_conversion for one in instruments), default=inf)
-            if due > now:
-                break
+        while (due := min([one.next_conversion for one in instruments], default=inf)) <= now:
             self.drive.advance(due)
             for one in instruments:
                 if one.next_conversion <= due:
@@ -91,6 +98,8 @@ class LiveWinch:
 
     def receive(self, identifier: int, data: bytes, now: float) -> None:
         """Take a frame from the CAN bus."""
+        if identifier <= _TO_ALL or identifier & _NODE == self.drive.node:
+            self.advance(now)
         self.drive.receive(identifier, data, now)
         for one in self.instruments.values():
             if isinstance(one, ProcessInstrument):

@@ -14,6 +14,7 @@ from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from winchkit.errors import ConnectionLost
+from winchkit.sim.clock.simulated_clock import SimulatedClock, SimulatedThread
 from winchkit.sim.modbus_cable import PtyCable
 from winchkit.sim.modbus_instrument import ModbusInstrument
 
@@ -31,7 +32,8 @@ class ModbusLine:
     """One Modbus server with several instruments by unit id: over TCP, or RTU where ``serial``.
 
     ``up_to_date`` is called, on this line's thread, before registers are read or written; it
-    brings the simulation to now, and is a context in which nobody else touches it.
+    brings the simulation to now, and is a context in which nobody else touches it. With a
+    ``clock`` it serves in simulated time, over TCP within the process.
     """
 
     def __init__(
@@ -42,14 +44,19 @@ class ModbusLine:
         host: str = "127.0.0.1",
         port: int = 0,
         serial: bool = False,
+        clock: SimulatedClock | None = None,
     ) -> None:
         self._instruments = dict(instruments)
         self._up_to_date = up_to_date
         self._wanted = (host, port)
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, name="modbus-server", daemon=True)
+        self._loop = asyncio.new_event_loop() if clock is None else clock.event_loop()
+        self._thread: threading.Thread | SimulatedThread = (
+            threading.Thread(target=self._run, name="modbus-server", daemon=True)
+            if clock is None
+            else clock.thread(self._run, "modbus-server", device=True)
+        )
         self._server: Any = None
-        self._started = threading.Event()
+        self._started = threading.Event() if clock is None else clock.event()
         self._failure: OSError | None = None
         self._serial = serial
         self._cable: PtyCable | None = None

@@ -155,12 +155,9 @@ class WinchPlant:
         """Integrate ``duration`` s under one command; UsageError for a negative duration."""
         if not duration >= 0:
             raise UsageError(f"time cannot advance by {duration:g} s")
-        if duration == 0:
-            return
         count = ceil(duration / MAX_STEP - 1e-9)
-        dt = duration / count
         for _ in range(count):
-            self._step(dt, command)
+            self._step(duration / count, command)
 
     def measure(self) -> Measurement:
         """Read every instrument now, each with fresh noise."""
@@ -170,6 +167,12 @@ class WinchPlant:
             tension=self._cell_reading,
             cable_length=self._length_reading,
         )
+
+    def read(self, quantity: str) -> float:
+        """Read one instrument now, by the name of its quantity in :class:`Measurement`."""
+        read = {"tension": self._cell_reading, "cable_length": self._length_reading}
+        true: float = read.get(quantity, getattr(self._state, quantity))
+        return true + self._instruments.noise(quantity, self._state.time)
 
     # How it goes on.
 

@@ -12,6 +12,7 @@ from winchkit.bench.bench import Bench, open_bench
 from winchkit.drivers.can.cia402 import state_of
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.simbench import SimBench
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live import LiveBench
 from winchkit.sim.pace import PacedClock
 from winchkit.testing.frames import Frame
@@ -29,22 +30,33 @@ class OpenedBench:
     """A bench on simulated winches; a context manager.
 
     ``bench`` is what ``open_bench`` gives, ``spec`` its wiring, ``live`` the simulation behind
-    it, ``clock`` the clock of both, which stands still while this machine is busy elsewhere.
-    Times are on that clock, s. Faults last until ``recover``.
+    it, ``clock`` the clock of both. Times are on that clock, s. Faults last until ``recover``.
+
+    Time is simulated: it advances while the test waits on ``clock``, as fast as the computer can,
+    and stands still otherwise. With ``real_time`` it runs by itself, for tests in which other
+    processes or threads take part, and stands still only while this machine is busy elsewhere.
     """
 
-    def __init__(self, declared: SimBench, *, hidden: Sequence[str] = (), seed: int = 0) -> None:
+    def __init__(
+        self,
+        declared: SimBench,
+        *,
+        hidden: Sequence[str] = (),
+        seed: int = 0,
+        real_time: bool = False,
+    ) -> None:
         """Open it at once; raises FileError, UsageError and what ``open_bench`` raises."""
-        self.clock = PacedClock()
+        self.clock: SimulatedClock | PacedClock = PacedClock() if real_time else SimulatedClock()
         self._disturbances: list[Callable[[], None]] = []
         self._faulty: set[str] = set()
         with ExitStack() as stack:
-            live = LiveBench(declared, seed=seed, hidden=hidden, clock=self.clock.simulation)
+            live = _live(self.clock, declared, seed, hidden)
             self.live = stack.enter_context(live)
             self.spec: BenchSpec = live.bench_spec
             self._recording = Recording(self.spec, live.wire)
             self.bench: Bench = stack.enter_context(open_bench(self.spec, self.clock))
-            self.bench.on_cycle(self.clock.control)
+            if isinstance(self.clock, PacedClock):
+                self.bench.on_cycle(self.clock.control)
             self._start: dict[str, float] = {}
             self.mark()
             self._stack = stack.pop_all()
@@ -166,12 +178,13 @@ class OpenedBench:
     def wait_until(self, condition: Callable[[], bool], within: float = 5.0) -> bool:
         """Whether it comes true within a time on the bench's clock, s."""
         deadline = self.clock.now() + within
-        # Nobody's test may hang where the clock does.
+        # A test must not hang where the clock of real time does.
         wall = time.monotonic() + max(_LEAST_WALL, _WALL * within)
+        simulated = isinstance(self.clock, SimulatedClock)
         while not condition():
-            if self.clock.now() > deadline or time.monotonic() > wall:
+            if self.clock.now() > deadline or (time.monotonic() > wall and not simulated):
                 return False
-            time.sleep(_POLL)
+            self.clock.sleep(_POLL)
         return True
 
     def assert_state(self, winch: str, state: str, within: float = 2.0) -> None:
@@ -224,3 +237,12 @@ class OpenedBench:
             ends.callback(self.live.wire[bus].disturb(identifiers, share=share, delay=delay))
         self._disturbances.append(ends.close)
         return ends.close
+
+
+def _live(
+    clock: SimulatedClock | PacedClock, declared: SimBench, seed: int, hidden: Sequence[str]
+) -> LiveBench:
+    """The simulation, on the clock of the bench."""
+    if isinstance(clock, SimulatedClock):
+        return LiveBench(declared, seed=seed, hidden=hidden, simulated_time=clock)
+    return LiveBench(declared, seed=seed, hidden=hidden, clock=clock.simulation)

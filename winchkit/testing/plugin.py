@@ -31,20 +31,24 @@ class SimBench:
         winches: Mapping[str, Mapping[str, Any]] | None = None,
         hidden: Sequence[str] = (),
         seed: int = 0,
+        real_time: bool = False,
     ) -> OpenedBench:
         """Open a bench of ``sim/`` by name or path, or one with the declared ``winches``.
 
         A winch is a table as in a file, ``{"load_mass": "20 kg", "limits": {"speed": "1 m/s"}}``;
         what it leaves out is as on ``spiral-bench``. With both, the winches stand on the named
         bench instead of its own. ``hidden`` is physics that the profile does not know, ``seed``
-        that of the noise. The bench is closed at the end of the test. Raises FileError,
-        UsageError, and the errors of ``open_bench``.
+        that of the noise. With ``real_time`` time runs by itself, see :class:`OpenedBench`. The
+        bench is closed at the end of the test. Raises FileError, UsageError, and the errors of
+        ``open_bench``.
         """
         from winchkit.testing.declared import declared
         from winchkit.testing.opened import OpenedBench
 
         bench = declared(name, winches, self._folder)
-        return self._stack.enter_context(OpenedBench(bench, hidden=hidden, seed=seed))
+        return self._stack.enter_context(
+            OpenedBench(bench, hidden=hidden, seed=seed, real_time=real_time)
+        )
 
 
 @pytest.fixture

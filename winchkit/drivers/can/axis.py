@@ -4,33 +4,33 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections import deque
 from pathlib import Path
 
 from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import State, Wish, control_word
+from winchkit.drivers.can.cia402 import QUICK_STOP, State, Wish, control_word
 from winchkit.drivers.can.command import Command, Commander
 from winchkit.drivers.can.commission import Commissioned, WatchSpec, await_booted, commission
-from winchkit.drivers.can.emergency import Emergency, error_text, parse_emergency
+from winchkit.drivers.can.emergency import EmergencyLog, error_text
 from winchkit.drivers.can.feedback import AxisFeedback, FeedbackHealth, Gathering, check_feedback
-from winchkit.drivers.can.heartbeat import HeartbeatWatch, NmtState
+from winchkit.drivers.can.heartbeat import NmtState
+from winchkit.drivers.can.host_loss.mechanism import Silence, Terms
+from winchkit.drivers.can.host_loss.watch import HostWatch
 from winchkit.drivers.can.mode_change import change_mode
 from winchkit.drivers.can.modes import MODES, Homing, Target, homing_state, status_words
+from winchkit.drivers.can.motor_position import MotorPosition
 from winchkit.drivers.can.node import SdoNode
 from winchkit.drivers.can.pdo_setup import cob_id
 from winchkit.drivers.can.profile import HomingSpec, set_homing, set_profile
-from winchkit.drivers.can.watchdog import Proof, prove_watchdog
+from winchkit.drivers.can.sdo_stop import SdoStop
 from winchkit.drivers.clock import Clock
 from winchkit.errors import Fault, FileError, NotPermitted, WinchkitError
 from winchkit.schema.device import DeviceSpec
 
 __all__ = ["AxisFeedback", "Cia402Axis"]
 
-_POLL = 0.005
-_REST = 0.05
-"""Below this speed of the motor, rad/s, it counts as standing still."""
 _STALE_SYNCS, _STALE_BEATS = 5, 2
 """Feedback that is older than both of these tells nothing of the drive's state any more."""
+_NMT_STOP = 0x02
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 
@@ -51,43 +51,143 @@ class Cia402Axis:
             raise FileError(Fault("is no servo drive; name one as `servo`", device.path))
         self.name = f"bus '{bus.name}' node {node}"
         self.servo = device.servo
-        self.heartbeat = HeartbeatWatch(watch.timeout)
-        self.emergencies: deque[Emergency] = deque(maxlen=64)
+        self.emergencies = EmergencyLog()
         self.drive: Commissioned | None = None
         """What it agreed to; None before it is commissioned."""
         self.mode: str = device.servo.motion_mode
         self._bus, self._clock, self._watch = bus, clock, watch
         self._node = SdoNode(bus, node, Path(device.path).parent / device.servo.eds)
+        terms = Terms(watch.host, watch.timeout, watch.heartbeat, watch.cycle)
+        self.host = HostWatch(self._node, device.servo, terms, clock, watch.hardware)
+        """How the drive watches the host; its ``silent`` ends the life signs, to stop it."""
+        self.heartbeat = self.host.heartbeat
+        self._position = MotorPosition(device.servo, watch.speed)
         self._gathering: Gathering | None = None
         self._commander: Commander | None = None
         self._cycle = (0, -math.inf)
-        self._boot_ups = self._beats = self._short_emergencies = 0
+        self._boot_ups = self._beats = 0
         self._previous = 0
+        self._sdo_stop = SdoStop(bus, node)
+        self._stop_frames: list[tuple[int, bytes]] = []
         bus.on(0x700 + node, self.heartbeat.receive)
-        bus.on(0x080 + node, self._on_emergency)
+        bus.on(0x080 + node, self.emergencies.receive)
 
     def commission(self) -> Commissioned:
         """Set the drive up, checked and disabled; raises NoReply, DeviceRefused, NotPermitted."""
         self._gathering = self._commander = None
         self._previous = 0
+        self._sdo_stop.hold(True)
+        try:
+            return self._commission()
+        finally:
+            self._sdo_stop.hold(False)
+
+    def _commission(self) -> Commissioned:
         self.heartbeat.last = self.heartbeat.state = None
-        await_booted(self._node, self.servo.boot_time, self._clock)
+        await_booted(self._node, self.servo.boot_time, self._clock, self.heartbeat)
         # Only a boot-up after this one takes away what is set up now.
         self._boot_ups = self.heartbeat.boot_ups
         self._beats = self._bus.beats[self._watch.host]
-        drive = commission(self._node, self.servo, self._watch, self._clock)
-        self._await_operational()
+        drive = commission(self._node, self.servo, self._watch, self._clock, self.host)
+        self.host.await_operational()
         if self._watch.prove:
-            drive = dataclasses.replace(drive, proof=self._prove())
-        commander = Commander(self.name, drive, self._node.node, drive.mode)
+            proof = self.host.prove(self.emergencies)
+            self.emergencies.clear()
+            loss = self.host.reaction(proof, drive.options, seen=self._watch.seen_stopping)
+            drive = dataclasses.replace(drive, proof=proof, host_loss=loss)
+        self.host.arm()
+        counter = self._position.begin(drive, self._boot_ups)
+        commander = Commander(self.name, drive, self._node.node, drive.mode, counter)
         gathering = self._listen(drive)
         self.drive, self.mode = drive, drive.mode
         self._commander, self._gathering = commander, gathering
+        self._stop_frames = commander.stop_frames()
+        self.emergencies.in_force.clear()
         return drive
 
+    def take_commissioning(self, *, seen_stopping: bool, stops_on_nmt: bool) -> None:
+        """Take what the commissioning record says of this very drive, while it is enabled."""
+        self._watch = dataclasses.replace(
+            self._watch, seen_stopping=seen_stopping, stops_on_nmt=stops_on_nmt
+        )
+        if self.drive is not None:
+            loss = self.host.reaction(self.drive.proof, self.drive.options, seen=seen_stopping)
+            self.drive = dataclasses.replace(self.drive, host_loss=loss, stops_on_nmt=stops_on_nmt)
+
+    def emergency_stop(self, *, sdo: bool) -> None:
+        """Send the quick stop that was prepared at commissioning: RPDOs with 02h, SDO where asked.
+
+        Nothing is computed and nothing is read: it works whatever else has failed. The RPDOs take
+        effect at the next SYNC. Raises ConnectionLost.
+        """
+        self._previous = QUICK_STOP
+        for identifier, data in () if self.host.withholds_rpdos else self._stop_frames:
+            self._bus.send(identifier, data)
+        if sdo:
+            self._sdo_stop.send()
+
+    def stop_by_sdo(self) -> None:
+        """Quick stop by SDO, and its state asked for, without waiting; raises ConnectionLost."""
+        self._sdo_stop.send()
+
+    def stop_by_nmt(self) -> None:
+        """NMT stop; raises ConnectionLost."""
+        self._bus.nmt(_NMT_STOP, self._node.node)
+
+    def end_stop(self) -> None:
+        """The stop by SDO is over: its replies are the confirmed client's again."""
+        self._sdo_stop.end()
+
+    @property
+    def sdo_state(self) -> State | None:
+        """Power state that it told by SDO since the stop by SDO began."""
+        return self._sdo_stop.state
+
+    @property
+    def sdo_refused(self) -> bool:
+        """Whether it aborted the stop by SDO that is under way."""
+        return self._sdo_stop.refused
+
+    @property
+    def stops_on_nmt(self) -> bool:
+        """Whether commissioning saw it leave operation enabled on NMT stop."""
+        return False if self.drive is None else self.drive.stops_on_nmt
+
+    @property
+    def moves_alone(self) -> bool:
+        """Whether it makes the motion of its mode by itself (HM, PP)."""
+        return MODES[self.mode].moves_alone
+
+    @property
+    def nmt_text(self) -> str:
+        """NMT state of its heartbeat in words."""
+        return "unknown" if self.heartbeat.state is None else str(NmtState(self.heartbeat.state))
+
+    @property
+    def alarms(self) -> tuple[int, ...]:
+        """Emergency codes that it sent and has not taken back."""
+        return tuple(self.emergencies.in_force)
+
+    @property
+    def alarm_text(self) -> str:
+        """They in words."""
+        return self.emergencies.standing
+
+    def forget_alarms(self) -> None:
+        """A reset has dealt with them; those that still hold are sent again."""
+        self.emergencies.in_force.clear()
+
     def disarm(self) -> None:
-        """Let the drive, at rest, stop watching the host's heartbeat; raises ConnectionLost."""
-        self._node.write(0x1016, 1, 0)
+        """Let the drive, at rest, stop watching the host; raises ConnectionLost."""
+        self.host.disarm()
+
+    def fall_silent(self) -> bool:
+        """End the life signs that the drive watches, until it is commissioned again.
+
+        Returns whether SYNC is one of them, which the control loop has to end.
+        """
+        self.host.silent = True
+        return self.host.mechanism.silence in (Silence.SYNC, Silence.ALL)
 
     @property
     def objects(self) -> SdoNode:
@@ -107,7 +207,7 @@ class Cia402Axis:
     @property
     def short_frames(self) -> int:
         """Frames with fewer bytes than they should have."""
-        return self.health.short + self._short_emergencies
+        return self.health.short + self.emergencies.short
 
     @property
     def position_mode(self) -> bool:
@@ -129,6 +229,11 @@ class Cia402Axis:
     def mapping_lost(self) -> bool:
         """Whether it has booted since it was commissioned, and forgotten its PDOs."""
         return self.heartbeat.boot_ups != self._boot_ups
+
+    @property
+    def lost_set_up(self) -> bool:
+        """Whether it has to be commissioned again: it booted, or does not run its PDOs."""
+        return self.mapping_lost or not self.operational or self.state is State.UNKNOWN
 
     @property
     def state(self) -> State:
@@ -163,11 +268,12 @@ class Cia402Axis:
     @property
     def at_rest(self) -> bool:
         """Whether the newest feedback says that the motor stands still."""
-        return self.feedback is not None and abs(self.feedback.velocity) <= _REST
+        return self._position.at_rest(self.feedback)
 
     def begin_cycle(self, sync: int, now: float) -> None:
         """Note the SYNC that is about to be sent: TPDOs that follow were sampled at it."""
         self._cycle = (sync, now)
+        self.host.begin_cycle(now)
         if self._gathering is not None:
             self._gathering.begin(sync, now)
 
@@ -195,8 +301,8 @@ class Cia402Axis:
             return self._previous
         if wish in (Wish.RUN_DOWN, Wish.HALT) and not MODES[self.mode].can_run_down:
             wish = Wish.STOP
-        if wish is Wish.ENABLE and self._bus.beats[self._watch.host] == self._beats:
-            # The drive's watchdog arms on the first heartbeat that it hears.
+        if wish is Wish.ENABLE and not self._watched:
+            # The drive's watchdog arms on the first life sign that it hears.
             wish = Wish.DISABLE
         word = control_word(
             self.state,
@@ -207,7 +313,7 @@ class Cia402Axis:
         )
         command = Command(wish, velocity, angle, torque, start)
         word, frames = commander.frames(word, command, feedback)
-        for identifier, data in frames:
+        for identifier, data in () if self.host.withholds_rpdos else frames:
             self._bus.send(identifier, data)
         self._previous = word
         return word
@@ -223,15 +329,20 @@ class Cia402Axis:
             raise NotPermitted(
                 f"{self.name}: the drive has no mode {mode}; it has {', '.join(drive.modes)}"
             )
-        commander = Commander(self.name, drive, self._node.node, mode)
+        homed = self.homing is Homing.DONE
+        commander = Commander(self.name, drive, self._node.node, mode, self._position.counter)
         before = self._commander, self.mode
         # From here on cyclic PDOs must carry the new mode, lest they set the old one again.
         self._commander, self.mode = commander, mode
+        self._stop_frames = commander.stop_frames()
         try:
             change_mode(self._node, mode, self._clock)
         except WinchkitError:
             self._commander, self.mode = before
+            if self._commander is not None:
+                self._stop_frames = self._commander.stop_frames()
             raise
+        self._position.changed_mode(before[1], mode, homed=homed)
 
     def prepare_homing(self, homing: HomingSpec) -> None:
         """Set a homing up and change to HM, disabled; ``send(Wish.ENABLE, start=True)`` runs it.
@@ -243,10 +354,20 @@ class Cia402Axis:
         set_homing(self._node, self.servo, drive.scale, homing)
         self.switch_mode("HM")
 
+    def permit_angle(self, angle: float) -> None:
+        """Raise NotPermitted where a position mode cannot go to a motor angle (rad)."""
+        if self.position_mode and self._commander is not None:
+            self._commander.counts(angle)
+
     def set_profile(self, *, speed: float | None = None, acceleration: float | None = None) -> None:
         """Set speed (rad/s) and ramps (rad/s^2) of the profile modes; raises NotPermitted."""
         drive = self._disabled_drive("set its profile")
         set_profile(self._node, self.servo, drive.scale, speed=speed, acceleration=acceleration)
+
+    @property
+    def _watched(self) -> bool:
+        """Whether the drive has had a life sign of the host since it was commissioned."""
+        return self.host.begun(self._bus.beats[self._watch.host] - self._beats)
 
     def _disabled_drive(self, what: str) -> Commissioned:
         if self.drive is None:
@@ -258,43 +379,11 @@ class Cia402Axis:
             )
         return self.drive
 
-    def _prove(self) -> Proof:
-        """Prove that the drive watches the host; leaves it operational, disabled, forgiven."""
-        proof = prove_watchdog(
-            self._node,
-            self.heartbeat,
-            self.emergencies,
-            self._clock,
-            host=self._watch.host,
-            timeout=self._watch.timeout,
-        )
-        self._await_operational()
-        self.emergencies.clear()
-        return proof
-
     def _listen(self, drive: Commissioned) -> Gathering:
         """Hear the drive's TPDOs, put together anew."""
         check_feedback(self.name, drive.tpdo)
-        gathering = Gathering(drive.tpdo, drive.scale, self._watch.cycle)
+        gathering = Gathering(drive.tpdo, drive.scale, self._watch.cycle, self._position.counter)
         for codec in drive.tpdo:
             identifier = cob_id("tpdo", codec.spec.number, self._node.node)
             self._bus.on(identifier, gathering.receiver(codec))
         return gathering
-
-    def _await_operational(self) -> None:
-        """Wait for the heartbeat that confirms the start; also proves that it beats at all."""
-        deadline = self._clock.now() + self._watch.timeout
-        while self.heartbeat.state != NmtState.OPERATIONAL:
-            if self._clock.now() > deadline:
-                raise NotPermitted(
-                    f"{self.name}: no heartbeat says operational within "
-                    f"{self._watch.timeout:g} s of the start; check 1017h and the drive's errors"
-                )
-            self._clock.sleep(_POLL)
-
-    def _on_emergency(self, data: bytes, now: float) -> None:
-        emergency = parse_emergency(data, now)
-        if emergency is None:
-            self._short_emergencies += 1
-        else:
-            self.emergencies.append(emergency)

@@ -7,14 +7,23 @@ import logging
 import threading
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 
 import can
 import canopen
 
 from winchkit.drivers.can.frame_time import FrameTime
 from winchkit.drivers.can.health import BusHealth, BusState, ErrorTally
-from winchkit.drivers.can.interface import Frame, Interface, open_interface
+from winchkit.drivers.can.interface import (
+    Frame,
+    Interface,
+    open_interface,
+    queue_full,
+    sends_remote,
+    simulated_interface,
+)
 from winchkit.drivers.clock import Clock
+from winchkit.drivers.scheduling import event_of, thread_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
@@ -30,6 +39,8 @@ _SDO_REPLY = range(0x581, 0x600)
 _WAIT = 0.05
 _MAX_FAILURES = 5
 _FAILURE_PAUSE = 0.01
+_FULL_TIME = 0.1
+"""For which the queue of the interface may be full before the bus counts as dead, s."""
 _GONE = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO)
 _SDO_SIZE = 8
 _LAST_NODE = 127
@@ -49,15 +60,26 @@ class CanBus:
         self.name = name
         self.clock = clock
         self.received = self.sent = self.unsent = self.reopened = 0
+        self.thread_id = 0
+        """Native id of the receive thread, once it runs."""
         self.fault: str | None = None
         self.beats: Counter[int] = Counter()
         """Heartbeats sent, by the node that they were sent for."""
+        self.sends_remote = sends_remote(spec)
+        """Whether the interface sends remote frames, as far as that is known."""
+        self.sync_held = self.heartbeat_held = False
+        """Whether :meth:`sync` or :meth:`heartbeat` send nothing, while a drive is to miss them."""
         self.network = canopen.Network()
         self._spec = spec
         self._handlers: dict[int, Handler] = {}
         self._errors = ErrorTally()
         self._heard: set[int] = set()
-        self._dropped = 0
+        self._dropped = self._syncs_heard = 0
+        self._syncs_sent = 0
+        self._full_since: float | None = None
+        self.on_foreign_sync: Callable[[str], None] = lambda _words: None
+        """Called on the receive thread with each SYNC that was not sent here."""
+        self.on(_SYNC, self._hear_sync)
         self._open()
 
     def close(self) -> None:
@@ -103,6 +125,7 @@ class CanBus:
             dropped=self._dropped + self._port.dropped,
             unsent=self.unsent,
             reopened=self.reopened,
+            foreign_syncs=self.foreign_syncs,
             fault=self.fault or "",
         )
 
@@ -112,6 +135,29 @@ class CanBus:
         known = (identifier - _HEARTBEAT for identifier in tuple(self._handlers))
         return frozenset(self._heard.union(node for node in known if 0 < node <= _LAST_NODE))
 
+    @property
+    def foreign_syncs(self) -> int:
+        """SYNC frames on the bus that were not sent here."""
+        # Over UDP multicast what is sent comes back.
+        own = self._syncs_sent if self._spec.interface == "udp_multicast" else 0
+        return max(0, self._syncs_heard - own)
+
+    @property
+    def foreign_sync(self) -> str:
+        """That somebody else sends SYNC, in words; empty where nobody does."""
+        count = self.foreign_syncs
+        if not count:
+            return ""
+        return (
+            f"bus '{self.name}': {count} SYNC frames that were not sent here; a second master, or "
+            "a drive whose 1005h has bit 30 set, sends SYNC too: cyclic modes need one producer"
+        )
+
+    def _hear_sync(self, _data: bytes, _now: float) -> None:
+        self._syncs_heard += 1
+        if words := self.foreign_sync:
+            self.on_foreign_sync(words)
+
     def on(self, identifier: int, handler: Handler) -> None:
         """Call ``handler`` for every frame with this identifier."""
         self._handlers[identifier] = handler
@@ -120,23 +166,44 @@ class CanBus:
         """Let frames with this identifier pass again."""
         self._handlers.pop(identifier, None)
 
-    def send(self, identifier: int, data: bytes) -> None:
-        """Send one frame; raises ConnectionLost."""
+    def pass_on(self, identifier: int, data: bytes, now: float) -> None:
+        """Hand an SDO reply that a handler does not want to the confirmed SDO client."""
+        self.network.notify(identifier, bytearray(data), now)
+
+    def send(self, identifier: int, data: bytes) -> bool:
+        """Send one frame; raises ConnectionLost.
+
+        A full queue of the interface is no dead bus: the frame is left out and counted (False is
+        returned), and only a queue that stays full is a fault.
+        """
         port = self._port
         try:
             with self.network.send_lock:
                 port.send(identifier, data)
         except (can.CanError, OSError, ValueError) as error:
-            self.unsent += 1
-            reason = f"cannot send: {error}"
-            if port is self._port:
-                self.fault = reason
-            raise ConnectionLost(f"bus '{self.name}': {reason}; check the adapter") from error
+            if self._queue_full(error):
+                return False
+            raise self._unsendable(port, error) from error
+        self.sent += 1
+        if self._full_since is not None:
+            self._full_since = None
+        return True
+
+    def remote(self, identifier: int) -> None:
+        """Send a remote frame, to which a node answers with one byte; raises ConnectionLost."""
+        port = self._port
+        try:
+            with self.network.send_lock:
+                port.send_remote(identifier)
+        except (can.CanError, OSError, ValueError) as error:
+            raise self._unsendable(port, error) from error
         self.sent += 1
 
     def sync(self) -> None:
         """Send SYNC."""
-        self.send(_SYNC, b"")
+        if not self.sync_held:
+            self._syncs_sent += 1
+            self.send(_SYNC, b"")
 
     def nmt(self, command: int, node: int) -> None:
         """Send an NMT command: 1 start, 2 stop, 80h pre-operational, 81h reset."""
@@ -144,21 +211,42 @@ class CanBus:
 
     def heartbeat(self, node: int, state: int) -> None:
         """Send the host's heartbeat."""
-        self.send(_HEARTBEAT + node, bytes((state,)))
-        self.beats[node] += 1
+        if self.heartbeat_held:
+            return
+        if self.send(_HEARTBEAT + node, bytes((state,))):
+            self.beats[node] += 1
+
+    def _queue_full(self, error: Exception) -> bool:
+        """Whether a frame may be left out: the queue is full, and has not been for long."""
+        if not queue_full(error):
+            return False
+        now = self.clock.now()
+        if self._full_since is None:
+            self._full_since = now
+        lasting = now - self._full_since > _FULL_TIME
+        self.unsent += not lasting
+        return not lasting
+
+    def _unsendable(self, port: Interface, error: Exception) -> ConnectionLost:
+        self.unsent += 1
+        reason = f"cannot send: {error}"
+        if port is self._port:
+            self.fault = reason
+        return ConnectionLost(f"bus '{self.name}': {reason}; check the adapter")
 
     def _open(self) -> None:
-        self._port: Interface = open_interface(self._spec, self.name)
+        simulated = simulated_interface(self._spec, self.clock)
+        self._port: Interface = simulated or open_interface(self._spec, self.name)
         self.network.bus = self._port.library
         self._times = FrameTime()
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(
-            target=self._receive, args=(self._port,), name=f"can-{self.name}", daemon=True
-        )
+        self._stopping = event_of(self.clock)
+        receive = partial(self._receive, self._port)
+        self._thread = thread_of(self.clock, receive, f"can-{self.name}")
         self._thread.start()
 
     def _receive(self, port: Interface) -> None:
         """Receive until closed; one unreadable frame is counted, many in a row end the bus."""
+        self.thread_id = threading.get_native_id()
         failures, stopping = 0, self._stopping
         while not stopping.is_set():
             try:

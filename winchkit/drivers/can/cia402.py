@@ -16,6 +16,8 @@ __all__ = [
     "HALT",
     "QUICK_STOP",
     "SHUTDOWN",
+    "STATES",
+    "STATE_BITS",
     "SWITCH_ON",
     "TRANSITIONS",
     "State",
@@ -41,7 +43,10 @@ class State(IntEnum):
     FAULT = 7
 
     def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
+        return _STATE_WORDS[self + 1]
+
+
+_STATE_WORDS = tuple(state.name.lower().replace("_", " ") for state in State)
 
 
 class StatusBit(IntEnum):
@@ -136,13 +141,15 @@ def _said(status: int) -> State:
     return State.UNKNOWN
 
 
-_STATE_BITS = 0x6F
-_STATES = tuple(_said(bits) for bits in range(_STATE_BITS + 1))
+STATE_BITS = 0x6F
+"""Bits of the status word that say the power state."""
+STATES = tuple(_said(bits) for bits in range(STATE_BITS + 1))
+"""The power state by these bits."""
 
 
 def state_of(status: int) -> State:
     """Power state that a status word 6041h says."""
-    return _STATES[status & _STATE_BITS]
+    return STATES[status & STATE_BITS]
 
 
 def control_word(

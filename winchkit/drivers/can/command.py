@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import struct
+from typing import NamedTuple
 
-from winchkit.drivers.can.cia402 import ENABLE_OPERATION, HALT, State, Wish
+from winchkit.drivers.can.cia402 import ENABLE_OPERATION, HALT, QUICK_STOP, State, Wish
 from winchkit.drivers.can.commission import Commissioned
-from winchkit.drivers.can.feedback import AxisFeedback
+from winchkit.drivers.can.feedback import AxisFeedback, counter_range
 from winchkit.drivers.can.modes import MODES, START, TARGETS, Target
 from winchkit.drivers.can.pdo_setup import cob_id
+from winchkit.drivers.can.position_counter import PositionCounter
 from winchkit.drivers.can.set_point import SetPoint
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, NotPermitted
 
 __all__ = ["Command", "Commander"]
 
@@ -22,8 +24,7 @@ _ALWAYS = {_CONTROL, _MODE, _VELOCITY_OFFSET, _TORQUE_OFFSET}
 _MOVES = (Wish.ENABLE, Wish.RUN_DOWN)
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
+class Command(NamedTuple):
     """What is asked of the drive in a cycle; SI at the motor shaft."""
 
     wish: Wish
@@ -40,18 +41,34 @@ class Command:
 class Commander:
     """Makes frames of commands, for one drive in one mode."""
 
-    def __init__(self, name: str, drive: Commissioned, node: int, mode: str) -> None:
+    def __init__(
+        self,
+        name: str,
+        drive: Commissioned,
+        node: int,
+        mode: str,
+        counter: PositionCounter | None = None,
+    ) -> None:
         """Raise FileError where the device file maps too little, or what nobody fills."""
-        self._drive, self._mode = drive, MODES[mode]
+        self._name, self._drive, self._mode = name, drive, MODES[mode]
+        self.counter = counter or PositionCounter(*counter_range(drive.tpdo))
         self._set_point = SetPoint()
         target = self._mode.target
         _check(name, drive, mode, target)
         live = _ALWAYS if target is None else _ALWAYS | {target}
         self._codecs = tuple(
-            (cob_id("rpdo", codec.spec.number, node), codec, tuple(codec.position))
+            (cob_id("rpdo", codec.spec.number, node), codec)
             for codec in drive.rpdo
             if live & codec.position.keys()
         )
+        self._objects = [key for _, codec in self._codecs for key in codec.position]
+        """Of all RPDOs in their order; the values of a cycle stand in the same order."""
+        self._zeros = [self._mode.number if key == _MODE else 0 for key in self._objects]
+        kind, feeds = self._mode.kind, (_VELOCITY_OFFSET,)
+        self._controls = self._places(_CONTROL)
+        self._angles = self._places((0x607A, 0), (0x60C1, 1))
+        self._speeds = self._places((0x60FF, 0), *(feeds if kind is Target.ANGLE else ()))
+        self._torques = self._places((0x6071, 0) if kind is Target.TORQUE else _TORQUE_OFFSET)
 
     def frames(
         self, word: int, command: Command, feedback: AxisFeedback
@@ -62,52 +79,76 @@ class Commander:
         bits and targets, any other goes with zero and the actual position. Raises NotPermitted
         for targets beyond the drive's range.
         """
-        scale = self._drive.scale
         enabled = feedback.state is State.OPERATION_ENABLED
         moves = enabled and word == ENABLE_OPERATION and command.wish in _MOVES
         bits, angle = self._aim(command, feedback, moves)
         if moves and command.wish is Wish.RUN_DOWN and self._mode.moves_alone:
             bits = HALT
-        values: dict[Key, int] = {
-            _CONTROL: word | bits,
-            _MODE: self._mode.number,
-            (0x607A, 0): angle,
-            (0x60C1, 1): angle,
-            (0x60FF, 0): scale.velocity_counts(command.velocity) if moves else 0,
-            **self._offsets(command, moves),
-        }
-        return word | bits, [
-            (identifier, codec.encode([values[key] for key in keys]))
-            for identifier, codec, keys in self._codecs
-        ]
+        values = self._zeros.copy()
+        for place in self._controls:
+            values[place] = word | bits
+        for place in self._angles:
+            values[place] = angle
+        if moves:
+            scale = self._drive.scale
+            for place in self._speeds:
+                values[place] = scale.velocity_counts(command.velocity)
+            for place in self._torques:
+                values[place] = scale.torque_counts(command.torque)
+        return word | bits, self._packed(values)
+
+    def stop_frames(self) -> list[tuple[int, bytes]]:
+        """Frames of a quick stop that need no feedback: 02h, the mode, and zero targets.
+
+        In quick stop the drive makes its own ramp, and no target counts (CiA 402-2).
+        """
+        values = self._zeros.copy()
+        for place in self._controls:
+            values[place] = QUICK_STOP
+        frames = zip(self._packed(values), self._codecs, strict=True)
+        return [frame for frame, (_, codec) in frames if _CONTROL in codec.position]
+
+    def _places(self, *keys: Key) -> tuple[int, ...]:
+        """Where the values of these objects stand, as far as an RPDO carries them."""
+        return tuple(place for place, key in enumerate(self._objects) if key in keys)
+
+    def _packed(self, values: list[int]) -> list[tuple[int, bytes]]:
+        """The RPDOs with these values."""
+        frames, end = [], 0
+        for identifier, codec in self._codecs:
+            start, end = end, end + len(codec.objects)
+            try:
+                frames.append((identifier, codec.encode(values[start:end])))
+            except struct.error:
+                said = zip(codec.position, values[start:end], strict=True)
+                words = ", ".join(f"{_text(key)} = {value}" for key, value in said)
+                raise NotPermitted(
+                    f"{self._name}: a target does not fit into RPDO {codec.spec.number} ({words}); "
+                    "it is beyond the drive's range"
+                ) from None
+        return frames
 
     def _aim(self, command: Command, feedback: AxisFeedback, moves: bool) -> tuple[int, int]:
         """The bits of the mode and the target position: the actual one where nothing is asked."""
-        scale = self._drive.scale
-        actual = scale.angle_counts(feedback.angle)
-        if not moves:
+        actual = feedback.shown
+        if actual is None:
+            actual = self._drive.scale.angle_counts(feedback.angle)
+        if not moves or self._mode.kind is not Target.ANGLE:
             self._set_point.reset(actual)
-            return 0, actual
-        wanted = None if command.angle is None else scale.angle_counts(command.angle)
+            return self._start_bit(command) if moves else 0, actual
+        wanted = None if command.angle is None else self.counts(command.angle)
         if self._mode.name == "PP":
             return self._set_point.step(wanted, feedback.status)
         return self._start_bit(command), actual if wanted is None else wanted
+
+    def counts(self, angle: float) -> int:
+        """Target position (607Ah) for an angle; raises NotPermitted beyond the counter's end."""
+        return self.counter.target(self._drive.scale.unwrapped_counts(angle), self._name)
 
     def _start_bit(self, command: Command) -> int:
         """Bit 4 in modes without a handshake: follow (IP), start a homing (HM)."""
         name = self._mode.name
         return START if name == "IP" or (name == "HM" and command.start) else 0
-
-    def _offsets(self, command: Command, moves: bool) -> dict[Key, int]:
-        """Torque as the target of torque modes, torque and velocity fed forward in others."""
-        scale, kind = self._drive.scale, self._mode.kind
-        torque = scale.torque_counts(command.torque) if moves else 0
-        feeds = moves and kind is Target.ANGLE
-        return {
-            (0x6071, 0): torque if kind is Target.TORQUE else 0,
-            _TORQUE_OFFSET: 0 if kind is Target.TORQUE else torque,
-            _VELOCITY_OFFSET: scale.velocity_counts(command.velocity) if feeds else 0,
-        }
 
 
 def _check(name: str, drive: Commissioned, mode: str, target: Key | None) -> None:

@@ -15,6 +15,7 @@ from winchkit.drivers.can.config import Config, Key, settings
 from winchkit.drivers.can.fitting import Identity
 from winchkit.drivers.can.objects import Value, object_name
 from winchkit.errors import Fault, FileError
+from winchkit.regular_file import read_text
 
 __all__ = ["read_config_file", "write_config_file"]
 
@@ -40,7 +41,7 @@ def read_config_file(path: Path, dictionary: Any) -> Config:
     """
     is_json = _is_json(path)
     try:
-        text = path.read_text(encoding="utf-8" if is_json else "latin-1")
+        text = read_text(path, "utf-8" if is_json else "latin-1")
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(Fault(f"cannot be read: {error}", str(path))) from error
     known = settings(dictionary)

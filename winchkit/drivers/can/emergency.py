@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import struct
+from collections import deque
 from dataclasses import dataclass
 
-__all__ = ["Emergency", "error_text", "parse_emergency"]
+__all__ = ["Emergency", "EmergencyLog", "error_text", "parse_emergency"]
 
 _TEXT: dict[int, str] = {
     0x0000: "no error",
@@ -34,6 +35,9 @@ _TEXT: dict[int, str] = {
     0x8130: "heartbeat or life guard error: the drive lost the host",
     0x8140: "recovered from bus off",
     0x8210: "PDO not processed: wrong length",
+    0x8220: "PDO length exceeded",
+    0x8240: "unexpected SYNC data length",
+    0x8250: "RPDO timeout: the drive lost the host",
     0x8311: "excess torque",
     0x8400: "velocity loop error",
     0x8500: "position loop error",
@@ -54,6 +58,9 @@ _FAMILY: dict[int, str] = {
     0xF0: "additional function",
     0xFF: "device specific",
 }
+
+
+_KEPT = 64
 
 
 @dataclass(frozen=True)
@@ -84,3 +91,31 @@ def parse_emergency(data: bytes, now: float) -> Emergency | None:
         return None
     code, register = struct.unpack_from("<HB", data)
     return Emergency(code, register, bytes(data[3:8]), now)
+
+
+class EmergencyLog(deque[Emergency]):
+    """The newest messages of one drive; ``receive`` takes its frames."""
+
+    def __init__(self) -> None:
+        super().__init__(maxlen=_KEPT)
+        self.in_force: dict[int, Emergency] = {}
+        """By code, what the drive has not taken back by 0000h."""
+        self.short = 0
+        """Frames too short to be a message."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take a frame of 80h + node."""
+        found = parse_emergency(data, now)
+        if found is None:
+            self.short += 1
+            return
+        self.append(found)
+        if found.code == 0:
+            self.in_force.clear()
+        else:
+            self.in_force[found.code] = found
+
+    @property
+    def standing(self) -> str:
+        """Messages in force in words; over-temperature (4210h) may come without a fault."""
+        return "; ".join(str(item) for item in tuple(self.in_force.values()))

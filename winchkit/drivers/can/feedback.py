@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from operator import itemgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from winchkit.drivers.can.bus import Handler
-from winchkit.drivers.can.cia402 import State, StatusBit, state_of
-from winchkit.drivers.can.pdo import PdoCodec
+from winchkit.drivers.can.cia402 import STATE_BITS, STATES, State, StatusBit
+from winchkit.drivers.can.pdo import PdoCodec, joint_layout
+from winchkit.drivers.can.position_counter import PositionCounter
 from winchkit.drivers.can.scale import Scale
 from winchkit.errors import Fault, FileError
 
@@ -24,6 +26,7 @@ __all__ = [
     "FeedbackHealth",
     "Gathering",
     "check_feedback",
+    "counter_range",
 ]
 
 Key = tuple[int, int]
@@ -31,6 +34,10 @@ Key = tuple[int, int]
 STATUS, POSITION, VELOCITY, TORQUE = (0x6041, 0), (0x6064, 0), (0x606C, 0), (0x6077, 0)
 MODE, ERROR, CURRENT = (0x6061, 0), (0x603F, 0), (0x6078, 0)
 _SHOWN = (STATUS, POSITION, VELOCITY, TORQUE, MODE, ERROR, CURRENT)
+_QUANTITIES = (POSITION, VELOCITY, TORQUE, CURRENT)
+_WITHOUT: Mapping[Key, int | None] = {MODE: None, ERROR: 0}
+"""What is shown where a drive does not send it."""
+_new = tuple.__new__
 _NONE = 0
 """No TPDO has this number."""
 _KEPT = 3
@@ -62,6 +69,10 @@ class AxisFeedback(NamedTuple):
     error_code: int = 0
     current: float = math.nan
     """A; NaN where the drive does not send it."""
+    shown: int | None = None
+    """6064h in counts as the drive shows it; ``angle`` counts on where it wraps."""
+    turns_known: bool = True
+    """Whether ``angle`` counts every turn: not after a gap in which 6064h may have wrapped."""
 
     @property
     def limited(self) -> bool:
@@ -97,23 +108,42 @@ class Gathering:
     none of them can be left over from the SYNC before. The order is that of their numbers until
     a drive answers twice running in another one. TPDOs of other types are slower: their newest
     values are joined until they are too old, and are then unknown.
+
+    The frames of the set are kept as they come and unpacked together, once it is complete.
     """
 
-    def __init__(self, codecs: Sequence[PdoCodec], scale: Scale, cycle: float) -> None:
+    def __init__(
+        self,
+        codecs: Sequence[PdoCodec],
+        scale: Scale,
+        cycle: float,
+        counter: PositionCounter | None = None,
+    ) -> None:
+        """Without a ``counter`` one of the mapped position's own size is made."""
         self.feedback: AxisFeedback | None = None
-        self._scale, self._cycle = scale, cycle
-        self._order = sorted(codec.spec.number for codec in codecs if codec.spec.every_sync)
-        self._parts, places = _places(codecs)
-        row = sum(len(codec.objects) for codec in codecs)
-        # What no TPDO carries stands at the end of the row and stays unknown.
-        self._values: list[int | None] = [None] * (row + 1)
-        self._pick = itemgetter(*(places.get(key, row) for key in _SHOWN))
-        self._expires: dict[int, float] = {}
-        self._members, self._place = len(self._order), 0
-        self._next = self._order[0]
+        self._counter = counter or PositionCounter(*counter_range(codecs))
+        self._cycle = cycle
+        members = [codec for codec in codecs if codec.spec.every_sync]
+        self._frames = [b""] * len(members)
+        self._unpack, each = joint_layout(members)
+        slower = [codec for codec in codecs if not codec.spec.every_sync]
+        self._slower = [_Slower(codec, self._lifetime(codec)) for codec in slower]
+        mapped = [*each, *(key for codec in slower for key in codec.position)]
+        lacking = [key for key in _WITHOUT if key not in mapped]
+        self._lacking = tuple(_WITHOUT[key] for key in lacking)
+        self._has_others = bool(slower or lacking)
+        objects = [*mapped, *lacking]
+        # A quantity that no TPDO carries is any number times NaN.
+        self._pick = itemgetter(*(objects.index(key) if key in objects else 0 for key in _SHOWN))
+        units = zip(
+            _QUANTITIES, (scale.angle, scale.velocity, scale.torque, scale.current), strict=True
+        )
+        self._units = tuple(unit if key in mapped else math.nan for key, unit in units)
+        self._next = _NONE
+        self._set_order(sorted(codec.spec.number for codec in members))
         self._strays: list[int] = []
         self._before: list[int] = []
-        self._sync, self._sent, self._time = 0, -math.inf, -math.inf
+        self._sync, self._sent, self._came = 0, -math.inf, -math.inf
         self._complete = self._missed = self._torn = self._short = self._late = 0
 
     @property
@@ -123,79 +153,108 @@ class Gathering:
 
     def begin(self, sync: int, now: float) -> None:
         """Note a SYNC that is about to be sent: what follows is its answer."""
-        if self._sent > -math.inf and self._place < self._members:
+        if self._next and self._sync:
             self._missed += 1
             self._learn_order()
-        self._strays = []
-        self._place, self._next = 0, self._order[0]
+        if self._strays:
+            self._strays = []
+        self._next = self._first
         self._sync, self._sent = sync, now
 
     def receiver(self, codec: PdoCodec) -> Handler:
         """What takes the frames of one TPDO."""
-        return self._member(codec) if codec.spec.every_sync else self._slower(codec)
+        return self._member(codec) if codec.spec.every_sync else self._slower_one(codec)
 
     def _member(self, codec: PdoCodec) -> Handler:
-        """Take a TPDO of the set; the last of them completes an answer."""
-        number, size, unpack = codec.spec.number, codec.size, codec.unpack
-        part, row = self._parts[number], self._values
+        """Take a TPDO of the set; the last of them completes an answer, which becomes feedback."""
+        number, size, frames = codec.spec.number, codec.size, self._frames
+        place = sorted(self._order).index(number)
+        unpack, pick, cycle = self._unpack, self._pick, self._cycle
+        counter = self._counter
+        angle, speed, torque, current = self._units
 
         def receive(data: bytes, now: float) -> None:
-            if len(data) < size:
-                self._short += 1
-            elif number == self._next or self._begins_anew(number):
-                row[part] = unpack(data)
-                self._count_on(now)
+            if len(data) != size:
+                if len(data) < size:
+                    self._short += 1
+                    return
+                data = data[:size]
+            if number != self._next and not self._begins_anew(number):
+                return
+            frames[place] = data
+            if number == self._first:
+                self._came = now
+            self._next = following = self._following[number]
+            if following:
+                return
+            values = unpack(b"".join(frames))
+            if self._has_others:
+                values += self._others(now)
+            status, position, velocity, force, mode, error, amperes = pick(values)
+            delay, sent = self._came - self._sent, self._sent
+            time = sent + delay / 2 if 0 <= delay < cycle else sent
+            self._complete += 1
+            # What AxisFeedback(...) makes, without the call of its constructor.
+            self.feedback = _new(
+                AxisFeedback,
+                (
+                    time,
+                    self._sync,
+                    STATES[status & STATE_BITS],
+                    status,
+                    counter.take(position, time) * angle,
+                    velocity * speed,
+                    force * torque,
+                    mode,
+                    error,
+                    amperes * current,
+                    position,
+                    counter.known,
+                ),
+            )
 
         return receive
 
-    def _slower(self, codec: PdoCodec) -> Handler:
+    def _slower_one(self, codec: PdoCodec) -> Handler:
         """Take a TPDO that comes less often, to be joined to the answers that follow."""
-        number, lifetime = codec.spec.number, self._lifetime(codec)
+        newest = next(one for one in self._slower if one.codec is codec)
 
         def receive(data: bytes, now: float) -> None:
-            values = codec.decode(data)
-            if values is None:
+            if not newest.take(data, now):
                 self._short += 1
-            else:
-                self._values[self._parts[number]] = values
-                self._expires[number] = now + lifetime
 
         return receive
 
-    def _count_on(self, now: float) -> None:
-        """One more of the set is there."""
-        place = self._place
-        if place == 0:
-            delay = now - self._sent
-            self._time = self._sent + delay / 2 if 0 <= delay < self._cycle else self._sent
-        self._place = place = place + 1
-        if place == self._members:
-            self._next = _NONE
-            self._publish(now)
-        else:
-            self._next = self._order[place]
+    def _set_order(self, order: list[int]) -> None:
+        self._order, self._first = order, order[0]
+        self._following = dict(zip(order, [*order[1:], _NONE], strict=True))
+        self._next = self._first
 
     def _begins_anew(self, number: int) -> bool:
         """Whether a TPDO that is not the next of the set is the first of another one."""
-        first = self._order[0]
-        if self._place == self._members and number == first:
+        first = self._first
+        if not self._next and number == first:
             self._late += 1
         else:
             self._torn += 1
-            self._strays += self._order[: self._place]
-        self._place, self._next = 0, first
+            self._strays += self._arrived()
+        self._next = first
         if number == first:
             return True
         self._strays.append(number)
         return False
 
+    def _arrived(self) -> list[int]:
+        """Those of the set that have come in their order."""
+        return self._order[: self._order.index(self._next)] if self._next else self._order
+
     def _learn_order(self) -> None:
         """Take an order over that the drive keeps to, of all its TPDOs once each."""
-        came = [*self._strays, *self._order[: self._place]]
+        came = [*self._strays, *self._arrived()]
         if sorted(came) != sorted(self._order):
             self._before = []
         elif came == self._before:
-            self._order = came
+            self._set_order(came)
         else:
             self._before = came
 
@@ -205,42 +264,39 @@ class Gathering:
             return _KEPT * spec.event_timer or math.inf
         return _KEPT * spec.transmission * self._cycle or math.inf
 
-    def _forget_expired(self, now: float) -> None:
-        for number, expires in self._expires.items():
-            if now > expires:
-                part = self._parts[number]
-                self._values[part] = [None] * (part.stop - part.start)
-
-    def _publish(self, now: float) -> None:
-        if self._expires:
-            self._forget_expired(now)
-        status, position, velocity, torque, mode, error, current = self._pick(self._values)
-        scale = self._scale
-        self._complete += 1
-        self.feedback = AxisFeedback(
-            self._time,
-            self._sync,
-            state_of(status),
-            status,
-            position * scale.angle,
-            math.nan if velocity is None else velocity * scale.velocity,
-            math.nan if torque is None else torque * scale.torque,
-            mode,
-            error or 0,
-            math.nan if current is None else current * scale.current,
-        )
+    def _others(self, now: float) -> tuple[Any, ...]:
+        """Values that do not come with every SYNC: those of slower TPDOs, and unknown ones."""
+        return tuple(chain.from_iterable(one.values(now) for one in self._slower)) + self._lacking
 
 
-def _places(codecs: Sequence[PdoCodec]) -> tuple[dict[int, slice], dict[Key, int]]:
-    """Where each TPDO's values stand in one row of all, and where each object does."""
-    parts: dict[int, slice] = {}
-    places: dict[Key, int] = {}
-    end = 0
+def counter_range(codecs: Sequence[PdoCodec]) -> tuple[int, int]:
+    """Lowest and highest count that the mapped 6064h can show."""
     for codec in codecs:
-        start, end = end, end + len(codec.objects)
-        parts[codec.spec.number] = slice(start, end)
-        places |= {(o.index, o.sub): start + k for k, o in enumerate(codec.objects)}
-    return parts, places
+        if POSITION in codec.position:
+            bits = codec.objects[codec.position[POSITION]].bits
+            return -(1 << bits - 1), (1 << bits - 1) - 1
+    return -(1 << 31), (1 << 31) - 1
+
+
+class _Slower:
+    """The newest values of a TPDO that does not come with every SYNC."""
+
+    def __init__(self, codec: PdoCodec, lifetime: float) -> None:
+        self.codec, self._lifetime = codec, lifetime
+        self._unknown = tuple(_WITHOUT.get(key, math.nan) for key in codec.position)
+        self._values, self._expires = self._unknown, math.inf
+
+    def take(self, data: bytes, now: float) -> bool:
+        """Take a frame; False where it is too short."""
+        values = self.codec.decode(data)
+        if values is None:
+            return False
+        self._values, self._expires = values, now + self._lifetime
+        return True
+
+    def values(self, now: float) -> tuple[Any, ...]:
+        """They, or that they are unknown."""
+        return self._values if now <= self._expires else self._unknown
 
 
 def check_feedback(name: str, codecs: Sequence[PdoCodec]) -> None:

@@ -42,6 +42,8 @@ class BusHealth:
     unsent: int = 0
     """Frames that could not be sent."""
     reopened: int = 0
+    foreign_syncs: int = 0
+    """SYNC frames that another producer sent."""
     fault: str = ""
     """Why it cannot be used; empty while it can."""
 
@@ -61,6 +63,7 @@ class BusHealth:
             "dropped": self.dropped,
             "not sent": self.unsent,
             "reopened": self.reopened,
+            "SYNC of another producer": self.foreign_syncs,
         }
         words = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
         return f"{self.state.value}: {words or 'nothing yet'}" + (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -15,6 +16,9 @@ class NmtState(IntEnum):
     STOPPED = 4
     OPERATIONAL = 5
     PRE_OPERATIONAL = 127
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", "-")
 
 
 @dataclass
@@ -40,9 +44,9 @@ class HeartbeatWatch:
         """Seconds since the last heartbeat; None before the first."""
         return None if self.last is None else now - self.last
 
-    def lost(self, now: float) -> bool:
-        """Whether an armed watch has waited longer than its timeout."""
-        return self.last is not None and now - self.last > self.timeout
+    def lost(self, now: float, since: float = -math.inf) -> bool:
+        """Whether an armed watch has waited longer than its timeout, from ``since`` (s) on."""
+        return self.last is not None and now - max(self.last, since) > self.timeout
 
 
 @dataclass

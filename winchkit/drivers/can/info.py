@@ -47,6 +47,12 @@ ENTRIES: dict[str, tuple[tuple[int, int, str], ...]] = {
         (0x6075, 0, "rated current, mA"),
         (0x6076, 0, "rated torque, mN m"),
     ),
+    "communication": (
+        (0x1005, 0, "SYNC identifier; bit 30: it sends SYNC itself"),
+        (0x1006, 0, "SYNC period, µs"),
+        (0x1014, 0, "EMCY identifier; bit 31: it sends none"),
+        (0x1029, 1, "network state after an error"),
+    ),
     "heartbeat": (
         (0x1016, 1, "watches (node << 16 | ms)"),
         (0x1017, 0, "sends every, ms"),

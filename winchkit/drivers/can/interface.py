@@ -6,7 +6,7 @@ takes the count for a protocol error. So the socket is read here.
 
 from __future__ import annotations
 
-import select
+import errno
 import socket
 import struct
 from contextlib import suppress
@@ -15,18 +15,31 @@ from typing import Any, NamedTuple, Protocol
 import can
 
 from winchkit.drivers.can.health import BusState
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.scheduling import Scheduler
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
-__all__ = ["Frame", "Interface", "open_interface", "parse_socketcan"]
+__all__ = [
+    "Frame",
+    "Interface",
+    "open_interface",
+    "parse_socketcan",
+    "queue_full",
+    "sends_remote",
+    "simulated_interface",
+]
 
 _STAMPED = {"pcan", "kvaser", "ixxat", "vector", "neovi", "nican"}
 """Interfaces whose time stamps are the hardware's or its driver's."""
 _NO_BITRATE = ("virtual", "udp_multicast")
+_NO_REMOTE = ("socketcand", "neousys")
+"""Interfaces for which python-can sends a remote frame as a data frame, or not at all."""
 
 _FRAME = struct.Struct("=IB3x8s")
 _EXTENDED, _REMOTE, _ERROR = 1 << 31, 1 << 30, 1 << 29
 _STAMP = struct.Struct("@qq")
+_INTERVAL = struct.Struct("@ll")
 _DROPS = struct.Struct("=I")
 _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 35, 40
 _ANCILLARY = 128
@@ -67,6 +80,9 @@ class Interface(Protocol):
     def send(self, identifier: int, data: bytes) -> None:
         """Send a data frame of 11 bits; raises can.CanError or OSError."""
 
+    def send_remote(self, identifier: int) -> None:
+        """Send a remote frame of 11 bits for one byte; raises can.CanError or OSError."""
+
     def state(self) -> BusState | None:
         """What the controller says of itself; None where only error frames do."""
 
@@ -96,6 +112,9 @@ class _Library:
     def send(self, identifier: int, data: bytes) -> None:
         self.library.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
+    def send_remote(self, identifier: int) -> None:
+        self.library.send(_remote_frame(identifier))
+
     def state(self) -> BusState | None:
         return _STATES.get(self.library.state) if self._tells else None
 
@@ -113,11 +132,16 @@ class _SocketCan:
         self._socket: socket.socket = bus.socket
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _QUEUE)
         self._socket.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+        self._socket.setblocking(True)
+        self._timeout = -1.0
 
     def receive(self, timeout: float) -> Frame | None:
-        if not select.select([self._socket], [], [], timeout)[0]:
+        if timeout != self._timeout:
+            self._set_timeout(timeout)
+        try:
+            data, ancillary, _, _ = self._socket.recvmsg(_FRAME.size, _ANCILLARY)
+        except BlockingIOError:
             return None
-        data, ancillary, _, _ = self._socket.recvmsg(_FRAME.size, _ANCILLARY)
         frame, drops = parse_socketcan(data, ancillary)
         if drops is not None:
             self.dropped = drops
@@ -126,12 +150,51 @@ class _SocketCan:
     def send(self, identifier: int, data: bytes) -> None:
         self._socket.send(_FRAME.pack(identifier, len(data), data))
 
+    def send_remote(self, identifier: int) -> None:
+        self._socket.send(_FRAME.pack(identifier | _REMOTE, 1, b""))
+
     def state(self) -> BusState | None:
         return None
+
+    def _set_timeout(self, timeout: float) -> None:
+        """Let the kernel wait: one call a frame, where ``select`` would be another."""
+        seconds = int(timeout)
+        microseconds = max(1, round((timeout - seconds) * 1e6))
+        interval = _INTERVAL.pack(seconds, microseconds)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, interval)
+        self._timeout = timeout
 
     def close(self) -> None:
         with suppress(can.CanError, OSError):
             self.library.shutdown()
+
+
+class _Simulated:
+    """A port of a simulated bus in this process, in simulated time."""
+
+    def __init__(self, port: Any) -> None:
+        self.library = port
+        self.dropped = 0
+
+    def receive(self, timeout: float) -> Frame | None:
+        received = self.library.receive(timeout)
+        return None if received is None else Frame(*received)
+
+    def send(self, identifier: int, data: bytes) -> None:
+        self.library.transmit(identifier, data)
+
+    def send_remote(self, identifier: int) -> None:
+        self.library.send(_remote_frame(identifier))
+
+    def state(self) -> BusState | None:
+        return None
+
+    def close(self) -> None:
+        self.library.close()
+
+
+def _remote_frame(identifier: int) -> can.Message:
+    return can.Message(arbitration_id=identifier, is_remote_frame=True, dlc=1, is_extended_id=False)
 
 
 def parse_socketcan(
@@ -158,6 +221,23 @@ def parse_socketcan(
     if not error and identifier & (_EXTENDED | _REMOTE):
         return None, drops
     return Frame(identifier & (_ERROR - 1), payload[:size], stamp, error), drops
+
+
+def queue_full(error: BaseException) -> bool:
+    """Whether a frame could not be sent because the interface's queue is full for now."""
+    number = getattr(error, "error_code", None) or getattr(error, "errno", None)
+    return number in (errno.ENOBUFS, errno.EAGAIN)
+
+
+def sends_remote(spec: BusSpec) -> bool:
+    """Whether remote frames can be sent through this interface, as far as that is known."""
+    return spec.interface not in _NO_REMOTE
+
+
+def simulated_interface(spec: BusSpec, clock: Clock) -> Interface | None:
+    """The bus that a clock of simulated time has under this channel; None where it has none."""
+    port = clock.can_port(spec.channel or "") if isinstance(clock, Scheduler) else None
+    return None if port is None else _Simulated(port)
 
 
 def open_interface(spec: BusSpec, name: str) -> Interface:

@@ -17,9 +17,12 @@ _OFFSETS = (0x60B0, 0x60B1, 0x60B2)
 
 
 def supported_modes(node: SdoNode, servo: ServoSpec, wanted: str) -> tuple[str, ...]:
-    """The modes of 6502h, else of the device file; raises NotPermitted without the wanted one."""
+    """The modes of 6502h, else of the device file; raises NotPermitted without the wanted one.
+
+    A drive without any mode is none: 6502h that reads 0 says nothing.
+    """
     supported = node.read_if_there(0x6502)
-    there: tuple[str, ...] = servo.modes if supported is None else modes_of(supported)
+    there: tuple[str, ...] = modes_of(supported) if supported else servo.modes
     if wanted not in there:
         raise NotPermitted(
             f"{node.place(0x6502)}: the drive has no mode {wanted}; it has "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +11,19 @@ import canopen
 
 from winchkit.drivers.can.bus import CanBus
 from winchkit.drivers.can.eds import read_eds
+from winchkit.drivers.can.interface import queue_full
+from winchkit.drivers.can.objects import is_signed
 from winchkit.drivers.can.pdo import MappedObject
+from winchkit.drivers.can.sdo_client import sdo_client
+from winchkit.drivers.scheduling import lock_of
 from winchkit.errors import DeviceRefused, FileError, NoReply, NotPermitted
 
 __all__ = ["SdoNode", "read_dictionary"]
 
 _ABSENT = {0x06020000, 0x06090011}
 _TIMEOUT = 0.5
+_FULL_TRIES, _FULL_PAUSE = 20, 0.005
+"""How often, and after which pause (s), a full queue of the interface is tried again."""
 
 
 def read_dictionary(path: Path, node: int) -> Any:
@@ -35,9 +41,9 @@ class SdoNode:
         self.dictionary = read_dictionary(eds, node)
         remote = canopen.RemoteNode(node, self.dictionary)
         bus.network.add_node(remote)
-        self._sdo = remote.sdo
+        self._sdo = sdo_client(remote, bus.clock)
         self._sdo.RESPONSE_TIMEOUT = _TIMEOUT
-        self._lock = threading.Lock()
+        self._lock = lock_of(bus.clock)
 
     def place(self, index: int, sub: int = 0) -> str:
         """How messages name an object."""
@@ -54,7 +60,7 @@ class SdoNode:
         """Bytes of any object as the device sends them; raises NoReply, DeviceRefused."""
         with self._lock:
             try:
-                return bytes(self._sdo.upload(index, sub))
+                return bytes(self._insist(lambda: self._sdo.upload(index, sub)))
             except canopen.SdoAbortedError as error:
                 raise self._refused("read", index, sub, error) from error
             except (canopen.SdoCommunicationError, can.CanError, OSError) as error:
@@ -76,10 +82,13 @@ class SdoNode:
             raise
 
     def write(self, index: int, sub: int, value: int) -> None:
-        """Write an integer object; raises NoReply, DeviceRefused, NotPermitted for its range."""
+        """Write an integer object; raises NoReply, DeviceRefused, NotPermitted for its range.
+
+        A negative value goes as the two's complement of the object's size.
+        """
         item = self._variable(index, sub, 4)
         try:
-            data = value.to_bytes(item.bits // 8, "little", signed=value < 0)
+            data = value.to_bytes(item.bits // 8, "little", signed=value < 0 or item.signed)
         except OverflowError as error:
             raise NotPermitted(
                 f"{self.place(index, sub)}: {value} does not fit into its {item.bits} bits"
@@ -90,7 +99,7 @@ class SdoNode:
         """Write the bytes of any object; raises NoReply, DeviceRefused."""
         with self._lock:
             try:
-                self._sdo.download(index, sub, data)
+                self._insist(lambda: self._sdo.download(index, sub, data))
             except canopen.SdoAbortedError as error:
                 value = int.from_bytes(data, "little")
                 raise self._refused(f"write {value} to", index, sub, error) from error
@@ -118,6 +127,17 @@ class SdoNode:
             raise FileError(f"{self.place(index, sub)}: not in the EDS, so it cannot be mapped")
         return self._variable(index, sub, 4)
 
+    def _insist(self, transfer: Callable[[], Any]) -> Any:
+        """Run a transfer; while the interface's queue is full, again after a pause."""
+        for _ in range(_FULL_TRIES):
+            try:
+                return transfer()
+            except (can.CanError, OSError) as error:
+                if not queue_full(error):
+                    raise
+                self.bus.clock.sleep(_FULL_PAUSE)
+        return transfer()
+
     def _number(self, index: int, sub: int, data: bytes) -> int:
         signed = self._variable(index, sub, len(data)).signed
         return int.from_bytes(data, "little", signed=signed)
@@ -126,8 +146,7 @@ class SdoNode:
         variable = self.dictionary.get_variable(index, sub)
         if variable is None:
             return MappedObject(index, sub, 8 * size, False)
-        signed = variable.data_type in canopen.objectdictionary.datatypes.SIGNED_TYPES
-        return MappedObject(index, sub, len(variable), signed)
+        return MappedObject(index, sub, len(variable), is_signed(variable))
 
     def _refused(self, what: str, index: int, sub: int, error: Exception) -> DeviceRefused:
         return DeviceRefused(f"{self.place(index, sub)}: the device refused to {what} it: {error}")

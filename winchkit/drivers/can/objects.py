@@ -7,10 +7,17 @@ from typing import Any, Protocol
 
 from canopen.objectdictionary import ODVariable, datatypes
 
-__all__ = ["ObjectPort", "Objects", "Value", "object_name", "variables"]
+__all__ = ["ObjectPort", "Objects", "Value", "is_signed", "object_name", "variables"]
 
 Value = int | float | str
 """Of an object: numbers, and texts."""
+
+_SIGNED = {
+    *(0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x6007, 0x6060, 0x6061, 0x6062, 0x6064, 0x606B),
+    *(0x606C, 0x6071, 0x6074, 0x6077, 0x6078, 0x607A, 0x607C, 0x607D, 0x6098, 0x60B0, 0x60B1),
+    *(0x60B2, 0x60F4, 0x60FA, 0x60FF),
+}
+"""Objects that CiA 402-2 makes signed; some makers declare them unsigned in their EDS."""
 
 
 class ObjectPort(Protocol):
@@ -36,8 +43,7 @@ class Objects:
         data = self.port.upload_if_there(index, sub)
         if data is None:
             return None
-        variable = self.dictionary.get_variable(index, sub)
-        signed = variable is not None and variable.data_type in datatypes.SIGNED_TYPES
+        signed = is_signed(self.dictionary.get_variable(index, sub))
         return int.from_bytes(data, "little", signed=signed)
 
     def text(self, index: int, sub: int = 0) -> str:
@@ -56,6 +62,23 @@ class Objects:
     def write(self, variable: ODVariable, value: Value) -> None:
         """Write a declared object; raises ValueError where the value does not fit its type."""
         self.port.download(variable.index, variable.subindex, variable.encode_raw(value))
+
+
+def is_signed(variable: ODVariable | None) -> bool:
+    """Whether the bits of an object are two's complement: by its type, or by CiA 402-2.
+
+    Five of Roboteq's EDS files declare 60FFh UNSIGNED32; a negative speed is written to it as the
+    two's complement of its size all the same.
+    """
+    if variable is None:
+        return False
+    if variable.data_type in datatypes.SIGNED_TYPES:
+        return True
+    return (
+        variable.index in _SIGNED
+        and variable.data_type in datatypes.UNSIGNED_TYPES
+        and (variable.index != 0x607D or variable.subindex > 0)
+    )
 
 
 def variables(dictionary: Any) -> Iterator[ODVariable]:

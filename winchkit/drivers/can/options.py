@@ -57,6 +57,8 @@ OPTIONS: dict[str, _Row] = {
 """By the keys of a device file."""
 
 _LOST = "connection_lost"
+_BY_6007 = ("heartbeat", "guarding")
+"""Mechanisms by which a drive notices a dead host and then does what 6007h says."""
 _UNKNOWN = "the maker's own: see the drive's manual"
 
 
@@ -74,17 +76,21 @@ def read_options(node: SdoNode) -> dict[str, OptionCode]:
     return {key: _option(row, node.read_if_there(row.index)) for key, row in OPTIONS.items()}
 
 
-def set_options(node: SdoNode, wanted: OptionSpec, brake: bool) -> dict[str, OptionCode]:
+def set_options(
+    node: SdoNode, wanted: OptionSpec, brake: bool, host_loss: str | None = "heartbeat"
+) -> dict[str, OptionCode]:
     """Write what is configured, read everything back, refuse what would drop a load.
 
-    Raises NotPermitted, NoReply, DeviceRefused.
+    ``host_loss`` is the mechanism by which it notices a dead host, None for none. Raises
+    NotPermitted, NoReply, DeviceRefused.
     """
     for key, row in OPTIONS.items():
         value = getattr(wanted, key)
         if value is not None and node.read_if_there(row.index) != value:
             node.write_verified(row.index, 0, value)
     options = read_options(node)
-    _check_lost(node, options[_LOST])
+    if host_loss in _BY_6007:
+        _check_lost(node, options[_LOST])
     _check_quick_stop(node, options["quick_stop"])
     if not brake:
         _check_coasting(node, options)
@@ -97,7 +103,8 @@ def _option(row: _Row, value: int | None) -> OptionCode:
 
 
 def _check_lost(node: SdoNode, lost: OptionCode) -> None:
-    if lost.value in (1, 2, 3):
+    if lost.value in (None, 1, 2, 3):
+        # Without a 6007h what an enabled drive does is for the commissioning to see.
         return
     raise NotPermitted(
         f"{node.place(lost.index)} is {lost.value}: the drive would go on moving when the host "

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from winchkit.errors import Fault, FileError
 from winchkit.schema.device_servo import PdoSpec
 
-__all__ = ["MappedObject", "PdoCodec", "parse_object"]
+__all__ = ["MappedObject", "PdoCodec", "joint_layout", "parse_object"]
 
 _CHARACTER = {(8, False): "B", (16, False): "H", (32, False): "I", (64, False): "Q"}
 _CHARACTER |= {(bits, True): char.lower() for (bits, _), char in list(_CHARACTER.items())}
@@ -51,19 +52,27 @@ class PdoCodec:
         if bits > 64 or odd or not objects:
             reason = f"{bits} bits of 64" if not odd else f"{odd[0].index:04X}h has {odd[0].bits}"
             raise FileError(Fault(f"objects do not fit: {reason} bits", key=f"PDO {spec.number}"))
-        layout = "".join(_CHARACTER[item.bits, item.signed] for item in objects)
-        self._struct = struct.Struct("<" + layout)
+        self.layout = "".join(_CHARACTER[item.bits, item.signed] for item in objects)
+        """Format characters of ``struct``, little-endian."""
+        self._struct = struct.Struct("<" + self.layout)
         self.size = self._struct.size
-        self.unpack = self._struct.unpack_from
-        """Values in a frame of at least ``size`` bytes."""
         self.position = {(item.index, item.sub): k for k, item in enumerate(objects)}
 
     def decode(self, data: bytes) -> tuple[int, ...] | None:
         """Values in the order of the objects; None when the frame is too short."""
         if len(data) < self.size:
             return None
-        return self.unpack(data)
+        return self._struct.unpack_from(data)
 
     def encode(self, values: Sequence[int]) -> bytes:
         """Frame data; raises ``struct.error`` for a value beyond its object's range."""
         return self._struct.pack(*values)
+
+
+def joint_layout(
+    codecs: Sequence[PdoCodec],
+) -> tuple[Callable[[bytes], tuple[Any, ...]], tuple[tuple[int, int], ...]]:
+    """How to unpack the frames of several PDOs at once, joined by number, and their objects."""
+    ordered = sorted(codecs, key=lambda codec: codec.spec.number)
+    layout = struct.Struct("<" + "".join(codec.layout for codec in ordered))
+    return layout.unpack, tuple(key for codec in ordered for key in codec.position)

@@ -7,6 +7,7 @@ from typing import Literal
 
 from winchkit.drivers.can.node import SdoNode
 from winchkit.drivers.can.pdo import PdoCodec, parse_object
+from winchkit.errors import NotPermitted
 from winchkit.schema.device_servo import PdoSpec
 
 __all__ = ["Direction", "cob_id", "codecs", "set_up"]
@@ -19,6 +20,7 @@ _COMMUNICATION = {"tpdo": 0x1800, "rpdo": 0x1400}
 _MAPPING = {"tpdo": 0x1A00, "rpdo": 0x1600}
 _FIRST_COB = {"tpdo": 0x180, "rpdo": 0x200}
 _PREDEFINED = range(1, 5)
+_MOST = 512
 _INHIBIT_UNIT, _MS = 1e-4, 1e-3
 
 
@@ -36,20 +38,30 @@ def codecs(node: SdoNode, specs: Iterable[PdoSpec]) -> tuple[PdoCodec, ...]:
 
 
 def set_up(node: SdoNode, direction: Direction, wanted: tuple[PdoCodec, ...]) -> None:
-    """Map ``wanted`` and switch every other predefined PDO of this direction off.
+    """Map ``wanted`` and switch every other PDO of this direction off, those beyond four too.
 
     The node must be pre-operational. Raises NoReply, DeviceRefused.
     """
     by_number = {codec.spec.number: codec for codec in wanted}
-    for number in _PREDEFINED:
+    for number in (*_PREDEFINED, *_beyond(node, direction)):
         record = _COMMUNICATION[direction] + number - 1
         codec = by_number.get(number)
         if codec is not None:
             _map(node, direction, codec)
             continue
         identifier = node.read_if_there(record, 1)
-        if identifier is not None and not identifier & _INVALID:
+        if identifier is not None and not identifier & _INVALID and node.writes(record, 1):
             node.write(record, 1, identifier | _INVALID)
+
+
+def _beyond(node: SdoNode, direction: Direction) -> list[int]:
+    """Numbers of the PDOs above four that the EDS declares."""
+    first = _COMMUNICATION[direction]
+    return [
+        number
+        for number in range(_PREDEFINED.stop, _MOST + 1)
+        if first + number - 1 in node.dictionary
+    ]
 
 
 def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
@@ -62,12 +74,28 @@ def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
     node.write(record, 1, identifier | _INVALID)
     node.write_verified(record, 2, codec.spec.transmission)
     _set_timers(node, record, codec.spec)
-    node.write(mapping, 0, 0)
-    for position, item in enumerate(codec.objects, start=1):
-        node.write_verified(mapping, position, item.entry)
-    node.write_verified(mapping, 0, len(codec.objects))
+    if node.writes(mapping, 0):
+        node.write(mapping, 0, 0)
+        for position, item in enumerate(codec.objects, start=1):
+            node.write_verified(mapping, position, item.entry)
+        node.write_verified(mapping, 0, len(codec.objects))
+    else:
+        _check_fixed(node, direction, codec)
     node.write(record, 1, identifier)
     _verify_identifier(node, record, identifier)
+
+
+def _check_fixed(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
+    """A mapping that the EDS does not let change has to be the one that is wanted."""
+    mapping = _MAPPING[direction] + codec.spec.number - 1
+    count = node.read(mapping, 0)
+    held = [node.read(mapping, position) for position in range(1, count + 1)]
+    if held != [item.entry for item in codec.objects]:
+        entries = ", ".join(f"{entry:08X}h" for entry in held) or "nothing"
+        raise NotPermitted(
+            f"{node.place(mapping)} is fixed and holds {entries}, not the objects of {direction} "
+            f"{codec.spec.number} in the device file; write there what the drive holds"
+        )
 
 
 def _set_timers(node: SdoNode, record: int, spec: PdoSpec) -> None:

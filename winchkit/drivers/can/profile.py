@@ -6,16 +6,28 @@ from dataclasses import dataclass
 from math import pi
 
 from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.pdo import parse_object
 from winchkit.drivers.can.scale import Scale
 from winchkit.errors import NotPermitted
 from winchkit.schema.device_servo import ServoSpec
 
-__all__ = ["HomingSpec", "set_homing", "set_profile"]
+__all__ = ["HERE", "HomingSpec", "check_homing", "set_homing", "set_profile"]
 
 _RAMP_SPEED = 3000 * 2 * pi / 60
 """Speed that a ramp declared as a time reaches from standstill, rad/s."""
 _MS = 1e-3
-_METHOD = range(-128, 128)
+METHODS = range(-128, 128)
+HERE = (37, 35)
+"""Methods that take the present position for the zero: the present number and the old one."""
+_INSTEAD = {
+    0x6098: "it cannot home; set reference.motor_angle in the winch's profile",
+    0x6099: "use method 37, or a method of the drive's own tools",
+}
+"""What to do without an object."""
+_NO_OFFSET = (
+    "home without a length (`winchkit home --method`) and set reference.motor_angle in the winch's "
+    "profile, or name the maker's object as home_offset in the device file"
+)
 
 
 @dataclass(frozen=True)
@@ -55,23 +67,44 @@ def set_profile(
                 node.write_verified(index, 0, counts)
 
 
+def check_homing(node: SdoNode, servo: ServoSpec, homing: HomingSpec, *, defines: bool) -> None:
+    """Read every object that a homing needs, before anything is written or moves.
+
+    ``defines`` says that the zero is to get a position (the home offset). Raises NotPermitted
+    naming what the drive lacks, NoReply, DeviceRefused.
+    """
+    if homing.method not in METHODS:
+        raise NotPermitted(f"{node.place(0x6098)}: there is no homing method {homing.method}")
+    needed = [(0x6098, 0)]
+    if homing.method not in HERE:
+        needed += [(0x6099, 1), (0x6099, 2)]
+    if homing.offset or defines:
+        needed.append(parse_object(servo.home_offset))
+    for index, sub in needed:
+        if node.read_if_there(index, sub) is None:
+            raise NotPermitted(
+                f"{node.place(index, sub)}: the drive has no such object, which this homing needs; "
+                f"{_INSTEAD.get(index, _NO_OFFSET)}"
+            )
+
+
 def set_homing(node: SdoNode, servo: ServoSpec, scale: Scale, homing: HomingSpec) -> None:
     """Write a homing's parameters and read them back.
 
-    Raises NotPermitted, NoReply, DeviceRefused (a method that the drive lacks).
+    Speeds and the acceleration (609Ah) are left out where the drive has none and the method needs
+    none. Raises NotPermitted, NoReply, DeviceRefused (a method that the drive lacks).
     """
-    if homing.method not in _METHOD:
-        raise NotPermitted(f"{node.place(0x6098)}: there is no homing method {homing.method}")
+    check_homing(node, servo, homing, defines=False)
     node.write_verified(0x6098, 0, homing.method)
     for sub, speed in ((1, homing.fast), (2, homing.slow)):
         counts = scale.velocity_counts(_positive(speed, "homing speed", "rad/s"))
-        node.write_verified(0x6099, sub, counts)
+        if node.read_if_there(0x6099, sub) is not None:
+            node.write_verified(0x6099, sub, counts)
     if node.read_if_there(0x609A) is not None:
         node.write_verified(0x609A, 0, _ramp(servo, scale, homing.acceleration))
-    if node.read_if_there(0x607C) is not None:
-        node.write_verified(0x607C, 0, scale.angle_counts(homing.offset))
-    elif homing.offset:
-        raise NotPermitted(f"{node.place(0x607C)}: the drive has no home offset")
+    home_offset = parse_object(servo.home_offset)
+    if node.read_if_there(*home_offset) is not None:
+        node.write_verified(*home_offset, scale.angle_counts(homing.offset))
 
 
 def _ramp(servo: ServoSpec, scale: Scale, acceleration: float) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import nan, pi
+from math import isfinite, nan, pi
 
 from winchkit.drivers.can.node import SdoNode
 from winchkit.errors import NotPermitted
@@ -49,6 +49,12 @@ class Scale:
     def angle_counts(self, angle: float) -> int:
         """Counts of a motor angle (rad); raises NotPermitted beyond 32 bits."""
         return _counts(angle, self.angle, _I32, "angle", "rad")
+
+    def unwrapped_counts(self, angle: float) -> int:
+        """Counts of a motor angle (rad) of any number of turns; raises NotPermitted for none."""
+        if not isfinite(angle):
+            raise NotPermitted(f"motor angle {angle:g} rad is no target")
+        return round(angle / self.angle)
 
     def velocity_counts(self, velocity: float) -> int:
         """Counts of a motor speed (rad/s); raises NotPermitted beyond 32 bits."""

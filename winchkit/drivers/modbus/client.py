@@ -1,7 +1,8 @@
 """The one module that knows pymodbus: a client for one line that lets exact answers through only.
 
 pymodbus takes whatever decodes as an answer. Its trace hook sees every byte first; the gate that
-stands there passes the one frame that answers the request and counts all else.
+stands there passes the one frame that answers the request and counts all else. A TCP connection
+on which anything else came, or on which an answer did not come in time, is replaced by a new one.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ import logging
 import sys
 from collections import defaultdict, deque
 from collections.abc import Awaitable, Sequence
+from functools import partial
+from random import Random
 from typing import Any
 
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
@@ -17,6 +20,7 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ExceptionResponse
 
 from winchkit.drivers.modbus.frames import AnswerGate, Event
+from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.modbus_parts import ReadBlock
@@ -26,6 +30,8 @@ __all__ = ["ModbusClient"]
 _NEVER = 1 << 30
 _KEPT = 256
 """Events of a unit that nobody asks for, e.g. of another master's devices."""
+_LAST_TRANSACTION = 65_000
+"""The library begins again at 1 after it."""
 _ACKNOWLEDGE, _BUSY = 5, 6
 _EXCEPTIONS = {
     1: "illegal function",
@@ -56,8 +62,11 @@ class ModbusClient:
         self.name = name
         self._spec = spec
         self._client: AsyncModbusTcpClient | AsyncModbusSerialClient | None = None
-        self._gate = AnswerGate("tcp" if spec.kind == "modbus-tcp" else "rtu")
+        self._gate: AnswerGate | TcpAnswerGate = AnswerGate()
         self._known = 0
+        self._random = Random()
+        self.replaced = False
+        """Whether the connection was closed here because something else than the answer came."""
         self.refusal = 0
         """Exception code of the newest refusal."""
         self._events: defaultdict[int, deque[Event]] = defaultdict(lambda: deque(maxlen=_KEPT))
@@ -70,12 +79,17 @@ class ModbusClient:
 
     @property
     def connected(self) -> bool:
-        """Whether the line is open."""
+        """Whether the line is open and fit to be used."""
+        if self._gate.broken and self._client is not None:
+            self.replaced = True
+            self.close()
         return self._client is not None and bool(self._client.connected)
 
     async def connect(self) -> None:
         """Open the line anew, so that nothing of an old one remains; raises ConnectionLost."""
         self.close()
+        self._gate = self._new_gate()
+        self._known = 0
         try:
             self._client = client = self._make()
             client.set_max_no_responses(_NEVER)
@@ -84,11 +98,15 @@ class ModbusClient:
             raise ConnectionLost(f"{self.where}: cannot be opened: {error}") from error
         if not open_now:
             raise ConnectionLost(f"{self.where}: cannot be opened; check address and power")
+        # Transactions of one connection are not those of the one before: a reply to an old
+        # request that a gateway hands over on the new connection answers nothing.
+        client.ctx.next_tid = self._random.randrange(1, _LAST_TRANSACTION)
 
     def close(self) -> None:
         """Close the line."""
         client, self._client = self._client, None
         self._gate.expire()
+        self._collect()
         if client is not None:
             try:
                 client.close()
@@ -131,14 +149,22 @@ class ModbusClient:
             )
         return reply
 
-    def _trace(self, sending: bool, data: bytes) -> bytes:
+    def _new_gate(self) -> AnswerGate | TcpAnswerGate:
+        old = self._gate
+        if self._spec.kind != "modbus-tcp":
+            return AnswerGate()
+        return TcpAnswerGate(old.transactions if isinstance(old, TcpAnswerGate) else ())
+
+    def _trace(self, gate: AnswerGate | TcpAnswerGate, sending: bool, data: bytes) -> bytes:
         """Stand between pymodbus and the line; it hands over all that it has not used yet."""
+        if gate is not self._gate:
+            return b""  # of a connection that was closed
         if sending:
-            self._gate.sent(data)
+            gate.sent(data)
             self._known = 0
             return data
         fresh = data[self._known :] if len(data) >= self._known else data
-        answer = self._gate.received(fresh)
+        answer = gate.received(fresh)
         self._known = len(data) - len(answer)
         return answer
 
@@ -155,7 +181,7 @@ class ModbusClient:
                 timeout=spec.timeout,
                 retries=0,
                 reconnect_delay=0,
-                trace_packet=self._trace,
+                trace_packet=partial(self._trace, self._gate),
             )
         return AsyncModbusSerialClient(
             str(spec.port),
@@ -165,16 +191,16 @@ class ModbusClient:
             timeout=spec.timeout,
             retries=0,
             reconnect_delay=0,
-            trace_packet=self._trace,
+            trace_packet=partial(self._trace, self._gate),
         )
 
     def _open(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
-        if self._client is None or not self._client.connected:
+        if not self.connected or self._client is None:
             raise ConnectionLost(f"{self.where}: the line is closed; it is opened again by itself")
         return self._client
 
     def _failed(self, unit: int, error: Exception, came: bool) -> ConnectionLost:
-        if not self.connected:
+        if self._client is None or not self._client.connected:
             return ConnectionLost(f"{self.where}: connection lost: {error}")
         place, time = f"{self.where} unit {unit}", f"{self._spec.timeout:g} s"
         if came:

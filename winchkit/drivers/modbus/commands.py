@@ -67,8 +67,8 @@ async def identity(client: ModbusClient, instrument: Instrument) -> dict[str, fl
     spec = instrument.decoder.spec
     for item in spec.identity:
         count = REGISTERS[item.type]
-        block = ReadBlock(item.register, count, spec.read.function)
-        words = await client.read(instrument.unit, block, count)
+        block = ReadBlock(item.register, count, spec.read.function, fixed=True)
+        words = await instrument.ask(client, block)
         number = number_of(
             item.type, item.order, dict(enumerate(words, item.register)), block.start
         )

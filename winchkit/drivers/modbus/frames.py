@@ -1,16 +1,16 @@
 """Lets only the exact answer to a request through, and says what everything else was.
 
-A Modbus answer names neither the address it was read from nor, on a serial line, its request. What
-can be checked is checked here: unit, function, length, check sum and, over TCP, the transaction.
+A Modbus RTU answer names neither the address it was read from nor its request. What can be checked
+is checked here: unit, function, length and check sum. For TCP see ``tcp_frames``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["AnswerGate", "Event", "Framing", "crc16"]
+__all__ = ["AnswerGate", "Event", "Framing", "Kind", "Request", "crc16", "request_of"]
 
 Framing = Literal["rtu", "tcp"]
 Kind = Literal["crc", "malformed", "late", "resynchronised"]
@@ -31,10 +31,12 @@ class Event:
     unit: int
     kind: Kind
     count: int = 1
+    registers: int = 0
+    """That a whole answer of the unit held; 0 where there was none."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Request:
+class Request:
     """What was sent, and what its answer must look like from the unit to the end of the PDU."""
 
     packet: bytes
@@ -48,22 +50,23 @@ class _Request:
 
 
 class AnswerGate:
-    """Fed with what is sent and received on one line, one request at a time."""
+    """Fed with what is sent and received on one serial line, one request at a time."""
 
-    def __init__(self, framing: Framing) -> None:
-        """``rtu`` for a serial line, ``tcp`` for Modbus TCP."""
-        self._framing: Framing = framing
-        self._request: _Request | None = None
+    broken = False
+    """Every frame of a serial line has its check sum: one that is damaged spoils no other."""
+
+    def __init__(self) -> None:
+        self._request: Request | None = None
         self._unit = 0
         self._buffer = b""
         self._echoes = False
-        self._last: dict[int, _Request] = {}
+        self._last: dict[int, Request] = {}
         self._events: list[Event] = []
 
     def sent(self, packet: bytes) -> None:
         """A request goes out; what is left of the time before was no answer to it."""
         self.expire()
-        self._request = _request(packet, self._framing)
+        self._request = request_of(packet, "rtu")
         self._unit = self._request.unit
 
     def received(self, data: bytes) -> bytes:
@@ -99,19 +102,18 @@ class AnswerGate:
         events, self._events = self._events, []
         return events
 
-    def _answers(self, request: _Request) -> Iterator[tuple[int, bytes]]:
+    def _answers(self, request: Request) -> Iterator[tuple[int, bytes]]:
         """Whole answers to the request, wherever in the buffer they begin."""
         echo = self._echoes
-        start = _HEAD[self._framing]
         for at in range(len(self._buffer)):
-            if self._buffer.startswith(request.wanted, at + start):
+            if self._buffer.startswith(request.wanted, at):
                 size = request.size
-            elif self._buffer.startswith(request.refusal, at + start):
-                size = start + 3 + _TAIL[self._framing]
+            elif self._buffer.startswith(request.refusal, at):
+                size = 3 + _TAIL["rtu"]
             else:
                 continue
             frame = self._buffer[at : at + size]
-            if len(frame) < size or not self._valid(frame, request):
+            if len(frame) < size or crc16(frame[:-2]) != frame[-2:]:
                 continue
             if frame == request.packet and echo:
                 # On a line that echoes, the first copy of a written register is our own.
@@ -119,23 +121,19 @@ class AnswerGate:
                 continue
             yield at, frame
 
-    def _valid(self, frame: bytes, request: _Request) -> bool:
-        if self._framing == "rtu":
-            return crc16(frame[:-2]) == frame[-2:]
-        return frame[:4] == request.packet[:4] and _length(frame) == len(frame) - 6
-
-    def _judge(self, junk: bytes, request: _Request | None, *, answered: bool) -> None:
+    def _judge(self, junk: bytes, request: Request | None, *, answered: bool) -> None:
         """Say what came beside an answer, instead of one, or while nothing was asked."""
         noise = 0
         while junk:
             if request is not None and junk.startswith(request.packet):
-                self._echoes |= self._framing == "rtu" and request.reads
+                self._echoes |= request.reads
                 self._note(request.unit, "malformed")
                 junk = junk[len(request.packet) :]
                 continue
-            frame, unit = _first_frame(junk, self._framing)
+            frame = junk[: _rtu_size(junk)]
             if frame:
-                self._note(unit, self._kind(frame, unit, request))
+                registers = frame[2] // 2 if frame[1] in _READS else 0
+                self._note(frame[0], self._kind(frame, request), registers=registers)
             else:
                 noise += 1
             junk = junk[len(frame) or 1 :]
@@ -144,21 +142,18 @@ class AnswerGate:
         if request is None or answered:
             self._note(self._unit, "resynchronised", noise)
         else:
-            whole = self._framing == "rtu" and noise >= request.size
-            self._note(request.unit, "crc" if whole else "malformed")
+            self._note(request.unit, "crc" if noise >= request.size else "malformed")
 
-    def _kind(self, frame: bytes, unit: int, request: _Request | None) -> Kind:
+    def _kind(self, frame: bytes, request: Request | None) -> Kind:
         """Whether a good frame is an old answer or one that was never asked for."""
         if request is None:
             return "late"
-        if self._framing == "tcp":
-            return "malformed" if frame[:2] == request.packet[:2] else "late"
-        old = self._last.get(unit)
+        old = self._last.get(frame[0])
         same = old is not None and frame.startswith(old.wanted) and len(frame) == old.size
         return "late" if same else "malformed"
 
-    def _note(self, unit: int, kind: Kind, count: int = 1) -> None:
-        self._events.append(Event(unit, kind, count))
+    def _note(self, unit: int, kind: Kind, count: int = 1, registers: int = 0) -> None:
+        self._events.append(Event(unit, kind, count, registers))
 
 
 def crc16(data: bytes) -> bytes:
@@ -178,11 +173,7 @@ def _table_entry(byte: int) -> int:
 _TABLE = tuple(_table_entry(byte) for byte in range(256))
 
 
-def _length(frame: bytes) -> int:
-    return int.from_bytes(frame[4:6], "big")
-
-
-def _request(packet: bytes, framing: Framing) -> _Request:
+def request_of(packet: bytes, framing: Framing) -> Request:
     """What a request asks for, read from the request itself."""
     body = packet[_HEAD[framing] : len(packet) - _TAIL[framing]]
     unit, function = body[0], body[1]
@@ -193,16 +184,7 @@ def _request(packet: bytes, framing: Framing) -> _Request:
     else:
         wanted, rest = body[:6], 0
     whole = _HEAD[framing] + len(wanted) + rest + _TAIL[framing]
-    return _Request(packet, unit, wanted, bytes((unit, function | _REFUSED)), whole, reads)
-
-
-def _first_frame(data: bytes, framing: Framing) -> tuple[bytes, int]:
-    """The frame that data begins with and its unit; empty where it begins with none."""
-    find: Callable[[bytes], int] = _rtu_size if framing == "rtu" else _tcp_size
-    size = find(data)
-    if not 0 < size <= len(data):
-        return b"", 0
-    return data[:size], data[_HEAD[framing]]
+    return Request(packet, unit, wanted, bytes((unit, function | _REFUSED)), whole, reads)
 
 
 def _rtu_size(data: bytes) -> int:
@@ -219,10 +201,3 @@ def _rtu_size(data: bytes) -> int:
     else:
         return 0
     return size if size <= len(data) and crc16(data[: size - 2]) == data[size - 2 : size] else 0
-
-
-def _tcp_size(data: bytes) -> int:
-    """Size of what looks like a whole answer at the beginning of TCP data, else 0."""
-    if len(data) < 9 or data[2:4] != b"\0\0" or not 3 <= _length(data) <= 254:
-        return 0
-    return 6 + _length(data)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from math import inf
+from math import inf, nan
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.modbus.client import ModbusClient
 from winchkit.drivers.modbus.consistency import Consistency
 from winchkit.drivers.modbus.decoder import Decoded, Decoder
-from winchkit.drivers.modbus.distrust import LISTENING, Distrust
+from winchkit.drivers.modbus.late_replies import LISTENING, LateReplies
 from winchkit.drivers.publisher import Publisher, Publishing, Sampled
 from winchkit.drivers.reading import Quality
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.device import DeviceSpec
+from winchkit.schema.modbus_parts import ReadBlock
 
 __all__ = ["Instrument"]
 
@@ -23,10 +24,16 @@ _RETRY = 0.5
 _STALE_TIMEOUTS = 2
 """One lost answer is no reason to stop a winch, two are."""
 _LATE = 0.02
+_STALLED = 0.01
+"""By which this process may be late with an answer that came just in time, s."""
 _FRESH = 0.06
 """No overload comes and goes within it, s: a status so old still says what is before a value."""
 _TOO_LONG = (2, 3)
 """Exceptions with which a device refuses a block longer than its own: address, value."""
+
+
+class _Withheld(NoReply):
+    """The answer could not be told from a reply that is outstanding, so nothing is asked."""
 
 
 class Instrument(Publishing):
@@ -64,13 +71,11 @@ class Instrument(Publishing):
         self._timeout = timeout
         self._wire = (0.0, 0.0)
         self._failures = 0
-        self._longer = self._longer_works = False
-        self._fixed = self.decoder.spec.read.fixed
-        self._distrust = Distrust(self.decoder.spec.longest_reply, timeout)
+        spec = self.decoder.spec
+        self._late = LateReplies(spec.longest_reply, spec.max_registers)
         self._consistency = Consistency(floats=self.decoder.field.type == "f32")
         self._status_before: Sequence[int] | None = None
         self._status_at = -inf
-        self._tagged = False
         self.on_line(1 / self.wanted_rate, (0.0, 0.0), tagged=False)
 
     def on_line(self, period: float, wire: tuple[float, float], *, tagged: bool) -> None:
@@ -79,7 +84,7 @@ class Instrument(Publishing):
         On a ``tagged`` line (TCP) every answer names its request, so none can be mistaken.
         """
         self.period = period
-        self._tagged = tagged
+        self._late.tagged = tagged
         self._wire = wire
         self.max_age = max(_STALE_TIMEOUTS * self._timeout, 5 * period)
         """A reading older than this is stale, s."""
@@ -92,12 +97,6 @@ class Instrument(Publishing):
         return self.decoder.status.has("net", self.status)
 
     @property
-    def _all_alike(self) -> bool:
-        """Whether an old answer cannot be told from a new one by its length."""
-        one_length = self._fixed or self.decoder.spec.status_read is not None
-        return one_length and not self._tagged
-
-    @property
     def dead(self) -> bool:
         """Whether it has failed so often that it is to be asked less often."""
         return self._failures > _QUICK_RETRIES
@@ -105,9 +104,13 @@ class Instrument(Publishing):
     def reconnected(self, *, again: bool) -> None:
         """Note that the line was opened: nothing of an old one can come any more."""
         self.publisher.tally.reconnects += again
-        self._distrust.clear()
+        self._late.clear()
         self._failures = 0
         self.due = self._clock.now()
+
+    def reopened(self) -> None:
+        """Note that the connection was replaced, because something else than the answer came."""
+        self.publisher.tally.reconnects += 1
 
     def lost(self, error: ConnectionLost) -> None:
         """Note that the line is closed."""
@@ -122,38 +125,66 @@ class Instrument(Publishing):
         t_request = self._clock.now()
         self.due, self.asked = max(self.due + self.pace, t_request), t_request
         self._take_events(client)
-        if self._distrust.silent(t_request):
-            self.due = self._distrust.until
+        if self._late.silent(t_request):
+            self.due = self._late.until
             return False
         try:
             registers, t_receive = await self._ask_value(client)
             status = await self._ask_status(client)
-        except DeviceRefused as error:
-            self._refused(error, client.refusal)
-        except NoReply as error:
-            self._unanswered(error, client)
+        except _Withheld:
+            self._status_before = None
+            self.due = self._late.until
         except ConnectionLost as error:
+            self.publisher.tally.exceptions += isinstance(error, DeviceRefused)
             self._failed(error)
         else:
             self._take_events(client)
-            if not self._distrust.discards(self._clock.now(), fixed=self._all_alike):
-                self._distrust.answered(self._clock.now(), fixed=self._all_alike)
-                self._publish(registers, status, (t_request, t_receive))
-                return True
-            self.publisher.tally.drops += 1
-            self._status_before = None
-            self.due = self._distrust.until
+            if self._late.alike(self.decoder.spec.read):
+                # A second copy of this answer must not be taken for the next one.
+                self._late.until = max(self._late.until, self._clock.now() + LISTENING)
+            self._publish(registers, status, (t_request, t_receive))
+            return True
         return False
+
+    async def ask(self, client: ModbusClient, block: ReadBlock) -> list[int]:
+        """Registers of a block, in an answer that can be none to an earlier request.
+
+        Raises NoReply, DeviceRefused, ConnectionLost.
+        """
+        count = self._late.count(block, self._clock.now())
+        if not count:
+            wait = self._late.until - self._clock.now()
+            raise _Withheld(
+                f"{self.name}: a reply is outstanding that could not be told from the next "
+                f"answer; nothing is asked for {wait:.1f} s"
+            )
+        asked = self._clock.now()
+        try:
+            registers = await client.read(self.unit, block, count)
+        except DeviceRefused:
+            lengths_left = self._late.refused(block, count, self._clock.now())
+            if client.refusal in _TOO_LONG and lengths_left:
+                return await self.ask(client, block)
+            raise
+        except NoReply:
+            self._unanswered(count, self._take_events(client))
+            raise
+        self._late.answered(block, count)
+        if (took := self._clock.now() - asked) > self._timeout + _STALLED:
+            # This computer stood still: the answer lay there, nobody knows how long.
+            self.publisher.tally.late += 1
+            raise NoReply(
+                f"{self.name}: an answer was taken {took:.2f} s after its request, later than its "
+                f"time-out of {self._timeout:g} s; this computer was busy"
+            )
+        return registers[: block.count]
 
     async def _ask_value(self, client: ModbusClient) -> tuple[list[int], float]:
         """Registers of the value's block, and when they came."""
         if self.decoder.spec.status_read is not None and not self._status_is_fresh:
             self._status_before = await self._read_status(client)
             await self._listen()
-        self._longer = not self._longer and not self._fixed
-        block = self.decoder.spec.read
-        registers = await client.read(self.unit, block, block.count + self._longer)
-        self._longer_works |= self._longer
+        registers = await self.ask(client, self.decoder.spec.read)
         return registers, self._clock.now()
 
     async def _ask_status(self, client: ModbusClient) -> Sequence[int]:
@@ -171,38 +202,32 @@ class Instrument(Publishing):
 
     async def _listen(self) -> None:
         """Let a second copy of an answer come before the next query, which it would answer."""
-        if self._all_alike:
+        spec = self.decoder.spec
+        if any(block and self._late.alike(block) for block in (spec.read, spec.status_read)):
             await asyncio.sleep(LISTENING)
 
     async def _read_status(self, client: ModbusClient) -> Sequence[int]:
         block = self.decoder.spec.status_read
         assert block is not None, "asked for only where the device has a status block"
-        return await client.read(self.unit, block, block.count)
+        return await self.ask(client, block)
 
-    def _take_events(self, client: ModbusClient) -> bool:
-        """Count what came from this unit beside good answers; True where that spoilt an answer."""
-        spoilt = False
-        tally = self.publisher.tally
+    def _take_events(self, client: ModbusClient) -> set[str]:
+        """Count what came from this unit beside good answers; returns what kinds of it."""
+        kinds, tally = set[str](), self.publisher.tally
         for event in client.events(self.unit):
             setattr(tally, event.kind, getattr(tally, event.kind) + event.count)
-            spoilt |= event.kind in ("crc", "malformed")
-            if event.kind == "late" and not self._tagged:
-                self._distrust.late(self._clock.now())
-        return spoilt
+            kinds.add(event.kind)
+            if event.kind == "late" or event.registers:
+                self._late.came(event.registers, self._clock.now())
+        return kinds
 
-    def _refused(self, error: DeviceRefused, code: int) -> None:
-        if self._longer and not self._longer_works and code in _TOO_LONG:
-            # A device that ends where its block ends: no alternating lengths for this one.
-            self._fixed = True
-            return
-        self.publisher.tally.exceptions += 1
-        self._failed(error)
-
-    def _unanswered(self, error: NoReply, client: ModbusClient) -> None:
-        self.publisher.tally.timeouts += not self._take_events(client)
-        if not self._tagged:
-            self._distrust.unanswered(self._clock.now())
-        self._failed(error)
+    def _unanswered(self, count: int, kinds: set[str]) -> None:
+        """No answer of ``count`` registers came in time, only what is of these ``kinds``."""
+        self.publisher.tally.timeouts += not kinds & {"crc", "malformed"}
+        if kinds == {"crc"} and not self._late.outstanding:
+            # It did answer, with a frame of the right length that was damaged on the way.
+            count = 0
+        self._late.unanswered(count, self._clock.now())
 
     def _failed(self, error: ConnectionLost) -> None:
         self.problem = error
@@ -210,7 +235,7 @@ class Instrument(Publishing):
         self.publisher.tally.drops += 1
         self._status_before = None
         pause = max(_RETRY, 4 * self._timeout) if self.dead else 0.0
-        self.due = max(self._clock.now() + pause, self._distrust.until)
+        self.due = max(self._clock.now() + pause, self._late.until)
 
     def _publish(
         self, registers: Sequence[int], status: Sequence[int], times: tuple[float, float]
@@ -229,6 +254,9 @@ class Instrument(Publishing):
             max(t_receive - back, t_request) - spec.filter_delay,
         )
         self.problem, self._failures, self.status = None, 0, decoded.status
+        if self._late.discards():
+            self.publisher.publish(nan, nan, nan, quality | Quality.AMBIGUOUS, sampled)
+            return
         told = True if self._consistency.order_known else None
         if told is None and decoded.quality.usable:
             told = self.decoder.order_told(registers)

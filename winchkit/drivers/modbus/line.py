@@ -127,8 +127,11 @@ class ModbusLine:
                 instrument.lost(error)
             return False
         for instrument in self.sensors:
-            instrument.reconnected(again=self._opened)
-        self._opened = True
+            if self._client.replaced:
+                instrument.reopened()
+            else:
+                instrument.reconnected(again=self._opened)
+        self._opened, self._client.replaced = True, False
         return True
 
     def _share_out(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from winchkit.drivers.modbus.distrust import LISTENING
+from winchkit.drivers.modbus.late_replies import LISTENING
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.device_modbus import ModbusSpec
 from winchkit.schema.modbus_parts import ReadBlock
@@ -45,7 +45,7 @@ def exchange(spec: ModbusSpec, bus: BusSpec) -> Exchange:
     wire = 0.0
     if bus.kind == "modbus-rtu":
         wire = size * _bits(bus) / bus.baudrate
-        if spec.read.fixed or len(blocks) > 1:
+        if any(block.fixed for block in blocks):
             silence += len(blocks) * LISTENING
     return Exchange(
         size,

@@ -40,7 +40,9 @@ class Conversation:
         """``name`` is the bus's."""
         self.port = port
         self.was_silent = False
-        """Whether nothing at all came for the last request."""
+        """Whether nothing at all came in time for the last request."""
+        self.came_late = False
+        """Whether something came for the last request after its time."""
         self._spec = spec
         self._where = f"bus '{name}' ({spec.port})"
         self._clock = clock
@@ -218,7 +220,7 @@ class Conversation:
             if found or parser.counts.spoilt > spoilt:
                 break
         self._selected = None
-        await self.idle(start + instrument.spec.longest_reply, instrument)
+        self.came_late = await self.idle(start + instrument.spec.longest_reply, instrument)
         if self.was_silent:
             raise self.silent(instrument)
         raise NoReply(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from typing import Protocol
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.publisher import Publisher, Publishing, Sampled
-from winchkit.drivers.reading import Counters, Quality
+from winchkit.drivers.reading import REPLY_HORIZON, Counters, Quality
 from winchkit.drivers.stream.decoder import Decoded
 from winchkit.drivers.stream.parser import (
     Item,
@@ -78,6 +78,8 @@ class StreamInstrument(Publishing):
         """Whether it was told what to send."""
         self._clock = clock
         self._failures = 0
+        self._outstanding = False
+        """Whether a reply was not heard that may come and be taken for the next answer."""
         self._net: bool | None = None
         self._flags = Quality.GOOD
         self._chunk_at = clock.now()
@@ -119,7 +121,12 @@ class StreamInstrument(Publishing):
         earliest = t_request - 1.0 / self.spec.rate
         latest = max(t_request, t_receive - item.size * wire.byte_time)
         late = Quality.LATE if t_receive - t_request > _LATE else Quality.GOOD
-        self._publish(item, self._sampled(t_request, t_receive, earliest, latest), late)
+        when = self._sampled(t_request, t_receive, earliest, latest)
+        if self._outstanding:
+            self._outstanding, self.problem, self._failures = False, None, 0
+            self.publisher.publish(nan, nan, nan, late | Quality.AMBIGUOUS, when)
+            return
+        self._publish(item, when, late)
 
     def sent(self, items: list[Item], t_chunk: float, wire: Wire) -> None:
         """Publish the frames of one chunk that the device sent by itself.
@@ -166,7 +173,18 @@ class StreamInstrument(Publishing):
         often = self._failures > _QUICK_RETRIES
         if often:
             self.started = False
-        self.due = self._clock.now() + (_RETRY if often else 0.0)
+        pause = _RETRY if often else 0.0
+        if timeout and self.spec.mode == "polled":
+            # Its answers have no number: nothing is asked until the reply cannot come any more,
+            # and the first answer after it is discarded.
+            self._outstanding = True
+            pause = max(pause, REPLY_HORIZON * self.spec.longest_reply)
+        self.due = self._clock.now() + pause
+
+    def overheard(self) -> None:
+        """Note that something came that was not asked for: perhaps what was outstanding."""
+        if self._outstanding:
+            self.due = min(self.due, self._clock.now() + self.spec.longest_reply)
 
     def refused(self, error: ConnectionLost) -> None:
         """Keep and count an answer that is a refusal."""

@@ -149,7 +149,8 @@ class StreamLine:
         async with self._lock:
             now = self._clock.now()
             if now < instrument.due:
-                await talk.idle(min(instrument.due, now + _LISTEN), instrument)
+                if await talk.idle(min(instrument.due, now + _LISTEN), instrument):
+                    instrument.overheard()
                 return
             instrument.asked = begun = self._clock.now()
             instrument.due = max(instrument.due + 1 / instrument.wanted_rate, begun)
@@ -160,6 +161,8 @@ class StreamLine:
                 instrument.refused(error)
             except NoReply as error:
                 instrument.failed(error, timeout=talk.was_silent)
+                if talk.came_late:
+                    instrument.overheard()
             if instrument.publisher.tally.readings > before:
                 took = self._clock.now() - begun
                 if self._share.took(self._place(instrument), took):

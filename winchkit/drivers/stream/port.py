@@ -6,12 +6,12 @@ A thread reads, because that works for every port that pyserial knows on every s
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections import deque
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
 
 from winchkit.drivers.clock import Clock
+from winchkit.drivers.scheduling import Scheduler, event_of, thread_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
@@ -58,7 +58,7 @@ async def open_serial(spec: BusSpec, name: str, clock: Clock) -> Port:
     It is opened on another thread: a network port that does not answer must not stop the others.
     """
     where = f"bus '{name}' ({spec.port})"
-    opened = await asyncio.to_thread(_opened, spec, where)
+    opened = await asyncio.to_thread(_opened, spec, where, clock)
     return SerialPort(opened, str(spec.port), where, clock)
 
 
@@ -75,8 +75,8 @@ class SerialPort:
         self._chunks: deque[Chunk] = deque()
         self._wanted: asyncio.Future[None] | None = None
         self._failure: Exception | None = None
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._receive, name=f"serial {port}", daemon=True)
+        self._closing = event_of(clock)
+        self._thread = thread_of(clock, self._receive, f"serial {port}")
         self._thread.start()
 
     async def read(self, until: float) -> Chunk | None:
@@ -142,10 +142,12 @@ class SerialPort:
             self._wanted.set_result(None)
 
 
-def _opened(spec: BusSpec, where: str) -> serial.Serial:
+def _opened(spec: BusSpec, where: str, clock: Clock) -> serial.Serial:
     import serial
 
     try:
+        if isinstance(clock, Scheduler) and (line := clock.serial_port(str(spec.port))):
+            return cast("serial.Serial", line)
         return serial.serial_for_url(
             str(spec.port),
             baudrate=spec.baudrate,

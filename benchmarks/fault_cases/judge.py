@@ -1,0 +1,210 @@
+"""Judges a case from the truth: stopped in time, nothing moved again, tension, cause, log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fault_cases.case import Planned
+from fault_cases.kinds import KINDS, STIFFNESS, Kind
+from fault_cases.play import Record
+from fault_cases.world import LIMITS, Sample
+
+__all__ = ["Verdict", "judge"]
+
+_MOVES = 0.004
+"""Cable speed above which a winch moves, m/s."""
+_SETTLES = 0.05
+"""The brake and the drive's filters take this long beside v/a, s."""
+_DEAD_MAN = 0.2
+_FLUSH = {"csv": 0.3}
+"""What a log may lack at its end, s: rows that wait for the next sample of every channel."""
+_NOISE = 15.0
+"""Above the true tension at which the cell's noise may trip, and oscillations, N."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a case showed; empty strings are good."""
+
+    stopped: str = ""
+    moved_after_trip: str = ""
+    over_tension: str = ""
+    cause: str = ""
+    log: str = ""
+    error: str = ""
+    reaction: float = math.nan
+    """From the onset of the first fault until no drive followed set-points, s."""
+    recovered: bool = True
+    """Whether a new command after the reset moved it."""
+    refusal: str = ""
+    """What refused the reset, in words."""
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing is wrong."""
+        return not (
+            self.stopped
+            or self.moved_after_trip
+            or self.over_tension
+            or self.cause
+            or self.log
+            or self.error
+        )
+
+
+def judge(record: Record) -> Verdict:
+    """Judge what is true."""
+    if record.error:
+        return Verdict(error=record.error)
+    reference = _must_stop(record)
+    stopped, reaction = _judge_stop(record, reference)
+    return Verdict(
+        stopped or _judge_release(record),
+        _judge_rest(record, reference),
+        _judge_tension(record),
+        _judge_cause(record, reference),
+        _judge_log(record),
+        reaction=reaction,
+        recovered=record.moved_again,
+        refusal=record.late_reset,
+    )
+
+
+def _must_stop(record: Record) -> tuple[float, float] | None:
+    """Onset and bound of what must stop the bench first; None where nothing must."""
+    found = []
+    for planned, onset in record.onsets:
+        kind = KINDS[planned.kind]
+        if not kind.stops or (planned.span is not None and planned.span < kind.least):
+            continue
+        start = _crossing(record, planned, kind, onset)
+        if start is not None:
+            found.append((start, kind.bound))
+    return min(found, key=sum, default=None)
+
+
+def _crossing(record: Record, planned: Planned, kind: Kind, onset: float) -> float | None:
+    """When the time begins to count."""
+    if not kind.crosses:
+        return onset
+    for sample in record.truth[planned.winch]:
+        high = kind.crosses == "high" and sample.tension > LIMITS["tension_high"]
+        slack = kind.crosses == "slack" and sample.tension < LIMITS["tension_slack"]
+        if sample.time > onset and (high or slack):
+            return sample.time
+    return None
+
+
+def _between(samples: Sequence[Sample], start: float, end: float) -> list[Sample]:
+    return [sample for sample in samples if start <= sample.time < end]
+
+
+def _judge_stop(record: Record, reference: tuple[float, float] | None) -> tuple[str, float]:
+    if reference is None:
+        return "", math.nan
+    onset, bound = reference
+    reaction = 0.0
+    for name, samples in record.truth.items():
+        later = _between(samples, onset, min(record.mended, record.reset))
+        if not later:
+            continue
+        moving = [s for s in later if s.follows]
+        left = moving[-1].time - onset if moving and later[0].follows else 0.0
+        reaction = max(reaction, left)
+        if left > bound:
+            return f"winch {name} followed set-points for {left:.3f} s (bound {bound:.3f} s)", left
+        fastest = max(s.speed for s in _between(samples, onset - 0.01, onset + bound + 0.01))
+        allowed = bound + fastest / LIMITS["acceleration"] + _SETTLES
+        running = [s.time - onset for s in later if s.speed > _MOVES]
+        rest = running[-1] if running else 0.0
+        if rest > allowed:
+            return f"winch {name} stood still after {rest:.3f} s only (bound {allowed:.3f} s)", left
+    return "", reaction
+
+
+def _judge_release(record: Record) -> str:
+    """After the release, and after a dead-man that was let go, everything comes to rest."""
+    moments = [record.released] if record.case.motion == "jog" else []
+    moments += [onset for planned, onset in record.onsets if planned.kind == "released"]
+    for moment in moments:
+        for name, samples in record.truth.items():
+            before = _between(samples, moment - 0.05, moment + _DEAD_MAN + 0.15)
+            fastest = max((s.speed for s in before), default=0.0)
+            allowed = _DEAD_MAN + 0.15 + fastest / LIMITS["acceleration"] + _SETTLES
+            end = record.pressed if moment == record.released else record.reset
+            late = [s for s in _between(samples, moment + allowed, end) if s.speed > _MOVES]
+            if late:
+                return f"winch {name} moved {late[-1].time - moment:.2f} s after the release"
+    return ""
+
+
+def _tripped_at(record: Record, reference: tuple[float, float] | None) -> float | None:
+    """From when on nothing may move, as the truth has it."""
+    if reference is not None:
+        onset, bound = reference
+        return onset + bound + LIMITS["speed"] / LIMITS["acceleration"] + _SETTLES
+    if not math.isfinite(record.tripped_at):
+        return None
+    # Something tripped that need not have: from then on nothing may move either.
+    stopping = KINDS["cut wire"].bound + LIMITS["speed"] / LIMITS["acceleration"] + _SETTLES
+    return record.tripped_at + stopping
+
+
+def _judge_rest(record: Record, reference: tuple[float, float] | None) -> str:
+    start = _tripped_at(record, reference)
+    if start is None:
+        return ""
+    end = record.released if record.case.motion == "jog" else record.reset
+    for name, samples in record.truth.items():
+        for sample in _between(samples, start, end):
+            if sample.speed > _MOVES or sample.enabled:
+                what = "was enabled" if sample.enabled else f"moved at {sample.speed:.3f} m/s"
+                place = "before the reset" if sample.time < record.reset else "after the reset"
+                return f"winch {name} {what} {sample.time - start:.2f} s after the stop, {place}"
+    return ""
+
+
+def _judge_tension(record: Record) -> str:
+    speed = record.case.speed
+    snags = any(KINDS[planned.kind].crosses == "high" for planned, _ in record.onsets)
+    way = speed * 0.15 + speed * speed / (2 * LIMITS["acceleration"])
+    limit = LIMITS["tension_high"] + _NOISE + (STIFFNESS * way if snags else 0.0)
+    for name, samples in record.truth.items():
+        highest = max((s.tension for s in _between(samples, 0, record.ended)), default=0.0)
+        if highest > limit:
+            return f"winch {name}: {highest:.0f} N (computed {limit:.0f} N)"
+    return ""
+
+
+def _judge_cause(record: Record, reference: tuple[float, float] | None) -> str:
+    right = {cause for planned, _ in record.onsets for cause in KINDS[planned.kind].causes}
+    named = [kind for kind, _ in record.trips]
+    if record.failure is not None:
+        named.append("failure")
+    if not named:
+        return "nothing was told" if reference is not None and _enabled(record) else ""
+    if named[0] in right:
+        return ""
+    words = next((text for _, text in record.trips), str(record.failure))
+    return f"'{words}' for {', '.join(planned.kind for planned, _ in record.onsets)}"
+
+
+def _enabled(record: Record) -> bool:
+    """Whether a drive that a fault concerns was enabled when that came: else there is no trip."""
+    for planned, onset in record.onsets:
+        before = _between(record.truth[planned.winch], onset - 0.01, onset)
+        if any(sample.enabled for sample in before):
+            return True
+    return False
+
+
+def _judge_log(record: Record) -> str:
+    full = [onset for planned, onset in record.onsets if planned.kind == "recorder fails"]
+    if record.log_error and not full:
+        return record.log_error
+    end = min(full) if full else record.ended
+    if not record.log_end >= end - _FLUSH["csv"] - (1.0 if full else 0.0):
+        return f"the log ends {end - record.log_end:.2f} s early {record.log_error}"
+    return ""

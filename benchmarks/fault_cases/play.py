@@ -1,0 +1,182 @@
+"""Plays a case: motion, faults, keys held on, mending, resets, release and a new command."""
+
+from __future__ import annotations
+
+import logging
+import math
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from fault_cases.case import Case, Planned
+from fault_cases.kinds import KINDS
+from fault_cases.operator import Operator
+from fault_cases.world import Sample, World, opened_world
+from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.runs import read_run
+
+__all__ = ["Record", "play"]
+
+_AFTER = 1.1
+"""From the last fault until all is mended, s."""
+_HELD_ON = 0.5
+_RELEASED = 0.95
+"""A held command counts as released after 0.8 s."""
+
+
+@dataclass
+class Record:
+    """What happened, as it is true."""
+
+    case: Case
+    begun: float = 0.0
+    onsets: list[tuple[Planned, float]] = field(default_factory=list)
+    mended: float = 0.0
+    reset: float = math.inf
+    """When the first reset that succeeded began, or the last one, s."""
+    released: float = 0.0
+    pressed: float = 0.0
+    ended: float = 0.0
+    truth: dict[str, list[Sample]] = field(default_factory=dict)
+    tripped_at: float = math.inf
+    """When the first trip was shown, s."""
+    trips: list[tuple[str, str]] = field(default_factory=list)
+    """Kind and words of the trips before the reset, in their order."""
+    failure: BaseException | None = None
+    early_reset: str = ""
+    late_reset: str = ""
+    logged_from: float = 0.0
+    log_end: float = 0.0
+    """Time of the log's last row, s; NaN where it could not be read."""
+    log_error: str = ""
+    moved_again: bool = False
+    """Whether the new command at the end moved a winch."""
+    error: str = ""
+    """What the harness did not expect."""
+
+
+def play(case: Case) -> Record:
+    """Play a case in a folder of its own."""
+    record = Record(case)
+    logging.disable(logging.CRITICAL)
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            with opened_world(
+                case.winches,
+                case.seed,
+                Path(folder),
+                real_time=case.real_time,
+                independent=case.independent,
+            ) as world:
+                _play(world, record)
+                record.truth = world.truth
+        except BaseException as error:  # noqa: BLE001 - a case that breaks is told as one
+            known = record.failure is not None and error is record.failure
+            record.error = "" if known else f"{type(error).__name__}: {error}"
+        _read_log(record, Path(folder))
+    return record
+
+
+def _play(world: World, record: Record) -> None:
+    case, clock, bench = record.case, world.clock, world.bench
+    recorder = bench.log(world.folder / "case.csv")
+    record.logged_from = world.now
+    bench.on_cycle(partial(_note_trip, record))
+    clock.sleep(0.2)
+    record.begun = world.now
+    operator = Operator(world, case)
+    ends: list[Callable[[], None]] = []
+    last = _schedule(world, record, operator, ends)
+    clock.sleep(record.begun + last + _AFTER - world.now)
+    record.trips = _trips(world)
+    if case.resets_early and (record.trips or bench.loop.failure is not None):
+        operator.orders = False
+        begun = world.now
+        record.early_reset = operator.reset()
+        record.reset = math.inf if record.early_reset else begun
+        clock.sleep(0.3)
+    record.trips = record.trips or _trips(world)
+    record.mended = world.now
+    for end in ends:
+        end()
+    clock.sleep(_HELD_ON)
+    record.trips = record.trips or _trips(world)
+    operator.orders = False
+    record.failure = bench.loop.failure
+    record.reset = min(record.reset, world.now)
+    if _trips(world) or record.failure is not None:
+        record.late_reset = operator.reset()
+    clock.sleep(_HELD_ON)
+    record.released = world.now
+    operator.let_go()
+    clock.sleep(_RELEASED)
+    record.pressed = world.now
+    _press(world, case)
+    record.ended = world.now
+    try:
+        recorder.close()
+    except Exception as error:  # noqa: BLE001 - a full disk is told here
+        record.log_error = str(error)
+    world.sample()
+    record.moved_again = any(
+        abs(sample.velocity) > 0.5
+        for samples in world.truth.values()
+        for sample in samples
+        if sample.time > record.pressed
+    )
+
+
+def _schedule(
+    world: World, record: Record, operator: Operator, ends: list[Callable[[], None]]
+) -> float:
+    """Let the faults come at their times; the last of these, s."""
+
+    def begin(fault: Planned) -> None:
+        record.onsets.append((fault, world.now))
+        if fault.kind == "released":
+            operator.holds = False
+            return
+        end = KINDS[fault.kind].begin(world, fault.winch)
+        if end is None:
+            return
+        if fault.span is None:
+            ends.append(end)
+        else:
+            world.call_at(world.now + fault.span, end)
+
+    for fault in record.case.faults:
+        world.call_at(record.begun + fault.at, lambda fault=fault: begin(fault))  # type: ignore[misc]
+    return max(fault.at + (fault.span or 0.0) for fault in record.case.faults)
+
+
+def _note_trip(record: Record, snapshot: BenchSnapshot) -> None:
+    if snapshot.tripped and not math.isfinite(record.tripped_at):
+        record.tripped_at = snapshot.time
+
+
+def _press(world: World, case: Case) -> None:
+    """A new command, as a person gives one after a reset."""
+    end = world.now + 0.4
+    while world.now < end:
+        for winch in world.bench.winch.values():
+            try:
+                winch.jog(**{"wind_in" if case.paying_out else "pay_out": 0.1})
+            except Exception:  # noqa: BLE001 - judged by what moves
+                continue
+        world.clock.sleep(0.05)
+    world.clock.sleep(0.4)
+
+
+def _trips(world: World) -> list[tuple[str, str]]:
+    return [(trip.kind, str(trip)) for trip in world.bench.snapshot.tripped]
+
+
+def _read_log(record: Record, folder: Path) -> None:
+    try:
+        run = read_run(folder / "case.csv")
+        record.log_end = record.logged_from + float(run.time[-1])
+    except Exception as error:  # noqa: BLE001 - counted as a log that is not whole
+        record.log_error = record.log_error or f"{type(error).__name__}: {error}"
+        record.log_end = float("nan")

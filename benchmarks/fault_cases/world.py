@@ -1,0 +1,186 @@
+"""A simulated bench with its truth, in simulated or in real time."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from heapq import heappop, heappush
+from itertools import count
+from pathlib import Path
+
+import can
+
+from fault_cases.independent_drive import IndependentDrive, replace_drives
+from winchkit.bench.bench import Bench, open_bench
+from winchkit.sim.clock.simulated_clock import SimulatedClock
+from winchkit.sim.drive import SimDrive
+from winchkit.sim.drive_power import Order
+from winchkit.sim.drive_state import State as SimState
+from winchkit.sim.live import LiveBench
+from winchkit.sim.pace import PacedClock
+from winchkit.sim.wire import Carried
+from winchkit.testing.declared import declared
+
+__all__ = ["HEARTBEAT", "LIMITS", "Sample", "World", "opened_world"]
+
+HEARTBEAT = 0.05
+LIMITS = {"speed": 0.6, "acceleration": 1.5, "tension_high": 400.0, "tension_slack": 15.0}
+"""Of ``spiral-bench``."""
+_SAMPLED = 2e-3
+_OPEN = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What is true of one winch at one moment."""
+
+    time: float
+    velocity: float
+    """Of the motor, rad/s."""
+    speed: float
+    """Of the cable by the motor, m/s, without sign."""
+    tension: float
+    """N."""
+    enabled: bool
+    """Whether the drive is in operation enabled."""
+    follows: bool
+    """Whether it is in operation enabled and follows set-points, no ramp of its own."""
+
+
+@dataclass
+class World:
+    """An open bench, what is true of it, and what can be done to it from outside."""
+
+    clock: SimulatedClock | PacedClock
+    live: LiveBench
+    folder: Path
+    bench: Bench
+    truth: dict[str, list[Sample]] = field(default_factory=dict)
+    frames: list[Carried] = field(default_factory=list)
+    _later: list[tuple[float, int, Callable[[], None]]] = field(default_factory=list)
+    _order: count[int] = field(default_factory=count)
+    _stopping: threading.Event = field(default_factory=threading.Event)
+    _bus: can.BusABC | None = None
+
+    @property
+    def simulated(self) -> SimulatedClock | None:
+        """The clock of simulated time; None in real time."""
+        return self.clock if isinstance(self.clock, SimulatedClock) else None
+
+    @property
+    def now(self) -> float:
+        """s."""
+        return self.clock.now()
+
+    def call_at(self, moment: float, function: Callable[[], None]) -> None:
+        """Call a function at a time."""
+        if self.simulated is not None:
+            self.simulated.call_at(moment, function)
+        else:
+            heappush(self._later, (moment, next(self._order), function))
+
+    def inject_frame(self, identifier: int, data: bytes) -> None:
+        """A stranger on the bus sends a frame."""
+        if self.simulated is not None:
+            self.live._ports["can"].inject(identifier, data)  # type: ignore[union-attr]
+            return
+        if self._bus is None:
+            channel = self.live.bench_spec.bus["can"].channel
+            self._bus = can.Bus(interface="virtual", channel=channel)
+        self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def begin_sampling(self) -> None:
+        """Note from now on what is true."""
+        for wire in self.live.wire.values():
+            wire.taps.append(self.frames.append)
+        self.truth = {name: [] for name in self.live.winches}
+        if self.simulated is not None:
+            self._sample_and_go_on()
+        else:
+            threading.Thread(target=self._run_real, name="truth", daemon=True).start()
+
+    def close(self) -> None:
+        """Sample no more."""
+        self._stopping.set()
+        if self._bus is not None:
+            self._bus.shutdown()
+
+    def sample(self) -> None:
+        """Note what is true now."""
+        with self.live.up_to_date():
+            now = self.now
+            for name, winch in self.live.winches.items():
+                plant, arm = winch.plant, winch.plant._state.arm
+                enabled, follows, velocity = _seen(winch.drive, plant.motor_velocity)
+                speed = abs(velocity * arm)
+                self.truth[name].append(
+                    Sample(now, velocity, speed, plant.tension, enabled, follows)
+                )
+
+    def _sample_and_go_on(self) -> None:
+        if not self._stopping.is_set():
+            self.sample()
+            self.call_at(self.now + _SAMPLED, self._sample_and_go_on)
+
+    def _run_real(self) -> None:
+        while not self._stopping.is_set():
+            self.sample()
+            while self._later and self._later[0][0] <= self.now:
+                heappop(self._later)[2]()
+            time.sleep(_SAMPLED)
+
+
+def _seen(drive: SimDrive | IndependentDrive, velocity: float) -> tuple[bool, bool, float]:
+    """Whether a drive is enabled, whether it follows set-points, and how fast its motor turns."""
+    if isinstance(drive, IndependentDrive):
+        return drive.enabled, drive.follows, drive.velocity
+    enabled = drive.state is SimState.OPERATION_ENABLED
+    return enabled, enabled and drive._power.order is Order.FOLLOW, velocity
+
+
+@contextmanager
+def opened_world(
+    winches: int,
+    seed: int | str,
+    folder: Path,
+    *,
+    real_time: bool = False,
+    independent: bool = False,
+) -> Iterator[World]:
+    """A bench of ``spiral-bench``'s winches with a heartbeat of 50 ms, opened.
+
+    ``independent``: with the slaves of ``tests/slave`` for drives.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    bench = declared(None, {name: {} for name in "ABCDEFGH"[:winches]}, folder)
+    buses = {
+        name: replace(bus, heartbeat=HEARTBEAT) if bus.kind == "can" else bus
+        for name, bus in bench.bench.bus.items()
+    }
+    bench = replace(bench, bench=replace(bench.bench, bus=buses, name=f"case-{os.getpid()}"))
+    number = int.from_bytes(str(seed).encode()[-6:], "little")
+    clock: SimulatedClock | PacedClock = PacedClock() if real_time else SimulatedClock()
+    live = (
+        LiveBench(bench, seed=number, clock=clock.simulation)
+        if isinstance(clock, PacedClock)
+        else LiveBench(bench, seed=number, simulated_time=clock)
+    )
+    with live:
+        if independent:
+            replace_drives(live)
+        opened = open_bench(live.bench_spec, clock)
+        if isinstance(clock, PacedClock):
+            opened.on_cycle(clock.control)
+        world = World(clock, live, folder, opened)
+        try:
+            world.begin_sampling()
+            yield world
+        finally:
+            try:
+                opened.close()
+            finally:
+                world.close()

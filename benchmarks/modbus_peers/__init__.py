@@ -1,0 +1,1 @@
+"""Peers for ``modbus_campaign.py`` that share no code with winchkit."""

@@ -1,0 +1,217 @@
+"""Eight winches at 250 Hz for a long time: memory, lost samples, missed cycles that nobody told.
+
+``python benchmarks/soak.py --minutes 30 --json``. The drives (the slaves of ``tests/slave``, over a
+pair of datagram sockets) and the load cells (Modbus TCP) run in a process of their own, the bench
+with its recorder in this one. Prints one JSON object; exit 1 where memory grows by more than
+1 MB/h, a sample is lost or a missed cycle is not reported. See benchmarks/README.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import math
+import multiprocessing
+import os
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from soak_devices import Wire, serve
+
+from winchkit.bench.bench import Bench, open_bench
+from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.drivers.clock import MonotonicClock
+
+_WINCHES = "ABCDEFGH"
+_CYCLE = 0.004
+_SAMPLED = 5.0
+_WARM_UP = 0.2
+"""Share of the time, at least 30 s."""
+_MISSED = 2.05
+"""A longer gap, in cycles, holds a cycle that was left out."""
+_ROTATE = "64MB"
+_PERIOD, _SPEED = 20.0, 0.1
+
+
+class Watch:
+    """Counts gaps between cycles by itself, and moves every winch up and down."""
+
+    def __init__(self) -> None:
+        self.cycles = self.gaps = 0
+        self.longest = 0.0
+        self._before = math.nan
+        self._began = math.nan
+
+    def __call__(self, snapshot: BenchSnapshot) -> dict[str, float]:
+        """Note the cycle; winding speeds by winch."""
+        gap = snapshot.time - self._before
+        self._before = snapshot.time
+        self.cycles += 1
+        if math.isfinite(gap):
+            self.gaps += gap > _MISSED * _CYCLE
+            self.longest = max(self.longest, gap)
+        else:
+            self._began = snapshot.time
+        phase = 2 * math.pi * (snapshot.time - self._began) / _PERIOD
+        return dict.fromkeys(snapshot.winch, _SPEED * math.sin(phase))
+
+
+class _Clock(MonotonicClock):
+    """The machine's clock, with the wire to the drives for a CAN bus."""
+
+    def __init__(self, own: str, other: str) -> None:
+        self._ends = own, other
+
+    def thread(self, target: Callable[[], None], name: str) -> threading.Thread:
+        """A thread, not started yet."""
+        return threading.Thread(target=target, name=name, daemon=True)
+
+    def event(self) -> threading.Event:
+        """An event."""
+        return threading.Event()
+
+    def lock(self) -> AbstractContextManager[Any]:
+        """A lock."""
+        return threading.Lock()
+
+    def event_loop(self) -> asyncio.AbstractEventLoop:
+        """An event loop."""
+        return asyncio.new_event_loop()
+
+    def can_port(self, _channel: str) -> Wire:
+        """The host's end of the wire."""
+        return Wire(*self._ends)
+
+    def serial_port(self, _port: str) -> None:
+        """There is none."""
+
+
+def resident() -> float:
+    """Resident memory of this process, MB."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def bench_file(folder: Path, cells: int) -> Path:
+    """A bench of eight winches, each with a load cell."""
+    lines = [
+        "schema = 1",
+        'kind = "bench"',
+        'name = "soak"',
+        f'cycle = "{_CYCLE * 1e3:g} ms"',
+        "[bus.can]",
+        'kind = "can"',
+        'interface = "virtual"',
+        f'channel = "soak-{os.getpid()}"',
+        'heartbeat = "200 ms"',
+        "[bus.cells]",
+        'kind = "modbus-tcp"',
+        'host = "127.0.0.1"',
+        f"port = {cells}",
+    ]
+    for number, name in enumerate(_WINCHES, start=1):
+        lines += [
+            f"[winch.{name}]",
+            'profile = "bench-spiral"',
+            f'servo = {{ device = "generic-cia402", bus = "can", node = {number} }}',
+            f'cell = {{ device = "laumas-tlb", bus = "cells", unit = {number}, rate = "25 Hz" }}',
+            "brake = true",
+            f"[winch.{name}.limits]",
+            'speed = "0.3 m/s"',
+            'acceleration = "1 m/s^2"',
+        ]
+    path = folder / "soak.toml"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def measured(bench: Bench, folder: Path, duration: float) -> dict[str, Any]:
+    """Let it run; what was counted."""
+    watch = Watch()
+    recorder = bench.log(folder / "soak.mcap", rotate=_ROTATE)
+    remove = bench.on_cycle(watch)
+    before = {name: axis.health for name, axis in bench.axes.items()}
+    overruns, begun = bench.loop.overruns, time.monotonic()
+    times, memory = [], []
+    trips = ""
+    while (passed := time.monotonic() - begun) < duration:
+        time.sleep(min(_SAMPLED, duration - passed))
+        if passed > max(_WARM_UP * duration, min(30.0, duration / 3)):
+            times.append(time.monotonic() - begun)
+            memory.append(resident())
+        for part in sorted(folder.glob("soak.*.mcap"))[:-2]:
+            part.unlink()
+        trips = trips or "; ".join(map(str, bench.snapshot.tripped))
+    remove()
+    health = {name: axis.health for name, axis in bench.axes.items()}
+    drops = recorder.counters()
+    recorder.close()
+    reported = bench.loop.overruns - overruns
+    slope = float(np.polyfit(times, memory, 1)[0]) * 3600 if len(times) > 2 else math.nan
+    return {
+        "minutes": round(duration / 60, 2),
+        "cycles": watch.cycles,
+        "missed_cycles": watch.gaps,
+        "missed_unreported": max(0, watch.gaps - reported),
+        "longest_gap_s": round(watch.longest, 4),
+        "memory_mb": round(memory[-1], 1) if memory else None,
+        "growth_mb_h": round(slope, 2),
+        "samples_lost": int(drops["log"]["drops"]),
+        "feedback_missed": sum(health[n].missed - before[n].missed for n in health),
+        "cell_readings": sum(drops[f"{n}.cell"]["readings"] for n in _WINCHES),
+        "cell_drops": sum(drops[f"{n}.cell"]["drops"] for n in _WINCHES),
+        "trips": trips,
+    }
+
+
+def run(duration: float) -> dict[str, Any]:
+    """Devices in one process, the bench in this one."""
+    ours, theirs = multiprocessing.Pipe()
+    context = multiprocessing.get_context("spawn")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        drives, host = str(folder / "drives"), str(folder / "host")
+        arguments = (theirs, len(_WINCHES), drives, host)
+        devices = context.Process(target=serve, args=arguments, daemon=True)
+        devices.start()
+        try:
+            cells = _received(ours)
+            with open_bench(bench_file(folder, cells), _Clock(host, drives)) as bench:
+                return measured(bench, folder, duration)
+        finally:
+            ours.send("end")
+            devices.join(10.0)
+
+
+def _received(connection: Connection) -> int:
+    if not connection.poll(30.0):
+        raise SystemExit("the devices did not start")
+    return int(connection.recv())
+
+
+def main() -> int:
+    """Exit 1 where something was lost, not reported, or memory grows."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    found = {"schema": 1, **run(60 * arguments.minutes)}
+    print(json.dumps(found) if arguments.json else found)
+    lost = found["samples_lost"] or found["missed_unreported"] or found["trips"]
+    return 1 if lost or not found["growth_mb_h"] <= 1.0 else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,76 @@
+"""The fault campaign in small: each case is judged from the truth, on both kinds of drives."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from fault_cases.case import Case, Planned, cases
+from fault_cases.judge import judge
+from fault_cases.kinds import KINDS
+from fault_cases.play import play
+
+
+def case(kind: str, **changes: object) -> Case:
+    """A jog that one lasting fault meets."""
+    first = KINDS[kind]
+    plain = Case(
+        seed="small/1",
+        winches=1,
+        motion="jog",
+        speed=0.2,
+        paying_out=first.moving == "out",
+        faults=(Planned(kind, "A", 0.6, None),),
+        resets_early=False,
+    )
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("kind", "independent", "resets_early"),
+    [
+        ("enable input open", True, True),
+        ("second master: 6040h = 00h", False, False),
+        ("stranger: NMT pre-operational", True, False),
+        ("TPDOs lost", True, True),
+        ("SYNC lost", False, False),
+        ("cut wire", True, False),
+        ("cell silent", False, True),
+        ("over-tension", False, False),
+        ("computer stalls 0.5 s", True, False),
+        ("exception in the loop", True, False),
+        ("released", True, False),
+    ],
+)
+def test_a_fault_stops_the_winch_and_nothing_moves_again(
+    kind: str, independent: bool, resets_early: bool
+) -> None:
+    verdict = judge(play(case(kind, independent=independent, resets_early=resets_early)))
+    assert verdict.good, verdict
+
+
+def test_a_winch_that_goes_on_is_found() -> None:
+    """The judge does not depend on what winchkit says: here nothing must stop, and nothing does."""
+    record = play(case("recorder fails"))
+    assert judge(record).good
+    blamed = replace(record.case, faults=(Planned("cut wire", "A", 0.6, None),))
+    record.case = blamed
+    record.onsets = [(blamed.faults[0], record.onsets[0][1])]
+    verdict = judge(record)
+    assert "followed set-points" in verdict.stopped
+    assert "enabled" in verdict.moved_after_trip
+    assert verdict.cause == "nothing was told"
+
+
+def test_the_same_seed_draws_the_same_cases() -> None:
+    assert cases(50, 3) == cases(50, 3)
+    assert cases(50, 3) != cases(50, 4)
+    assert {c.faults[0].kind for c in cases(len(KINDS), 1)} <= set(KINDS)
+    real = [c for c in cases(100, 1, real_time_share=0.05) if c.real_time]
+    assert len(real) == 5
+    assert all(KINDS[fault.kind].real_time for c in real for fault in c.faults)

@@ -1,0 +1,76 @@
+"""SIGTERM and SIGHUP end a command like Ctrl-C, each with its own exit code."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+PROGRAM = """
+import os, signal, sys, time
+from winchkit.cli.outcome import finish
+
+def command():
+    try:
+        os.kill(os.getpid(), {number})
+        time.sleep(10)
+    finally:
+        for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
+            os.kill(os.getpid(), number)  # a repetition must not break the stop
+        time.sleep(0.05)
+        print("stopped", flush=True)
+
+finish(command)
+"""
+
+
+def run(program: str, **options: object) -> subprocess.CompletedProcess[str]:
+    done: subprocess.CompletedProcess[str] = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        **options,  # type: ignore[call-overload]
+    )
+    return done
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "words"),
+    [
+        (signal.SIGINT, 130, "winchkit: interrupted\n"),
+        (signal.SIGTERM, 143, "winchkit: ended by SIGTERM\n"),
+        (signal.SIGHUP, 129, "winchkit: ended by SIGHUP\n"),
+    ],
+)
+def test_a_signal_ends_a_command_after_its_stop(number: int, code: int, words: str) -> None:
+    done = run(PROGRAM.format(number=int(number)))
+    assert done.returncode == code, done.stderr
+    assert done.stdout == "stopped\n"
+    assert done.stderr == words
+
+
+def test_a_signal_that_is_ignored_from_outside_stays_ignored() -> None:
+    """As under nohup."""
+    ignoring = "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+    program = PROGRAM.format(number=int(signal.SIGHUP)).replace("sleep(10)", "sleep(0.1)")
+    program = program.replace("(signal.SIGTERM, signal.SIGHUP, signal.SIGINT)", "()")
+    done = run(ignoring + program)
+    assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+
+
+def test_a_library_installs_no_handler() -> None:
+    done = run(
+        "import signal, winchkit\n"
+        "from winchkit.bench.session import attach, at_station\n"
+        "from winchkit.bench.bench import open_bench\n"
+        "assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL\n"
+        "assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL\n"
+    )
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,110 @@
+"""What a program reads from pipes: ``sim serve``, ``log`` and ``monitor`` with ``--json``."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from winchkit.runs import read_run
+
+pytestmark = [
+    pytest.mark.realtime,
+    pytest.mark.skipif(os.name != "posix", reason="signals of POSIX"),
+]
+
+WINCHKIT = [sys.executable, "-c", "from winchkit.cli import main; main()"]
+PIPE = subprocess.PIPE
+
+
+def start(*arguments: str | Path, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
+    words = [*WINCHKIT, *map(str, arguments)]
+    return subprocess.Popen(words, stdin=stdin, stdout=PIPE, stderr=PIPE, text=True)
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A bench that is used as soon as the line is there, without any waiting."""
+    path = tmp_path_factory.mktemp("served") / "bench.toml"
+    words = ("sim", "serve", "spiral-bench", "--json", "--bench-file", path)
+    with start(*words, stdin=PIPE) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        assert process.stderr is not None
+        line = process.stdout.readline()
+        if not line:
+            reason = process.stderr.read()
+            if "ip route add" in reason:
+                pytest.skip(f"no route for multicast here: {reason}")
+            pytest.fail(reason)
+        assert json.loads(line) == {"schema": 1, "bench": str(path), "ready": True}
+        yield path
+        process.stdin.write("status\nnonsense\n")
+        process.stdin.flush()
+        reply = json.loads(process.stdout.readline())
+        assert reply["line"] == "status"
+        assert "A: " in reply["reply"]
+        process.send_signal(signal.SIGTERM)
+        out, _ = process.communicate(timeout=30)
+        assert process.returncode == 0
+        assert out == "", "nothing but JSON on stdout"
+
+
+def test_monitor_has_the_cable_length_of_every_winch(served: Path) -> None:
+    with start("monitor", "-b", served, "--json", "--for", "2s") as process:
+        out, told = process.communicate(timeout=60)
+    assert process.returncode == 0, told
+    pictures = [json.loads(line) for line in out.splitlines()]
+    assert pictures
+    for picture in pictures:
+        assert set(picture["winch"]) == {"A"}
+        assert math.isfinite(picture["winch"]["A"]["cable_length"])
+        assert {"cable_speed", "phase", "tension"} <= set(picture["winch"]["A"])
+
+
+def test_log_ends_with_its_rows(served: Path, tmp_path: Path) -> None:
+    path = tmp_path / "lift.csv"
+    with start("log", "-b", served, "-o", path, "--for", "2s", "--json") as process:
+        out, told = process.communicate(timeout=60)
+    assert process.returncode == 0, told
+    found = json.loads(out)
+    assert list(found)[-1] == "rows"
+    assert found["rows"] == len(read_run(path)) > 10
+    assert found["output"] == str(path)
+
+
+def test_a_log_that_is_interrupted_ends_with_its_rows_too(served: Path, tmp_path: Path) -> None:
+    path = tmp_path / "lift.csv"
+    with start("log", "-b", served, "-o", path, "--json") as process:
+        end = time.monotonic() + 40
+        while not path.is_file() or path.read_bytes().count(b"\n") < 60:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        out, told = process.communicate(timeout=60)
+    assert process.returncode == 0, told
+    assert json.loads(out)["rows"] == len(read_run(path))
+
+
+def test_a_log_that_fails_says_how_many_rows_are_saved(served: Path, tmp_path: Path) -> None:
+    path = tmp_path / "lift.csv"
+    with start("log", "-b", served, "-o", path, "--json") as process:
+        end = time.monotonic() + 40
+        while not path.is_file() or path.read_bytes().count(b"\n") < 60:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        path.unlink()
+        out, told = process.communicate(timeout=60)
+    assert process.returncode == 3
+    assert "was removed by another program" in told
+    found = json.loads(out)
+    assert "was removed by another program" in found["problem"]
+    assert found["rows"] > 10

@@ -1,0 +1,26 @@
+"""docs/safety.md has the supervisor's conditions and the ways to stop as the code has them."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from collections.abc import Callable
+
+from snippets import ROOT
+
+from winchkit.bench.control.conditions import BENCH_CONDITIONS
+
+
+def test_the_tables_are_what_the_code_declares() -> None:
+    written: Callable[[str], str] = runpy.run_path(str(ROOT / "docs/make_safety.py"))["tables"]
+    there = (ROOT / "docs/safety.md").read_text(encoding="utf-8")
+    assert there == written(there), "run: python docs/make_safety.py"
+
+
+def test_every_trip_of_the_control_loop_stands_in_the_table() -> None:
+    source = "".join(
+        (ROOT / "winchkit/bench" / name).read_text(encoding="utf-8")
+        for name in ("loop.py", "wiring.py", "control/latch.py")
+    )
+    raised = set(re.findall(r'Trip\(\s*"([a-z ]+)"', source))
+    assert raised == {row.kind for row in BENCH_CONDITIONS}

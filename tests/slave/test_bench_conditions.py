@@ -1,0 +1,176 @@
+"""Conditions on the bench as a whole, each on a moving winch; switched off, a test fails.
+
+They trip in the control loop and not in the supervisor's table, so that switching one off means
+that its trip (or its warning) is dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from slave.held_key import jogging, observe
+from slave.rig import Rig
+from winchkit.bench.bench import Bench
+from winchkit.bench.control.conditions import BENCH_CONDITIONS
+from winchkit.bench.loop import ControlLoop
+from winchkit.bench.snapshot import Trip
+from winchkit.bench.supervisor import Supervisor
+from winchkit.errors import LimitTripped, NotPermitted
+
+_WITHIN = 0.15
+"""s."""
+
+
+def _unplug(rig: Rig, _bench: Bench) -> None:
+    """The adapter refuses every frame; the drive's own watchdog has to stop it."""
+
+    def refuse(*_: Any) -> None:
+        raise OSError(19, "No such device")
+
+    for port in rig.ports:
+        port.transmit = refuse  # type: ignore[method-assign]
+
+
+def _stall(rig: Rig, _bench: Bench) -> None:
+    rig.clock.stall(0.2)
+
+
+def _raise_in_loop(_rig: Rig, bench: Bench) -> None:
+    def picture(*_: Any) -> None:
+        raise ZeroDivisionError("float division by zero")
+
+    bench.loop._picture = picture  # type: ignore[method-assign, assignment]
+
+
+def _target_out_of_range(_rig: Rig, bench: Bench) -> None:
+    commander = bench.axes["A"]._commander
+    assert commander is not None
+
+    def frames(*_: Any) -> None:
+        raise NotPermitted("motor velocity -1e9 rad/s is beyond the drive's range")
+
+    commander.frames = frames  # type: ignore[method-assign, assignment]
+
+
+def _heed_nothing(rig: Rig, bench: Bench) -> None:
+    rig.slaves[0].inject("control word unheeded")
+    rig.slaves[0].inject("nmt unheard")
+    bench.stop_now(wait=False)
+
+
+def _lose_the_latch_file(rig: Rig, bench: Bench) -> None:
+    """A trip that comes afterwards cannot be kept."""
+    Path(bench.spec.latch_file).unlink()
+    Path(bench.spec.latch_file).mkdir()
+    rig.slaves[0].inject("second master disables")
+
+
+def _speak_over(rig: Rig, _bench: Bench) -> None:
+    """A second SYNC producer, e.g. a drive with bit 30 of 1005h."""
+
+    def produce() -> None:
+        if round(rig.time / 1e-3) % 10 == 0:
+            rig.from_stranger(0x080, b"")
+
+    rig.each.append(produce)
+
+
+def _fail_to_record(_rig: Rig, bench: Bench) -> None:
+    def sample(_snapshot: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    bench.loop.samplers.append(sample)
+
+
+@dataclass(frozen=True)
+class Case:
+    """How a condition comes about."""
+
+    kind: str
+    begin: Callable[[Rig, Bench], None]
+    stops: bool = True
+    within: float = _WITHIN
+
+
+CASES = (
+    Case("bus", _unplug),
+    Case("computer", _stall),
+    Case("loop", _raise_in_loop, within=0.02),
+    Case("target", _target_out_of_range, within=0.02),
+    Case("deaf", _heed_nothing, within=0.3),
+    Case("latch file", _lose_the_latch_file, within=0.02),
+    Case("sync", _speak_over, stops=False),
+    Case("recorder", _fail_to_record, stops=False),
+)
+
+
+def happens(folder: Path, case: Case) -> None:
+    """The condition on a winch that pays out: what is told, and what the drive does."""
+    rig = Rig(folder)
+    bench = rig.open()
+    try:
+        key = jogging(rig, bench)
+        start = rig.time
+        case.begin(rig, bench)
+        rig.wait(0.6)
+        seen = observe(rig, key, start)
+        snapshot = bench.snapshot
+        told = {trip.kind for trip in (*snapshot.tripped, *snapshot.warnings)}
+        key.release()
+        rig.slaves[0].mend_all()
+    finally:
+        rig.kill(bench)
+    assert case.kind in told, told
+    assert (seen.left <= case.within) is case.stops, f"left after {seen.left:.3f} s"
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.kind)
+def test_a_condition_on_the_bench_is_named_and_stops_it(tmp_path: Path, case: Case) -> None:
+    happens(tmp_path, case)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.kind)
+def test_a_condition_on_the_bench_that_is_switched_off_makes_a_test_fail(
+    tmp_path: Path, case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    latch, warn = Supervisor.latch, ControlLoop.warn
+
+    def without(before: Callable[[Any, Trip], None]) -> Callable[[Any, Trip], None]:
+        def drop(self: Any, trip: Trip) -> None:
+            if trip.kind != case.kind:
+                before(self, trip)
+
+        return drop
+
+    monkeypatch.setattr(Supervisor, "latch", without(latch))
+    monkeypatch.setattr(ControlLoop, "warn", without(warn))
+    with pytest.raises(AssertionError):
+        happens(tmp_path, case)
+
+
+def test_every_condition_on_the_bench_has_a_case() -> None:
+    assert {case.kind for case in CASES} == {row.kind for row in BENCH_CONDITIONS}
+
+
+@pytest.mark.parametrize("change", ["removed", "replaced"])
+def test_a_trip_is_kept_although_the_latch_file_was_changed(tmp_path: Path, change: str) -> None:
+    rig = Rig(tmp_path)
+    bench = rig.open()
+    path = Path(bench.spec.latch_file)
+    if change == "removed":
+        path.unlink()
+    else:
+        copy = path.with_suffix(".copy")
+        copy.write_bytes(path.read_bytes())
+        copy.replace(path)
+    rig.slaves[0].inject("second master enables")
+    rig.wait(0.5)
+    rig.kill(bench)
+    rig.wait(0.5)
+    with rig.opened() as again, pytest.raises(LimitTripped):
+        again.winch["A"].move_by(pay_out=0.02)

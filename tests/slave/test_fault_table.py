@@ -1,0 +1,322 @@
+"""Every fault of the table on a moving winch: stopped in time, cause named, latched until a reset.
+
+The winch pays out at 0.1 m/s under a key that is held all the time, heartbeat 50 ms. What the
+shaft does is read from the slave, not from what winchkit says.
+A lost RPDO shows in nothing while the same speed is commanded: it is tested with the dead-man's
+expiry.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from slave import Slave, State
+from slave.held_key import HeldKey, jogging, observe, since
+from slave.rig import Rig
+from slave.wire import GENERIC
+from winchkit.bench.bench import Bench
+from winchkit.errors import LimitTripped, MotionError
+
+_RAMP, _BRAKE = 628.0, 100.0
+"""6085h of the slave, and what its brake does without torque, rad/s^2."""
+_WITHIN = 0.15
+"""Of the first stop, s: a heartbeat of 50 ms, a consumer time of 2.5 beats."""
+_DEVIATES = 0.28
+"""A deviation is debounced by 0.25 s: no fault of communication (docs/safety.md)."""
+_LAG = 0.03
+"""Five time constants of the slave's velocity loop, s."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A fault, and what should come of it."""
+
+    fault: str
+    value: Any = None
+    cause: str = "."
+    """Regular expression of what the person is told first."""
+    without_torque: bool = False
+    """The drive loses its torque at once: the brake stops the shaft."""
+    within: float = _WITHIN
+    reset: bool = True
+    """Whether a reset brings it back."""
+
+    @property
+    def name(self) -> str:
+        return self.fault if self.value is None else f"{self.fault} {self.value}"
+
+
+_LEFT = "left operation enabled without a command"
+_ROWS = (
+    Row("enable input open", cause=_LEFT, without_torque=True),
+    Row("second master disables", cause=_LEFT, without_torque=True),
+    Row("reboots", cause="restarted", without_torque=True),
+    Row("reset by a stranger", cause="restarted|left operation|NMT", without_torque=True),
+    Row("stopped by a stranger", cause="NMT|" + _LEFT),
+    Row("pre-operational by a stranger", cause="pre-operational"),
+    Row("goes pre-operational", cause="pre-operational"),
+    Row("drive fault", cause="fault"),
+    Row("mode changed", cause="mode of operation"),
+    Row("sync unheard", cause="no complete feedback"),
+    Row("host frames lost", cause="feedback|operational|NMT|left"),
+    Row("heartbeat unheard", cause="NMT|operational|" + _LEFT),
+    Row("tpdo lost", cause="no complete feedback"),
+    Row("tpdo lost", {1}, cause="no complete feedback"),
+    Row("tpdo lost", {2}, cause="no complete feedback"),
+    Row("heartbeat lost", cause="heartbeat is gone"),
+    Row("silent", cause="heartbeat is gone|no complete feedback"),
+    Row("off the bus", cause="heartbeat is gone|no complete feedback"),
+    Row("follows wrongly", -1.0, cause="the other way"),
+    Row("follows wrongly", 0.0, cause="does not follow", within=_DEVIATES),
+    Row("follows wrongly", 3.0, cause="faster than commanded|beyond limits.speed"),
+)
+
+
+@pytest.mark.parametrize("row", _ROWS, ids=lambda row: row.name)
+def test_a_fault_under_a_held_key(tmp_path: Path, row: Row) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    slave = rig.slaves[0]
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        start = rig.time
+        slave.inject(row.fault, row.value)
+        rig.wait(1.0)
+        mended = rig.time
+        slave.mend_all()
+        rig.wait(2.0)
+        after = since(rig, mended)
+        assert not after.moved, "it moved again by itself"
+        assert not after.enabled, "it was enabled again by itself"
+        seen = observe(rig, key, start)
+        ramp = _BRAKE if row.without_torque else _RAMP
+        assert re.search(row.cause, seen.cause), seen.cause
+        assert seen.told < 0.5
+        if row.reset:
+            resets(rig, bench, key)
+        key.release()
+        rig.wait(0.5)
+    assert seen.left <= row.within, f"left after {seen.left:.3f} s: {seen.cause}"
+    assert seen.rest <= row.within + seen.speed / ramp + _LAG
+
+
+def resets(rig: Rig, bench: Bench, key: HeldKey) -> None:
+    """A reset under a held key starts nothing; a new press does."""
+    bench.reset()
+    start = rig.time
+    rig.wait(2.0)
+    assert not since(rig, start).enabled, "enabled by a reset under a held key"
+    key.release()
+    rig.wait(1.0)
+    again = rig.time
+    fresh = HeldKey(rig, bench).press()
+    rig.wait(1.0)
+    assert since(rig, again).moved, fresh.errors
+    fresh.release()
+    rig.wait(1.5)
+    assert rig.slaves[0].power.state is State.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize("fault", ["second master enables", "enables itself"])
+def test_enabled_by_somebody_else_at_rest_is_a_latched_trip(tmp_path: Path, fault: str) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        rig.wait(0.5)
+        start = rig.time
+        rig.slaves[0].inject(fault)
+        rig.wait(1.0)
+        enabled = [s.time - start for s in since(rig, start).samples if s.state is State.ENABLED]
+        assert enabled
+        assert max(enabled) <= _WITHIN
+        with pytest.raises(MotionError, match="enabled without a command"):
+            bench.winch["A"].jog(pay_out=0.1)
+        bench.reset()
+        bench.winch["A"].move_by(pay_out=0.02)
+
+
+def test_turning_while_disabled_is_a_latched_trip(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        rig.wait(0.5)
+        rig.slaves[0].inject("turns while disabled", 5.0)
+        rig.wait(0.5)
+        rig.slaves[0].mend_all()
+        rig.wait(0.5)
+        with pytest.raises(LimitTripped, match="turns although rest is commanded"):
+            bench.winch["A"].move_by(pay_out=0.02)
+        bench.reset()
+        bench.winch["A"].move_by(pay_out=0.02)
+
+
+@pytest.mark.parametrize("fault", ["velocity stuck", "position stuck", "status frozen"])
+def test_a_stuck_value_is_noticed_when_the_key_is_let_go(tmp_path: Path, fault: str) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        start = rig.time
+        rig.slaves[0].inject(fault)
+        rig.wait(0.1)
+        key.release()
+        rig.wait(3.0)
+        assert abs(rig.slaves[0].motor.velocity) < 0.1
+        assert rig.slaves[0].power.state is not State.ENABLED, "it stays enabled"
+        with pytest.raises(MotionError):
+            bench.winch["A"].move_by(pay_out=0.02)
+        assert since(rig, start).samples
+        rig.slaves[0].mend_all()
+
+
+@pytest.mark.parametrize("fault", ["rpdo unheard", "sync unheard", "host frames lost", "tpdo lost"])
+def test_the_dead_man_expires_into_a_fault(tmp_path: Path, fault: str) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        key.release()
+        start = rig.time
+        rig.slaves[0].inject(fault)
+        rig.wait(2.0)
+        seen = observe(rig, key, start)
+        expires = 0.2
+        assert seen.left <= expires + _WITHIN
+        assert seen.rest <= expires + _WITHIN + seen.speed / _RAMP + _LAG
+
+
+def test_an_emergency_without_a_fault_is_told_and_trips_only_where_declared(
+    tmp_path: Path,
+) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        rig.slaves[0].inject("emergency", 0x4210)
+        rig.wait(0.5)
+        assert abs(rig.slaves[0].motor.velocity) > 10, key.errors
+        assert any("4210" in str(trip) for trip in bench.snapshot.warnings)
+        key.release()
+        rig.wait(1.0)
+
+
+def test_a_reset_that_fails_leaves_the_latch(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    slave = rig.slaves[0]
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        slave.inject("drive fault")
+        rig.wait(1.0)
+        key.release()
+        rig.wait(1.0)
+        with pytest.raises(MotionError):
+            bench.reset()
+        slave.mend_all()
+        rig.wait(1.0)
+        start = rig.time
+        again = HeldKey(rig, bench).press()
+        rig.wait(1.0)
+        assert not since(rig, start).enabled
+        again.release()
+        bench.reset()
+        rig.wait(1.0)
+        bench.winch["A"].move_by(pay_out=0.02)
+
+
+def test_a_stall_of_this_computer_is_named(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        start = rig.time
+        rig.clock.stall(1.0)
+        rig.wait(2.0)
+        seen = observe(rig, key, start)
+        assert "this computer stood still for 1.0" in seen.cause
+        assert seen.left <= _WITHIN, "the drive's own watchdog"
+        key.release()
+        rig.wait(0.5)
+
+
+@dataclass(frozen=True)
+class LoopFault:
+    """Something that the control loop raises."""
+
+    name: str
+    break_: Callable[[Bench], None]
+
+
+def _unsigned_target(bench: Bench) -> None:
+    """60FFh is UNSIGNED32 in five makers' files: a negative speed does not fit."""
+
+    def encode(*_: Any) -> bytes:
+        raise OverflowError("can't convert negative int to unsigned")
+
+    commander = bench.axes["A"]._commander
+    assert commander is not None
+    commander.frames = encode  # type: ignore[method-assign, assignment]
+
+
+def _snapshot(bench: Bench) -> None:
+    def picture(*_: Any) -> None:
+        raise ZeroDivisionError("float division by zero")
+
+    bench.loop._picture = picture  # type: ignore[method-assign, assignment]
+
+
+def _supervisor(bench: Bench) -> None:
+    def check(*_: Any) -> None:
+        raise KeyError("A")
+
+    bench.loop.supervisor.check = check  # type: ignore[method-assign, assignment]
+
+
+@pytest.mark.parametrize("break_", [_unsigned_target, _snapshot, _supervisor])
+def test_an_exception_in_the_control_loop_stops_the_drive_and_is_named(
+    tmp_path: Path, break_: Callable[[Bench], None]
+) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        start = rig.time
+        break_(bench)
+        rig.wait(1.0)
+        seen = observe(rig, key, start)
+        assert seen.left <= 0.02
+        assert seen.rest <= 0.02 + seen.speed / _RAMP + _LAG
+        assert re.search("OverflowError|ZeroDivisionError|KeyError", seen.cause), seen.cause
+        key.release()
+        rig.wait(0.5)
+    with rig.opened() as again, pytest.raises(LimitTripped, match="control loop failed"):
+        again.winch["A"].jog(pay_out=0.1)
+
+
+def test_a_drive_stopped_by_a_stranger_comes_back_with_a_reset(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        rig.from_stranger(0x000, b"\x02\x01")
+        rig.wait(0.5)
+        with pytest.raises(LimitTripped, match="stopped"):
+            bench.winch["A"].move_by(pay_out=0.02)
+        bench.reset()
+        bench.winch["A"].move_by(pay_out=0.02)
+    rig.from_stranger(0x000, b"\x02\x01")
+    rig.wait(0.1)
+    with rig.opened() as bench:
+        bench.winch["A"].move_by(pay_out=0.02)
+
+
+def test_the_latch_outlives_a_killed_process(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    bench = rig.open()
+    key = jogging(rig, bench)
+    rig.slaves[0].inject("second master disables")
+    rig.wait(0.5)
+    key.release()
+    rig.kill(bench)
+    rig.wait(1.0)
+    with rig.opened() as again:
+        with pytest.raises(LimitTripped, match="left operation enabled"):
+            again.winch["A"].jog(pay_out=0.1)
+        again.reset()
+        again.winch["A"].move_by(pay_out=0.02)
+    assert not Path(again.spec.latch_file).exists()

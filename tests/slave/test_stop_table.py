@@ -1,0 +1,117 @@
+"""Each rung of the stop table is used when it is due, and only then; without it a test fails.
+
+A winch that pays out under a held key gets a quick stop while its drive does not hear what the
+rungs before say. Which rung stopped it is read from the bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from slave.frames import Frame
+from slave.held_key import jogging, observe
+from slave.rig import Rig
+from winchkit.bench.control import stop_escalation
+from winchkit.bench.control.stop_escalation import STOP_TABLE, Rung
+
+_RAMP, _LAG = 628.0, 0.03
+_WITHIN = 0.15
+"""Of the first stop, s."""
+_SDO_STOP = bytes.fromhex("2b406000")
+_NMT_STOP = bytes.fromhex("0201")
+_BEAT = 0x77F
+
+
+def _is_sdo_stop(frame: Frame) -> bool:
+    """A download of 6040h = 02h, in any of the two ways to write its size."""
+    head = frame.data[:4]
+    return frame.identifier == 0x601 and head in (_SDO_STOP, b"\x22\x40\x60\x00")
+
+
+def _is_nmt_stop(frame: Frame) -> bool:
+    return frame.identifier == 0x000 and frame.data == _NMT_STOP
+
+
+def _is_beat(frame: Frame) -> bool:
+    return frame.identifier == _BEAT
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is not heard, and what has to be seen on the bus in the half second after the stop."""
+
+    rung: Rung
+    unheard: tuple[str, ...]
+    says: tuple[tuple[Callable[[Frame], bool], bool], ...]
+    """Kinds of frames, and whether they come."""
+
+
+CASES = (
+    Case(Rung.PDO, (), ((_is_sdo_stop, False), (_is_nmt_stop, False), (_is_beat, True))),
+    Case(
+        Rung.SDO,
+        ("rpdo unheard",),
+        ((_is_sdo_stop, True), (_is_nmt_stop, False), (_is_beat, True)),
+    ),
+    Case(
+        Rung.NMT,
+        ("rpdo unheard", "sdo refused"),
+        ((_is_sdo_stop, True), (_is_nmt_stop, True), (_is_beat, True)),
+    ),
+    Case(
+        Rung.SILENCE,
+        ("rpdo unheard", "sdo unheard", "nmt unheard"),
+        ((_is_sdo_stop, True), (_is_beat, False)),
+    ),
+)
+
+
+def stopped(folder: Path, case: Case) -> None:
+    """A quick stop in this case: in time, and by this rung."""
+    rig = Rig(folder)
+    slave = rig.slaves[0]
+    with rig.opened() as bench:
+        if case.rung is Rung.NMT:
+            # As after a commissioning that has seen the drive leave operation enabled on it.
+            bench.axes["A"].take_commissioning(seen_stopping=True, stops_on_nmt=True)
+        key = jogging(rig, bench)
+        for name in case.unheard:
+            slave.inject(name)
+        rig.wait(0.05)
+        start = rig.time
+        key.release()
+        bench.stop_now(wait=False)
+        rig.wait(0.5)
+        seen = observe(rig, key, start)
+        frames = [frame for time, frame in rig.frames if time > start + 0.1 or not _is_beat(frame)]
+        said = [(kind, any(kind(frame) for frame in frames)) for kind, _ in case.says]
+        slave.mend_all()
+        rig.wait(0.5)
+    # Silence takes the consumer time of 2.5 heartbeats, from the last of them.
+    within = _WITHIN + (0.125 if case.rung is Rung.SILENCE else 0.0)
+    assert seen.left <= within, f"left after {seen.left:.3f} s"
+    assert seen.rest <= within + seen.speed / _RAMP + _LAG
+    assert said == list(case.says)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.rung.name)
+def test_a_rung_stops_the_drive_that_hears_none_before(tmp_path: Path, case: Case) -> None:
+    stopped(tmp_path, case)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.rung.name)
+def test_a_rung_that_is_switched_off_makes_a_test_fail(
+    tmp_path: Path, case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = tuple(row for row in STOP_TABLE if row.rung is not case.rung)
+    monkeypatch.setattr(stop_escalation, "STOP_TABLE", table)
+    with pytest.raises(AssertionError):
+        stopped(tmp_path, case)
+
+
+def test_every_rung_has_a_case() -> None:
+    assert {case.rung for case in CASES} == {row.rung for row in STOP_TABLE} == set(Rung)

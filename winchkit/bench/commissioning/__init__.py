@@ -1,0 +1,1 @@
+"""Commissioning of a bench: trials, guided procedure, signed-off record, and its validity."""

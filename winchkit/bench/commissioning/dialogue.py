@@ -1,0 +1,86 @@
+"""Who answers the questions of a commissioning: a person at a terminal, or a file for tests."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from winchkit.bench.commissioning.record import hash_of
+from winchkit.errors import Fault, FileError, NotPermitted, UsageError
+
+__all__ = ["AnswerFile", "Dialogue", "TypedAnswers", "confirm"]
+
+_YES = ("yes", "y")
+_NO = ("no", "n")
+
+
+class Dialogue(Protocol):
+    """Where questions go to and answers come from."""
+
+    source: str
+    """For the record: ``typed``, or the file of answers."""
+
+    def tell(self, text: str) -> None:
+        """Say something that needs no answer."""
+
+    def ask(self, key: str, question: str) -> str:
+        """The answer to a question; ``key`` names it in a file of answers."""
+
+
+class TypedAnswers:
+    """Questions on a stream, answers from another."""
+
+    source = "typed"
+
+    def __init__(self, say: Callable[[str], None], read: Callable[[], str]) -> None:
+        """``read`` returns a line with its end, and nothing when the input has ended."""
+        self.tell, self._read = say, read
+
+    def ask(self, key: str, question: str) -> str:
+        """Ask until something is answered; raises NotPermitted when the input ends."""
+        while True:
+            self.tell(question)
+            line = self._read()
+            if not line:
+                raise NotPermitted(f"the input ended at the question '{key}'; nothing was recorded")
+            if answer := line.strip():
+                return answer
+
+
+class AnswerFile:
+    """Answers by key from a TOML file, for tests and benches that nobody stands at."""
+
+    def __init__(self, path: str | Path, say: Callable[[str], None]) -> None:
+        """Raise FileError for a file that cannot be used."""
+        self.tell = say
+        found = hash_of(path)
+        self.source = f"{found.path} sha256 {found.sha256}"
+        self._path = str(path)
+        try:
+            self._tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise FileError(Fault(f"cannot be read as TOML: {error}", str(path))) from error
+
+    def ask(self, key: str, question: str) -> str:
+        """The answer under a dotted key; raises UsageError where there is none."""
+        found: object = self._tree
+        for part in key.split("."):
+            found = found.get(part) if isinstance(found, dict) else None
+        if found is None or isinstance(found, dict):
+            raise UsageError(f"{self._path}: no answer '{key}' to: {question}")
+        answer = str(found).strip()
+        self.tell(f"{question} {answer}")
+        return answer
+
+
+def confirm(dialogue: Dialogue, key: str, question: str) -> str:
+    """An answer that is yes; raises NotPermitted for no, UsageError for anything else."""
+    answer = dialogue.ask(key, f"{question} [yes/no]")
+    word = answer.casefold()
+    if word in _YES:
+        return answer
+    if word in _NO:
+        raise NotPermitted(f"not confirmed: {key}; nothing was recorded")
+    raise UsageError(f"'{answer}' is neither yes nor no ({key}); nothing was recorded")

@@ -1,0 +1,19 @@
+"""Winches that only hardware stops when the host dies: told at every start."""
+
+from __future__ import annotations
+
+import sys
+
+from winchkit.schema.bench import BenchSpec
+
+__all__ = ["tell_hardware"]
+
+
+def tell_hardware(spec: BenchSpec) -> None:
+    """Say on stderr which winches those are, and what stops them."""
+    for name, winch in spec.winch.items():
+        if winch.host_loss:
+            sys.stderr.write(
+                f"winch {name}: its drive does not notice when this computer falls silent; what "
+                f"stops the winch then is {winch.host_loss_description}\n"
+            )

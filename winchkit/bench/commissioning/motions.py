@@ -1,0 +1,105 @@
+"""Small motions of a commissioning, and what the instruments said of them."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from dataclasses import dataclass
+
+from winchkit.bench.bench import Bench
+from winchkit.errors import NotPermitted
+
+__all__ = ["Motions", "Moved"]
+
+_STEP = 0.02
+_TURN = 2 * math.pi
+_AGREES = 0.1
+_RESOLUTION = 2e-3
+"""Of a length sensor beside its own error in proportion, m."""
+_LOOK = 0.5
+_PAUSE = 0.02
+_SIGMAS = 5.0
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What a motion came to; positive pays out."""
+
+    cable: float
+    """By the motor's position and the profile, m."""
+    turns: float
+    """Of the motor."""
+    sensor: float
+    """By the length sensor, m; NaN where there is none."""
+
+
+class Motions:
+    """Moves one winch by small lengths at a slow speed."""
+
+    def __init__(self, bench: Bench, name: str, speed: float) -> None:
+        self._bench, self._name, self._speed = bench, name, speed
+        self._winch = bench.winch[name]
+        arm = abs(self._winch.rope.arm(bench.snapshot.winch[name].motor_angle))
+        self.turn = _TURN * arm
+        """Cable of one motor turn, m."""
+        self.step = min(_STEP, self.turn)
+        self.cell_noise = 0.0
+        """Five standard deviations of the last tension, N."""
+
+    @property
+    def pays_out_first(self) -> bool:
+        """Whether the limits leave room for paying out a step."""
+        return self.has_room(self.step)
+
+    def has_room(self, change: float) -> bool:
+        """Whether the length limits allow this change (m, positive pays out)."""
+        limits = self._winch.wiring.limits.length
+        if limits is None:
+            return True
+        target = self._bench.snapshot.winch[self._name].cable_length + change
+        return limits[0] <= target <= limits[1]
+
+    def go(self, change: float) -> Moved:
+        """Pay out, or with a negative length wind in; returns at rest and disabled."""
+        before = self._bench.snapshot.winch[self._name]
+        if change > 0:
+            self._winch.move_by(pay_out=change, speed=self._speed)
+        else:
+            self._winch.move_by(wind_in=-change, speed=self._speed)
+        self._bench.clock.sleep(_LOOK)
+        after = self._bench.snapshot.winch[self._name]
+        moved = Moved(
+            after.cable_length - before.cable_length,
+            (after.motor_angle - before.motor_angle) / _TURN,
+            after.length - before.length,
+        )
+        if abs(moved.cable - change) > _RESOLUTION + _AGREES * abs(change):
+            raise NotPermitted(
+                f"winch {self._name}: {change * 1e3:.1f} mm of cable were commanded and the motor "
+                f"moved {moved.cable * 1e3:.1f} mm; check its units and what holds it"
+            )
+        return moved
+
+    def check_sensor(self, moved: Moved) -> None:
+        """Raise NotPermitted where the length sensor and the profile disagree."""
+        if abs(moved.sensor - moved.cable) > _RESOLUTION + _AGREES * abs(moved.cable):
+            raise NotPermitted(
+                f"winch {self._name}: the length sensor measured {moved.sensor * 1e3:.1f} mm, the "
+                f"motor turned {moved.cable * 1e3:.1f} mm by the profile; check "
+                "increments_per_turn, gear ratio, drum radius and reeving"
+            )
+
+    def tension(self) -> float:
+        """Mean of the cell over half a second, N; raises NotPermitted where it reads nothing."""
+        clock = self._bench.clock
+        end, values = clock.now() + _LOOK, []
+        while clock.now() < end:
+            values.append(self._bench.snapshot.winch[self._name].tension)
+            clock.sleep(_PAUSE)
+        good = [value for value in values if math.isfinite(value)]
+        if len(good) < len(values) / 2:
+            raise NotPermitted(
+                f"winch {self._name}: the cell gives no reading; see `winchkit cell info`"
+            )
+        self.cell_noise = max(1e-3, _SIGMAS * statistics.pstdev(good))
+        return statistics.fmean(good)

@@ -1,0 +1,324 @@
+"""The guided commissioning of a bench: trials first, then small motions, then the record.
+
+Nothing is enabled while a question is open, each motion is announced and begins after an answer,
+and the record is written only when every item of every winch has been confirmed.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Mapping
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from winchkit import __version__
+from winchkit.bench.bench import Bench
+from winchkit.bench.commissioning.dialogue import Dialogue, confirm
+from winchkit.bench.commissioning.motions import Motions
+from winchkit.bench.commissioning.record import (
+    Confirmation,
+    DriveRecord,
+    HostLossRecord,
+    Record,
+    WinchRecord,
+    hash_of,
+    write_record,
+)
+from winchkit.bench.commissioning.trial import Trial, Trials
+from winchkit.bench.commissioning.validity import drive_record
+from winchkit.bench.instruments import device_of
+from winchkit.bench.remote.commander import client_name
+from winchkit.bench.remote.handover import own
+from winchkit.drivers.clock import Clock
+from winchkit.errors import NotPermitted
+from winchkit.schema.bench import BenchSpec, WinchWiring
+
+__all__ = ["commission_bench"]
+
+_COMMAND = "commission"
+_SLIP = 5e-3
+"""Of the cable within two seconds after the drive was disabled, m."""
+_SLOW = 0.1
+_SLOWEST, _FASTEST = 0.005, 0.05
+_LIBRARIES = ("canopen", "python-can", "numpy")
+_LIMITS = (
+    ("speed", "m/s"),
+    ("acceleration", "m/s²"),
+    ("tension_high", "N"),
+    ("tension_slack", "N"),
+    ("tension_rate", "N/s"),
+)
+
+
+def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> Record:
+    """Lead through every item and write the record beside the bench file; returns it.
+
+    Raises NotPermitted for what was not confirmed or did not stop, and every error of opening.
+    """
+    if not spec.path:
+        raise NotPermitted("a bench without a file cannot be commissioned; write a bench file")
+    by = dialogue.ask("by", "Who commissions this bench (name, for the record)?")
+    confirm(
+        dialogue,
+        "safety.emergency_stop",
+        "The emergency stop of EN 60204-1 is within reach and was tried today?",
+    )
+    confirm(
+        dialogue,
+        "safety.area",
+        "Nobody stands where a cable, a load or a drum may move, and a load that falls harms "
+        "nobody?",
+    )
+    hashed = hash_of(spec.path)
+    steps = {name: _Steps(spec, name, dialogue) for name in spec.winch}
+    ownership = own(spec, client_name(_COMMAND))
+    with ExitStack() as stack:
+        # Held from the first trial to the last motion: nobody else comes in between.
+        stack.callback(ownership.close)
+        with Trials(spec, clock) as trials:
+            for step in steps.values():
+                step.trials(trials)
+        stack.pop_all()
+    with Bench(spec, clock, _COMMAND, ownership, commissioning=True) as bench:
+        for step in steps.values():
+            step.motions(bench)
+    confirm(dialogue, "sign", f"Everything above is right; sign the record as {by}?")
+    record = Record(
+        bench=spec.name,
+        date=_now(),
+        by=by,
+        answers=dialogue.source,
+        software=_software(),
+        bench_file=hashed,
+        winch={name: step.record() for name, step in steps.items()},
+    )
+    if hash_of(spec.path) != hashed:
+        raise NotPermitted(f"{spec.path} was changed meanwhile; nothing was recorded")
+    write_record(record, spec.record_file)
+    return record
+
+
+class _Steps:
+    """The items of one winch."""
+
+    def __init__(self, spec: BenchSpec, name: str, dialogue: Dialogue) -> None:
+        self._spec, self._name, self._dialogue = spec, name, dialogue
+        self._wiring: WinchWiring = spec.winch[name]
+        self._confirmed: list[Confirmation] = []
+        self._drive = DriveRecord()
+        self._host_loss = HostLossRecord("", 0.0)
+        self._stops_on_nmt = False
+
+    def trials(self, trials: Trials) -> None:
+        """Identity, brake, host loss, NMT stopped."""
+        axis, name = trials.axes[self._name], self._name
+        self._drive = drive_record(axis)
+        numbers = ", ".join(f"{key} {value}" for key, value in vars(self._drive).items())
+        self._dialogue.tell(f"winch {name}: {numbers}")
+        if not self._drive.serial:
+            self._dialogue.tell(
+                f"winch {name}: the drive tells no serial number (1018h:4); another drive of the "
+                "same type in its place cannot be recognised"
+            )
+        self._brake(trials)
+        drive = axis.drive
+        assert drive is not None, "the bench was opened"
+        noticed = drive.proof.delay if drive.proof is not None and drive.proof.noticed else None
+        standstill = self._host_silent(trials, 0.0)
+        moving = self._moving(trials)
+        self._host_loss = HostLossRecord(
+            mechanism=drive.host_loss.mechanism,
+            limit=drive.host_loss.limit,
+            noticed_after=noticed,
+            stopped_after=standstill.after,
+            stopped_moving_after=None if moving is None else moving.after,
+            hardware=self._wiring.host_loss_description,
+        )
+        self._nmt(trials)
+
+    def motions(self, bench: Bench) -> None:
+        """Direction, units, cell, limits."""
+        motions = Motions(bench, self._name, _slow(self._wiring))
+        self._direction(motions)
+        self._units(motions)
+        if self._wiring.cell is not None:
+            self._cell(motions)
+        self._limits()
+
+    def record(self) -> WinchRecord:
+        """What stands in the record."""
+        device = device_of(self._spec, self._wiring.servo)
+        assert device.servo is not None, "the reader has checked it"
+        return WinchRecord(
+            drive=self._drive,
+            device=hash_of(device.path),
+            eds=hash_of(Path(device.path).parent / device.servo.eds),
+            host_loss=self._host_loss,
+            stops_on_nmt=self._stops_on_nmt,
+            confirmed=tuple(self._confirmed),
+        )
+
+    def _brake(self, trials: Trials) -> None:
+        question = (
+            f"winch {self._name}: it will be enabled at rest. Is the cable unloaded ('unloaded'), "
+            "or does a brake hold the load ('brake'; it is tried now)?"
+        )
+        answer = self._dialogue.ask(f"{self._name}.brake", question)
+        if answer == "unloaded":
+            self._note("brake", question, answer)
+            return
+        if answer != "brake" or not self._wiring.brake:
+            raise NotPermitted(
+                f"winch {self._name}: '{answer}': the bench file declares "
+                f"brake = {str(self._wiring.brake).lower()}; unload the cable, or fit and declare "
+                "a brake"
+            )
+        seen = trials.brake(self._name)
+        if abs(seen.travel) > _SLIP:
+            raise NotPermitted(
+                f"winch {self._name}: the cable moved {seen.travel * 1e3:.1f} mm in "
+                f"{seen.after:g} s after the drive was disabled (limit {_SLIP * 1e3:g} mm); the "
+                "brake does not hold"
+            )
+        text = f"winch {self._name}: with the drive disabled the cable moved {_mm(seen.travel)}."
+        held = confirm(self._dialogue, f"{self._name}.brake_held", f"{text} The brake held?")
+        self._note("brake", f"{question} {text}", f"{answer}, {held}", slip=seen.travel)
+
+    def _host_silent(self, trials: Trials, speed: float) -> Trial:
+        where = f"in motion at {speed:g} m/s" if speed else "at standstill"
+        seen = trials.host_loss(self._name, speed)
+        if not seen.stopped:
+            raise NotPermitted(
+                f"winch {self._name}: the host fell silent with the drive enabled {where}, and "
+                f"after {seen.after:.2f} s the drive was still {seen.state}; it would go on moving "
+                "when the host dies. Nothing was recorded"
+            )
+        text = (
+            f"winch {self._name}: the host fell silent with the drive enabled {where}: it went to "
+            f"{seen.state} after {seen.after:.3f} s, cable {_mm(seen.travel)}."
+        )
+        item = "host loss in motion" if speed else "host loss"
+        key = f"{self._name}.{item.replace(' ', '_')}"
+        answer = confirm(self._dialogue, key, f"{text} Is that what you saw?")
+        self._note(item, text, answer, after=seen.after, travel=seen.travel)
+        return seen
+
+    def _moving(self, trials: Trials) -> Trial | None:
+        speed = _slow(self._wiring)
+        question = (
+            f"winch {self._name}: try the loss of the host in a slow move, winding in at "
+            f"{speed:g} m/s for 0.8 s ('yes' moves it, 'no' leaves it out)?"
+        )
+        answer = self._dialogue.ask(f"{self._name}.try_in_motion", question)
+        return self._host_silent(trials, speed) if answer.casefold() in ("yes", "y") else None
+
+    def _nmt(self, trials: Trials) -> None:
+        seen = trials.nmt_stopped(self._name)
+        self._stops_on_nmt = seen.stopped
+        verb = "leaves" if seen.stopped else "does not leave"
+        text = f"winch {self._name}: on NMT stopped the drive {verb} operation enabled"
+        self._dialogue.tell(f"{text} ({seen.state}).")
+        self._note("NMT stopped", text, "measured", after=seen.after)
+
+    def _direction(self, motions: Motions) -> None:
+        pays_out = motions.pays_out_first
+        step = motions.step
+        verb = "pay out" if pays_out else "wind in"
+        go = f"winch {self._name}: it will {verb} {_mm(step)} of cable. Begin?"
+        confirm(self._dialogue, f"{self._name}.direction_go", go)
+        moved = motions.go(step if pays_out else -step)
+        question = f"winch {self._name}: did it {verb} cable?"
+        answer = confirm(self._dialogue, f"{self._name}.direction", question)
+        self._note("direction", question, answer, commanded=step, moved=moved.cable)
+
+    def _units(self, motions: Motions) -> None:
+        turn = motions.turn
+        name = self._name
+        sign = 1.0 if motions.has_room(turn) else -1.0
+        verb = "pay out" if sign > 0 else "wind in"
+        go = f"winch {name}: the motor will make one turn and {verb} {_mm(turn)}. Begin?"
+        confirm(self._dialogue, f"{name}.units_go", go)
+        moved = motions.go(sign * turn)
+        measured = {"turns": moved.turns, "cable": moved.cable}
+        if math.isfinite(moved.sensor):
+            measured["length sensor"] = moved.sensor
+            motions.check_sensor(moved)
+            question = (
+                f"winch {name}: the length sensor measured {_mm(moved.sensor)} for "
+                f"{_mm(moved.cable)} by the profile. Did the motor make one turn?"
+            )
+        else:
+            question = (
+                f"winch {name}: did the motor make one turn, and the cable move by {_mm(turn)}, as "
+                "measured at the drum or with a tape?"
+            )
+        answer = confirm(self._dialogue, f"{name}.units", question)
+        self._note("units", question, answer, **measured)
+
+    def _cell(self, motions: Motions) -> None:
+        name, before = self._name, motions.tension()
+        question = (
+            f"winch {name}: the cell reads {before:.1f} N. Pull on the cable or hang a load on it "
+            "and keep it there, then answer 'pulled'; or answer 'right' where a known load hangs "
+            "now and its tension has this size and sign"
+        )
+        answer = self._dialogue.ask(f"{name}.cell", question)
+        after = motions.tension()
+        if answer == "pulled":
+            if after - before <= motions.cell_noise:
+                raise NotPermitted(
+                    f"winch {name}: the cell read {before:.1f} N and then {after:.1f} N; a pull "
+                    "must raise it. Check its sign (`scale` of its device file), its wiring, and "
+                    "whether it is on this cable"
+                )
+        elif answer != "right" or not after > motions.cell_noise:
+            raise NotPermitted(
+                f"winch {name}: cell: '{answer}' at {after:.1f} N: neither a pull that raises it, "
+                "nor a tension above its noise that is confirmed as right"
+            )
+        self._note("cell", question, answer, before=before, after=after)
+
+    def _limits(self) -> None:
+        limits = self._wiring.limits
+        shown = [
+            f"{key} {value:g} {unit}"
+            for key, unit in _LIMITS
+            if (value := getattr(limits, key)) is not None
+        ]
+        if limits.length is not None:
+            shown.append(f"length {limits.length[0]:g} to {limits.length[1]:g} m")
+        missing = [key for key in ("length", "tension_high") if getattr(limits, key) is None]
+        lacking = f"; NOT limited: {', '.join(missing)}" if missing else ""
+        question = f"winch {self._name}: limits: {', '.join(shown)}{lacking}. Right?"
+        answer = confirm(self._dialogue, f"{self._name}.limits", question)
+        self._note("limits", question, answer)
+
+    def _note(self, item: str, question: str, answer: str, **measured: float) -> None:
+        self._confirmed.append(Confirmation(item, question, answer, _now(), measured))
+
+
+def _slow(wiring: WinchWiring) -> float:
+    """Speed of the motions of a commissioning, m/s."""
+    limit = wiring.limits.speed
+    return min(limit, max(_SLOWEST, min(_FASTEST, _SLOW * limit)))
+
+
+def _mm(length: float) -> str:
+    return f"{length * 1e3:.1f} mm"
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _software() -> Mapping[str, str]:
+    found = {"winchkit": __version__, "python": platform.python_version()}
+    for name in _LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,271 @@
+"""Trials on an enabled drive, in a cycle of their own: host loss, NMT stopped, holding brake.
+
+The control loop of an open bench would stop the drive by other ways before the one under trial
+acts; so a trial wires the bench without starting that loop. Only one drive is ever enabled, at rest
+or at the given slow speed, for less than two seconds; whatever ends a trial, its last frames are a
+quick stop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Self
+
+from winchkit.bench.control.latch import LatchFile
+from winchkit.bench.rope import RopeMap
+from winchkit.bench.wiring import Wired, wire
+from winchkit.drivers.can.axis import Cia402Axis
+from winchkit.drivers.can.cia402 import DISABLE_VOLTAGE, QUICK_STOP, State, Wish, state_of
+from winchkit.drivers.can.heartbeat import HeartbeatProducer, NmtState
+from winchkit.drivers.can.host_loss.mechanism import Silence
+from winchkit.drivers.can.host_loss.proof import bring_back
+from winchkit.drivers.clock import Clock
+from winchkit.errors import ConnectionLost, MotionError, NoReply, NotPermitted
+from winchkit.schema.bench import BenchSpec
+
+__all__ = ["Trial", "Trials"]
+
+_ENABLE_TIME = 2.0
+_SETTLE_TIME = 0.3
+_MOVE_TIME = 0.8
+_PATIENCE = 0.5
+"""For the drive beyond its limit, s."""
+_HARDWARE_PATIENCE = 5.0
+_NMT_TIME = 0.15
+_BRAKE_TIME = 2.0
+_REST_TIME = 3.0
+_POLL = 0.002
+_PRE_OPERATIONAL = 0x80
+_HALF = 1 << 31
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one trial showed."""
+
+    stopped: bool
+    """Whether the drive left operation enabled."""
+    after: float
+    """From the last life sign, or the command, until that was seen, s."""
+    state: str
+    """Its state then, in words."""
+    travel: float = 0.0
+    """Change of the cable length from then until the drive was at rest, m; positive pays out."""
+
+
+class Trials:
+    """A bench that is wired for trials; a context manager."""
+
+    def __init__(self, spec: BenchSpec, clock: Clock) -> None:
+        """Wire a bench that the caller owns: drives disabled, each mechanism proved so.
+
+        Raises what opening a bench raises.
+        """
+        self.spec, self._clock = spec, clock
+        with ExitStack() as stack:
+            latch = LatchFile(spec.latch_file)
+            stack.callback(latch.close)
+            if trips := latch.open():
+                raise NotPermitted(f"{trips[0]}; run `winchkit reset` before commissioning")
+            self._wired: Wired = wire(spec, clock, stack, latch)
+            self.axes = self._wired.axes
+            self._stack = stack.pop_all()
+        self._sync, self._hold = 0, 0.0
+        self._beats = [
+            (bus, spec.bus[name].node, HeartbeatProducer(spec.bus[name].heartbeat))
+            for name, bus in self._wired.buses.items()
+        ]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._stack:
+            for axis in self.axes.values():
+                with _frames_lost():
+                    axis.disarm()
+
+    def host_loss(self, name: str, speed: float = 0.0) -> Trial:
+        """Fall silent with the drive enabled, at rest or winding in at ``speed`` (m/s)."""
+        axis = self.axes[name]
+        with self._ended(axis):
+            self._enable(axis)
+            self._run(axis, speed, _MOVE_TIME if speed else _SETTLE_TIME, name)
+            start, angle = self._clock.now(), _angle(axis)
+            nothing = axis.host.mechanism.silence is Silence.NOTHING
+            limit = axis.host.mechanism.limit
+            patience = _HARDWARE_PATIENCE if nothing else limit + _PATIENCE
+            # Where any frame is a life sign the drive is not asked before its time is over.
+            blind = limit + _PATIENCE / 2 if axis.host.mechanism.silence is Silence.ALL else 0.0
+            state, after = self._left(axis, start, blind, patience)
+            stopped = state is not State.OPERATION_ENABLED
+            if stopped:
+                self._await_rest(axis)
+            travel = self._travel(name, axis, angle)
+        return Trial(stopped, after, str(state), travel)
+
+    def nmt_stopped(self, name: str) -> Trial:
+        """NMT stopped with the drive enabled at rest; every other life sign goes on."""
+        axis = self.axes[name]
+        with self._ended(axis):
+            self._enable(axis)
+            self._run(axis, 0.0, _SETTLE_TIME, name)
+            start = self._clock.now()
+            axis.stop_by_nmt()
+            self._run(axis, 0.0, _NMT_TIME, name)
+            # Only a state with SDO can be asked; RPDOs are not heard in it.
+            axis.objects.bus.nmt(_PRE_OPERATIONAL, axis.objects.node)
+            state = state_of(axis.objects.read(0x6041))
+            after = self._clock.now() - start
+        return Trial(state is not State.OPERATION_ENABLED, after, str(state))
+
+    def brake(self, name: str) -> Trial:
+        """Enable the drive at rest, disable it, and see whether the cable moves after that."""
+        axis = self.axes[name]
+        with self._ended(axis):
+            self._enable(axis)
+            self._run(axis, 0.0, _SETTLE_TIME, name)
+            angle, start = _angle(axis), self._clock.now()
+            while self._clock.now() - start < _BRAKE_TIME:
+                self._cycle(axis, Wish.DISABLE)
+            travel = self._travel(name, axis, angle)
+            state = axis.state
+        return Trial(state is not State.OPERATION_ENABLED, _BRAKE_TIME, str(state), travel)
+
+    @contextmanager
+    def _ended(self, axis: Cia402Axis) -> Iterator[None]:
+        """Whatever happens, the drive is stopped, disabled, cleared and set up anew afterwards."""
+        try:
+            yield
+        except BaseException:
+            with _frames_lost():
+                axis.emergency_stop(sdo=True)
+                self._wired_syncs()
+                axis.end_stop()
+            self._recover(axis)
+            raise
+        self._recover(axis)
+
+    def _wired_syncs(self) -> None:
+        for bus, _, _ in self._beats:
+            bus.sync()
+
+    def _recover(self, axis: Cia402Axis) -> None:
+        node = axis.objects
+        # A drive that stopped (1029h:1 = 2, NMT stopped) answers SDO only when pre-operational.
+        node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        if state_of(node.read(0x6041)) is State.OPERATION_ENABLED:
+            node.write(0x6040, 0, QUICK_STOP)
+        self._await_rest(axis)
+        for one in self.axes.values():
+            one.objects.bus.nmt(_PRE_OPERATIONAL, one.objects.node)
+            one.objects.write(0x6040, 0, DISABLE_VOLTAGE)
+            bring_back(one.objects, self._clock, clears=True)
+            one.commission()
+
+    def _enable(self, axis: Cia402Axis) -> None:
+        deadline = self._clock.now() + _ENABLE_TIME
+        while axis.state is not State.OPERATION_ENABLED:
+            self._cycle(axis, Wish.ENABLE)
+            if self._clock.now() > deadline:
+                raise NotPermitted(
+                    f"{axis.name}: still {axis.state} {_ENABLE_TIME:g} s after it was told to "
+                    f"enable: {axis.fault_text}; look at its enable input, supply and errors"
+                )
+        self._hold = _angle(axis)
+
+    def _run(self, axis: Cia402Axis, speed: float, duration: float, name: str) -> None:
+        """Keep it enabled; the speed is reached on the winch's own ramp."""
+        rope: RopeMap = self._wired.loop.winches[name].rope
+        arm = rope.arm(self._hold)
+        wanted = speed / arm
+        slope = self.spec.winch[name].limits.acceleration / abs(arm)
+        start = last = self._clock.now()
+        velocity, angle = 0.0, self._hold
+        while (now := self._clock.now()) - start < duration:
+            dt, last = now - last, now
+            velocity += max(-slope * dt, min(slope * dt, wanted - velocity))
+            angle += velocity * dt
+            self._cycle(axis, Wish.ENABLE, velocity, angle)
+
+    def _cycle(
+        self, axis: Cia402Axis, wish: Wish, velocity: float = 0.0, angle: float | None = None
+    ) -> None:
+        now = self._clock.now()
+        self._sync += 1
+        for one in self.axes.values():
+            one.begin_cycle(self._sync, now)
+        for bus, host, producer in self._beats:
+            bus.sync()
+            if producer.due(now):
+                bus.heartbeat(host, NmtState.OPERATIONAL)
+        self._clock.sleep(self.spec.cycle)
+        for one in self.axes.values():
+            if one is axis:
+                one.send(wish, velocity=velocity, angle=angle)
+            else:
+                one.send(Wish.DISABLE)
+
+    def _left(
+        self, axis: Cia402Axis, start: float, blind: float, patience: float
+    ) -> tuple[State, float]:
+        """The first state other than operation enabled, and when; or that one, at the end."""
+        self._clock.sleep(blind)
+        while True:
+            state = _asked(axis)
+            after = self._clock.now() - start
+            if state is not State.OPERATION_ENABLED or after > patience:
+                return state, after
+            self._clock.sleep(_POLL)
+
+    def _await_rest(self, axis: Cia402Axis) -> None:
+        deadline = self._clock.now() + _REST_TIME
+        while _asked(axis) in (State.FAULT_REACTION_ACTIVE, State.QUICK_STOP_ACTIVE):
+            if not axis.objects.read_if_there(0x606C):
+                return
+            if self._clock.now() > deadline:
+                raise MotionError(
+                    f"{axis.name}: not at rest {_REST_TIME:g} s after it stopped; use the "
+                    "emergency stop and look at the drive"
+                )
+            self._clock.sleep(_POLL)
+
+    def _travel(self, name: str, axis: Cia402Axis, angle: float) -> float:
+        """Of the cable since an angle, by the drive's position object; positive pays out."""
+        assert axis.drive is not None, "it was enabled"
+        rope: RopeMap = self._wired.loop.winches[name].rope
+        feedback = axis.feedback
+        assert feedback is not None, "it was enabled"
+        unit = axis.drive.scale.angle
+        # Less than half of the counter's range, whichever way: it may wrap.
+        counts = axis.objects.read(0x6064) - round(feedback.angle / unit)
+        now = feedback.angle + ((counts + _HALF) % (2 * _HALF) - _HALF) * unit
+        return rope.cable_length(now) - rope.cable_length(angle)
+
+
+def _asked(axis: Cia402Axis) -> State:
+    """Power state by SDO; a drive whose network state is stopped has to leave that first."""
+    node = axis.objects
+    try:
+        return state_of(node.read(0x6041))
+    except NoReply:
+        node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        return state_of(node.read(0x6041))
+
+
+def _angle(axis: Cia402Axis) -> float:
+    feedback = axis.feedback
+    if feedback is None:
+        raise NotPermitted(f"{axis.name}: sends no PDOs on SYNC; check its PDO mapping")
+    return feedback.angle
+
+
+@contextmanager
+def _frames_lost() -> Iterator[None]:
+    """Go on where a frame cannot be sent: what comes next must still be done."""
+    try:
+        yield
+    except ConnectionLost:
+        return

@@ -1,0 +1,1 @@
+"""The control loop of a bench: motion, supervision, stops, and the latch."""

@@ -1,0 +1,451 @@
+"""The conditions that the supervisor tests on each winch, as a table.
+
+A row names its variable and limit in words (``docs/safety.md`` prints them), says what the
+condition forbids and whether it is latched although nothing moved, and has two small functions:
+whether it holds, and the message. Debouncing and latching are the supervisor's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from winchkit.bench.control.observation import Instrumented, Memory, Supervised, WinchInput
+from winchkit.bench.snapshot import Direction
+
+__all__ = ["BENCH_CONDITIONS", "CONDITIONS", "BenchCondition", "Condition"]
+
+_MISSED_SYNCS = 5
+"""A late cycle of the host makes feedback old; a drive that is silent also misses SYNCs."""
+_SLACK_TIME = 0.2
+"""A load that swings relieves its cable for less, s."""
+_LENGTH_TOLERANCE = 5e-3
+"""Overshoot of a position loop at a length limit, m."""
+_SPEED_TOLERANCE = 1.2
+_REST_TIME = 0.1
+"""A brake that closes lets the motor settle for less, s."""
+_DEVIATION = 0.25
+"""Share of ``limits.speed``: well above the lag of a velocity loop at the limit's acceleration."""
+_DEVIATION_TIME = 0.25
+"""A holding brake opens, and static friction is overcome, in less, s."""
+_RUNAWAY_TIME = 0.03
+"""An overshoot of a velocity loop is over, s; no brake and no friction makes a motor faster."""
+_FOLLOWING_TIME = 0.25
+"""At ``limits.speed``, the lag of a position loop of gain 4/s, s."""
+_FOLLOWING_DEBOUNCE = 0.05
+_SLIP = 0.05
+"""Of cable, m, and ..."""
+_SLIP_SHARE = 0.05
+"""... share of the moved length: a length sensor's filter and a profile's error are below."""
+_SLIP_TIME = 0.5
+
+Test = Callable[[WinchInput, Supervised, Memory], bool]
+Words = Callable[[WinchInput, Supervised, Memory], str]
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A row of the table."""
+
+    kind: str
+    variable: str
+    limit: str
+    holds: Test
+    words: Words
+    blocks: Direction = Direction.BOTH
+    """Directions that it forbids; NONE is a warning."""
+    latches: bool = False
+    """Latched although nothing moved. What forbids a motion under way is latched in any case."""
+    debounce: float = 0.0
+    """How long it has to hold, s."""
+    needs: str = ""
+    """The key of ``[winch.A.limits]`` or the instrument without which it is not tested."""
+
+
+def _cell(item: WinchInput) -> Instrumented:
+    assert item.tension is not None, "tested only where there is a cell"
+    return item.tension
+
+
+def _fresh(item: WinchInput) -> bool:
+    """Whether the cell's newest reading is a number that counts."""
+    cell = _cell(item)
+    return cell.age <= cell.max_age and not math.isnan(cell.value)
+
+
+def _gross(item: WinchInput) -> float:
+    """Tension of the cable: a tare neither hides an overload nor makes it slack."""
+    cell = _cell(item)
+    return cell.gross if math.isfinite(cell.gross) else cell.value
+
+
+def _high(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
+    limit = own.limits.tension_high
+    return limit is not None and _fresh(item) and _gross(item) > limit
+
+
+def _slack(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
+    limit = own.limits.tension_slack
+    return limit is not None and _fresh(item) and _gross(item) < limit
+
+
+def _rate(item: WinchInput, own: Supervised, memory: Memory) -> bool:
+    limit = own.limits.tension_rate
+    return limit is not None and _fresh(item) and abs(memory.tension_rate) > limit
+
+
+def _short(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
+    return item.cable_length < own.shortest - _LENGTH_TOLERANCE
+
+
+def _long(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
+    return item.cable_length > own.longest + _LENGTH_TOLERANCE
+
+
+def _beyond(speed: float, commanded: float) -> float:
+    """By how much a speed is faster than the commanded one, or directed against it."""
+    return max(abs(speed) - abs(commanded), abs(speed) if speed * commanded < 0 else 0.0)
+
+
+def _following_limit(own: Supervised) -> float:
+    return own.limits.following_error or _FOLLOWING_TIME * own.limits.speed
+
+
+def _stale_words(item: WinchInput, _own: Supervised, _memory: Memory) -> str:
+    cell = _cell(item)
+    since = "yet" if math.isinf(cell.age) else f"for {cell.age:.2f} s"
+    reason = f": {cell.problem}" if cell.problem else ""
+    return f"no load cell reading {since} (limit {cell.max_age:.2f} s){reason}"
+
+
+def _rest_limit(own: Supervised) -> float:
+    return max(3 * own.resolution, 0.01 * own.limits.speed)
+
+
+CONDITIONS: tuple[Condition, ...] = (
+    Condition(
+        "boot-up",
+        "boot-up messages since commissioning",
+        "none",
+        lambda item, _own, memory: item.boot_ups > memory.boot_ups,
+        lambda *_: "the drive has restarted and lost its PDO mapping; look why, then reset",
+        latches=True,
+    ),
+    Condition(
+        "heartbeat",
+        "age of the drive's heartbeat",
+        "2.5 heartbeat periods",
+        lambda item, _own, _memory: item.heartbeat_lost,
+        lambda *_: "the drive's heartbeat is gone; check its power and the bus, then reset",
+        latches=True,
+    ),
+    Condition(
+        "nmt",
+        "NMT state in the drive's heartbeat",
+        "operational",
+        lambda item, _own, _memory: not item.operational,
+        lambda item, *_: (
+            f"the drive left the NMT state operational (it is {item.nmt}): another master, or "
+            "its own monitoring; look why, then reset"
+        ),
+        latches=True,
+    ),
+    Condition(
+        "feedback",
+        "age of the newest complete feedback",
+        "2 heartbeat periods, and 5 SYNCs unanswered",
+        lambda item, own, _memory: (
+            item.feedback_age > own.stale and item.missed_syncs >= _MISSED_SYNCS
+        ),
+        lambda item, own, _memory: (
+            f"no complete feedback for {item.feedback_age * 1e3:.0f} ms (limit "
+            f"{own.stale * 1e3:.0f} ms); check the bus load and the drive"
+        ),
+    ),
+    Condition(
+        "fault",
+        "power state and error code of the drive",
+        "no fault",
+        lambda item, _own, _memory: bool(item.fault),
+        lambda item, *_: f"drive fault: {item.fault}; clear the cause, then reset",
+    ),
+    Condition(
+        "mode",
+        "mode of operation that the drive shows (6061h)",
+        "the mode that it was given",
+        lambda item, _own, _memory: not item.mode_kept,
+        lambda *_: "the drive has changed its mode of operation; reset",
+    ),
+    Condition(
+        "state",
+        "power state of the drive against the control words sent",
+        "no change that was not commanded",
+        lambda item, _own, _memory: bool(item.uncommanded),
+        lambda item, *_: f"{item.uncommanded}; find out what did it, then reset",
+        latches=True,
+    ),
+    Condition(
+        "motion at rest",
+        "cable speed by the motor while the drive is commanded to be disabled",
+        "3 steps of 606Ch, at least 1 % of limits.speed",
+        lambda item, own, _memory: item.disabled and abs(item.winding_speed) > _rest_limit(own),
+        lambda item, own, _memory: (
+            f"the motor turns although rest is commanded: {item.winding_speed:.3f} m/s of "
+            f"cable (limit {_rest_limit(own):.3f} m/s); check the brake and who turns it, reset"
+        ),
+        latches=True,
+        debounce=_REST_TIME,
+    ),
+    Condition(
+        "slowing down",
+        "measured cable speed while the commanded speed falls",
+        "the fastest commanded within limits.response_time, and 5 %",
+        lambda item, _own, memory: item.follows and memory.deaf,
+        lambda item, own, _memory: (
+            f"the drive does not slow down as commanded: {item.winding_speed:.3f} m/s, commanded "
+            f"{item.target_speed:.3f} m/s, within {own.limits.response_time:g} s "
+            "(limits.response_time); it does not hear its targets, or they do not act"
+        ),
+    ),
+    Condition(
+        "deviation",
+        "measured against commanded cable speed",
+        "25 % of limits.speed",
+        lambda item, own, _memory: (
+            item.follows
+            and abs(item.winding_speed - item.commanded) > _DEVIATION * own.limits.speed
+        ),
+        lambda item, own, _memory: (
+            f"the motor does not follow: {item.winding_speed:.3f} m/s, commanded "
+            f"{item.commanded:.3f} m/s (limit of the difference "
+            f"{_DEVIATION * own.limits.speed:.3f} m/s for "
+            f"{_DEVIATION_TIME:g} s); check load, brake and drive limits"
+        ),
+        debounce=_DEVIATION_TIME,
+    ),
+    Condition(
+        "runaway",
+        "measured cable speed against the direction and above the size of the commanded one",
+        "25 % of limits.speed",
+        lambda item, own, _memory: (
+            item.follows
+            and _beyond(item.winding_speed, item.commanded) > _DEVIATION * own.limits.speed
+        ),
+        lambda item, own, _memory: (
+            f"the motor turns faster than commanded, or the other way: {item.winding_speed:.3f} "
+            f"m/s, commanded {item.commanded:.3f} m/s (limit of the difference "
+            f"{_DEVIATION * own.limits.speed:.3f} m/s); check direction, scale and load"
+        ),
+        debounce=_RUNAWAY_TIME,
+    ),
+    Condition(
+        "following error",
+        "target position less measured position, in cable",
+        "limits.following_error, else 0.25 s at limits.speed",
+        lambda item, own, _memory: (
+            item.follows and abs(item.following_error) > _following_limit(own)
+        ),
+        lambda item, own, _memory: (
+            f"following error {abs(item.following_error) * 1e3:.0f} mm of cable (limit "
+            f"{_following_limit(own) * 1e3:.0f} mm); check load, brake and drive limits"
+        ),
+        debounce=_FOLLOWING_DEBOUNCE,
+    ),
+    Condition(
+        "speed",
+        "cable speed by the motor",
+        "1.2 x limits.speed",
+        lambda item, own, _memory: abs(item.winding_speed) > own.limits.speed * _SPEED_TOLERANCE,
+        lambda item, own, _memory: (
+            f"cable speed {item.winding_speed:.3f} m/s is beyond limits.speed "
+            f"{own.limits.speed:g} m/s by more than a fifth"
+        ),
+    ),
+    Condition(
+        "length",
+        "cable length by the motor, lower limit",
+        "limits.length, with 5 mm of tolerance",
+        _short,
+        lambda item, own, _memory: (
+            f"cable length {item.cable_length:.3f} m is below limits.length {own.shortest:g} m; "
+            "only paying out is allowed"
+        ),
+        blocks=Direction.WIND_IN,
+        needs="length",
+    ),
+    Condition(
+        "length",
+        "cable length by the motor, upper limit",
+        "limits.length, with 5 mm of tolerance",
+        _long,
+        lambda item, own, _memory: (
+            f"cable length {item.cable_length:.3f} m is above limits.length {own.longest:g} m; "
+            "only winding in is allowed"
+        ),
+        blocks=Direction.PAY_OUT,
+        needs="length",
+    ),
+    Condition(
+        "dead wraps",
+        "cable length by the motor",
+        "the length at which the last two wraps are left on the drum, by the profile",
+        lambda item, own, _memory: item.cable_length > own.safe_length,
+        lambda item, own, _memory: (
+            f"cable length {item.cable_length:.3f} m leaves fewer than two dead wraps on the drum "
+            f"(from {own.safe_length:.3f} m on); only winding in is allowed"
+        ),
+        blocks=Direction.PAY_OUT,
+    ),
+    Condition(
+        "cable slip",
+        "change of the length sensor against the change by the motor, since the motion began",
+        "50 mm and 5 % of the moved length",
+        lambda item, _own, memory: (
+            item.moving and abs(memory.slip) > _SLIP + _SLIP_SHARE * memory.moved
+        ),
+        lambda _item, _own, memory: (
+            f"the length sensor and the motor disagree by {memory.slip * 1e3:.0f} mm after "
+            f"{memory.moved:.2f} m of motion; the cable slips, sticks or the profile is wrong"
+        ),
+        debounce=_SLIP_TIME,
+        needs="length instrument",
+    ),
+    Condition(
+        "cell stale",
+        "age of the load cell's newest reading",
+        "the device file's longest age",
+        lambda item, _own, _memory: _cell(item).age > _cell(item).max_age,
+        _stale_words,
+        needs="cell",
+    ),
+    Condition(
+        "cell",
+        "flags of the load cell's reading",
+        "a number",
+        lambda item, _own, _memory: (
+            _cell(item).age <= _cell(item).max_age and math.isnan(_cell(item).value)
+        ),
+        lambda item, *_: f"the load cell reads no number ({_cell(item).quality}); check it",
+        needs="cell",
+    ),
+    Condition(
+        "cell frozen",
+        "raw counts of the load cell, against their noise and the predicted tension (SPRT)",
+        "10⁻⁹ for a live cell to stand still so long",
+        lambda item, _own, _memory: bool(item.frozen),
+        lambda item, *_: item.frozen,
+        needs="cell",
+    ),
+    Condition(
+        "cell unstable",
+        "stability bit and noise of the load cell at rest",
+        "stable 5 s after a motion; 5 times the noise of the last blocks of 200 conversions",
+        lambda item, _own, _memory: bool(item.unstable),
+        lambda item, *_: f"the load cell is unstable: {item.unstable}",
+        blocks=Direction.NONE,
+        needs="cell",
+    ),
+    Condition(
+        "tension high",
+        "gross reading of the load cell",
+        "limits.tension_high",
+        _high,
+        lambda item, own, _memory: (
+            f"tension {_gross(item):.1f} N is above tension_high {own.limits.tension_high:g} N; "
+            "only paying out is allowed until it falls"
+        ),
+        blocks=Direction.WIND_IN,
+        needs="tension_high",
+    ),
+    Condition(
+        "slack",
+        "gross reading of the load cell",
+        "limits.tension_slack",
+        _slack,
+        lambda item, own, _memory: (
+            f"tension {_gross(item):.1f} N is below tension_slack {own.limits.tension_slack:g} N; "
+            "only winding in is allowed until it rises"
+        ),
+        blocks=Direction.PAY_OUT,
+        debounce=_SLACK_TIME,
+        needs="tension_slack",
+    ),
+    Condition(
+        "tension rate",
+        "change of the load cell's reading over 50 ms",
+        "limits.tension_rate",
+        _rate,
+        lambda _item, own, memory: (
+            f"tension changes by {memory.tension_rate:.0f} N/s, limit "
+            f"{own.limits.tension_rate:g} N/s"
+        ),
+        needs="tension_rate",
+    ),
+    Condition(
+        "emergency",
+        "emergency messages of the drive without a fault",
+        "codes of limits.emergency_trips",
+        lambda item, own, _memory: any(own.trips_on(code) for code in item.emergencies),
+        lambda item, *_: f"the drive sent {item.emergency_text}; clear the cause, then reset",
+        latches=True,
+        needs="emergency_trips",
+    ),
+    Condition(
+        "emergency",
+        "emergency messages of the drive without a fault",
+        "none in force",
+        lambda item, _own, _memory: bool(item.emergencies),
+        lambda item, *_: f"the drive sent {item.emergency_text}",
+        blocks=Direction.NONE,
+    ),
+    Condition(
+        "turns",
+        "time without feedback against half the range of 6064h at 1.5 × limits.speed",
+        "shorter",
+        lambda item, _own, _memory: not item.turns_known,
+        lambda *_: (
+            "the cable length is not known: 6064h may have wrapped while the drive was not "
+            "heard; home the winch"
+        ),
+        blocks=Direction.NONE,
+    ),
+)
+"""Tested in this order, on each winch that has what a row needs."""
+
+
+@dataclass(frozen=True, slots=True)
+class BenchCondition:
+    """A row on the bench as a whole, or on what only the control loop sees; it trips there."""
+
+    kind: str
+    variable: str
+    limit: str
+    reaction: str = "quick stop of all"
+    latches: bool = True
+
+
+BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
+    BenchCondition("bus", "sending and receiving on each CAN bus", "no error that lasts"),
+    BenchCondition(
+        "computer",
+        "time between two cycles by the bench's clock",
+        "2 heartbeat periods, at least 6 cycles (while nothing moves: 2.5 heartbeat periods)",
+    ),
+    BenchCondition(
+        "loop",
+        "exceptions in the control loop",
+        "none",
+        "RPDO with 02h, SYNC, SDO 6040h = 02h, from prepared frames; only stops from then on",
+    ),
+    BenchCondition("target", "targets against the range of the drive's objects", "within it"),
+    BenchCondition(
+        "deaf", "stops that the drive does not heed", "none", "silence (see Ways to stop a drive)"
+    ),
+    BenchCondition("latch file", "reading and writing of the latch file", "possible"),
+    BenchCondition(
+        "sync", "SYNC frames that were not sent here", "none", "a warning", latches=False
+    ),
+    BenchCondition("recorder", "exceptions of a recorder", "none", "a warning", latches=False),
+)
+"""Tested by the control loop."""

@@ -1,0 +1,51 @@
+"""A held command (a key, a repeated jog) must be released after a stop before it counts again."""
+
+from __future__ import annotations
+
+from winchkit.bench.dead_man import FIRST_PRESS
+from winchkit.errors import NotPermitted
+
+__all__ = ["NotReleased", "ReleaseGuard"]
+
+_RELEASE = FIRST_PRESS + 0.1
+"""Without a request for this long a held command was released, s: a key that is pressed anew
+repeats only after its first delay, which must not count as a release."""
+
+
+class NotReleased(NotPermitted):
+    """A held command that was given before the last stop."""
+
+
+class ReleaseGuard:
+    """Tells a new held command from one that was held already when everything stopped."""
+
+    def __init__(self) -> None:
+        """Nothing was stopped yet."""
+        self._asked: dict[str, float] = {}
+        self._closed: set[str] = set()
+
+    def close(self, winches: set[str]) -> None:
+        """From now on these winches want a release first: they were stopped or reset."""
+        self._closed |= winches
+
+    def resume(self, begun: float, ended: float) -> None:
+        """What was held when a reset began (s) is held when it has ended, unless it is released.
+
+        Whoever resets may be the one who holds, and asks for nothing meanwhile.
+        """
+        for winch, last in self._asked.items():
+            if begun - last < _RELEASE:
+                self._asked[winch] = max(last, ended)
+
+    def ask(self, winch: str, now: float) -> None:
+        """Note a request at ``now`` (s); raises NotReleased where a release has to come first."""
+        last = self._asked.get(winch)
+        self._asked[winch] = now
+        if winch not in self._closed:
+            return
+        if last is not None and now - last < _RELEASE:
+            raise NotReleased(
+                f"winch {winch} was stopped or reset while this command was held; release it for "
+                f"{_RELEASE:g} s before moving the winch again"
+            )
+        self._closed.discard(winch)

@@ -1,0 +1,39 @@
+"""The direction of a motion as a caller names it: exactly one of ``pay_out`` and ``wind_in``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from winchkit.errors import UsageError
+
+__all__ = ["no_positional", "paid_out"]
+
+
+def paid_out(what: str, pay_out: float | None, wind_in: float | None) -> float:
+    """The one that is given, positive paying out: a cable speed, or a change of cable length.
+
+    ``what`` names the call in the message. Raises UsageError unless exactly one is given, finite
+    and above zero.
+    """
+    if (pay_out is None) == (wind_in is None):
+        count = "neither" if pay_out is None else "both"
+        raise UsageError(f"{what} needs one of pay_out= and wind_in=, and has {count}")
+    name, value = ("wind_in", wind_in) if pay_out is None else ("pay_out", pay_out)
+    assert value is not None, "one of them is given"
+    if not 0 < value < math.inf:
+        raise UsageError(
+            f"{what}: {name}={value:g} is not a positive number; the name tells the direction, "
+            "write pay_out=0.1 or wind_in=0.1"
+        )
+    return value if wind_in is None else -value
+
+
+def no_positional(call: str, unit: str, given: Sequence[object]) -> None:
+    """Raise TypeError for values without a name: their sign would tell the direction."""
+    if given:
+        raise TypeError(
+            f"{call}({', '.join(map(repr, given))}): a number without a name does not tell the "
+            f"direction; write {call}(pay_out=...) or {call}(wind_in=...) with a positive number "
+            f"({unit}), and every other argument by name"
+        )

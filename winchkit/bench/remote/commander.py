@@ -1,0 +1,173 @@
+"""Who commands each winch of a bench: one client at a time, from its first order on.
+
+A client commands a winch from the first motion that it orders until it leaves, releases it, or
+another client takes it over explicitly. Everybody may stop, at any time.
+"""
+
+from __future__ import annotations
+
+import getpass
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from winchkit.bench.dead_man import FIRST_PRESS
+from winchkit.drivers.clock import Clock
+from winchkit.errors import MotionError, NotPermitted
+
+__all__ = ["Client", "Commanded", "Commanders", "NotCommander", "client_name"]
+
+_RELEASE = FIRST_PRESS + 0.1
+"""A refused client is heard again once it has ordered nothing for so long, s: longer than the
+pause before a held key repeats."""
+
+
+class NotCommander(NotPermitted):
+    """Another client commands the winch, or did until a moment ago."""
+
+
+class Commanded(Protocol):
+    """A winch as far as its commander goes."""
+
+    commander: str
+    """Name of the client that commands it; empty for nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class Client:
+    """Somebody who orders motion; two clients of one name are still two."""
+
+    name: str
+    observer: bool = field(default=False)
+    """Whether it only looks on, as ``monitor`` and ``log`` do."""
+
+
+def client_name(what: str | None = None) -> str:
+    """This process in words, e.g. ``jog (process 4711, user x)``."""
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):
+        user = "unknown"
+    program = what or Path(sys.argv[0] or "python").name or "python"
+    return f"{program} (process {os.getpid()}, user {user})"
+
+
+class Commanders:
+    """Grants, refuses and hands over the command of winches; thread-safe.
+
+    Calls act for the client of the innermost :meth:`acting` of their thread, else for the program
+    that owns the bench.
+    """
+
+    def __init__(
+        self,
+        winches: Mapping[str, Commanded],
+        clock: Clock,
+        owner: Client,
+        run_down: Callable[[str], None],
+    ) -> None:
+        """Take winches by name; ``run_down`` ramps one to rest when it is taken over."""
+        self.owner = owner
+        self._winches, self._clock, self._run_down = winches, clock, run_down
+        self._holders: dict[str, Client] = {}
+        self._taken: dict[tuple[Client, str], str] = {}
+        self._refused: dict[tuple[Client, str], float] = {}
+        self._actor: ContextVar[Client] = ContextVar("actor", default=owner)
+        self._lock = threading.RLock()
+
+    @property
+    def actor(self) -> Client:
+        """The client for whom this thread acts."""
+        return self._actor.get()
+
+    @contextmanager
+    def acting(self, client: Client) -> Iterator[None]:
+        """Act for a client in this thread."""
+        token = self._actor.set(client)
+        try:
+            yield
+        finally:
+            self._actor.reset(token)
+
+    def holder(self, winch: str) -> Client | None:
+        """Who commands a winch; None for nobody."""
+        return self._holders.get(winch)
+
+    def held_by(self, client: Client) -> set[str]:
+        """Winches that a client commands."""
+        with self._lock:
+            return {winch for winch, holder in self._holders.items() if holder is client}
+
+    def require(self, winch: str) -> None:
+        """Raise NotPermitted, naming the commander, where another client commands the winch."""
+        with self._lock:
+            actor, holder, now = self.actor, self._holders.get(winch), self._clock.now()
+            key = (actor, winch)
+            if holder is not None and holder is not actor:
+                self._refused[key] = now
+                raise NotCommander(
+                    f"winch {winch} is commanded by {holder.name}; end that one first, or take "
+                    "the winch over (--take-over)"
+                )
+            if now - self._refused.get(key, -_RELEASE) < _RELEASE:
+                self._refused[key] = now
+                raise NotCommander(
+                    f"winch {winch} was commanded by another client; let go before moving it"
+                )
+            self._refused.pop(key, None)
+
+    def claim(self, winch: str) -> None:
+        """Command a winch from now on; raises as :meth:`require`."""
+        with self.claimed(winch):
+            pass
+
+    @contextmanager
+    def claimed(self, winch: str) -> Iterator[None]:
+        """Command a winch, and let nobody take it over while this lasts; raises as ``require``."""
+        with self._lock:
+            self.require(winch)
+            self._give(winch, self.actor)
+            yield
+
+    def take_over(self, winch: str) -> None:
+        """Command a winch that another client commands; its motion ends by a ramp to rest."""
+        with self._lock:
+            actor, holder = self.actor, self._holders.get(winch)
+            if holder is not None and holder is not actor:
+                self._taken[holder, winch] = actor.name
+                self._run_down(winch)
+            self._refused.pop((actor, winch), None)
+            self._give(winch, actor)
+
+    def release(self, winch: str) -> None:
+        """Let a winch be commanded by whoever orders next; only its commander can."""
+        with self._lock:
+            if self._holders.get(winch) is self.actor:
+                del self._holders[winch]
+                self._winches[winch].commander = ""
+
+    def leave(self, client: Client) -> None:
+        """Forget a client, and let the winches go that it commands."""
+        with self._lock, self.acting(client):
+            for winch in self.held_by(client):
+                self.release(winch)
+            for kept in (self._taken, self._refused):
+                for key in [key for key in kept if key[0] is client]:
+                    del kept[key]
+
+    def raise_taken(self, winch: str) -> None:
+        """Raise MotionError naming who has taken this winch over from the acting client."""
+        by = self._taken.get((self.actor, winch))
+        if by is not None:
+            raise MotionError(f"winch {winch} was taken over by {by}; the motion before it ended")
+
+    def _give(self, winch: str, client: Client) -> None:
+        self._holders[winch] = client
+        self._taken.pop((client, winch), None)
+        self._winches[winch].commander = client.name

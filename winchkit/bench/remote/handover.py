@@ -1,0 +1,72 @@
+"""Owning a bench: at once where it is free, else handed over by a bench process that may."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+
+from winchkit.bench.client import RemoteStation
+from winchkit.bench.owner import Ownership, connect_to_owner
+from winchkit.errors import ConnectionLost, NotPermitted
+from winchkit.schema.bench import BenchSpec
+
+__all__ = ["own", "own_or_find"]
+
+_PATIENCE = 10.0
+"""For a bench process to disable its drives and end, s."""
+_CLOSING = 2.0
+"""For an owner that lets nobody in any more, s."""
+_OPENING = 8.0
+"""For an owner that is opening the bench, s."""
+_POLL = 0.02
+
+
+def own(spec: BenchSpec, name: str) -> Ownership:
+    """Own a bench as ``name``.
+
+    Raises NotPermitted, naming the owner and who uses the bench, where it is not handed over.
+    """
+    asked = False
+    deadline = time.monotonic() + _CLOSING
+    while True:
+        try:
+            return Ownership(spec, name)
+        except NotPermitted:
+            if time.monotonic() > deadline:
+                raise
+        if not asked and _hand_over(spec, name):
+            asked, deadline = True, time.monotonic() + _PATIENCE
+        time.sleep(_POLL)
+
+
+def own_or_find(spec: BenchSpec, name: str) -> Ownership | None:
+    """Own a bench as ``name``; None where somebody else does and takes clients in.
+
+    Raises NotPermitted, naming the owner, where it takes nobody in.
+    """
+    deadline = time.monotonic() + _OPENING
+    while True:
+        try:
+            return Ownership(spec, name)
+        except NotPermitted:
+            if time.monotonic() > deadline:
+                raise
+        with suppress(ConnectionLost):
+            connection = connect_to_owner(spec)
+            if connection is not None:
+                connection.close()
+                return None
+        time.sleep(_POLL)
+
+
+def _hand_over(spec: BenchSpec, name: str) -> bool:
+    """Ask the owner for the bench; whether it gives it. Raises NotPermitted where it refuses."""
+    try:
+        connection = connect_to_owner(spec)
+        if connection is None:
+            return False
+        with RemoteStation(connection, name=name) as station:
+            station.hand_over()
+    except ConnectionLost:
+        return False
+    return True

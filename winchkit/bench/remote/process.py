@@ -1,0 +1,164 @@
+"""The bench process: owns a bench for the commands that attach to it, and ends after the last.
+
+``python -m winchkit.bench.remote.process BENCH [EFFECTS ...]``, started by :func:`spawn`. It runs
+in a session of its own, without a terminal, and does nothing but the bench. Its first line on
+stdout says whether the bench is open, or the error that kept it from opening.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TextIO
+
+from winchkit import errors
+from winchkit.bench.owner import log_path
+from winchkit.bench.remote.commander import client_name
+from winchkit.bench.remote.handover import own_or_find
+from winchkit.bench.remote.interruption import interrupted_by_signals
+from winchkit.errors import ConnectionLost, WinchkitError
+from winchkit.schema.bench import BenchSpec
+
+if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench
+
+__all__ = ["Spawned", "can_spawn", "main", "spawn"]
+
+LINGER = 3.0
+"""The process ends this long after its last client has left, or the first one has not come, s."""
+_FIRST = 10.0
+"""For the first client, which waits for the opening, s."""
+_POLL = 0.02
+_OWNED = "owned"
+"""In the first line: somebody else owns the bench; attach there."""
+
+
+@dataclass(frozen=True)
+class Spawned:
+    """What became of a bench process that was started."""
+
+    owned: bool = False
+    """Whether another process owns the bench already."""
+    error: WinchkitError | None = None
+    """Why it could not open the bench."""
+
+
+def can_spawn(spec: BenchSpec) -> bool:
+    """Whether another process can reach the buses of this bench: those of ``virtual`` it cannot."""
+    buses = [bus for bus in spec.bus.values() if bus.kind == "can"]
+    return bool(sys.executable and spec.path) and all(b.interface != "virtual" for b in buses)
+
+
+def spawn(spec: BenchSpec, effects: Sequence[str] = ()) -> Spawned:
+    """Start a bench process and wait until it has opened the bench, or could not.
+
+    Raises OSError where no process can be started.
+    """
+    files = [os.path.abspath(file) for file in (spec.path, *effects)]
+    command = [sys.executable, "-P", "-m", "winchkit.bench.remote.process", *files]
+    with (
+        log_path(spec).open("ab") as said,
+        subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            start_new_session=True,
+        ) as process,
+    ):
+        assert process.stdout is not None, "it is a pipe"
+        line = process.stdout.readline()
+    return _spawned(spec, line)
+
+
+def _spawned(spec: BenchSpec, line: bytes) -> Spawned:
+    """The first line of a bench process, read."""
+    if not line:
+        message = f"the bench process ended without opening the bench; see {log_path(spec)}"
+        return Spawned(error=ConnectionLost(message))
+    told = json.loads(line)
+    if "error" in told:
+        return Spawned(error=getattr(errors, told["error"], WinchkitError)(told["message"]))
+    return Spawned(owned=told.get(_OWNED, False))
+
+
+def main() -> None:
+    """Own the bench that the command line names until the last client has left."""
+    bench_file, *effects = sys.argv[1:]
+    _detach()
+    # What it writes later goes nowhere but to its log: the client that waits has gone by then.
+    report = os.fdopen(os.dup(sys.stdout.fileno()), "w")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    with interrupted_by_signals() as interruption:
+        try:
+            _own(bench_file, effects, report)
+        except WinchkitError as error:
+            _report(report, _words_of(error))
+            sys.stderr.write(f"{client_name('bench')}: {error}\n")
+            sys.exit(error.exit_code)
+        except KeyboardInterrupt:
+            sys.stderr.write(f"{client_name('bench')}: {interruption.words}\n")
+            sys.exit(interruption.exit_code)
+
+
+def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:
+    from winchkit.bench.bench import Bench
+    from winchkit.drivers.clock import MonotonicClock
+    from winchkit.schema.read import read_bench
+
+    spec, name = read_bench(bench_file), client_name("bench process")
+    ownership = own_or_find(spec, name)
+    if ownership is None:
+        _report(report, {_OWNED: True})
+        return
+    clock = MonotonicClock()
+    with Bench(spec.with_effects(effects), clock, name, ownership, realtime="try") as bench:
+        bench.stations.may_hand_over = True
+        _report(report, {"ok": True})
+        _serve(bench)
+
+
+def _serve(bench: Bench) -> None:
+    """Wait until nobody needs the bench any more; raises what ended the control loop."""
+    begun = left = time.monotonic()
+    seen = False
+    while not bench.stations.handed_to and bench.loop.alive:
+        now = time.monotonic()
+        if bench.stations.clients:
+            seen, left = True, now
+        elif (
+            now - (left if seen else begun) > (LINGER if seen else _FIRST)
+            and bench.stations.close_door()
+        ):
+            return
+        time.sleep(_POLL)
+
+
+def _detach() -> None:
+    """Leave the client's process tree, so that it has no child to wait for."""
+    if hasattr(os, "fork") and os.fork():
+        os._exit(0)
+
+
+def _words_of(error: WinchkitError) -> dict[str, object]:
+    """An error as its public class and message."""
+    known = (cls.__name__ for cls in type(error).__mro__ if cls.__module__ == errors.__name__)
+    return {"error": next(known), "message": str(error)}
+
+
+def _report(report: TextIO, told: dict[str, object]) -> None:
+    """Say the first line, once."""
+    if report.closed:
+        return
+    with suppress(OSError), report:  # the client that waited may have gone
+        report.write(json.dumps(told) + "\n")
+
+
+if __name__ == "__main__":
+    main()

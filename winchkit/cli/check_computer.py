@@ -1,0 +1,35 @@
+"""What ``winchkit check`` says of this computer as one that a control loop runs on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from winchkit.schema.bench import BenchSpec
+
+__all__ = ["about_computer", "refusals"]
+
+_SIMULATED = ("virtual", "udp_multicast")
+
+
+def about_computer() -> tuple[str, ...]:
+    """Everything that the control loop asks of this computer, a line each."""
+    from winchkit.bench.control.computer import survey
+
+    return tuple(f"{'ok' if item.granted else 'no'}  {item}" for item in survey())
+
+
+def refusals(bench: BenchSpec) -> tuple[str, ...]:
+    """What this computer lacks to control the drives of a bench; nothing for simulated buses."""
+    real = [
+        bus
+        for bus in bench.bus.values()
+        if bus.kind == "can"
+        and bus.interface not in _SIMULATED
+        and not (bus.channel or "").startswith("vcan")
+    ]
+    if not real:
+        return ()
+    from winchkit.bench.control.computer import survey
+
+    return tuple(f"this computer, {item}" for item in survey() if not item.granted)

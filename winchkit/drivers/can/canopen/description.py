@@ -1,0 +1,292 @@
+"""What an EDS or DCF says of a drive before it is opened: modes, PDOs, loss of the host, options.
+
+An EDS declares objects; whether the drive acts on them is proved at commissioning only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from canopen.objectdictionary import datatypes
+
+from winchkit.drivers.can.canopen.declared import (
+    declared,
+    fixed_mapping,
+    mapped_objects,
+    said,
+    unmappable,
+    writable,
+)
+from winchkit.drivers.can.fitting import Identity
+from winchkit.drivers.can.modes import MODES, modes_of
+from winchkit.drivers.can.objects import object_name
+from winchkit.drivers.can.options import OPTIONS
+
+__all__ = [
+    "ALWAYS",
+    "NEEDED",
+    "DriveDescription",
+    "HostLoss",
+    "OptionEntry",
+    "PdoEntry",
+    "describe",
+    "host_loss_ways",
+]
+
+NEEDED = {
+    "PP": (0x607A, 0x6081, 0x6083),
+    "PV": (0x60FF,),
+    "PT": (0x6071,),
+    "HM": (0x6098, 0x6099),
+    "IP": (0x60C1, 0x60C2),
+    "CSP": (0x607A,),
+    "CSV": (0x60FF,),
+    "CST": (0x6071,),
+}
+"""Objects without which a drive cannot have a mode."""
+ALWAYS = (0x6040, 0x6041, 0x6060, 0x6061, 0x6064, 0x606C)
+"""Objects without which winchkit moves no drive."""
+_MOTION = ("CSV", "CSP", "PV", "IP")
+_FEEDBACK = (0x6041, 0x6064, 0x606C, 0x6077, 0x6061, 0x603F)
+_NEEDED_FEEDBACK = (0x6041, 0x6064, 0x606C)
+_RPDO, _TPDO, _MAPPING = 0x1400, 0x1800, 0x200
+_PDOS = 512
+_UNSIGNED_WHERE_SIGNED = (0x6064, 0x606C, 0x607A, 0x60FF, 0x6071, 0x6077)
+"""Signed objects of CiA 402-2 that some makers declare unsigned."""
+
+
+@dataclass(frozen=True)
+class PdoEntry:
+    """A PDO that the EDS declares."""
+
+    number: int
+    fixed: bool
+    """Whether its mapping cannot be changed."""
+    objects: tuple[str, ...]
+    """Its mapping by default, e.g. ``0x6041``; empty where the EDS does not say."""
+
+
+@dataclass(frozen=True)
+class OptionEntry:
+    """An option code that the EDS declares."""
+
+    index: str
+    occasion: str
+    writable: bool
+    default: int | None
+    meaning: str
+
+
+@dataclass(frozen=True)
+class HostLoss:
+    """A way for a drive to notice that the host is dead, by the objects of its EDS."""
+
+    way: str
+    """As ``host_loss`` in a device file: heartbeat, guarding, rpdo-timeout, sync-loss."""
+    objects: tuple[str, ...]
+    reaction: str
+    """What the drive does then, as far as the EDS says."""
+
+
+@dataclass(frozen=True)
+class DriveDescription:
+    """What an EDS says that matters for moving the drive."""
+
+    maker: str
+    product: str
+    identity: Identity
+    device_profile: int | None
+    """Lower half of 1000h, 402 for drives; None where the EDS does not say."""
+    modes: tuple[str, ...]
+    """Whose objects the EDS has."""
+    motion_modes: tuple[str, ...]
+    """Those of them that the bench can move it in."""
+    feedback: dict[str, bool]
+    """Objects of the feedback by index: whether a TPDO can carry them."""
+    targets: dict[str, bool]
+    """Targets and control word: whether an RPDO can carry them."""
+    receive: tuple[PdoEntry, ...]
+    transmit: tuple[PdoEntry, ...]
+    host_loss: tuple[HostLoss, ...]
+    options: tuple[OptionEntry, ...]
+    obstacles: tuple[str, ...]
+    """Why winchkit cannot move it; none where it can."""
+    differences: tuple[str, ...]
+    """What is unusual, and what winchkit does about it."""
+
+
+def describe(dictionary: Any) -> DriveDescription:
+    """Describe a drive by canopen's dictionary of its EDS."""
+    info = dictionary.device_information
+    modes = tuple(_modes(dictionary))
+    receive, transmit = (tuple(_pdos(dictionary, first)) for first in (_RPDO, _TPDO))
+    targets = {MODES[mode].target for mode in modes} - {None}
+    return DriveDescription(
+        maker=info.vendor_name or "",
+        product=info.product_name or "",
+        identity=Identity(
+            info.vendor_number or 0, info.product_number or 0, info.revision_number or 0
+        ),
+        device_profile=_profile(dictionary),
+        modes=modes,
+        motion_modes=tuple(mode for mode in _MOTION if mode in modes),
+        feedback=_carried(dictionary, [(index, 0) for index in _FEEDBACK], receive=False),
+        targets=_carried(dictionary, [(0x6040, 0), *sorted(filter(None, targets))], receive=True),
+        receive=receive,
+        transmit=transmit,
+        host_loss=host_loss_ways(dictionary),
+        options=tuple(_options(dictionary)),
+        obstacles=tuple(_obstacles(dictionary, modes, receive, transmit)),
+        differences=tuple(_differences(dictionary, receive, transmit)),
+    )
+
+
+def _profile(dictionary: Any) -> int | None:
+    kind = said(declared(dictionary, 0x1000))
+    return None if not kind else kind & 0xFFFF
+
+
+def host_loss_ways(dictionary: Any) -> tuple[HostLoss, ...]:
+    """The ways in which the drive might notice a dead host, best first; each needs its proof."""
+    return tuple(_host_loss(dictionary))
+
+
+def _host_loss(dictionary: Any) -> Iterator[HostLoss]:
+    reaction, by = _reaction(dictionary)
+    if writable(dictionary, 0x1016, 1):
+        yield HostLoss("heartbeat", ("1016h", *by), reaction)
+    if writable(dictionary, 0x100C) and writable(dictionary, 0x100D):
+        yield HostLoss("guarding", ("100Ch", "100Dh", *by), reaction)
+    timers = [
+        entry.number
+        for entry in _pdos(dictionary, _RPDO)
+        if writable(dictionary, _RPDO + entry.number - 1, 5)
+    ]
+    if timers:
+        records = tuple(f"{_RPDO + number - 1:04X}h:5" for number in timers[:1])
+        yield HostLoss("rpdo-timeout", records, "EMCY 8250h; what else it does is to be proved")
+    cyclic = any(MODES[mode].cyclic for mode in _modes(dictionary))
+    if cyclic and writable(dictionary, 0x1006):
+        yield HostLoss("sync-loss", ("1006h",), "what it does is to be proved")
+
+
+def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
+    """What the drive does when it misses a heartbeat or guarding, and which object says so."""
+    lost = declared(dictionary, 0x6007)
+    if lost is not None:
+        row = OPTIONS["connection_lost"]
+        if lost.writable:
+            return "as 6007h says, which can be set to 3 (quick stop) or 1 (fault)", ("6007h",)
+        words = row.meanings.get(lost.default or 0, "of the maker's own")
+        return f"as 6007h says, which cannot be written: {lost.default} ({words})", ("6007h",)
+    if declared(dictionary, 0x1029, 1) is not None:
+        return (
+            "it leaves the state operational (1029h:1), there is no 6007h: whether the motor "
+            "stops then is to be proved"
+        ), ("1029h:1",)
+    return "neither 6007h nor 1029h: what it does is to be proved", ()
+
+
+def _modes(dictionary: Any) -> Iterator[str]:
+    """Modes whose objects are there and which 6502h does not deny."""
+    told = declared(dictionary, 0x6502)
+    claimed = modes_of(told.default) if told is not None and told.default else tuple(NEEDED)
+    for mode, needed in NEEDED.items():
+        if mode in claimed and all(index in dictionary for index in needed):
+            yield mode
+
+
+def _pdos(dictionary: Any, first: int) -> Iterator[PdoEntry]:
+    for number in range(1, _PDOS + 1):
+        if first + number - 1 in dictionary:
+            fixed = fixed_mapping(dictionary, first == _RPDO, number)
+            mapping = first + _MAPPING + number - 1
+            yield PdoEntry(number, fixed is not None, mapped_objects(dictionary, mapping))
+
+
+def _carried(dictionary: Any, keys: list[tuple[int, int]], *, receive: bool) -> dict[str, bool]:
+    found = {}
+    for key in keys:
+        variable = declared(dictionary, *key)
+        able = variable is not None and not unmappable(variable, receive=receive)
+        found[object_name(*key)] = able
+    return found
+
+
+def _options(dictionary: Any) -> Iterator[OptionEntry]:
+    for row in OPTIONS.values():
+        variable = declared(dictionary, row.index)
+        if variable is not None:
+            value = said(variable)
+            meaning = "" if value is None else row.meanings.get(value, "of the maker's own")
+            yield OptionEntry(
+                f"{row.index:04X}h", row.occasion, bool(variable.writable), value, meaning
+            )
+
+
+def _obstacles(
+    dictionary: Any,
+    modes: tuple[str, ...],
+    receive: tuple[PdoEntry, ...],
+    transmit: tuple[PdoEntry, ...],
+) -> Iterator[str]:
+    if _profile(dictionary) not in (None, 402):
+        yield f"it is no servo drive: 1000h says device profile {_profile(dictionary)}, not 402"
+    for index in ALWAYS:
+        if index not in dictionary:
+            yield f"the EDS lacks {index:04X}h, which every motion needs"
+        elif index in _NEEDED_FEEDBACK and (
+            reason := unmappable(declared(dictionary, index), receive=False)
+        ):
+            yield f"no TPDO can carry {index:04X}h: {reason}"
+    if not any(mode in modes for mode in _MOTION):
+        yield f"none of the modes {', '.join(_MOTION)} is there"
+    for kind, entries in (("receive", receive), ("transmit", transmit)):
+        if not any(entry.number <= 4 for entry in entries):
+            yield f"the EDS declares no {kind} PDO (1 to 4)"
+    if not host_loss_ways(dictionary):
+        yield (
+            "the EDS has no way to notice a dead host (1016h, 100Ch with 100Dh, 1400h:5, 1006h); "
+            "a maker's own, or the hardware that stops the drive, is to be declared as host_loss"
+        )
+
+
+def _differences(
+    dictionary: Any, receive: tuple[PdoEntry, ...], transmit: tuple[PdoEntry, ...]
+) -> Iterator[str]:
+    for index in _UNSIGNED_WHERE_SIGNED:
+        variable = declared(dictionary, index)
+        if variable is not None and variable.data_type in datatypes.UNSIGNED_TYPES:
+            yield (
+                f"{index:04X}h is declared unsigned; CiA 402 makes it signed: it is read and "
+                "written as two's complement of its size"
+            )
+    error = declared(dictionary, 0x603F)
+    if error is not None and unmappable(error, receive=False):
+        yield "603Fh (error code) cannot be mapped: leave it out of the TPDOs, EMCY tells it"
+    if 0x607C not in dictionary:
+        yield (
+            "607Ch (home offset) is missing: `winchkit home --here` needs the maker's own object, "
+            "home_offset in the device file"
+        )
+    consumer = declared(dictionary, 0x1016, 1)
+    if consumer is not None and consumer.max is not None and consumer.max < 1 << 16:
+        yield (
+            f"1016h:1 is limited to {consumer.max} in the EDS, in which no node number fits "
+            "(node << 16): the EDS is wrong, or the drive has no such watchdog; its proof decides"
+        )
+    if 0x6502 not in dictionary:
+        yield "6502h (supported modes) is missing: the modes of the device file count"
+    for name, entries in (("RPDO", receive), ("TPDO", transmit)):
+        for entry in entries:
+            if entry.fixed and entry.number <= 4:
+                held = ", ".join(entry.objects) or "nothing"
+                yield f"{name} {entry.number} has a fixed mapping: {held}"
+        if beyond := [entry.number for entry in entries if entry.number > 4]:
+            yield f"{name} {', '.join(map(str, beyond))} beyond the first four: switched off"
+    if (sync := said(declared(dictionary, 0x1005)) or 0) & 1 << 30:
+        yield f"1005h is {sync:X}h: the drive produces SYNC itself, which is switched off"
+    if dictionary.device_information.vendor_number in (None, 0):
+        yield "the vendor number is missing: the drive cannot be recognised by its identity"

@@ -1,0 +1,179 @@
+"""Whether a device file of a drive fits the EDS that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from winchkit.drivers.can.canopen.declared import declared, fixed_mapping, unmappable
+from winchkit.drivers.can.canopen.description import ALWAYS, NEEDED, HostLoss, host_loss_ways
+from winchkit.drivers.can.eds import read_eds
+from winchkit.drivers.can.modes import MODES
+from winchkit.drivers.can.options import OPTIONS
+from winchkit.drivers.can.pdo import parse_object
+from winchkit.errors import Fault, FileError
+from winchkit.schema.device import DeviceSpec
+from winchkit.schema.device_servo import PdoSpec, ServoSpec
+from winchkit.schema.read_source import open_source
+
+__all__ = ["EdsReport", "check_drive", "host_loss_problem"]
+
+_LONGEST = 64
+_CONTROL = (0x6040, 0)
+_OBJECTS = {
+    "heartbeat": "a writable 1016h:1",
+    "guarding": "writable 100Ch and 100Dh",
+    "rpdo-timeout": "a writable event timer of an RPDO (1400h:5)",
+    "sync-loss": "a writable 1006h, or a cyclic mode",
+}
+"""Needed by each way to notice a dead host."""
+
+
+@dataclass(frozen=True)
+class EdsReport:
+    """What is wrong with a drive's EDS, or with a device file that names it."""
+
+    faults: tuple[Fault, ...]
+    warnings: tuple[Fault, ...]
+    host_loss: tuple[HostLoss, ...] = ()
+    """Ways to notice a dead host that the EDS has."""
+
+
+def check_drive(device: DeviceSpec) -> EdsReport:
+    """Check a device file of a drive against its EDS; FileError where there is none to read."""
+    servo = device.servo
+    if servo is None:
+        return EdsReport((), ())
+    dictionary, warnings = read_eds(Path(device.path).parent / servo.eds, 1)
+    source = open_source(device.path)
+    faults = [
+        source.fault(("servo", kind, place, "objects"), message)
+        for kind, specs in (("tpdo", servo.tpdo), ("rpdo", servo.rpdo))
+        for place, spec in enumerate(specs)
+        for message in _pdo_faults(dictionary, kind, spec)
+    ]
+    faults += [source.fault(("servo", "modes"), message) for message in _lacking(dictionary, servo)]
+    faults += [
+        source.fault(("servo", "options", key), message)
+        for key, message in _option_faults(dictionary, servo)
+    ]
+    if servo.home_offset != ServoSpec.home_offset and (
+        (key := _key(servo.home_offset)) is None or declared(dictionary, *key) is None
+    ):
+        faults.append(source.fault(("servo", "home_offset"), "is no object of the EDS"))
+    ways = host_loss_ways(dictionary)
+    doubt = host_loss_problem(ways, servo.host_loss) or _not_watched(dictionary, servo)
+    told = source.fault(("servo",), doubt) if doubt else None
+    if told is not None and ways:
+        faults.append(told)
+    elif told is not None:
+        warnings = (*warnings, told)
+    return EdsReport(tuple(faults), warnings, ways)
+
+
+def _not_watched(dictionary: Any, servo: ServoSpec) -> str:
+    """What the device file leaves out for its way to notice a dead host; empty where nothing."""
+    if servo.host_loss == "sync-loss" and not MODES[servo.motion_mode].cyclic:
+        return (
+            f'host_loss = "sync-loss" needs a cyclic mode; in {servo.motion_mode} no drive minds a '
+            "lost SYNC"
+        )
+    if servo.host_loss == "rpdo-timeout":
+        for spec in servo.rpdo:
+            if any(_key(text) == _CONTROL for text in spec.objects):
+                record = 0x1400 + spec.number - 1
+                if declared(dictionary, record, 5) is None:
+                    return f'host_loss = "rpdo-timeout" needs {record:04X}h:5, which the EDS lacks'
+                return ""
+        return 'host_loss = "rpdo-timeout" needs an RPDO that carries 0x6040'
+    return ""
+
+
+def host_loss_problem(ways: tuple[HostLoss, ...], way: str) -> str:
+    """Why a drive cannot notice a dead host in a declared way; empty where its EDS allows it.
+
+    A maker's own way (``vendor:``) and hardware that stops the drive are not in an EDS.
+    """
+    names = [one.way for one in ways]
+    if way in names or way == "hardware" or way.startswith("vendor:"):
+        return ""
+    if not names:
+        return (
+            "the EDS has no way to notice a dead host (no 1016h, no 100Ch with 100Dh, no "
+            "1400h:5, no 1006h): motion is refused, unless the bench file names the hardware that "
+            'stops the drive (host_loss = "hardware")'
+        )
+    return (
+        f'host_loss = "{way}" is not possible by the EDS, which lacks {_OBJECTS.get(way, way)}; '
+        f"it has {', '.join(names)}"
+    )
+
+
+def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec) -> Iterator[str]:
+    receive = kind == "rpdo"
+    record = (0x1400 if receive else 0x1800) + spec.number - 1
+    for index in (record, record + 0x200):
+        if index not in dictionary:
+            yield f"{kind} {spec.number} needs {index:04X}h, which the EDS lacks"
+    bits = 0
+    for text in spec.objects:
+        try:
+            index, sub = parse_object(text)
+        except FileError as error:
+            yield str(error)
+            continue
+        variable = declared(dictionary, index, sub)
+        if variable is None:
+            yield f"{text} is not in the EDS"
+            continue
+        bits += len(variable)
+        if reason := unmappable(variable, receive=receive):
+            yield f"{text} ({variable.name}) cannot be mapped: {reason}"
+    if bits > _LONGEST:
+        yield f"{kind} {spec.number} would have {bits} bits; a PDO carries {_LONGEST}"
+    else:
+        yield from _fixed_faults(dictionary, receive, spec)
+
+
+def _fixed_faults(dictionary: Any, receive: bool, spec: PdoSpec) -> Iterator[str]:
+    """A PDO whose mapping cannot be changed has to be taken as it is."""
+    fixed = fixed_mapping(dictionary, receive, spec.number)
+    if fixed is None:
+        return
+    if list(map(_key, spec.objects)) != list(map(_key, fixed)):
+        held = ", ".join(f'"{text}"' for text in fixed) or "nothing"
+        kind = "rpdo" if receive else "tpdo"
+        yield f"{kind} {spec.number} has a fixed mapping in the EDS: objects = [{held}]"
+
+
+def _key(text: str) -> tuple[int, int] | None:
+    """Index and sub-index; None for a text that is neither."""
+    try:
+        return parse_object(text)
+    except FileError:
+        return None
+
+
+def _lacking(dictionary: Any, servo: ServoSpec) -> Iterator[str]:
+    for index in ALWAYS:
+        if index not in dictionary:
+            yield f"{index:04X}h is not in the EDS; winchkit cannot do without"
+    for mode in servo.modes:
+        for index in NEEDED[mode]:
+            if index not in dictionary:
+                yield f"{mode} needs {index:04X}h, which the EDS lacks"
+
+
+def _option_faults(dictionary: Any, servo: ServoSpec) -> Iterator[tuple[str, str]]:
+    """Key and fault of every option code that the EDS lacks, or does not let be written."""
+    for key, row in OPTIONS.items():
+        value = getattr(servo.options, key)
+        variable = declared(dictionary, row.index)
+        if value is None:
+            continue
+        if variable is None:
+            yield key, f"the EDS lacks {row.index:04X}h; the drive has no such option code"
+        elif not variable.writable and variable.default != value:
+            yield key, f"{row.index:04X}h is {variable.access_type} in the EDS, it cannot be set"

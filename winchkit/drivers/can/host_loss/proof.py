@@ -1,0 +1,198 @@
+"""The proof that a disabled drive notices a silent host, and what an enabled one then does."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from winchkit.drivers.can.cia402 import DISABLE_VOLTAGE, FAULT_RESET, State, state_of
+from winchkit.drivers.can.emergency import Emergency
+from winchkit.drivers.can.heartbeat import HeartbeatWatch, NmtState
+from winchkit.drivers.can.host_loss.guarding import Guarding
+from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
+from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.options import OptionCode
+from winchkit.drivers.clock import Clock
+from winchkit.errors import NoReply, NotPermitted
+
+__all__ = ["HostLoss", "Proof", "bring_back", "prove", "reaction"]
+
+_PRE_OPERATIONAL, _START = 0x80, 0x01
+_PATIENCE = 0.4
+"""For its answer beyond its limit, s."""
+_GUARDED_PATIENCE = 0.1
+"""After which a guarded drive is asked by a poll, s."""
+_SETTLING = 1.0
+_POLL = 0.002
+_FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
+_STOPPING = (1, 2, 3)
+"""Of 6007h: fault, disable voltage, quick stop."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """How a disabled drive noticed that the host fell silent."""
+
+    emergency: Emergency | None
+    """The EMCY that said so, where it sent one."""
+    nmt: int
+    """NMT state that it showed then."""
+    delay: float
+    """From the last life sign to its answer, s."""
+    limit: float
+    """What it had been told to tolerate, s."""
+    fault: bool = False
+    """Whether it went into the state fault, in which no drive stays enabled."""
+    noticed: bool = True
+    """False where nothing was seen; only a mechanism that acts on enabled drives may be so."""
+
+
+@dataclass(frozen=True)
+class HostLoss:
+    """How a drive notices a dead host, and whether it is known to stop then."""
+
+    mechanism: str = "heartbeat"
+    """As declared: heartbeat, guarding, rpdo-timeout, sync-loss, vendor:NAME, hardware."""
+    silence: Silence = Silence.HEARTBEAT
+    """Which frames of the host have to end for the drive to notice."""
+    limit: float = 0.0
+    """What the drive tolerates, s."""
+    certain: bool = True
+    """Whether an enabled drive is known to leave *operation enabled* when it notices."""
+    words: str = ""
+    """What was proved, and what is left to ``winchkit commission``."""
+
+
+def prove(
+    mechanism: Mechanism,
+    watch: HeartbeatWatch,
+    emergencies: Collection[Emergency],
+) -> Proof:
+    """Fall silent towards a disabled, operational drive until it complains.
+
+    What the drive did is undone: it is disabled, and started again by the caller. Raises
+    NotPermitted where it does not notice though it should, NoReply, DeviceRefused.
+    """
+    node = mechanism.node
+    # A fault that stood before is the operator's to look at and to reset.
+    clears = state_of(node.read(0x6041)) is not State.FAULT
+    try:
+        limit = mechanism.withhold()
+        start = mechanism.clock.now()
+        proof = _await_complaint(mechanism, watch, emergencies, start, limit)
+    finally:
+        mechanism.release()
+        # A drive that stopped (1029h:1 = 2) answers SDO only once it is pre-operational.
+        node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        mechanism.restore()
+    state = state_of(node.read(0x6041))
+    if clears and state in _FAULTS:
+        proof = _with_fault(proof)
+    bring_back(node, mechanism.clock, clears=clears)
+    if not proof.noticed and mechanism.noticed_disabled:
+        raise NotPermitted(_unnoticed(mechanism, proof))
+    return proof
+
+
+def reaction(
+    mechanism: Mechanism,
+    proof: Proof | None,
+    options: Mapping[str, OptionCode],
+    *,
+    seen: bool,
+    hardware: str = "",
+) -> HostLoss:
+    """What is known of an enabled drive: by its fault, by 6007h, or because it was seen."""
+    lost = options.get("connection_lost")
+    code = None if lost is None else lost.value
+    by_option = mechanism.silence in (Silence.HEARTBEAT, Silence.GUARDING) and code in _STOPPING
+    if seen:
+        certain, words = True, "seen to stop the moving winch at commissioning"
+    elif proof is not None and proof.fault:
+        certain, words = True, "the drive goes into the state fault, which ends operation enabled"
+    elif by_option:
+        certain, words = True, f"6007h is {code}"
+    elif hardware:
+        certain, words = False, f"the drive watches nothing; {hardware} stops the winch"
+    else:
+        noticed = proof is None or proof.noticed
+        what = "notices the silence" if noticed else "shows nothing while it is disabled"
+        certain = False
+        words = f"the drive {what}; that it then stops was not seen: run `winchkit commission`"
+    return HostLoss(mechanism.name, mechanism.silence, mechanism.limit, certain, words)
+
+
+def bring_back(node: SdoNode, clock: Clock, *, clears: bool) -> None:
+    """Clear the fault that it made of the silence, without enabling, and start it again."""
+    if state_of(node.read(0x6041)) is State.FAULT_REACTION_ACTIVE:
+        _await_state(node, clock, State.FAULT)
+    if clears and state_of(node.read(0x6041)) is State.FAULT:
+        node.write(0x6040, 0, DISABLE_VOLTAGE)
+        node.write(0x6040, 0, FAULT_RESET)
+        _await_state(node, clock, State.SWITCH_ON_DISABLED)
+        node.write(0x6040, 0, DISABLE_VOLTAGE)
+    node.bus.nmt(_START, node.node)
+
+
+def _await_complaint(
+    mechanism: Mechanism,
+    watch: HeartbeatWatch,
+    emergencies: Collection[Emergency],
+    start: float,
+    limit: float,
+) -> Proof:
+    clock, asked = mechanism.clock, False
+    while (delay := clock.now() - start) <= limit + _PATIENCE:
+        new = [e for e in tuple(emergencies) if e.time >= start and _fits(mechanism, e)]
+        nmt = watch.state if watch.state is not None else NmtState.OPERATIONAL
+        if new or nmt != NmtState.OPERATIONAL:
+            return Proof(new[0] if new else None, nmt, delay, limit)
+        if isinstance(mechanism, Guarding) and delay > limit + _GUARDED_PATIENCE and not asked:
+            # Its state shows in an answer only, and the poll is one life sign more: ask once.
+            asked = True
+            mechanism.poll()
+        clock.sleep(_POLL)
+    fault = _shows_fault(mechanism.node)
+    return Proof(None, NmtState.OPERATIONAL, delay, limit, fault, noticed=fault)
+
+
+def _fits(mechanism: Mechanism, emergency: Emergency) -> bool:
+    if not mechanism.codes:
+        return emergency.code != 0
+    return emergency.code in mechanism.codes
+
+
+def _shows_fault(node: SdoNode) -> bool:
+    """Whether the silent drive is in fault; one that answers no SDO shows nothing."""
+    try:
+        return state_of(node.read(0x6041)) in _FAULTS
+    except NoReply:
+        return False
+
+
+def _with_fault(proof: Proof) -> Proof:
+    return Proof(proof.emergency, proof.nmt, proof.delay, proof.limit, True, True)
+
+
+def _unnoticed(mechanism: Mechanism, proof: Proof) -> str:
+    index, sub, sign = {
+        "heartbeat": (0x1016, 1, "a heartbeat was withheld"),
+        "guarding": (0x100D, 0, "no guarding poll was sent"),
+    }.get(mechanism.name, (0x6040, 0, "no RPDO was sent"))
+    codes = " or ".join(f"{code:04X}h" for code in sorted(mechanism.codes)) or "any EMCY"
+    return (
+        f"{mechanism.node.place(index, sub)}: {sign} for {proof.delay:.2f} s, the limit is "
+        f"{proof.limit:g} s, and the drive sent neither EMCY {codes} nor left operational; it "
+        "would go on moving when the host dies"
+    )
+
+
+def _await_state(node: SdoNode, clock: Clock, wanted: State) -> None:
+    deadline = clock.now() + _SETTLING
+    while (state := state_of(node.read(0x6041))) is not wanted:
+        if clock.now() > deadline:
+            raise NotPermitted(
+                f"{node.place(0x6041)}: still {state} {_SETTLING:g} s after its watchdog was "
+                f"proved, {wanted} was expected; look at the drive's errors"
+            )
+        clock.sleep(_POLL)

@@ -1,0 +1,91 @@
+"""Unwraps the position counter 6064h: any number of turns, both ways, from a counter that ends.
+
+After its highest value a counter goes on at its lowest. Two successive values that differ by more
+than half the range have crossed the end, as long as the motor cannot turn half the range between
+them; after a longer gap the number of crossings is unknown.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from winchkit.errors import NotPermitted
+
+__all__ = ["PositionCounter"]
+
+
+class PositionCounter:
+    """One drive's counter; ``low`` to ``high`` are the counts that it can show."""
+
+    __slots__ = ("_kept", "gap", "half", "high", "known", "last", "low", "offset", "span", "time")
+
+    def __init__(self, low: int, high: int, fastest: float = 0.0) -> None:
+        """Take the range, and the greatest speed of the motor in counts/s (0: not known)."""
+        self.low, self.high = low, high
+        self.span = high - low + 1
+        self.half: float = self.span // 2
+        self.gap = self.half / fastest if fastest > 0 else inf
+        """After this long without feedback the crossings are unknown, s."""
+        self.last: float = inf
+        """Newest count as the drive shows it; infinite before the first."""
+        self.time = -inf
+        self.offset = 0
+        """Whole ranges that were crossed, in counts: to be added to what the drive shows."""
+        self.known = True
+        """Whether no crossing can have been missed."""
+        self._kept = (0, True)
+
+    def take(self, count: int, time: float) -> int:
+        """Take a count of the drive and the time of its sampling (s); returns it unwrapped."""
+        change = count - self.last
+        if not -self.half <= change <= self.half:
+            self.cross(change)
+        if time - self.time > self.gap:
+            self.miss()
+        self.last, self.time = count, time
+        return count + self.offset
+
+    def cross(self, change: float) -> None:
+        """Count a crossing of the counter's end; the first value of all is none."""
+        if change in (inf, -inf):
+            return
+        self.offset += -self.span if change > 0 else self.span
+
+    def miss(self) -> None:
+        """Note a gap that is too long; one before the first value is none."""
+        if self.time > -inf:
+            self.known = False
+
+    def restart(self, *, forgotten: bool) -> None:
+        """Begin anew, with a drive that has forgotten its count or kept it.
+
+        A count that had crossed the end says nothing any more once the drive has restarted.
+        """
+        if forgotten:
+            self.known = self.known and self.offset == 0
+            self.offset, self.last, self.time = 0, inf, -inf
+
+    def suspend(self) -> None:
+        """Take the drive's counts as they are: while it homes, they jump to the new zero."""
+        self._kept = (self.offset, self.known)
+        self.offset, self.half, self.known = 0, inf, True
+
+    def resume(self, *, homed: bool) -> None:
+        """Unwrap again: from the new zero where one was found, else from where it was."""
+        self.half = self.span // 2
+        self.offset, self.known = (0, True) if homed else self._kept
+
+    def target(self, counts: int, name: str) -> int:
+        """What the drive is to be sent for an unwrapped target; raises NotPermitted beyond its end.
+
+        No drive is sent across the end of its counter: whether it then takes the short way or the
+        long one is proved by nothing that it declares.
+        """
+        shown = counts - self.offset
+        if not self.low <= shown <= self.high:
+            raise NotPermitted(
+                f"{name}: a target position of {shown} counts is beyond the end of the drive's "
+                f"counter, {self.low} to {self.high}; move in a velocity mode (motion_mode), or "
+                "set the drive's zero nearer"
+            )
+        return shown

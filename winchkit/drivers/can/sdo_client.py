@@ -1,0 +1,45 @@
+"""An SDO client of the canopen library that waits for its replies on the bench's clock."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import canopen
+from canopen.sdo import client as library
+
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.scheduling import event_of
+
+__all__ = ["sdo_client"]
+
+_SdoClient: Any = library.SdoClient
+
+
+def sdo_client(remote: canopen.RemoteNode, clock: Clock) -> Any:
+    """Replace the SDO client of a node on a network by one that waits on a clock."""
+    plain = remote.sdo
+    remote.network.unsubscribe(plain.tx_cobid, plain.on_response)
+    client = _WaitingSdoClient(plain.rx_cobid, plain.tx_cobid, remote.object_dictionary, clock)
+    client.network = remote.network
+    remote.sdo, remote.sdo_channels = client, [client]
+    remote.network.subscribe(client.tx_cobid, client.on_response)
+    return client
+
+
+class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
+    def __init__(self, request: int, reply: int, dictionary: Any, clock: Clock) -> None:
+        super().__init__(request, reply, dictionary)
+        self._arrived = event_of(clock)
+
+    def send_request(self, request: Any) -> None:
+        self._arrived.clear()
+        super().send_request(request)
+
+    def on_response(self, can_id: int, data: Any, timestamp: float) -> None:
+        super().on_response(can_id, data, timestamp)
+        self._arrived.set()
+
+    def read_response(self) -> Any:
+        if not self._arrived.wait(self.RESPONSE_TIMEOUT):
+            raise canopen.SdoCommunicationError("No SDO response received")
+        return super().read_response()

@@ -1,0 +1,130 @@
+"""Modbus TCP frames of one connection: the answer to the request, or none.
+
+A Modbus TCP frame has no check sum: a reply that was cut and the bytes after it join to a frame
+whose head is right and whose registers are not. A frame is therefore taken only where it begins
+exactly where the frame before it ended, its transaction, protocol, length, unit, function and byte
+count agree, nothing follows it, and no head of another frame stands within it. Whatever else comes
+makes the connection ``broken``: the client opens a new one (MODBUS Messaging on TCP/IP
+Implementation Guide V1.0b, 3.1.3 and 4.2).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+
+from winchkit.drivers.modbus.frames import Event, Kind, Request, request_of
+
+__all__ = ["TcpAnswerGate"]
+
+_HEAD = 6
+"""Bytes of transaction, protocol and length."""
+_LONGEST = 254
+"""Unit and PDU at most, bytes."""
+_SHORTEST = 3
+"""Unit, function and exception code."""
+_REMEMBERED = 8
+"""Requests whose transactions are looked for within a frame."""
+_SIGNATURE = 5
+"""Bytes of a head that are the same in every reply to a transaction: all but the lower length."""
+
+
+class TcpAnswerGate:
+    """Fed with what is sent and received on one connection, one request at a time."""
+
+    def __init__(self, transactions: Iterable[bytes] = ()) -> None:
+        """``transactions`` are those of requests on connections before this one."""
+        self.broken = False
+        """Whether something came that was not the answer; the connection is not used again."""
+        self.transactions = deque(transactions, maxlen=_REMEMBERED)
+        self._lost = False
+        self._request: Request | None = None
+        self._unit = 0
+        self._buffer = b""
+        self._joints: list[int] = []
+        """Where in the buffer a piece began that came later than the one before."""
+        self._events: list[Event] = []
+
+    def sent(self, packet: bytes) -> None:
+        """A request goes out."""
+        self.expire()
+        self._request = request_of(packet, "tcp")
+        self._unit = self._request.unit
+        self.transactions.append(packet[:2])
+
+    def received(self, data: bytes) -> bytes:
+        """The whole answer once it is there, else nothing."""
+        if self._buffer:
+            self._joints.append(len(self._buffer))
+        self._buffer += data
+        while not self._lost and (size := self._size()):
+            frame, self._buffer = self._buffer[:size], self._buffer[size:]
+            joints, self._joints = self._joints, []
+            if self._answers(frame, joints):
+                self._request = None
+                return frame
+        if self._request is None and self._buffer:
+            self._lose()
+        return b""
+
+    def expire(self) -> bool:
+        """The time for an answer is over; returns whether anything at all had come."""
+        waiting, self._request = self._request, None
+        came = bool(self._buffer) or self.broken
+        if self._buffer and not self._lost:
+            self._lose()
+        # An answer that was not heard may still come: never on this connection.
+        self.broken |= waiting is not None
+        return came
+
+    def events(self) -> list[Event]:
+        """What has happened since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    def _size(self) -> int:
+        """Size of the whole frame that the buffer begins with, else 0."""
+        if len(self._buffer) < _HEAD:
+            return 0
+        length = int.from_bytes(self._buffer[4:6], "big")
+        if self._buffer[2:4] != b"\0\0" or not _SHORTEST <= length <= _LONGEST:
+            self._lose()
+            return 0
+        return _HEAD + length if len(self._buffer) >= _HEAD + length else 0
+
+    def _answers(self, frame: bytes, joints: list[int]) -> bool:
+        """Whether a frame is the answer; one that is not makes the connection broken."""
+        request = self._request
+        if request is None or frame[:2] != request.packet[:2]:
+            # A whole frame of another transaction: the next one begins where it ends.
+            self.broken = True
+            kind: Kind = "late" if frame[:2] in self.transactions else "malformed"
+            self._events.append(Event(frame[_HEAD], kind))
+            return False
+        body, refusal = frame[_HEAD:], request.refusal
+        refused = body.startswith(refusal) and len(body) == len(refusal) + 1
+        agrees = body.startswith(request.wanted) and len(frame) == request.size
+        if not (agrees or refused) or self._buffer or self._holds_a_head(frame, joints):
+            self._lose()
+            return False
+        return True
+
+    def _holds_a_head(self, frame: bytes, joints: list[int]) -> bool:
+        """Whether the registers end with, or hold, the beginning of another frame's head."""
+        for transaction in tuple(self.transactions):
+            head = transaction + b"\0\0\0"
+            for at in range(_HEAD + 2, len(frame)):
+                left = frame[at : at + _SIGNATURE]
+                # A single byte alike is chance, except where a piece of its own begins with it.
+                if (len(left) > 1 or at in joints) and head.startswith(left):
+                    # The connection ends with it. A value that looks like it, and stays, must
+                    # not be refused on the next one for ever.
+                    self.transactions.remove(transaction)
+                    return True
+        return False
+
+    def _lose(self) -> None:
+        """Where the next frame begins is not known any more."""
+        self.broken = self._lost = True
+        self._buffer, self._joints = b"", []
+        self._events.append(Event(self._unit, "malformed"))

@@ -1,0 +1,54 @@
+"""Opens regular files only: a FIFO would block for ever, and a device may act on being opened."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+
+__all__ = ["file_kind", "read_text", "regular"]
+
+_KINDS = {
+    stat.S_IFDIR: "a directory",
+    stat.S_IFIFO: "a FIFO",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a character device",
+    stat.S_IFBLK: "a block device",
+}
+
+
+def regular(path: str | os.PathLike[str], flags: int = os.O_RDONLY) -> int:
+    """Open a regular file and return its descriptor: an ``opener`` for the built-in ``open``.
+
+    Raises OSError as ``os.open`` does; for anything but a regular file its ``strerror`` names the
+    kind of file, and nothing is opened.
+    """
+    try:
+        _require_regular(os.stat(path).st_mode, path)
+    except FileNotFoundError:
+        if not flags & os.O_CREAT:
+            raise
+    descriptor = os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
+    try:
+        _require_regular(os.fstat(descriptor).st_mode, path)
+    except OSError:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def read_text(path: str | os.PathLike[str], encoding: str = "utf-8") -> str:
+    """Text of a regular file; raises OSError, UnicodeDecodeError."""
+    with open(path, encoding=encoding, opener=regular) as file:
+        return file.read()
+
+
+def file_kind(mode: int) -> str:
+    """Words for the kind of a file, of its ``st_mode``; empty for a regular file."""
+    return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "a special file")
+
+
+def _require_regular(mode: int, path: str | os.PathLike[str]) -> None:
+    if kind := file_kind(mode):
+        number = errno.EISDIR if stat.S_ISDIR(mode) else errno.EINVAL
+        raise OSError(number, f"it is {kind}, not a regular file", os.fspath(path))

@@ -1,0 +1,1 @@
+"""Logs of a bench while they are recorded."""

@@ -1,0 +1,144 @@
+"""A CAN bus in simulated time: arbitration by identifier, and frames that take their bit times."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from heapq import heappop, heappush
+from itertools import count
+from typing import Any
+
+from winchkit.sim.clock.simulated_clock import SimulatedClock
+from winchkit.sim.wire import Wire
+
+__all__ = ["SimulatedCanBus", "SimulatedCanPort"]
+
+_FRAME_BITS = 47
+"""Of a data frame of 11 bits without its data, interframe space included."""
+_STUFFED_BITS = 34
+"""Of these, the ones among which stuff bits are inserted."""
+_STUFF_SHARE = 0.1
+"""Of stuff bits in typical data; at most 0.25."""
+_ALL = range(0x800)
+
+
+class SimulatedCanBus:
+    """One bus with its simulated devices at one side and any number of ports at the other.
+
+    ``deliver`` takes frames to the devices. ``wire`` is between the two sides: what it loses or
+    delays is lost or delayed for all of the other side.
+    """
+
+    def __init__(
+        self,
+        clock: SimulatedClock,
+        wire: Wire,
+        bitrate: int,
+        deliver: Callable[[int, bytes], None],
+    ) -> None:
+        self.ports: list[SimulatedCanPort] = []
+        self.wire = wire
+        self._clock, self._bitrate, self._deliver = clock, bitrate, deliver
+        self._pending: list[tuple[int, int, bytes, SimulatedCanPort | None]] = []
+        self._order = count()
+        self._busy = False
+
+    def connect(self) -> SimulatedCanPort:
+        """A new port at the host's side."""
+        port = SimulatedCanPort(self, self._clock)
+        self.ports.append(port)
+        return port
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Send a frame from a device."""
+        self.transmit(identifier, data, None)
+
+    def inject(self, identifier: int, data: bytes) -> None:
+        """Send a frame from a stranger at the host's side: host and devices hear it."""
+        self.transmit(identifier, data, SimulatedCanPort(self, self._clock))
+
+    def transmit(self, identifier: int, data: bytes, sender: SimulatedCanPort | None) -> None:
+        """Queue a frame for arbitration; ``sender`` is the port, None a device."""
+        heappush(self._pending, (identifier, next(self._order), data, sender))
+        if not self._busy:
+            self._begin()
+
+    def tick(self) -> None:
+        """Deliver the frames that the wire has delayed until now."""
+        while (late := self.wire.due(from_drive=True)) is not None:
+            self._to_ports(*late, None)
+        while (late := self.wire.due(from_drive=False)) is not None:
+            self._deliver(*late)
+
+    def _begin(self) -> None:
+        """Put the frame of the highest priority on the bus."""
+        identifier, _, data, sender = heappop(self._pending)
+        self._busy = True
+        bits = _FRAME_BITS + 8 * len(data)
+        bits += int(_STUFF_SHARE * (_STUFFED_BITS + 8 * len(data)))
+        end = self._clock.now() + bits / self._bitrate
+        self._clock.call_at(end, lambda: self._end(identifier, data, sender))
+
+    def _end(self, identifier: int, data: bytes, sender: SimulatedCanPort | None) -> None:
+        self._busy = False
+        if self._pending:
+            self._begin()
+        through = self.wire.carry(identifier, data, from_drive=sender is None)
+        if sender is not None:
+            self._to_ports(identifier, data, sender)
+        if not through:
+            return
+        if sender is None:
+            self._to_ports(identifier, data, None)
+        else:
+            self._deliver(identifier, data)
+
+    def _to_ports(self, identifier: int, data: bytes, sender: SimulatedCanPort | None) -> None:
+        for port in self.ports:
+            if port is not sender:
+                port.take(identifier, data)
+
+
+class SimulatedCanPort:
+    """A port of the host; also what the canopen library needs of a python-can bus."""
+
+    def __init__(self, bus: SimulatedCanBus, clock: SimulatedClock) -> None:
+        self._bus, self._clock = bus, clock
+        self._received: deque[tuple[int, bytes]] = deque()
+        self._arrived = clock.event()
+        self.refusal: OSError | None = None
+        """What sending and receiving raise, e.g. of an adapter that was pulled out."""
+
+    def take(self, identifier: int, data: bytes) -> None:
+        """A frame has arrived."""
+        self._received.append((identifier, data))
+        self._arrived.set()
+
+    def receive(self, timeout: float) -> tuple[int, bytes] | None:
+        """Next frame, waiting at most ``timeout`` s; raises OSError."""
+        if not self._received:
+            self._arrived.clear()
+            self._arrived.wait(timeout)
+        self._check()
+        return self._received.popleft() if self._received else None
+
+    def transmit(self, identifier: int, data: bytes) -> None:
+        """Send a frame; raises OSError."""
+        self._check()
+        self._bus.transmit(identifier, data, self)
+
+    def send(self, message: Any, timeout: float | None = None) -> None:
+        """Send a message of python-can; raises OSError."""
+        if message.is_remote_frame:
+            raise OSError("simulated drives are not guarded: their bus carries no remote frames")
+        self.transmit(message.arbitration_id, bytes(message.data))
+
+    def close(self) -> None:
+        """Let the port go."""
+        if self in self._bus.ports:
+            self._bus.ports.remove(self)
+        self._arrived.set()
+
+    def _check(self) -> None:
+        if self.refusal is not None:
+            raise self.refusal

@@ -1,0 +1,130 @@
+"""A serial line in simulated time: instruments at one end, a port like pyserial's at the other."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+
+from winchkit.sim.clock.simulated_clock import SimulatedClock
+from winchkit.sim.stream_instrument import StreamInstrument
+
+__all__ = ["SimulatedSerialLine"]
+
+_TICK = 2e-3
+_TIMEOUT = 0.1
+"""Of a read without bytes, s."""
+
+
+class SimulatedSerialLine:
+    """One line with its instruments, reached at :attr:`port` through the clock."""
+
+    def __init__(
+        self,
+        instruments: Sequence[StreamInstrument],
+        up_to_date: Callable[[], AbstractContextManager[None]],
+        clock: SimulatedClock,
+    ) -> None:
+        self.port = f"simulated-{os.urandom(4).hex()}"
+        self._instruments, self._up_to_date = tuple(instruments), up_to_date
+        self._clock = clock
+        self._end: _SerialEnd | None = None
+        self._plugged, self._stopped = True, False
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self._clock.serve_serial(self.port, self._connect)
+        self._tick()
+
+    def stop(self) -> None:
+        """Take the port away."""
+        self._stopped = True
+        self._unplug()
+
+    def write(self, data: bytes) -> None:
+        """Take bytes from the host."""
+        self._serve(data)
+
+    def _connect(self) -> _SerialEnd:
+        if not self._plugged:
+            raise FileNotFoundError(2, "the simulated adapter is unplugged", self.port)
+        self._end = _SerialEnd(self, self._clock)
+        return self._end
+
+    def _unplug(self) -> None:
+        self._plugged = False
+        if self._end is not None:
+            self._end.lose()
+            self._end = None
+
+    def _tick(self) -> None:
+        if self._stopped:
+            return
+        for instrument in self._instruments:
+            if "unplug" in instrument.faults:
+                instrument.faults.discard("unplug")
+                self._unplug()
+            if "replug" in instrument.faults:
+                instrument.faults.discard("replug")
+                self._plugged = True
+        self._serve(b"")
+        self._clock.call_at(self._clock.now() + _TICK, self._tick)
+
+    def _serve(self, received: bytes) -> None:
+        """Let the instruments hear what came, and send what they have to say by now."""
+        said = b""
+        with self._up_to_date():
+            now = self._clock.now()
+            for instrument in self._instruments:
+                if received:
+                    instrument.receive(received, now)
+                said += instrument.take_output(now)
+        if said and self._end is not None:
+            self._end.take(said)
+
+
+class _SerialEnd:
+    """What is used of ``serial.Serial``."""
+
+    def __init__(self, line: SimulatedSerialLine, clock: SimulatedClock) -> None:
+        self._line, self._arrived = line, clock.event()
+        self._bytes = b""
+        self._lost = False
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that have arrived."""
+        return len(self._bytes)
+
+    def read(self, size: int = 1) -> bytes:
+        """At most ``size`` bytes, waiting a tenth of a second for the first; raises OSError."""
+        if not self._bytes and not self._lost:
+            self._arrived.clear()
+            self._arrived.wait(_TIMEOUT)
+        self._check()
+        data, self._bytes = self._bytes[:size], self._bytes[size:]
+        return data
+
+    def write(self, data: bytes) -> int:
+        """Send bytes; raises OSError."""
+        self._check()
+        self._line.write(data)
+        return len(data)
+
+    def close(self) -> None:
+        """Let the port go."""
+        self._lost = True
+        self._arrived.set()
+
+    def take(self, data: bytes) -> None:
+        """Bytes have arrived."""
+        self._bytes += data
+        self._arrived.set()
+
+    def lose(self) -> None:
+        """The adapter is unplugged."""
+        self.close()
+
+    def _check(self) -> None:
+        if self._lost:
+            raise OSError(5, "the simulated adapter is unplugged")
