@@ -53,7 +53,9 @@ class Served:
         self.device, self.force, self.noise, self.serial = device, force, noise, serial
         self._random, self._lock = Random(3), threading.Lock()
         spec = spec_of(device)
-        self.cell = ModbusInstrument(spec, in_unit_of(spec, self._measure), now=time.monotonic())
+        # Switched on before anybody asks: its first conversion is through its filter.
+        on = time.monotonic() - 1.0
+        self.cell = ModbusInstrument(spec, in_unit_of(spec, self._measure), now=on)
         self.line = ModbusLine({1: self.cell}, self._up_to_date, serial=serial)
 
     def __enter__(self) -> Served:
