@@ -9,7 +9,7 @@ from pathlib import Path
 from winchkit.bench.bench import Bench
 from winchkit.bench.recorder import Recorder
 from winchkit.bench.winch import Winch
-from winchkit.errors import MotionError, RunError, UsageError
+from winchkit.errors import RunError, UsageError
 from winchkit.schema.programme import Programme, Step
 
 __all__ = ["Ask", "Progress", "earlier_runs", "run_programme"]
@@ -18,9 +18,6 @@ Ask = Callable[[Step], None]
 """Asks the operator to do something; returns when it is done, raises when it is refused."""
 Progress = Callable[[int, int, Step], None]
 """Told the repeat, the step's number and the step before it is executed."""
-
-Again = Callable[[MotionError], bool]
-"""Told what stopped a run; says whether to reset the bench and try the run once more."""
 
 _LEAD = 0.1
 """Logged at rest before the first and after the last motion of a run, s."""
@@ -34,7 +31,6 @@ def run_programme(
     *,
     suffix: str = ".csv",
     progress: Progress = lambda _repeat, _number, _step: None,
-    again: Again = lambda _error: False,
     replace: bool = False,
 ) -> list[Path]:
     """Run every step of every repeat; returns the files written, in order.
@@ -43,9 +39,8 @@ def run_programme(
     are ``<programme>-<load>kg-<repeat>.csv``, without the load where none is known. A
     question about a load that this programme has hung already is not asked again. At a question
     the winches are disabled. Raises whatever stops a motion, and what was logged until then is
-    kept, unless ``again`` says to try that run once more: then the bench is reset, its file
-    dropped, and the winches go back to where the run began. Earlier runs of a programme of this
-    name are written over with ``replace`` only; without it they raise UsageError before any motion.
+    kept: a reset and a new command are the caller's. Earlier runs of a programme of this name are
+    written over with ``replace`` only; without it they raise UsageError before any motion.
     """
     if not replace and (held := earlier_runs(programme, folder, suffix)):
         earlier = f"{held[0]} holds an earlier run of '{programme.name}'"
@@ -56,7 +51,7 @@ def run_programme(
     try:
         for repeat in range(1, programme.repeat + 1):
             for part in _parts(numbered):
-                execution.run(repeat, part, progress, again)
+                execution.run(repeat, part, progress)
     finally:
         execution.abandon()
     return execution.written
@@ -114,28 +109,14 @@ class _Execution:
         self._hanging = None if asks else _declared_load(bench)
         self._warm: float | None = None
 
-    def run(
-        self, repeat: int, part: list[tuple[int, Step]], progress: Progress, again: Again
-    ) -> None:
-        """Ask what there is to ask, then log the motions, as often as it takes."""
-        begun: dict[str, float] = {}
-        while True:
-            try:
-                for number, step in part:
-                    if step.ask is not None and begun:
-                        continue
-                    if step.ask is None and not begun:
-                        self.approach()
-                        begun = {n: w.cable_length for n, w in self._bench.winch.items()}
-                    progress(repeat, number, step)
-                    self.execute(repeat, step)
-                self.end_run()
-            except MotionError as error:
-                if not again(error):
-                    raise
-                self._go_back(begun)
-            else:
-                return
+    def run(self, repeat: int, part: list[tuple[int, Step]], progress: Progress) -> None:
+        """Ask what there is to ask, then log the motions."""
+        for number, step in part:
+            if step.ask is None:
+                self.approach()
+            progress(repeat, number, step)
+            self.execute(repeat, step)
+        self.end_run()
 
     def execute(self, repeat: int, step: Step) -> None:
         """One step; a motion starts the log of its run where none is open."""
@@ -147,15 +128,6 @@ class _Execution:
             self._hold(step.hold)
         else:
             self._move(step)
-
-    def _go_back(self, begun: dict[str, float]) -> None:
-        """Drop the disturbed run and go back to where it began."""
-        if self._recorder is not None:
-            self._finish()
-            self.written.pop().unlink()
-        self._bench.reset()
-        for name, length in begun.items():
-            self._bench.winch[name].move_to(length)
 
     def end_run(self) -> None:
         """Disable the winches and finish the file."""
