@@ -104,7 +104,7 @@ def test_a_held_key_refreshes_shortly_and_a_single_press_lasts() -> None:
     assert held.hold("up", 0.0) == 0.7
     assert held.hold("up", 0.5) == 0.2
     assert held.hold("up", 0.53) == 0.2
-    assert held.hold("up", 0.9) == 0.7, "let go in between"
+    assert held.hold("up", 0.9) == 0.7, "released in between"
     assert held.hold("down", 1.0) == 0.7, "another key"
 
 

@@ -1,4 +1,4 @@
-"""Who commands a winch: granted, refused by name, taken over, let go; on a clock of its own."""
+"""Who commands a winch: granted, refused by name, taken over, released; on a clock of its own."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_a_held_key_moves_nothing_when_the_other_client_leaves() -> None:
     assert rig.winches["A"].commander == ""
     for _ in range(20):
         rig.clock.sleep(0.1)
-        with pytest.raises(NotCommander, match="let go"):
+        with pytest.raises(NotCommander, match="release the jog"):
             rig.claim(SECOND)
     rig.clock.sleep(0.85)
     rig.claim(SECOND)

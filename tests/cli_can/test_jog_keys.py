@@ -1,4 +1,4 @@
-"""The keyboard of ``jog``: what each key, held, let go or pressed once, asks of the station."""
+"""The keyboard of ``jog``: what each key, held, released or pressed once, asks of the station."""
 
 from __future__ import annotations
 

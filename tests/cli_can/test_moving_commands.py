@@ -23,9 +23,18 @@ pytestmark = pytest.mark.realtime
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with served(tmp_path_factory.mktemp("moving"), "AB") as running:
-        yield running
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with served(tmp_path_factory.mktemp("moving"), "AB") as found:
+        yield found
+
+
+@pytest.fixture
+def bench(running: Served) -> Served:
+    """The served bench, without a trip that another test has left latched."""
+    if running.file.with_suffix(".trip.json").exists():
+        cleared = invoke("reset", "-b", running.file)
+        assert cleared.exit_code == 0, cleared.output
+    return running
 
 
 def length(bench: Served, winch: str = "A") -> float:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from event_timer_eds import with_event_timer
 from slave import Slave
 from slave.rig import Rig
 
@@ -102,19 +103,6 @@ class SlaveBench:
         return self.path.parent / "drive" / "device.toml"
 
 
-_EVENT_TIMER = """\
-[1400sub5]
-ParameterName=Event timer
-ObjectType=0x7
-DataType=0x0006
-AccessType=rw
-DefaultValue=0
-PDOMapping=0
-
-[1401]
-"""
-
-
 def write_bench(
     folder: Path, *, more: str = "", host_loss: str = "heartbeat", cycle: str = "10 ms"
 ) -> Path:
@@ -123,7 +111,7 @@ def write_bench(
     source = catalog.find("devices", "generic-cia402").parent
     shutil.copytree(source, drive, dirs_exist_ok=True)
     eds, device = drive / "generic-cia402.eds", drive / "device.toml"
-    eds.write_text(eds.read_text().replace("[1401]\n", _EVENT_TIMER))
+    eds.write_text(with_event_timer(eds.read_text()))
     device.write_text(
         device.read_text().replace("[servo]\n", f'[servo]\nhost_loss = "{host_loss}"\n')
     )

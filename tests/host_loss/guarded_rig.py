@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from event_timer_eds import with_event_timer
 from slave import Slave, State
 from slave.rig import Rig as World
 
@@ -30,19 +31,6 @@ from winchkit.sim.clock.simulated_clock import SimulatedClock
 HOST, HEARTBEAT, CYCLE = 127, 0.1, 0.005
 
 
-_EVENT_TIMER = """\
-[1400sub5]
-ParameterName=Event timer
-ObjectType=0x7
-DataType=0x0006
-AccessType=rw
-DefaultValue=0
-PDOMapping=0
-
-[1401]
-"""
-
-
 @cache
 def _generic() -> DeviceSpec:
     """The generic drive, whose RPDO 1 has the event timer of CiA 301 as well."""
@@ -51,9 +39,7 @@ def _generic() -> DeviceSpec:
     folder = Path(tempfile.mkdtemp(prefix="winchkit-eds-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     text = (Path(spec.path).parent / spec.servo.eds).read_text()
-    head, found, tail = text.partition("[1401]\n")
-    assert found
-    (folder / spec.servo.eds).write_text(head + _EVENT_TIMER + tail)
+    (folder / spec.servo.eds).write_text(with_event_timer(text))
     return dataclasses.replace(spec, path=str(folder / "device.toml"))
 
 

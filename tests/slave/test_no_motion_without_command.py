@@ -162,7 +162,7 @@ class NoMotionWithoutCommand(RuleBasedStateMachine):
     @precondition(lambda self: self.bench is not None)
     @rule()
     def bring_back(self) -> None:
-        """What an operator does after a trip: mend, let go, reset."""
+        """What an operator does after a trip: mend, release, reset."""
         self.mend()
         self._release_all()
         self.rig.wait(0.9)

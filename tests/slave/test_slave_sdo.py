@@ -68,18 +68,19 @@ def test_refused_and_delayed_replies() -> None:
 def test_pythons_canopen_reads_and_writes_it() -> None:
     channel = f"slave-{os.getpid()}-canopen"
     network = canopen.Network()
-    with SlavesOnBus([Slave.from_file(GENERIC, 3)], channel):
-        network.connect(interface="virtual", channel=channel)
-        try:
-            node = network.add_node(3, str(GENERIC))
+    network.connect(interface="virtual", channel=channel)
+    try:
+        node = network.add_node(3, str(GENERIC))
+        with SlavesOnBus([Slave.from_file(GENERIC, 3)], channel):
+            node.nmt.wait_for_bootup(5.0)  # before it a node answers no SDO
             node.sdo.RESPONSE_TIMEOUT = 5.0
             assert node.sdo[0x1000].raw == 0x00020192
             node.sdo[0x607A].raw = -12345
             assert node.sdo[0x607A].raw == -12345
             with pytest.raises(canopen.SdoAbortedError, match="0x06010002"):
                 node.sdo.download(0x6041, 0, b"\0\0")
-        finally:
-            network.disconnect()
+    finally:
+        network.disconnect()
 
 
 def test_files_with_faults_are_read(tmp_path: Path) -> None:

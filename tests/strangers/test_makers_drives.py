@@ -68,7 +68,7 @@ def checked(path: Path) -> tuple[int, str]:
 
 
 def moves(rig: Rig, text: str, dead: Callable[[Rig], None] | None = None) -> None:
-    """Jog for a while, let go; then move, and let the host die."""
+    """Jog for a while and release; then move, and let the host die."""
     slave = rig.slaves[0]
     with rig.opened(text) as bench:
         key = HeldKey(rig, bench, pay_out=0.05).press()
