@@ -61,7 +61,7 @@ def _show_table(bench: str, pause: float, end: float | None) -> None:
 
     from winchkit.bench.remote.reconnection import watch
 
-    with Live(Text("connecting"), console=Console(stderr=True), screen=False) as live:
+    with Live(Text("connecting\n"), console=Console(stderr=True), screen=False) as live:
 
         def show(station: Station) -> None:
             live.update(status_table(station.status()), refresh=True)
