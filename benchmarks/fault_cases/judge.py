@@ -125,7 +125,7 @@ def _judge_stop(record: Record, reference: tuple[float, float] | None) -> tuple[
 
 
 def _judge_release(record: Record) -> str:
-    """After the release, and after a dead-man that was let go, everything comes to rest."""
+    """After the release, and after a dead-man that was released, everything comes to rest."""
     moments = [record.released] if record.case.motion == "jog" else []
     moments += [onset for planned, onset in record.onsets if planned.kind == "released"]
     for moment in moments:

@@ -19,7 +19,7 @@ _WAYS = {"move": (-1.2, 0.65), "programme": (-0.15, 0.15)}
 
 
 class Operator:
-    """Moves every winch of a world until it lets go; what is refused is tried again at once."""
+    """Moves every winch of a world until it ends; what is refused is tried again at once."""
 
     def __init__(self, world: World, case: Case) -> None:
         """Begin."""

@@ -14,6 +14,7 @@ from winchkit.calibration.cell_file import read_points
 from winchkit.catalog import find, folder, names
 from winchkit.drivers.modbus.decoder import Decoder
 from winchkit.drivers.modbus.frames import AnswerGate, Framing, crc16
+from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.decoder import Meaning
 from winchkit.drivers.stream.parser import StreamParser
@@ -125,7 +126,7 @@ def gate_target(framing: Framing, request: bytes, answer: bytes) -> Target:
     """Whatever comes after a request: what is let through has the form of its answer."""
 
     def feed(data: bytes) -> None:
-        gate = AnswerGate(framing)
+        gate = AnswerGate() if framing == "rtu" else TcpAnswerGate()
         step = 1 + data[0] % 16 if data else 1
         for _ in range(2):
             gate.sent(request)

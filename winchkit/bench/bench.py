@@ -183,7 +183,7 @@ class Bench:
         self._run_down(others if self.spec.stop_together else names, wait=True)
 
     def stop_now(self, *, wait: bool = True) -> None:
-        """Quick-stop every winch. Whoever still holds a jog must let go before the next one."""
+        """Quick-stop every winch. A jog that is held must be released before the next one."""
         self._release.close(set(self.winch))
         self.stopped_by = self.commanders.actor.name
         with self.loop.ordering:
@@ -379,7 +379,7 @@ class Bench:
     def _stop_feeding(self, recorder: Recorder) -> None:
         if recorder in self._recorders:
             self._recorders.remove(recorder)
-            with suppress(ValueError):  # the loop has let go of one that failed
+            with suppress(ValueError):  # the loop has dropped one that failed
                 self.loop.samplers.remove(recorder.feed)
 
     def _come_to_rest(self) -> None:

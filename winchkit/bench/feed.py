@@ -99,7 +99,7 @@ class Feed:
                 instrument.listeners.remove(listener)
 
     def abandon(self) -> None:
-        """Stop listening and let go of what nobody will take."""
+        """Stop listening and drop what nobody will take."""
         self.close()
         self._snapshots.clear()
         for waiting in self._readings.values():

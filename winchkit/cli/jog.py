@@ -69,9 +69,9 @@ def command(
     """Move WINCH (the only one where there is one) by hand.
 
     --pay-out 0.1m/s --for 2s moves at a speed for a time, --wind-in 50mm by a length. Without
-    either, by the keyboard: hold the up arrow to wind in, the down arrow to pay out; letting go
-    stops it within 0.2 s (0.7 s after a first short press, since a keyboard repeats late). Key i:
-    inch mode, 1, 10 or 100 mm a tap; Space stops, q stops and quits. No emergency stop.
+    either, by the keyboard: hold the up arrow to wind in, the down arrow to pay out; releasing it
+    stops the winch within 0.2 s (0.7 s after a first short press, since a keyboard repeats late).
+    Key i: inch mode, 1, 10 or 100 mm a tap; Space stops, q stops and quits. No emergency stop.
     """
     from winchkit.cli.dry_run import station_for
 

@@ -1,4 +1,4 @@
-"""Bounds beyond which a number in a file or on a command line is a slip of the pen, with reasons.
+"""Bounds beyond which a number in a file or on a command line is taken for a mistake, with reasons.
 
 A value beyond them is refused where it is read: ``winchkit check`` says so, and nothing opens.
 They are wide; what is possible but rarely meant is a warning (:func:`doubts`).

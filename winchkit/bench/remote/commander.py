@@ -118,7 +118,8 @@ class Commanders:
             if now - self._refused.get(key, -_RELEASE) < _RELEASE:
                 self._refused[key] = now
                 raise NotCommander(
-                    f"winch {winch} was commanded by another client; let go before moving it"
+                    f"winch {winch} was commanded by another client; release the jog before "
+                    "moving it"
                 )
             self._refused.pop(key, None)
 

@@ -83,7 +83,7 @@ class Cia402Axis:
             self._sdo_stop.hold(False)
 
     def _commission(self) -> Commissioned:
-        self.heartbeat.last = self.heartbeat.state = None
+        self.heartbeat.forget()
         await_booted(self._node, self.servo.boot_time, self._clock, self.heartbeat)
         # Only a boot-up after this one takes away what is set up now.
         self._boot_ups = self.heartbeat.boot_ups
@@ -170,7 +170,7 @@ class Cia402Axis:
 
     @property
     def alarm_text(self) -> str:
-        """They in words."""
+        """The emergency codes in force, in words."""
         return self.emergencies.standing
 
     def forget_alarms(self) -> None:

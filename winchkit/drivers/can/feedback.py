@@ -131,7 +131,6 @@ class Gathering:
         mapped = [*each, *(key for codec in slower for key in codec.position)]
         lacking = [key for key in _WITHOUT if key not in mapped]
         self._lacking = tuple(_WITHOUT[key] for key in lacking)
-        self._has_others = bool(slower or lacking)
         objects = [*mapped, *lacking]
         # A quantity that no TPDO carries is any number times NaN.
         self._pick = itemgetter(*(objects.index(key) if key in objects else 0 for key in _SHOWN))
@@ -188,8 +187,7 @@ class Gathering:
             if following:
                 return
             values = unpack(b"".join(frames))
-            if self._has_others:
-                values += self._others(now)
+            values += self._others(now) if self._slower else self._lacking
             status, position, velocity, force, mode, error, amperes = pick(values)
             delay, sent = self._came - self._sent, self._sent
             time = sent + delay / 2 if 0 <= delay < cycle else sent
@@ -295,7 +293,7 @@ class _Slower:
         return True
 
     def values(self, now: float) -> tuple[Any, ...]:
-        """They, or that they are unknown."""
+        """The newest values, or unknown ones once those are too old."""
         return self._values if now <= self._expires else self._unknown
 
 

@@ -40,6 +40,10 @@ class HeartbeatWatch:
         if self.state == NmtState.BOOT_UP:
             self.boot_ups += 1
 
+    def forget(self) -> None:
+        """Count nothing that was received so far."""
+        self.last = self.state = None
+
     def age(self, now: float) -> float | None:
         """Seconds since the last heartbeat; None before the first."""
         return None if self.last is None else now - self.last

@@ -154,7 +154,7 @@ class _Ear:
         """Take an SDO reply, and hand it on to whoever asked."""
         self.replies[bytes(data[1:4])] += 1
         if len(data) == _SDO_SIZE:
-            self.bus.network.notify(_SDO_REPLY + self.node, bytearray(data), now)
+            self.bus.pass_on(_SDO_REPLY + self.node, data, now)
 
 
 def _reported(ear: _Ear) -> Found:

@@ -123,6 +123,7 @@ def describe(dictionary: Any) -> DriveDescription:
     modes = tuple(_modes(dictionary))
     receive, transmit = (tuple(_pdos(dictionary, first)) for first in (_RPDO, _TPDO))
     targets = {MODES[mode].target for mode in modes} - {None}
+    ways = host_loss_ways(dictionary)
     return DriveDescription(
         maker=info.vendor_name or "",
         product=info.product_name or "",
@@ -136,9 +137,9 @@ def describe(dictionary: Any) -> DriveDescription:
         targets=_carried(dictionary, [(0x6040, 0), *sorted(filter(None, targets))], receive=True),
         receive=receive,
         transmit=transmit,
-        host_loss=host_loss_ways(dictionary),
+        host_loss=ways,
         options=tuple(_options(dictionary)),
-        obstacles=tuple(_obstacles(dictionary, modes, receive, transmit)),
+        obstacles=tuple(_obstacles(dictionary, modes, receive, transmit, ways)),
         differences=tuple(_differences(dictionary, receive, transmit)),
     )
 
@@ -231,6 +232,7 @@ def _obstacles(
     modes: tuple[str, ...],
     receive: tuple[PdoEntry, ...],
     transmit: tuple[PdoEntry, ...],
+    ways: tuple[HostLoss, ...],
 ) -> Iterator[str]:
     if _profile(dictionary) not in (None, 402):
         yield f"it is no servo drive: 1000h says device profile {_profile(dictionary)}, not 402"
@@ -246,7 +248,7 @@ def _obstacles(
     for kind, entries in (("receive", receive), ("transmit", transmit)):
         if not any(entry.number <= 4 for entry in entries):
             yield f"the EDS declares no {kind} PDO (1 to 4)"
-    if not host_loss_ways(dictionary):
+    if not ways:
         yield (
             "the EDS has no way to notice a dead host (1016h, 100Ch with 100Dh, 1400h:5, 1006h); "
             "a maker's own, or the hardware that stops the drive, is to be declared as host_loss"

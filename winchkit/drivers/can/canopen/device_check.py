@@ -16,6 +16,7 @@ from winchkit.drivers.can.pdo import parse_object
 from winchkit.errors import Fault, FileError
 from winchkit.schema.device import DeviceSpec
 from winchkit.schema.device_servo import PdoSpec, ServoSpec
+from winchkit.schema.host_loss import HARDWARE, VENDOR
 from winchkit.schema.read_source import open_source
 
 __all__ = ["EdsReport", "check_drive", "host_loss_problem"]
@@ -97,7 +98,7 @@ def host_loss_problem(ways: tuple[HostLoss, ...], way: str) -> str:
     A maker's own way (``vendor:``) and hardware that stops the drive are not in an EDS.
     """
     names = [one.way for one in ways]
-    if way in names or way == "hardware" or way.startswith("vendor:"):
+    if way in names or way == HARDWARE or way.startswith(VENDOR):
         return ""
     if not names:
         return (

@@ -19,7 +19,6 @@ from winchkit.drivers.clock import Clock
 __all__ = [
     "HEARTBEAT_LOST",
     "LIFE_SIGNS",
-    "Hardware",
     "Heartbeat",
     "Mechanism",
     "Silence",
@@ -63,7 +62,7 @@ class Terms:
 
 
 class Mechanism:
-    """The base of all: nothing is watched."""
+    """The base of all, and what is used where hardware beside the drive stops the winch."""
 
     name = "hardware"
     silence = Silence.NOTHING
@@ -113,10 +112,6 @@ class Mechanism:
             if number:
                 self.clock.sleep(every)
             life_sign()
-
-
-class Hardware(Mechanism):
-    """No object of the drive: hardware beside it stops the winch, and the bench file names it."""
 
 
 class Heartbeat(Mechanism):

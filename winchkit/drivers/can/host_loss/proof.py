@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from winchkit.drivers.can.cia402 import DISABLE_VOLTAGE, FAULT_RESET, State, state_of
 from winchkit.drivers.can.emergency import Emergency
@@ -68,7 +68,7 @@ def prove(
     watch: HeartbeatWatch,
     emergencies: Collection[Emergency],
 ) -> Proof:
-    """Fall silent towards a disabled, operational drive until it complains.
+    """Withhold the life signs from a disabled, operational drive until it reports their absence.
 
     What the drive did is undone: it is disabled, and started again by the caller. Raises
     NotPermitted where it does not notice though it should, NoReply, DeviceRefused.
@@ -87,7 +87,7 @@ def prove(
         mechanism.restore()
     state = state_of(node.read(0x6041))
     if clears and state in _FAULTS:
-        proof = _with_fault(proof)
+        proof = replace(proof, fault=True, noticed=True)
     bring_back(node, mechanism.clock, clears=clears)
     if not proof.noticed and mechanism.noticed_disabled:
         raise NotPermitted(_unnoticed(mechanism, proof))
@@ -168,10 +168,6 @@ def _shows_fault(node: SdoNode) -> bool:
         return state_of(node.read(0x6041)) in _FAULTS
     except NoReply:
         return False
-
-
-def _with_fault(proof: Proof) -> Proof:
-    return Proof(proof.emergency, proof.nmt, proof.delay, proof.limit, True, True)
 
 
 def _unnoticed(mechanism: Mechanism, proof: Proof) -> str:

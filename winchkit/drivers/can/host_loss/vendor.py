@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from winchkit.drivers.can.heartbeat import NmtState
 from winchkit.drivers.can.host_loss.cyclic import RpdoTimeout
-from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
+from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, Mechanism, Silence
 from winchkit.drivers.can.pdo import parse_object
 from winchkit.schema.host_loss import VENDOR, VendorObject, VendorWatchdog
 
@@ -42,7 +42,8 @@ class VendorWatch(RpdoTimeout):
         bus, silence = self.node.bus, self.silence
         bus.sync_held = silence in (Silence.SYNC, Silence.ALL)
         bus.heartbeat_held = silence in (Silence.HEARTBEAT, Silence.ALL)
-        self._give(self._life_sign, self.terms.cycle, max(3, round(self.limit / self.terms.cycle)))
+        cycle = self.terms.cycle
+        self._give(self._life_sign, cycle, max(LIFE_SIGNS, round(self.limit / cycle)))
         return self.limit
 
     def release(self) -> None:

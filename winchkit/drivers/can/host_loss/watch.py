@@ -9,7 +9,7 @@ from winchkit.drivers.can.emergency import Emergency
 from winchkit.drivers.can.heartbeat import HeartbeatProducer, HeartbeatWatch, NmtState
 from winchkit.drivers.can.host_loss.cyclic import RpdoTimeout, SyncLoss
 from winchkit.drivers.can.host_loss.guarding import Guarding, GuardingWatch
-from winchkit.drivers.can.host_loss.mechanism import Hardware, Heartbeat, Mechanism, Silence, Terms
+from winchkit.drivers.can.host_loss.mechanism import Heartbeat, Mechanism, Silence, Terms
 from winchkit.drivers.can.host_loss.proof import HostLoss, Proof, bring_back, prove, reaction
 from winchkit.drivers.can.host_loss.vendor import VendorWatch
 from winchkit.drivers.can.node import SdoNode
@@ -78,7 +78,7 @@ class HostWatch:
         if self.mechanism.silence is Silence.NOTHING:
             return None
         proof = prove(self.mechanism, self.heartbeat, emergencies)
-        self.heartbeat.last = self.heartbeat.state = None
+        self.heartbeat.forget()
         self.await_operational()
         return proof
 
@@ -99,7 +99,7 @@ class HostWatch:
     def settle(self) -> None:
         """Undo what the drive did when another's proof made the host fall silent."""
         bring_back(self._node, self._clock, clears=True)
-        self.heartbeat.last = self.heartbeat.state = None
+        self.heartbeat.forget()
         self.await_operational()
         self.arm()
 
@@ -157,7 +157,7 @@ class HostWatch:
     def _chosen(self) -> Mechanism:
         node, terms, clock, servo = self._node, self._terms, self._clock, self._servo
         if self.hardware:
-            return Hardware(node, terms, clock)
+            return Mechanism(node, terms, clock)
         if servo.host_loss.startswith(VENDOR):
             name = servo.host_loss.removeprefix(VENDOR)
             vendor = VendorWatch(node, terms, clock, codecs(node, servo.rpdo), servo.motion_mode)
