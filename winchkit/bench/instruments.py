@@ -32,6 +32,7 @@ __all__ = [
     "calibration_of",
     "can_buses",
     "device_of",
+    "eds_of",
     "instruments",
     "refs_of",
     "tares_of",
@@ -59,6 +60,12 @@ def device_of(spec: BenchSpec, ref: DeviceRef) -> DeviceSpec:
     from winchkit.schema.read import read_device
 
     return read_device(catalog.find("devices", ref.device, spec.path or None))
+
+
+def eds_of(device: DeviceSpec) -> Path:
+    """EDS file of a servo's device file."""
+    assert device.servo is not None, "the reader has checked it"
+    return Path(device.path).parent / device.servo.eds
 
 
 def calibration_of(spec: BenchSpec, ref: DeviceRef) -> CellCalibration | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.bench.client import RemoteStation, attach
-from winchkit.bench.instruments import device_of
+from winchkit.bench.instruments import device_of, eds_of
 from winchkit.bench.remote.commander import client_name
 from winchkit.bench.remote.handover import own
 from winchkit.drivers.can.bus import CanBus
@@ -162,12 +162,6 @@ def free_bus(spec: BenchSpec, clock: Clock | None = None) -> Iterator[CanBus]:
         )
     with _owning(spec), _open(spec, names[0], clock or MonotonicClock()) as bus:
         yield bus
-
-
-def eds_of(device: DeviceSpec) -> Path:
-    """EDS file of a servo's device file."""
-    assert device.servo is not None, "the reader has checked it"
-    return Path(device.path).parent / device.servo.eds
 
 
 class _RemotePort:

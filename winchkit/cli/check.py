@@ -16,7 +16,6 @@ from winchkit.errors import Fault, FileError, one_line
 
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
-    from winchkit.schema.read import Declared
 
 __all__ = ["command"]
 
@@ -135,6 +134,7 @@ def _declaration(file: str, effects: Sequence[str]) -> Verdict:
     from winchkit.schema.read import load
 
     declaration = load(file)
+    bench = bench_of(declaration.value)
     drives = report_of(declaration.value)
     robot_faults, robot_warnings = of_robots(file, declaration.value)
     effect_faults, effect_warnings = of_effects(file, declaration.value, effects)
@@ -142,41 +142,31 @@ def _declaration(file: str, effects: Sequence[str]) -> Verdict:
     warnings = (
         *declaration.warnings,
         *effect_warnings,
-        *_doubts(file, declaration.value),
+        *_doubts(file, bench),
         *warnings_of_drums(file, declaration.value),
         *drives.warnings,
         *robot_warnings,
     )
-    said, bench = stroke_of(declaration.value), bench_of(declaration.value)
     return Verdict(
         file,
         declaration.kind,
         declaration.value.name,
-        said,
+        stroke_of(declaration.value),
         faults,
         warnings,
         details=(*drives.details, *(() if bench is None else refusals(bench))),
     )
 
 
-def _doubts(file: str, value: Declared) -> list[Fault]:
+def _doubts(file: str, bench: BenchSpec | None) -> list[Fault]:
     """Limits of a bench that are possible and rarely meant."""
     from winchkit.schema.plausible import doubts
     from winchkit.schema.read_source import open_source
-    from winchkit.schema.simbench import SimBench
 
-    bench = value.bench if isinstance(value, SimBench) else _bench(value)
     if bench is None or not (found := list(doubts(bench))):
         return []
     source = open_source(file)
     return [source.fault(key, message) for key, message in found]
-
-
-def _bench(value: Declared) -> BenchSpec | None:
-    """The bench of a bench file; None for any other declaration."""
-    from winchkit.schema.bench import BenchSpec
-
-    return value if isinstance(value, BenchSpec) else None
 
 
 def _show(verdict: Verdict) -> None:

@@ -29,18 +29,20 @@ class Directed:
     @property
     def change(self) -> float:
         """Change of the cable length, m; raises UsageError for a speed."""
-        return self._signed("length", "mm") if self.pays_out else -self._signed("length", "mm")
+        length = self._magnitude("length", "50mm")
+        return length if self.pays_out else -length
 
     @property
     def winding_speed(self) -> float:
         """Speed (m/s), positive winding in; raises UsageError for a length."""
-        return -self._signed("speed", "m/s") if self.pays_out else self._signed("speed", "m/s")
+        speed = self._magnitude("speed", "0.1m/s")
+        return -speed if self.pays_out else speed
 
-    def _signed(self, wanted: str, unit: str) -> float:
+    def _magnitude(self, wanted: str, example: str) -> float:
         if self.dimension != wanted:
             raise UsageError(
                 f"{self.option} is a {self.dimension} here and must be a {wanted}, such as "
-                f"{self.option} {'50' if wanted == 'length' else '0.1'}{unit}"
+                f"{self.option} {example}"
             )
         return self.value
 

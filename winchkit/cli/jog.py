@@ -124,10 +124,8 @@ def _read(
         if speed is not None:
             raise UsageError(f"--speed does not belong to --for: {_HOW}")
         _ = direction.winding_speed
-    elif direction is not None:
-        if direction.dimension == "speed":
-            raise UsageError(f"for how long? {direction.option} SPEED needs --for TIME: {_HOW}")
-        _ = direction.change
+    elif direction is not None and direction.dimension == "speed":
+        raise UsageError(f"for how long? {direction.option} SPEED needs --for TIME: {_HOW}")
     return _Asked(direction, limit, magnitude("--speed", speed or _SPEED, "speed"))
 
 

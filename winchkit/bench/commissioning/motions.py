@@ -46,11 +46,6 @@ class Motions:
         self.cell_noise = 0.0
         """Five standard deviations of the last tension, N."""
 
-    @property
-    def pays_out_first(self) -> bool:
-        """Whether the limits leave room for paying out a step."""
-        return self.has_room(self.step)
-
     def has_room(self, change: float) -> bool:
         """Whether the length limits allow this change (m, positive pays out)."""
         limits = self._winch.wiring.limits.length

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 from winchkit import __version__
 from winchkit.bench.bench import Bench
@@ -29,7 +28,7 @@ from winchkit.bench.commissioning.record import (
 )
 from winchkit.bench.commissioning.trial import Trial, Trials
 from winchkit.bench.commissioning.validity import drive_record
-from winchkit.bench.instruments import device_of
+from winchkit.bench.instruments import device_of, eds_of
 from winchkit.bench.remote.commander import client_name
 from winchkit.bench.remote.handover import own
 from winchkit.drivers.clock import Clock
@@ -151,11 +150,10 @@ class _Steps:
     def record(self) -> WinchRecord:
         """What stands in the record."""
         device = device_of(self._spec, self._wiring.servo)
-        assert device.servo is not None, "the reader has checked it"
         return WinchRecord(
             drive=self._drive,
             device=hash_of(device.path),
-            eds=hash_of(Path(device.path).parent / device.servo.eds),
+            eds=hash_of(eds_of(device)),
             host_loss=self._host_loss,
             stops_on_nmt=self._stops_on_nmt,
             confirmed=tuple(self._confirmed),
@@ -224,8 +222,8 @@ class _Steps:
         self._note("NMT stopped", text, "measured", after=seen.after)
 
     def _direction(self, motions: Motions) -> None:
-        pays_out = motions.pays_out_first
         step = motions.step
+        pays_out = motions.has_room(step)
         verb = "pay out" if pays_out else "wind in"
         go = f"winch {self._name}: it will {verb} {_mm(step)} of cable. Begin?"
         confirm(self._dialogue, f"{self._name}.direction_go", go)

@@ -115,7 +115,7 @@ class Trials:
             start = self._clock.now()
             axis.stop_by_nmt()
             self._run(axis, 0.0, _NMT_TIME, name)
-            # Only a state with SDO can be asked; RPDOs are not heard in it.
+            # Only a state with SDO can be asked; RPDOs are not processed in it.
             axis.objects.bus.nmt(_PRE_OPERATIONAL, axis.objects.node)
             state = state_of(axis.objects.read(0x6041))
             after = self._clock.now() - start

@@ -14,7 +14,7 @@ from winchkit.bench.commissioning.record import (
     hash_of,
     read_record,
 )
-from winchkit.bench.instruments import device_of
+from winchkit.bench.instruments import device_of, eds_of
 from winchkit.drivers.can.axis import Cia402Axis
 from winchkit.drivers.can.objects import Objects
 from winchkit.drivers.can.scan import identity_of
@@ -148,7 +148,7 @@ def _stale_winch(
     device = device_of(spec, wiring.servo)
     yield from _changed(f"winch {name}: the device file", known.device, device.path)
     if device.servo is not None:
-        eds = Path(device.path).parent / device.servo.eds
+        eds = eds_of(device)
         yield from _changed(f"winch {name}: the EDS", known.eds, eds)
         yield from _other_mechanism(name, wiring, device.servo.host_loss, known)
     for item in items_of(wiring):

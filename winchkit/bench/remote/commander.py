@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -24,8 +24,8 @@ from winchkit.errors import MotionError, NotPermitted
 __all__ = ["Client", "Commanded", "Commanders", "NotCommander", "client_name"]
 
 _RELEASE = FIRST_PRESS + 0.1
-"""A refused client is heard again once it has ordered nothing for so long, s: longer than the
-pause before a held key repeats."""
+"""A refused client may command again once it has ordered nothing for this time, s: longer than
+the pause before a held key repeats."""
 
 
 class NotCommander(NotPermitted):
@@ -44,7 +44,7 @@ class Client:
     """Somebody who orders motion; two clients of one name are still two."""
 
     name: str
-    observer: bool = field(default=False)
+    observer: bool = False
     """Whether it only looks on, as ``monitor`` and ``log`` do."""
 
 
@@ -154,7 +154,7 @@ class Commanders:
                 self._winches[winch].commander = ""
 
     def leave(self, client: Client) -> None:
-        """Forget a client, and let the winches go that it commands."""
+        """Forget a client, and release the winches that it commands."""
         with self._lock, self.acting(client):
             for winch in self.held_by(client):
                 self.release(winch)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["Spawned", "can_spawn", "main", "spawn"]
 
 LINGER = 3.0
-"""The process ends this long after its last client has left, or the first one has not come, s."""
+"""The process ends this long after its last client has left, s."""
 _FIRST = 10.0
 """For the first client, which waits for the opening, s."""
 _POLL = 0.02
@@ -126,16 +126,12 @@ def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:
 
 def _serve(bench: Bench) -> None:
     """Wait until nobody needs the bench any more; raises what ended the control loop."""
-    begun = left = time.monotonic()
-    seen = False
+    left, patience = time.monotonic(), _FIRST
     while not bench.stations.handed_to and bench.loop.alive:
         now = time.monotonic()
         if bench.stations.clients:
-            seen, left = True, now
-        elif (
-            now - (left if seen else begun) > (LINGER if seen else _FIRST)
-            and bench.stations.close_door()
-        ):
+            left, patience = now, LINGER
+        elif now - left > patience and bench.stations.close_door():
             return
         time.sleep(_POLL)
 
