@@ -21,7 +21,7 @@ from time import perf_counter
 import numpy as np
 
 from winchkit.estimation import PLAIN, DahlEstimator, Kernels, PulleyGroup, compiled
-from winchkit.estimation.batch import dahl_batch
+from winchkit.estimation.dahl_batch import dahl_batch
 from winchkit.model.friction import dahl, dahl_step
 
 GROUP = PulleyGroup(

@@ -26,18 +26,17 @@ sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np
 from campaign.truth import Situation, show
 from campaign.winch import Winch, turns_for, write_profile
-from numpy.typing import NDArray
 from scipy.signal import oaconvolve
 
+from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import diagnose
-from winchkit.diagnosis.each import diagnose_each
-from winchkit.diagnosis.result import Diagnosis
+from winchkit.diagnosis.fleet.diagnose import diagnose_each
+from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects import load_catalogue
 from winchkit.runs import read_run
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.read import read_winch
 
-Array = NDArray[np.float64]
 RATE = 1000.0
 WINCH = Winch("grooved", 0.06, 5e-3, 20.4, 1, 0.0, 6.0, 5.0, 1.5, 90.0, (90.0, 60.0), 0.0)
 NOISE = {

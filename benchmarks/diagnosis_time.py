@@ -20,9 +20,9 @@ from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.effects import load_catalogue
 from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme, Step
 from winchkit.schema.read import read_simbench
-from winchkit.schema.winch import WinchProfile
 from winchkit.sim.bench import hiding, profiles_of
 from winchkit.sim.record import record
 

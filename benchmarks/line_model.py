@@ -16,7 +16,7 @@ import numpy as np
 from winchkit.effects import Term, load_catalogue
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
-from winchkit.schema.winch import (
+from winchkit.schema.profiles.winch import (
     CableSpec,
     DrumSpec,
     GearboxSpec,

@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 
 from winchkit.estimation import DahlEstimator, PulleyGroup
-from winchkit.estimation.identify import Record, identify_dahl
+from winchkit.estimation.dahl_identification import Record, identify_dahl
 from winchkit.estimation.metrics import mean_relative_error, overshoot
 from winchkit.model.pulleys import Bearings, over_pulleys
 from winchkit.model.trajectory import plan
 from winchkit.sim.physics.pulley import PreslidingPulleys
-from winchkit.sim.state import State
+from winchkit.sim.physics.state import State
 
 Array = np.ndarray
 GRAVITY = 9.80665

@@ -71,7 +71,7 @@ class Stop:
 def owner(bench_file: str) -> None:
     """Jog until told otherwise: SIGUSR1 lets the control loop hang, SIGUSR2 ends the repeats."""
     from winchkit import open_bench
-    from winchkit.bench.snapshot import BenchSnapshot
+    from winchkit.bench.control.snapshot import BenchSnapshot
     from winchkit.errors import WinchkitError
 
     told: set[int] = set()

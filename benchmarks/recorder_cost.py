@@ -16,8 +16,8 @@ from pathlib import Path
 
 from recording.synthetic import SyntheticBench
 
-from winchkit.bench.recorder import Recorder
-from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.runs.read import read_log
 

@@ -25,11 +25,11 @@ from math import pi
 from pathlib import Path
 from statistics import median
 
-from winchkit.bench.owner import owner_process
+from winchkit.bench.ownership import owner_process
 from winchkit.catalog import find
 from winchkit.schema.read import read_bench, read_simbench
-from winchkit.sim.live import LiveBench
-from winchkit.sim.wire import Carried
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.buses import Carried
 
 JOG = [sys.executable, "-c", "from winchkit.cli import main; main()", "jog", "A"]
 SPEED = 0.2

@@ -31,7 +31,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from soak_devices import Wire, serve
 
 from winchkit.bench.bench import Bench, open_bench
-from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.drivers.clock import MonotonicClock
 
 _WINCHES = "ABCDEFGH"

@@ -13,8 +13,8 @@ from typing import Any
 
 from winchkit.catalog import find
 from winchkit.schema.read import read_device
-from winchkit.sim.modbus import ModbusLine
-from winchkit.sim.modbus_instrument import ModbusInstrument, in_unit_of
+from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of
+from winchkit.sim.instruments.modbus_line import ModbusLine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 

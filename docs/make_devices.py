@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from winchkit.catalog import find, names
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_quirks import QuirkSpec
-from winchkit.schema.device_servo import OptionSpec, PdoSpec, ServoSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.servo import OptionSpec, PdoSpec, QuirkSpec, ServoSpec
 from winchkit.schema.host_loss import VendorObject, VendorWatchdog
 from winchkit.schema.read import read_device
 

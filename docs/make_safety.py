@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from winchkit.bench.control.conditions import BENCH_CONDITIONS, CONDITIONS, Condition
+from winchkit.bench.control.snapshot import Direction
 from winchkit.bench.control.stop_escalation import STOP_TABLE
-from winchkit.bench.snapshot import Direction
 
 PAGE = Path(__file__).with_name("safety.md")
 _FORBIDS = {

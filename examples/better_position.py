@@ -16,14 +16,14 @@ import numpy as np
 
 from winchkit import open_bench
 from winchkit.catalog import find
-from winchkit.cli.add import write_addition
+from winchkit.cli.model.add import write_addition
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_programme, read_simbench, read_winch
 from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.record import record
 
 LENGTHS = (3.0, 1.0, 2.0)

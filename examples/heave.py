@@ -7,12 +7,12 @@ import math
 from pathlib import Path
 
 from winchkit import Bench, open_bench, read_run
-from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.catalog import find
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 
 PERIOD = 2.0
 """Of the waves, s."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from winchkit.sim.servo import DriveCommand
+from winchkit.sim.plant.servo import DriveCommand
 
 __all__ = ["INERTIA", "Flywheel"]
 

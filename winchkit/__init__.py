@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench, open_bench
-    from winchkit.bench.session import attach
+    from winchkit.bench.remote.session import attach
     from winchkit.runs import read_run
 
 __version__ = "0.1.0"
@@ -15,7 +15,7 @@ __all__ = ["Bench", "__version__", "attach", "open_bench", "read_run"]
 
 _HOME = {
     "Bench": "winchkit.bench.bench",
-    "attach": "winchkit.bench.session",
+    "attach": "winchkit.bench.remote.session",
     "open_bench": "winchkit.bench.bench",
     "read_run": "winchkit.runs",
 }

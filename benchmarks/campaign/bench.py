@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.motion import programme
 from campaign.sizes import Scene
 from campaign.truth import Situation
 from campaign.winch import Winch, draw_winch, turns_for
+from winchkit.arrays import Array
 
 __all__ = ["Bench", "draw_bench", "draw_beside"]
 
-Array = NDArray[np.float64]
 Random = np.random.Generator
 
 

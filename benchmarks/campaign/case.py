@@ -6,17 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.bench import Bench, draw_bench
 from campaign.record import record
 from campaign.sizes import CATALOGUE, OUTSIDE, Sized, allowed, draw
 from campaign.truth import OUTPUTS, Hidden, Shown, show
 from campaign.winch import write_profile
+from winchkit.arrays import Array
 
 __all__ = ["ATTEMPTS", "Case", "Plan", "draw_effects", "make_case", "size_effects"]
 
-Array = NDArray[np.float64]
 Random = np.random.Generator
 KINDS = {"none": 0, "single": 1, "pair": 2, "triple": 3, "norepeat": 1, "outside": 1}
 TOO_ALIKE = 0.9

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+
+from winchkit.arrays import Array
 
 __all__ = ["write_run"]
 
-Array = NDArray[np.float64]
 UNITS = {
     "time": "s",
     "motor_angle": "rad",

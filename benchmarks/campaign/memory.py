@@ -5,11 +5,10 @@ from __future__ import annotations
 from math import exp
 
 import numpy as np
-from numpy.typing import NDArray
+
+from winchkit.arrays import Array
 
 __all__ = ["dahl", "lag", "play", "stack"]
-
-Array = NDArray[np.float64]
 
 
 def play(x: Array, gap: float) -> Array:

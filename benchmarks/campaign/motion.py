@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from winchkit.arrays import Array
 
 __all__ = ["programme"]
-
-Array = NDArray[np.float64]
 
 
 def programme(

@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.bench import Bench
 from campaign.files import write_run
 from campaign.truth import OUTPUTS, Hidden, show
+from winchkit.arrays import Array
 
 __all__ = ["record", "record_several"]
 
-Array = NDArray[np.float64]
 Random = np.random.Generator
 _EDGE = 2
 

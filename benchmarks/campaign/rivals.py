@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.spectrum import Band, to_time
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.spectrum import Band, to_time
+from winchkit.diagnosis.selection.engine import Inquiry
 
 __all__ = ["RIVALS", "Regression", "regression_of"]
 
-Array = NDArray[np.float64]
 _LEVEL = 0.05
 _MOST = 15
 _FOLDS = 5

@@ -11,14 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.memory import dahl, lag, play, stack
 from campaign.winch import Winch
+from winchkit.arrays import Array
 
 __all__ = ["OUTPUTS", "Hidden", "Shown", "Situation", "show"]
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 Hidden = Mapping[str, Values]
 OUTPUTS = ("cable_length", "tension", "motor_torque")

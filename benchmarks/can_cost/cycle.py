@@ -21,22 +21,22 @@ from can_cost.far_drives import FarDrives
 from can_cost.probe import Probes
 from can_cost.wire import PairLibrary, VirtualWire
 from winchkit import catalog
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.controller import Controller
+from winchkit.bench.control.loop import ControlLoop, WinchParts
+from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.realtime import RealTime, RestCollector, acquire
-from winchkit.bench.controller import Controller
-from winchkit.bench.loop import ControlLoop, WinchParts
-from winchkit.bench.motion import Jog
-from winchkit.bench.rope import RopeMap
-from winchkit.bench.supervisor import Supervisor
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.commission import WatchSpec
-from winchkit.drivers.can.interface import _SocketCan
+from winchkit.bench.control.supervisor import Supervisor
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.bus.interface import _SocketCan
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.effects import line_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec, LimitSpec
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device, read_winch
 
 CYCLE, HEARTBEAT = 0.004, 0.05
@@ -150,7 +150,7 @@ class OtherProcess(FarDrives):
     def open(self, spec: BusSpec, clock: Clock) -> CanBus:
         """The bench's bus to them."""
         library = PairLibrary(self.end)
-        with patch("winchkit.drivers.can.bus.open_interface", lambda *_: _SocketCan(library)):
+        with patch("winchkit.drivers.can.bus.bus.open_interface", lambda *_: _SocketCan(library)):
             return CanBus(spec, spec.channel or "can", clock)
 
     def run(self) -> None:

@@ -12,10 +12,10 @@ import canopen
 from canopen.profiles.p402 import BaseNode402
 
 from winchkit import catalog
-from winchkit.drivers.can.feedback import Gathering
-from winchkit.drivers.can.pdo import MappedObject, PdoCodec
-from winchkit.drivers.can.scale import Scale
-from winchkit.schema.device_servo import PdoSpec
+from winchkit.drivers.can.canopen.pdo import MappedObject, PdoCodec
+from winchkit.drivers.can.cia402.feedback import Gathering
+from winchkit.drivers.can.cia402.units import Scale
+from winchkit.schema.devices.servo import PdoSpec
 
 NODE = 1
 MAPPED = (

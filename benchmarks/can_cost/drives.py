@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from can_cost.wire import Wire
-from winchkit.schema.device import DeviceSpec
-from winchkit.sim.drive import SimDrive
-from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
-from winchkit.sim.servo import DriveCommand
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
+from winchkit.sim.plant.servo import DriveCommand
 
 _FIRST, _SECOND = struct.Struct("<Hib"), struct.Struct("<ihH")
 _COMMAND = struct.Struct("<Hi")

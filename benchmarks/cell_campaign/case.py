@@ -19,7 +19,7 @@ from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.line import ModbusLine
 from winchkit.drivers.reading import Counters, Reading
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
 
 FAULTS = (

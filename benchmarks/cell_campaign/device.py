@@ -6,8 +6,7 @@ import struct
 from dataclasses import dataclass, field
 from random import Random
 
-from winchkit.schema.device_modbus import ModbusSpec
-from winchkit.schema.modbus_parts import REGISTERS, FieldSpec
+from winchkit.schema.devices.modbus import REGISTERS, FieldSpec, ModbusSpec
 
 _PACK = {"u16": ">H", "i16": ">h", "u32": ">I", "i32": ">i", "f32": ">f"}
 _FULL = {"u16": 60_000, "i16": 30_000, "u32": 900_000, "i32": 900_000, "f32": 900_000}

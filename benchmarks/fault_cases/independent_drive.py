@@ -12,10 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from winchkit.sim.drive_faults import FAULTS
-from winchkit.sim.live import LiveBench
-from winchkit.sim.plant import WinchPlant
-from winchkit.sim.servo import DriveCommand
+from winchkit.sim.drive.faults import FAULTS
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.sim.plant.servo import DriveCommand
 
 __all__ = ["IndependentDrive", "replace_drives"]
 

@@ -14,7 +14,7 @@ from fault_cases.case import Case, Planned
 from fault_cases.kinds import KINDS
 from fault_cases.operator import Operator
 from fault_cases.world import Sample, World, opened_world
-from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.runs import read_run
 
 __all__ = ["Record", "play"]

@@ -17,12 +17,12 @@ import can
 from fault_cases.independent_drive import IndependentDrive, replace_drives
 from winchkit.bench.bench import Bench, open_bench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.drive import SimDrive
-from winchkit.sim.drive_power import Order
-from winchkit.sim.drive_state import State as SimState
-from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
-from winchkit.sim.wire import Carried
+from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.power import Order
+from winchkit.sim.drive.power import State as SimState
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.buses import Carried
+from winchkit.sim.live.paced_clock import PacedClock
 from winchkit.testing.declared import declared
 
 __all__ = ["HEARTBEAT", "LIMITS", "Sample", "World", "opened_world"]

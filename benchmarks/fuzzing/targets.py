@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from winchkit.calibration.cell_file import read_points
+from winchkit.calibration.cell.files import read_points
 from winchkit.catalog import find, folder, names
 from winchkit.drivers.modbus.decoder import Decoder
 from winchkit.drivers.modbus.frames import AnswerGate, Framing, crc16
@@ -21,11 +21,11 @@ from winchkit.drivers.stream.parser import StreamParser
 from winchkit.errors import WinchkitError
 from winchkit.runs.info import info_of
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
-from winchkit.runs.log_writer import open_log
 from winchkit.runs.read import read_log, read_run
+from winchkit.runs.recording.writer import open_log
 from winchkit.runs.recover import recover
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.eds import read_eds_text
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.eds.eds import read_eds_text
 from winchkit.schema.read import read_any, read_device
 from winchkit.schema.template import parts_of
 from winchkit.units import UNITS, parse

@@ -21,8 +21,8 @@ from recording.synthetic import CYCLE, EVERY, GIVEN, REMEMBERED, TOLD, WINCHES
 from winchkit.errors import RunError
 from winchkit.runs.log import Log
 from winchkit.runs.read import read_log, read_run
+from winchkit.runs.recording.rotation import parts_beside
 from winchkit.runs.recover import recover
-from winchkit.runs.rotation import parts_beside
 
 __all__ = ["Killed", "kill_once"]
 

@@ -18,13 +18,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from winchkit.bench.recorder import Recorder
-from winchkit.bench.snapshot import BenchSnapshot, Phase, WinchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot, Phase, WinchSnapshot
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.counters import Counters
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import ConnectionLost
-from winchkit.runs.rotation import Rotation
+from winchkit.runs.recording.rotation import Rotation
 
 __all__ = ["GIVEN", "REMEMBERED", "TOLD", "Cell", "SyntheticBench", "record"]
 

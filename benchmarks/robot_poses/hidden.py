@@ -13,13 +13,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robot_poses.truth import GRAVITY, HOME, Noise, Row, Truth, Vector, csv, poses, turn
+from winchkit.arrays import Array
 
 __all__ = ["BASE", "MASS", "Beyond", "Case", "Seen", "profile_text", "record"]
 
-Array = NDArray[np.float64]
 Beyond = Callable[[int, Row], float]
 Seen = Callable[[Row], Row]
 BASE = Truth()

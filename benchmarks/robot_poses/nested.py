@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from robot_poses.truth import ANCHOR, EXIT, HOME, TURNS, UPPER
+from winchkit.arrays import Array
 
 __all__ = ["ITERATIONS", "NestedProblem", "nominal"]
 
-Array = NDArray[np.float64]
 ITERATIONS = 25
 LINES = 8
 _TURN = 2 * np.pi

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 
 from winchkit import Bench, open_bench
-from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot
 
 GAIN = 0.01
 """Rope speed per error, m/s per N."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.controller import Controller
+from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.observation import Supervised
-from winchkit.bench.controller import Controller
-from winchkit.bench.loop import ControlLoop
-from winchkit.bench.parts import WinchParts
-from winchkit.bench.rope import RopeMap
-from winchkit.bench.supervisor import Supervisor
-from winchkit.drivers.can.axis import AxisFeedback
-from winchkit.drivers.can.cia402 import State, Wish, control_word
-from winchkit.drivers.can.heartbeat import HeartbeatWatch
+from winchkit.bench.control.supervisor import Supervisor
+from winchkit.bench.control.winch_state import WinchParts
+from winchkit.drivers.can.canopen.nmt import HeartbeatWatch
+from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.state_machine import State, Wish, control_word
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import LimitSpec

@@ -12,12 +12,12 @@ from click.testing import CliRunner, Result
 
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
-from winchkit.bench.client import attach
-from winchkit.cli.cell import command
+from winchkit.bench.remote.client import attach
+from winchkit.cli.cell.group import command
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.schema.read import read_simbench
-from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.paced_clock import PacedClock
 
 pytestmark = pytest.mark.realtime
 

@@ -11,7 +11,7 @@ from winchkit.bench.bench import Bench
 from winchkit.errors import LimitTripped
 from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 
 
 @pytest.fixture

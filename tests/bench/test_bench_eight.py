@@ -10,13 +10,13 @@ import pytest
 
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
-from winchkit.bench.snapshot import Phase
+from winchkit.bench.control.snapshot import Phase
 from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
-from winchkit.sim.wire import Carried, Wire
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.buses import Carried, Wire
 
 NAMES = "ABCDEFGH"
 SYNC, RPDO = 0x080, 0x200

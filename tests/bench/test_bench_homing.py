@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import pytest
 from fake_axis import CYCLE, StraightLine
 
+from winchkit.bench.control.cable import RopeMap
 from winchkit.bench.homing import HomingMotion
-from winchkit.bench.rope import RopeMap
-from winchkit.drivers.can.modes import Homing
+from winchkit.drivers.can.cia402.modes import Homing
 
 ARM = 0.005
 

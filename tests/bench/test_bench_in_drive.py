@@ -11,11 +11,11 @@ import pytest
 from winchkit import catalog, open_bench
 from winchkit.errors import FileError, NotPermitted
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.device_servo import OptionSpec
+from winchkit.schema.devices.servo import OptionSpec
 from winchkit.schema.read import read_bench, read_simbench
 from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 
 
 def declared(**changes: object) -> SimBench:

@@ -16,10 +16,10 @@ import pytest
 
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
-from winchkit.bench.client import attach
+from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.emergency_stop import stop_on_bus
 from winchkit.bench.programme import run_programme
-from winchkit.bench.snapshot import Phase
+from winchkit.bench.remote.client import attach
 from winchkit.errors import (
     DriveFault,
     FileError,
@@ -32,8 +32,8 @@ from winchkit.runs import read_run
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.programme import Programme, Step
 from winchkit.schema.read import read_simbench
-from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.paced_clock import PacedClock
 
 pytestmark = pytest.mark.realtime
 

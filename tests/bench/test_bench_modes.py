@@ -13,13 +13,13 @@ import pytest
 
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
-from winchkit.cli.keys import HeldKey, split_keys
+from winchkit.cli.bench.keyboard_jog import HeldKey, split_keys
 from winchkit.errors import NotPermitted
 from winchkit.runs import read_run
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 
 
 def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:

@@ -7,11 +7,10 @@ from fake_axis import CYCLE, Rig, StraightLine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.bench.motion import DEAD_MAN, Jog, Move
-from winchkit.bench.rope import RopeMap
-from winchkit.bench.snapshot import Phase
-from winchkit.bench.trim import Trim
-from winchkit.drivers.can.cia402 import State
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.motion import DEAD_MAN, Jog, Move, Trim
+from winchkit.bench.control.snapshot import Phase
+from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.errors import NotPermitted
 from winchkit.schema.bench import LimitSpec
 

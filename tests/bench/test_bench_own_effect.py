@@ -10,19 +10,19 @@ from click.testing import CliRunner, Result
 from fake_axis import Rig
 
 from winchkit import open_bench
-from winchkit.bench.motion import Move
-from winchkit.bench.rope import RopeMap
-from winchkit.bench.snapshot import Phase
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.motion import Move
+from winchkit.bench.control.snapshot import Phase
 from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.effects import load_catalogue, terms_of
 from winchkit.errors import FileError
-from winchkit.estimation.rope_now import RopeNow, Sample
+from winchkit.estimation.cable_state import RopeNow, Sample
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.read import read_bench, read_simbench, read_winch
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
-from winchkit.sim.live_file import write_bench
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.bench_file import write_bench
 
 OWN = """\
 from winchkit.effects import Effect, Parameter

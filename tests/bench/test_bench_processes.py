@@ -21,11 +21,11 @@ from pathlib import Path
 import pytest
 
 from winchkit import attach, open_bench
-from winchkit.bench.owner import owner_process
+from winchkit.bench.ownership import owner_process
 from winchkit.errors import NotPermitted
 from winchkit.runs import read_run
 from winchkit.schema.read import read_bench
-from winchkit.sim.live_client import tell
+from winchkit.sim.live.client import tell
 
 pytestmark = [
     pytest.mark.realtime,

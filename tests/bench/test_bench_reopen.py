@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 
 from winchkit import catalog, open_bench
-from winchkit.bench.snapshot import Phase
+from winchkit.bench.control.snapshot import Phase
 from winchkit.errors import ConnectionLost, LimitTripped
 from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 
 
 def test_a_reset_opens_a_bus_that_went_down(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,10 +9,9 @@ from fake_axis import CYCLE, Rig, StraightLine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.bench.motion import Jog, Move
-from winchkit.bench.snapshot import Phase
-from winchkit.bench.start_gate import StartGate
-from winchkit.drivers.can.cia402 import State
+from winchkit.bench.control.motion import Jog, Move, StartGate
+from winchkit.bench.control.snapshot import Phase
+from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.schema.bench import LimitSpec
 
 LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0))

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.bench.control.latch import LatchFile
-from winchkit.bench.snapshot import Trip
+from winchkit.bench.control.snapshot import Trip
 from winchkit.errors import NotPermitted
 
 TRIP = Trip("state", "A", "the drive left operation enabled", latches=True)

@@ -7,10 +7,10 @@ from fake_axis import Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.release import NotReleased, ReleaseGuard
-from winchkit.bench.motion import Jog
-from winchkit.bench.snapshot import Phase
-from winchkit.drivers.can.cia402 import State
+from winchkit.bench.control.snapshot import Phase
+from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.errors import NotPermitted
 from winchkit.schema.bench import LimitSpec
 

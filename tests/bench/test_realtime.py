@@ -17,9 +17,9 @@ import pytest
 from winchkit import catalog, open_bench
 from winchkit.bench.control.computer import survey
 from winchkit.bench.control.realtime import RestCollector, acquire
-from winchkit.bench.snapshot import BenchSnapshot, Phase, WinchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot, Phase, WinchSnapshot
 from winchkit.schema.read import read_simbench
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="Linux scheduling")
 

@@ -7,9 +7,9 @@ from fake_axis import Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.bench.motion import Jog
-from winchkit.bench.snapshot import Phase
-from winchkit.drivers.can.cia402 import State
+from winchkit.bench.control.motion import Jog
+from winchkit.bench.control.snapshot import Phase
+from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.drivers.reading import Quality
 from winchkit.schema.bench import LimitSpec
 

@@ -18,11 +18,11 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from robot_poses.truth import Noise, Row, Truth, csv, poses
 
 from winchkit.catalog import find
-from winchkit.effects.robot_poses import Measured, read_poses
 from winchkit.model.robot import Robot, robot_of
 from winchkit.runs import read_run
+from winchkit.runs.poses import Measured, read_poses
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_robot
-from winchkit.schema.winch import WinchProfile
 
 __all__ = [
     "ELASTIC",

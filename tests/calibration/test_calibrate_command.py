@@ -14,8 +14,8 @@ from click.testing import CliRunner, Result
 
 from winchkit.catalog import find
 from winchkit.cli import main
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_robot
-from winchkit.schema.winch import WinchProfile
 
 
 def invoke(*arguments: object) -> Result:

@@ -21,13 +21,13 @@ from calibration_cases import (
 )
 from scipy.optimize import nnls
 
-from winchkit.calibration.robot import Calibrated, Options, calibrate, split
-from winchkit.calibration.robot_next import next_poses
-from winchkit.calibration.robot_predict import rms
-from winchkit.effects.robot_poses import Measured
+from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate, split
+from winchkit.calibration.robot.pose_design import next_poses
+from winchkit.calibration.robot.prediction import rms
 from winchkit.errors import UsageError
 from winchkit.model.robot import robot_of, rotation_of, structure_matrix
-from winchkit.schema.robot import PriorSpec
+from winchkit.runs.poses import Measured
+from winchkit.schema.profiles.robot import PriorSpec
 
 NO_BOUNDS = {
     "exit_point": PriorSpec(5e-3),

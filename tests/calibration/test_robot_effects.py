@@ -7,15 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calibration_cases import EXACT, Noise, Truth, csv, elastic_rows, held, measured, robot, rows
-from numpy.typing import NDArray
 from robot_poses.truth import GRAVITY, HOME, Row, turn
 
-from winchkit.calibration.robot import Calibrated, Options, calibrate
-from winchkit.calibration.robot_predict import rms
-from winchkit.effects.robot_poses import Measured
+from winchkit.arrays import Array
+from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate
+from winchkit.calibration.robot.prediction import rms
 from winchkit.errors import UsageError
-
-Array = NDArray[np.float64]
+from winchkit.runs.poses import Measured
 
 
 @pytest.fixture(scope="module")

@@ -9,19 +9,17 @@ import pytest
 from calibration_cases import csv, elastic_rows, held, measured, robot, rows
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from winchkit.calibration.robot import Options, calibrate, equations_of
-from winchkit.calibration.robot_elongation import LAWS, strain_of
-from winchkit.calibration.robot_equations import Equations, State
-from winchkit.calibration.robot_solve import moved
-from winchkit.calibration.robot_winding import winding_of
+from winchkit.arrays import Array
+from winchkit.calibration.robot.calibrate import Options, calibrate, equations_of
+from winchkit.calibration.robot.elongation import LAWS, strain_of
+from winchkit.calibration.robot.equations import Equations, State, winding_of
+from winchkit.calibration.robot.least_squares import moved
 from winchkit.effects import load_catalogue
 from winchkit.model.drum import drum_of
 from winchkit.model.robot import Pose, rotation_of
-from winchkit.schema.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
+from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
 
-Array = NDArray[np.float64]
 FEW = 6
 
 

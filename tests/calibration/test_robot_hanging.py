@@ -9,19 +9,18 @@ from math import pi
 import numpy as np
 import pytest
 from calibration_cases import Truth, robot
-from numpy.typing import NDArray
 from robot_poses.truth import HOME, turn
 from scipy.linalg import null_space
 from scipy.optimize import brentq, minimize
 
-from winchkit.calibration import robot_next
-from winchkit.calibration.robot import calibrate, split
-from winchkit.calibration.robot_predict import rms
-from winchkit.effects.robot_poses import Measured
+from winchkit.arrays import Array
+from winchkit.calibration.robot import pose_design as robot_next
+from winchkit.calibration.robot.calibrate import calibrate, split
+from winchkit.calibration.robot.prediction import rms
 from winchkit.errors import UsageError
 from winchkit.model.robot import Robot, lengths, robot_of, rotation_of
+from winchkit.runs.poses import Measured
 
-Array = NDArray[np.float64]
 CENTRE = np.array([0.0, 0.0, -0.05])
 ROPES, COUNT = 4, 60
 TRACKER, ENCODER, ANGLE = 2e-5, 1e-4, 1e-3

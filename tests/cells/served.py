@@ -10,10 +10,10 @@ from pathlib import Path
 from random import Random
 
 from winchkit import catalog
-from winchkit.schema.device_modbus import ModbusSpec
+from winchkit.schema.devices.modbus import ModbusSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.modbus import ModbusLine
-from winchkit.sim.modbus_instrument import ModbusInstrument, in_unit_of
+from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of
+from winchkit.sim.instruments.modbus_line import ModbusLine
 
 BENCH = """\
 schema = 1

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner, Result
 from served import Served
 
-from winchkit.bench.owner import Ownership
-from winchkit.cli.cell import command
+from winchkit.bench.ownership import Ownership
+from winchkit.cli.cell.group import command
 from winchkit.errors import NoReply, NotPermitted, UsageError
 from winchkit.schema.read import read_bench, read_calibration, read_tares
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from winchkit.calibration.cell_file import calibration_toml, read_points, tares_toml, write_text
+from winchkit.calibration.cell.files import calibration_toml, read_points, tares_toml, write_text
 from winchkit.errors import FileError
 from winchkit.schema.calibration import (
     CalibrationPoint,

@@ -8,8 +8,8 @@ from random import Random
 import numpy as np
 import pytest
 
-from winchkit.calibration.cell_fit import fit_cell
-from winchkit.calibration.cell_plan import plan
+from winchkit.calibration.cell.fit import fit_cell
+from winchkit.calibration.cell.weighing_order import plan
 from winchkit.errors import RunError, UsageError
 from winchkit.schema.calibration import CalibrationPoint
 

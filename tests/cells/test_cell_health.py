@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from winchkit.calibration.cell_health import Health, Samples, examine
+from winchkit.calibration.cell.health import Health, Samples, examine
 from winchkit.errors import RunError
 
 RATE, DIVISION = 120.0, 0.01

@@ -12,7 +12,7 @@ from winchkit import catalog
 from winchkit.drivers.modbus.timing import exchange, wire_times
 from winchkit.drivers.sharing import LineShare, fair_rates, next_of
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device_modbus import ModbusSpec
+from winchkit.schema.devices.modbus import ModbusSpec
 from winchkit.schema.read import read_device
 
 WISHES = st.lists(st.tuples(st.floats(1, 1000), st.floats(1e-4, 0.1)), min_size=1, max_size=8)

@@ -9,7 +9,7 @@ import pytest
 from winchkit import catalog
 from winchkit.bench.bench import open_bench
 from winchkit.schema.read import read_simbench
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 
 pytestmark = pytest.mark.realtime
 

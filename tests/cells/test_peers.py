@@ -21,7 +21,7 @@ from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import DeviceRefused
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.modbus_cable import PtyCable
+from winchkit.sim.instruments.modbus_line import PtyCable
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="Debian's peers, pseudo-terminals")
 NEEDS_MBPOLL = pytest.mark.skipif(

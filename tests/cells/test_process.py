@@ -15,16 +15,16 @@ import can
 import pytest
 
 from winchkit import catalog
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.process import ProcessInstrument, ProcessLine
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.process_value import ProcessInstrument, ProcessLine
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import NoReply, NotPermitted
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.process import ProcessInstrument as SimInstrument
+from winchkit.sim.instruments.process import ProcessInstrument as SimInstrument
 
 CLOCK = MonotonicClock()
 NODE = 5

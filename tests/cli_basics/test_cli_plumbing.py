@@ -20,7 +20,7 @@ from click.testing import CliRunner, Result
 
 import winchkit
 from winchkit.cli import COMMANDS, main
-from winchkit.cli.output import to_json
+from winchkit.cli.core.output import to_json
 from winchkit.errors import (
     ConnectionLost,
     DriveFault,
@@ -52,7 +52,7 @@ def running(
 ) -> Result:
     """Run the command line with another body in place of a command."""
     command = click.Command(name, callback=body)
-    monkeypatch.setattr("winchkit.cli.check.command", command)
+    monkeypatch.setattr("winchkit.cli.files.check.command", command)
     return CliRunner().invoke(main, [name])
 
 
@@ -181,7 +181,7 @@ def test_what_a_command_returns(monkeypatch: pytest.MonkeyPatch, value: object, 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 def test_interrupt_from_outside_is_130() -> None:
     code = (
-        "import os, signal, click, winchkit.cli.check as check\n"
+        "import os, signal, click, winchkit.cli.files.check as check\n"
         "from winchkit.cli import main\n"
         "check.command = click.Command('check', callback=lambda: os.kill(os.getpid(), 2))\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"

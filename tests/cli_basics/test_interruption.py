@@ -13,7 +13,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 PROGRAM = """
 import os, signal, sys, time
-from winchkit.cli.outcome import finish
+from winchkit.cli.core.outcome import finish
 
 def command():
     try:
@@ -68,7 +68,7 @@ def test_a_signal_that_is_ignored_from_outside_stays_ignored() -> None:
 def test_a_library_installs_no_handler() -> None:
     done = run(
         "import signal, winchkit\n"
-        "from winchkit.bench.session import attach, at_station\n"
+        "from winchkit.bench.remote.session import attach, at_station\n"
         "from winchkit.bench.bench import open_bench\n"
         "assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL\n"
         "assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL\n"

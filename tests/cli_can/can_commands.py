@@ -13,10 +13,14 @@ from click.testing import CliRunner, Result
 from winchkit import catalog
 from winchkit.cli import main
 from winchkit.schema.read import read_simbench
-from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.paced_clock import PacedClock
 
-CLOCKS = ("winchkit.bench.bench", "winchkit.bench.node_access", "winchkit.bench.emergency_stop")
+CLOCKS = (
+    "winchkit.bench.bench",
+    "winchkit.bench.drives.node_access",
+    "winchkit.bench.emergency_stop",
+)
 
 
 def invoke(*arguments: object, text: str | None = None) -> Result:

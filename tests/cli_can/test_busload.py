@@ -10,7 +10,7 @@ from can_commands import invoke
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.busload import FrameKind, frame_bits, load_of
+from winchkit.drivers.can.bus.load import FrameKind, frame_bits, load_of
 from winchkit.errors import NotPermitted
 
 MEGABIT = 1_000_000

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit import catalog
-from winchkit.drivers.can.decode import KnownNode, decode, known_node, write_frames
+from winchkit.drivers.can.tools.decode import KnownNode, decode, known_node, write_frames
 from winchkit.schema.read import read_device
-from winchkit.sim.drive_sdo import SdoServer
-from winchkit.sim.object_dictionary import Entry, ObjectDictionary
+from winchkit.sim.drive.object_dictionary import Entry, ObjectDictionary
+from winchkit.sim.drive.sdo import SdoServer
 
 
 @cache

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from can_commands import Served, invoke, served
 
-from winchkit.sim.drive_network import NmtState
+from winchkit.sim.drive.nmt import NmtState
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from winchkit.cli import jog
+from winchkit.cli.bench import jog
 from winchkit.errors import ConnectionLost, NotPermitted
 
 STATUS = {
@@ -74,7 +74,7 @@ def press(
     def open_keys() -> Iterator[Keyboard]:
         yield Keyboard()
 
-    monkeypatch.setattr("winchkit.cli.keys.open_keys", open_keys)
+    monkeypatch.setattr("winchkit.cli.bench.keyboard_jog.open_keys", open_keys)
     monkeypatch.setattr(jog, "time", SimpleNamespace(monotonic=lambda: now[0]))
     jog._jog_by_keys(station, "A", 0.1)  # type: ignore[arg-type]
 

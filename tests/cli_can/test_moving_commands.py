@@ -13,9 +13,9 @@ from can_commands import Served, invoke, served
 
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
-from winchkit.bench.client import RemoteStation, attach
+from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.programme import earlier_runs
-from winchkit.bench.snapshot import Phase
+from winchkit.bench.remote.client import RemoteStation, attach
 from winchkit.errors import UsageError
 from winchkit.schema.programme import Programme
 

@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 from model_files import answer, invoke
 
-from winchkit.bench.rope import RopeMap
+from winchkit.bench.control.cable import RopeMap
 from winchkit.catalog import find
 from winchkit.effects import terms_of
-from winchkit.estimation.rope_now import RopeNow, Sample
+from winchkit.estimation.cable_state import RopeNow, Sample
 from winchkit.schema.read import read_simbench, read_winch
 from winchkit.sim.bench import hiding
-from winchkit.sim.live_file import write_bench
-from winchkit.sim.plant import WinchPlant
-from winchkit.sim.servo import DriveCommand
+from winchkit.sim.live.bench_file import write_bench
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.sim.plant.servo import DriveCommand
 
 TIGHT = """\
 schema = 1

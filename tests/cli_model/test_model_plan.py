@@ -8,14 +8,14 @@ import pytest
 from model_files import answer, invoke, record_files
 
 from winchkit.catalog import find
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.kinds import KINDS
-from winchkit.diagnosis.plan import programme_of
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.design.plan import programme_of
+from winchkit.diagnosis.design.programmes import KINDS
 from winchkit.runs import read_run, write_csv
 from winchkit.schema.programme import Programme
 from winchkit.schema.read import read_programme, read_simbench, read_winch
 from winchkit.sim.bench import profiles_of
-from winchkit.sim.live_file import write_bench
+from winchkit.sim.live.bench_file import write_bench
 from winchkit.sim.record import record
 
 BENCH = read_simbench(find("sim", "demo-fat-drum"))

@@ -17,7 +17,7 @@ from winchkit.bench.commissioning import validity
 from winchkit.bench.commissioning.dialogue import AnswerFile
 from winchkit.bench.commissioning.procedure import commission_bench
 from winchkit.bench.commissioning.record import Record
-from winchkit.cli.commission import command
+from winchkit.cli.bench.commission import command
 from winchkit.errors import NotPermitted, UsageError
 
 
@@ -177,9 +177,9 @@ def test_the_command_says_where_the_record_is_and_a_closed_input_records_nothing
 def test_check_and_monitor_say_which_item_is_missing(
     tmp_path: Path, real: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from winchkit.bench.station import LocalStation
-    from winchkit.cli.check import command as check
-    from winchkit.cli.monitor import status_table
+    from winchkit.bench.remote.station import LocalStation
+    from winchkit.cli.bench.monitor import status_table
+    from winchkit.cli.files.check import command as check
 
     path = write_bench(tmp_path)
     checked = CliRunner().invoke(check, [str(path)])

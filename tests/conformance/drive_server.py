@@ -22,8 +22,8 @@ from flywheel import Flywheel
 
 from winchkit import catalog
 from winchkit.schema.read import read_device
-from winchkit.sim.drive import SimDrive
-from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
+from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
 
 NODE, HOST = 1, 127
 _WAIT = 1e-3

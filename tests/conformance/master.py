@@ -11,10 +11,10 @@ from bus_rig import HEARTBEAT, Rig
 from drive_server import HOST, NODE
 
 from winchkit import catalog
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.commission import Commissioned, WatchSpec
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.read import read_device
 

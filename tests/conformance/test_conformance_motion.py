@@ -10,7 +10,7 @@ from bus_rig import Rig, Seen
 from drive_server import NODE
 
 from winchkit.bench.bench import Bench
-from winchkit.bench.motion import DEAD_MAN
+from winchkit.bench.control.motion import DEAD_MAN
 from winchkit.errors import DriveFault, LimitTripped
 
 pytestmark = pytest.mark.realtime

@@ -9,8 +9,8 @@ from bus_rig import HEARTBEAT, Rig
 from drive_server import HOST, NODE
 from master import Master
 
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.heartbeat import NmtState
+from winchkit.drivers.can.canopen.nmt import NmtState
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 
 pytestmark = pytest.mark.realtime
 

@@ -9,7 +9,7 @@ from bus_rig import Rig
 from drive_server import NODE
 from master import Master
 
-from winchkit.drivers.can.cia402 import State, Wish
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.errors import NotPermitted
 
 pytestmark = pytest.mark.realtime

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from winchkit import catalog
-from winchkit.cli.check import command
+from winchkit.cli.files.check import command
 
 SOURCE = catalog.find("devices", "generic-cia402").parent
 

@@ -9,9 +9,9 @@ from eds_text import GOOD, written
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.eds import read_eds
+from winchkit.drivers.can.canopen.eds import read_eds
 from winchkit.errors import Fault, FileError
-from winchkit.sim.object_dictionary import read_eds as read_for_simulation
+from winchkit.sim.drive.object_dictionary import read_eds as read_for_simulation
 
 ROWS = GOOD.split("\n")
 

@@ -9,12 +9,12 @@ from dataclasses import replace
 import pytest
 
 from winchkit import catalog, open_bench
-from winchkit.bench.snapshot import Phase
-from winchkit.schema.device_servo import ServoSpec
+from winchkit.bench.control.snapshot import Phase
+from winchkit.schema.devices.servo import ServoSpec
 from winchkit.schema.read import read_device, read_simbench
 from winchkit.schema.simbench import NoiseSpec, SimBench
-from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.paced_clock import PacedClock
 
 
 def servo_of(name: str) -> ServoSpec | None:

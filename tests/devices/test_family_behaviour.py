@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from winchkit import catalog
-from winchkit.drivers.can.eds import read_eds
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_servo import ServoSpec
+from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.servo import ServoSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.drive import SimDrive
-from winchkit.sim.object_dictionary import Abort, Entry, ObjectDictionary
-from winchkit.sim.object_dictionary import read_eds as read_for_simulation
-from winchkit.sim.servo import DriveCommand
+from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.object_dictionary import Abort, Entry, ObjectDictionary
+from winchkit.sim.drive.object_dictionary import read_eds as read_for_simulation
+from winchkit.sim.plant.servo import DriveCommand
 
 VENDORS = {
     "generic-cia402": 0x0,

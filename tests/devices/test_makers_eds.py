@@ -13,10 +13,10 @@ import pytest
 from click.testing import CliRunner
 
 from winchkit import catalog
-from winchkit.cli.check import command
+from winchkit.cli.files.check import command
 from winchkit.drivers.can.canopen.declared import declared, unmappable
-from winchkit.drivers.can.eds import read_eds
-from winchkit.drivers.can.pdo import parse_object
+from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.drivers.can.canopen.pdo import parse_object
 from winchkit.schema.read import read_device
 
 FOLDER = Path(os.environ.get("WINCHKIT_MAKERS_EDS", Path(__file__).parents[3] / "shared/data/eds"))

@@ -8,20 +8,19 @@ from functools import cache
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.catalog import find
-from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.selection.engine import Inquiry
 from winchkit.effects.bind import Term, modifiers_of
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.runs.run import Channel, Run
-from winchkit.schema.read import read_programme, read_simbench
-from winchkit.schema.winch import (
+from winchkit.schema.profiles.winch import (
     CableSpec,
     DrumSpec,
     GearboxSpec,
@@ -29,10 +28,9 @@ from winchkit.schema.winch import (
     ReferenceSpec,
     WinchProfile,
 )
+from winchkit.schema.read import read_programme, read_simbench
 from winchkit.sim.bench import hiding, profiles_of, programme_path
 from winchkit.sim.record import record
-
-Array = NDArray[np.float64]
 
 CATALOGUE = load_catalogue()
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}

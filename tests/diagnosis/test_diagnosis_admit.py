@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from diagnosis_runs import GROOVED, NOISE, Ride, made, with_channel, without
 
-from winchkit.diagnosis.admit import admit
+from winchkit.diagnosis.data.validation import admit
 from winchkit.errors import FileError, RunError
 from winchkit.runs.run import Run
-from winchkit.schema.winch import GearboxSpec
+from winchkit.schema.profiles.winch import GearboxSpec
 
 GOOD = replace(made(0), path="lift.csv")
 OUTPUTS = ("cable_length", "tension", "motor_torque")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from diagnosis_runs import CATALOGUE, Ride, inquiry_into, term
 
-from winchkit.diagnosis.confusion import confusion_of
-from winchkit.diagnosis.recouple import recoupled
-from winchkit.diagnosis.search import _replaced
-from winchkit.diagnosis.signature import Signatures, redrawn
+from winchkit.diagnosis.selection.exchange import recoupled
+from winchkit.diagnosis.selection.signatures import Signatures, redrawn
+from winchkit.diagnosis.selection.stepwise import _replaced
+from winchkit.diagnosis.verdict.equivalence import confusion_of
 from winchkit.effects.bind import Term
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)

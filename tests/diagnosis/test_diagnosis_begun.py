@@ -8,7 +8,7 @@ import numpy as np
 from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_channel
 
 from winchkit.diagnosis.diagnose import diagnose
-from winchkit.diagnosis.result import Diagnosis
+from winchkit.diagnosis.results import Diagnosis
 
 RIDE = Ride(samples=1600, rate=25.0, period=64.0)  # so slow that the tension hardly changes
 MASSES = (10.0, 20.0, 35.0)

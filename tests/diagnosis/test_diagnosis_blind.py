@@ -13,7 +13,7 @@ from diagnosis_runs import CATALOGUE, recorded
 
 from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import diagnose
-from winchkit.diagnosis.result import Diagnosis
+from winchkit.diagnosis.results import Diagnosis
 from winchkit.schema.read import read_winch
 
 PROFILE = read_winch(find("profiles", "bench-spiral"))

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from diagnosis_runs import GROOVED, UNITS, Array
 
-from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose
-from winchkit.diagnosis.result import Diagnosis
+from winchkit.diagnosis.results import Diagnosis
 from winchkit.model.line import GRAVITY
 from winchkit.runs.run import Channel, Run
 

@@ -10,9 +10,9 @@ import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, SPIRAL, Ride, made, term
 
 from winchkit.diagnosis.diagnose import diagnose
-from winchkit.diagnosis.result import Diagnosis
+from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.bind import Term
-from winchkit.schema.winch import GuideSpec, WinchProfile
+from winchkit.schema.profiles.winch import GuideSpec, WinchProfile
 
 HIDDEN = {
     "radius": term("drum-radius", radius_error=3e-4),

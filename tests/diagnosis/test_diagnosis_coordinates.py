@@ -8,8 +8,8 @@ from diagnosis_runs import CATALOGUE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Effect
+from winchkit.effects.parametrization import Coordinates
 
 EFFECTS = list(CATALOGUE)
 every = pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.id)

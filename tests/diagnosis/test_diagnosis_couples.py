@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from diagnosis_runs import Ride, inquiry_into, term
 
-from winchkit.diagnosis.admissible import best_of_each
-from winchkit.diagnosis.couples import couples
-from winchkit.diagnosis.search import _coupled
+from winchkit.diagnosis.selection.engine import best_of_each
+from winchkit.diagnosis.selection.pairs import couples
+from winchkit.diagnosis.selection.stepwise import _coupled
 from winchkit.effects.bind import Term
 
 RIDE = Ride(samples=600, stroke=400.0)

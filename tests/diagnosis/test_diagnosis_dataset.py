@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from diagnosis_runs import GROOVED, SPIRAL, Ride, made, with_channel
 
-from winchkit.diagnosis.dataset import prepare
-from winchkit.schema.winch import WinchProfile
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.schema.profiles.winch import WinchProfile
 
 THICK = replace(SPIRAL, drum=replace(SPIRAL.drum, layer_growth=1e-3))
 """Layers of a millimetre: the step jerks the weight."""

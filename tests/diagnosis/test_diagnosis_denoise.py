@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
 
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.denoise import agreed, contrasts, quiet
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.input_denoising import agreed, contrasts, quiet
 
 COUNT = 2000
 

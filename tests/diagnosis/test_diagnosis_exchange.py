@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import Ride, inquiry_into, term
 
-from winchkit.diagnosis.confusion import confusion_of
+from winchkit.diagnosis.verdict.equivalence import confusion_of
 
 ONE_WAY = Ride(samples=1500, rate=25.0, period=100.0)
 """Wound in once and not quite out again: a creep can look like a wrong length of rope."""

@@ -9,12 +9,12 @@ import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
 from scipy.optimize import least_squares
 
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.fit import fit
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.regression.gls import fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.effects.bind import Term
-from winchkit.schema.winch import GuideSpec
+from winchkit.schema.profiles.winch import GuideSpec
 
 RIDE = Ride(samples=400)
 TRUE = {

@@ -9,9 +9,9 @@ import pytest
 from diagnosis_runs import recorded
 
 from winchkit.catalog import find
-from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.follows import follows, ranked
+from winchkit.diagnosis.residuals.attribution import follows, ranked
 from winchkit.effects import load_catalogue
 from winchkit.schema.read import read_winch
 

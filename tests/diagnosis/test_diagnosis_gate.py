@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from diagnosis_runs import GROOVED, NOISE, Array, Ride, made, term
 
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.fit import Fit, fit
-from winchkit.diagnosis.gate import (
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.regression.cross_validation import (
     Folds,
     blocks_of,
     confidence,
@@ -19,9 +18,10 @@ from winchkit.diagnosis.gate import (
     held_out_rms,
     left_out_steps,
 )
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.noise import Noise
-from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.effects.bind import Term
 
 RIDE = Ride(samples=300)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from diagnosis_runs import GROOVED, NOISE, Array, Ride, made, with_channel
 
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.limits import what_runs_cannot_show
-from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.design.excitation import what_runs_cannot_show
+from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.runs.run import Run
 
 RIDE = Ride(samples=200)

@@ -10,15 +10,20 @@ from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_cha
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.diagnosis.curves import PLACES, columns_of, hats_over, laws_over
-from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, inquire
-from winchkit.diagnosis.doubt import Doubt, judge_and_doubt
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.nameless import Beside, _Hats, best_curve
-from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.search import Found, search
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.stepwise import Found, search
+from winchkit.diagnosis.verdict.specification_test import (
+    Beside,
+    Doubt,
+    _Hats,
+    best_curve,
+    judge_and_doubt,
+)
+from winchkit.diagnosis.verdict.spline_alternatives import PLACES, columns_of, hats_over, laws_over
 from winchkit.effects.bind import Term
 from winchkit.runs.run import Run
 

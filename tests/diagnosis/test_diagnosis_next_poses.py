@@ -20,10 +20,10 @@ from robot_poses.hidden import BASE, profile_text, record
 from robot_poses.truth import turn
 
 from winchkit.cli import main
-from winchkit.diagnosis.confusion import pairs_of
-from winchkit.diagnosis.next_run import APART, power_of, separation
+from winchkit.diagnosis.design.discrimination import APART, power_of, separation
 from winchkit.diagnosis.robot.diagnose import diagnose_robot
-from winchkit.diagnosis.robot.next_poses import pose_offers
+from winchkit.diagnosis.robot.pose_design import pose_offers
+from winchkit.diagnosis.verdict.equivalence import pairs_of
 from winchkit.runs import read_run
 from winchkit.schema.read import read_robot
 

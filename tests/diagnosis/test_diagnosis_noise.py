@@ -10,16 +10,16 @@ from diagnosis_runs import Array, Ride, length_problem, term
 from scipy.fft import dct
 from scipy.stats import kstest
 
-from winchkit.diagnosis.fit import Fit, fit
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.noise import (
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.noise import (
     Noise,
     Presence,
     noise_from_repeats,
     noise_saturated,
     presence,
 )
-from winchkit.diagnosis.problem import Problem
+from winchkit.diagnosis.regression.time_series import Problem
 
 RIDE = Ride(samples=300)
 SIZE = 3e-4

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from diagnosis_runs import GROOVED, Ride, length_problem
-from numpy.typing import NDArray
 
-from winchkit.diagnosis.follows import harmonics
-from winchkit.diagnosis.hypothesis import Hypothesis
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.residuals.attribution import harmonics
 
-Array = NDArray[np.float64]
 RIDE = Ride(samples=3000, rate=100.0)
 
 

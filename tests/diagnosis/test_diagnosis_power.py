@@ -10,17 +10,17 @@ import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Array, Ride, made, term, with_channel
 from scipy.stats import norm
 
-from winchkit.cli.plan import _silent
-from winchkit.diagnosis.dataset import Dataset, prepare
+from winchkit.cli.model.plan import _silent
+from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.design.detectability import Bar, detectable
+from winchkit.diagnosis.design.discrimination import next_runs, power_of, separation, so_far
+from winchkit.diagnosis.design.plan import hopeless
+from winchkit.diagnosis.design.plan import offers as plan_offers
+from winchkit.diagnosis.design.programmes import KINDS, seen
 from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.kinds import KINDS, seen
-from winchkit.diagnosis.next_run import next_runs, power_of, separation, so_far
-from winchkit.diagnosis.plan import hopeless
-from winchkit.diagnosis.plan import offers as plan_offers
-from winchkit.diagnosis.power import Bar, detectable
-from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.result import Detectable, NextRun
-from winchkit.diagnosis.score import chance_level
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.results import Detectable, NextRun
+from winchkit.diagnosis.selection.scores import chance_level
 
 RIDE = Ride(samples=400)
 ROPE = term("cable-elongation-linear", axial_stiffness=3e5)

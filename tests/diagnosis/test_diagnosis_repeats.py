@@ -10,8 +10,8 @@ from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.repeats import Repeats, find_repeats, mean_load
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.repeats import Repeats, find_repeats, mean_load
 from winchkit.model.stages import Signals
 
 

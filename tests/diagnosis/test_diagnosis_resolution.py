@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from diagnosis_runs import GROOVED, Array, Ride, made, term
 
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.fit import Fit, fit
-from winchkit.diagnosis.gate import blocks_of
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.noise import Noise, noise_from_repeats
-from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.resolution import rounded, without_rounding
-from winchkit.diagnosis.uncertainty import estimates, spread_of
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.regression.cross_validation import blocks_of
+from winchkit.diagnosis.regression.discretization import rounded, without_rounding
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
+from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.effects.bind import Term
 from winchkit.runs.run import Run
 

@@ -16,7 +16,7 @@ from robot_poses.hidden import profile_text, record
 from winchkit.diagnosis.robot.dataset import prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, start_pose
 from winchkit.effects import Term, load_catalogue, robot_with_terms
-from winchkit.effects.placed import at_line
+from winchkit.effects.placement import at_line
 from winchkit.runs import read_run
 from winchkit.schema.read import read_robot
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
 
-from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, inquire
 
 RIDE = Ride(samples=400)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from diagnosis_runs import CATALOGUE, term
 
-from winchkit.diagnosis.shapes import by_coefficients, elsewhere, in_disguise
-from winchkit.effects.standard import standard_motion
+from winchkit.diagnosis.selection.starting_values import by_coefficients, elsewhere, in_disguise
+from winchkit.effects.reference_motion import standard_motion
 
 
 def test_coefficients_are_taken_from_the_first() -> None:

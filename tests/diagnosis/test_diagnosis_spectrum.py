@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
-from winchkit.diagnosis.spectrum import (
+from winchkit.diagnosis.data.spectrum import (
     Band,
     band_edges,
     low_pass,

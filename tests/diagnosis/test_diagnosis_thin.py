@@ -7,20 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_runs import CATALOGUE, GROOVED
-from numpy.typing import NDArray
 
-from winchkit.diagnosis.dataset import Filtering, assemble, prepare
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.thin import Thinning, thinning_for
-from winchkit.diagnosis.uncertainty import spread_of
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Filtering, assemble, prepare
+from winchkit.diagnosis.data.decimation import Thinning, thinning_for
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.intervals import spread_of
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.selection.engine import Inquiry
 from winchkit.effects.bind import Term, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.runs.run import Channel, Run
 
-Array = NDArray[np.float64]
 RATE = 1000.0
 TENTH = Thinning(10, 25.0)
 NOISE = {"cable_length": 3e-4, "tension": 0.8, "motor_torque": 5e-3}

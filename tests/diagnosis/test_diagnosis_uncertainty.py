@@ -10,14 +10,13 @@ import pytest
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 from scipy.optimize import least_squares
 
-from winchkit.diagnosis.dataset import prepare
-from winchkit.diagnosis.fit import Fit, fit
-from winchkit.diagnosis.gate import blocks_of
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.noise import Noise, noise_from_repeats
-from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.profile_likelihood import profile_ends
-from winchkit.diagnosis.uncertainty import estimates, spread_of
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.regression.cross_validation import blocks_of
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.intervals import estimates, profile_ends, spread_of
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
+from winchkit.diagnosis.regression.time_series import Problem
 
 RIDE = Ride(samples=400)
 GAIN = term("cell-gain", gain_error=0.01)

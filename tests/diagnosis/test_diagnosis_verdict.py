@@ -10,10 +10,10 @@ import pytest
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 
 from winchkit.diagnosis.diagnose import diagnose
-from winchkit.diagnosis.result import Diagnosis
+from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.bind import Term
 from winchkit.runs.run import Run
-from winchkit.schema.winch import EffectTable
+from winchkit.schema.profiles.winch import EffectTable
 
 RIDE = Ride(samples=400)
 DRAG = term("motor-coulomb", torque=0.02)

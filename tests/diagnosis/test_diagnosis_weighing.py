@@ -9,12 +9,12 @@ import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_channel
 
 from winchkit.diagnosis.add import add
-from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.noise import Noise
-from winchkit.diagnosis.weighing import weighed
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.weighting import weighed
 from winchkit.runs.run import Run
 
 RIDE = Ride(samples=3000, rate=50.0, period=12.0)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from winchkit.diagnosis import thin
+from winchkit.diagnosis.data import decimation as thin
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.each import diagnose_each
+from winchkit.diagnosis.fleet.diagnose import diagnose_each
 from winchkit.effects import load_catalogue
 from winchkit.schema.read import read_winch
 

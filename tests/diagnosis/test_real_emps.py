@@ -17,19 +17,19 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from winchkit.cli.add import write_addition
+from winchkit.cli.model.add import write_addition
 from winchkit.diagnosis.add import Addition, add
-from winchkit.diagnosis.dataset import prepare
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import Answer, diagnose, inquire
-from winchkit.diagnosis.result import Diagnosis
+from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.bind import line_of, modifiers_of
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.runs import read_run
 from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_winch
-from winchkit.schema.winch import WinchProfile
 
 VARIABLE = "WINCHKIT_EMPS"
 PROFILE = """\

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from winchkit.diagnosis.report.shared_text import effect_text, shared_effects_text
-from winchkit.diagnosis.result import Detectable, Diagnosis, Estimate, Step
-from winchkit.diagnosis.shared_effects import Pooled, alarms, pooled, shared_effects
+from winchkit.diagnosis.fleet.meta_analysis import Pooled, alarms, pooled, shared_effects
+from winchkit.diagnosis.results import Detectable, Diagnosis, Estimate, Step
+from winchkit.report.pages.fleet import effect_text, shared_effects_text
 
 NAMES = "ABCDEFGH"
 RUBS = "motor-coulomb"

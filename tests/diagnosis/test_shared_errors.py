@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from winchkit.diagnosis.report.shared_text import error_texts
-from winchkit.diagnosis.shared_errors import (
+from winchkit.diagnosis.fleet.anova import (
     SharedFollowed,
     WinchErrors,
     shared_errors,
 )
+from winchkit.report.pages.fleet import error_texts
 
 NAMES = "ABCDEFGH"
 N = 8000

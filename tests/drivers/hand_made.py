@@ -14,18 +14,18 @@ import canopen
 import pytest
 from drive_on_bus import device
 
-from winchkit.drivers.can import axis as axis_module
-from winchkit.drivers.can import node as node_module
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.cia402 import Wish
-from winchkit.drivers.can.commission import Commissioned, WatchSpec
-from winchkit.drivers.can.limits import DriveLimits
-from winchkit.drivers.can.modes import MODES
-from winchkit.drivers.can.pdo import MappedObject, PdoCodec
-from winchkit.drivers.can.scale import Scale
+from winchkit.drivers.can.canopen import node as node_module
+from winchkit.drivers.can.canopen.pdo import MappedObject, PdoCodec
+from winchkit.drivers.can.cia402 import axis as axis_module
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec
+from winchkit.drivers.can.cia402.limits import DriveLimits
+from winchkit.drivers.can.cia402.modes import MODES
+from winchkit.drivers.can.cia402.state_machine import Wish
+from winchkit.drivers.can.cia402.units import Scale
 from winchkit.errors import DeviceRefused
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_servo import PdoSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.servo import PdoSpec
 
 NODE = 1
 CYCLE = 0.004

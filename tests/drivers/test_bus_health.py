@@ -15,14 +15,13 @@ from drive_on_bus import DriveOnBus, bus_spec, device
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.drivers.can import bus as bus_module
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.commission import WatchSpec
-from winchkit.drivers.can.frame_time import FrameTime
-from winchkit.drivers.can.health import BusHealth, BusState, ErrorTally
-from winchkit.drivers.can.interface import Frame, parse_socketcan
+from winchkit.drivers.can.bus import bus as bus_module
+from winchkit.drivers.can.bus.bus import CanBus, FrameTime
+from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
+from winchkit.drivers.can.bus.interface import Frame, parse_socketcan
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.cia402 import (
+from winchkit.drivers.can.cia402.state_machine import (
     ENABLE_OPERATION,
     FAULT_RESET,
     QUICK_STOP,

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from drive_on_bus import DriveOnBus, bus_spec, device
 
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.commission import WatchSpec
-from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused, NoReply, NotPermitted
 

@@ -13,12 +13,12 @@ import pytest
 from drive_on_bus import DriveOnBus, bus_spec, device
 from hand_made import NODE, RPDO, HandMade, codec
 
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.commission import WatchSpec
-from winchkit.drivers.can.heartbeat import NmtState
-from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.nmt import NmtState
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 

@@ -9,13 +9,12 @@ from hand_made import SCALE, Objects
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.cycle import set_cycle
-from winchkit.drivers.can.limits import LimitsAtShaft, read_limits, set_limits
-from winchkit.drivers.can.options import merged, read_options, set_options
-from winchkit.drivers.can.profile import HomingSpec, set_homing, set_profile
+from winchkit.drivers.can.cia402.cycle import set_cycle
+from winchkit.drivers.can.cia402.limits import LimitsAtShaft, read_limits, set_limits
+from winchkit.drivers.can.cia402.option_codes import merged, read_options, set_options
+from winchkit.drivers.can.cia402.profile_parameters import HomingSpec, set_homing, set_profile
 from winchkit.errors import NotPermitted
-from winchkit.schema.device_quirks import QuirkSpec
-from winchkit.schema.device_servo import OptionSpec, ServoSpec
+from winchkit.schema.devices.servo import OptionSpec, QuirkSpec, ServoSpec
 
 SERVO = ServoSpec("x.eds", ("CSV",))
 CODES = {0x605A: 2, 0x605B: 1, 0x605C: 1, 0x605D: 1, 0x605E: 2, 0x6007: 3}

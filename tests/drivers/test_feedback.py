@@ -11,8 +11,8 @@ from hand_made import CYCLE, NODE, RPDO, SCALE, TPDO, HandMade, codec
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.feedback import Gathering, check_feedback
+from winchkit.drivers.can.cia402.feedback import Gathering, check_feedback
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.errors import FileError
 
 ENABLED, READY, DISABLED = 0x0237, 0x0231, 0x0250

@@ -13,8 +13,8 @@ from winchkit import catalog
 from winchkit.drivers.modbus.decoder import Decoder
 from winchkit.drivers.reading import Quality
 from winchkit.errors import FileError
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_modbus import FieldSpec, ModbusSpec, ReadBlock
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.modbus import FieldSpec, ModbusSpec, ReadBlock
 from winchkit.schema.read import read_device
 
 

@@ -9,8 +9,8 @@ from hand_made import RPDO, SCALE, TPDO, HandMade, codec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.cia402 import Wish
-from winchkit.drivers.can.modes import (
+from winchkit.drivers.can.cia402.command import SetPoint
+from winchkit.drivers.can.cia402.modes import (
     MODES,
     Homing,
     homing_state,
@@ -18,7 +18,7 @@ from winchkit.drivers.can.modes import (
     modes_of,
     status_words,
 )
-from winchkit.drivers.can.set_point import SetPoint
+from winchkit.drivers.can.cia402.state_machine import Wish
 from winchkit.errors import FileError, NotPermitted
 
 ENABLED = 0x0237

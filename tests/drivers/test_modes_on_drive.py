@@ -10,17 +10,17 @@ from collections.abc import Callable, Iterator
 import pytest
 from drive_on_bus import INERTIA, DriveOnBus, bus_spec, device
 
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.commission import WatchSpec
-from winchkit.drivers.can.limits import LimitsAtShaft
-from winchkit.drivers.can.modes import Homing
-from winchkit.drivers.can.profile import HomingSpec
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.limits import LimitsAtShaft
+from winchkit.drivers.can.cia402.modes import Homing
+from winchkit.drivers.can.cia402.profile_parameters import HomingSpec
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_servo import OptionSpec, PdoSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.servo import OptionSpec, PdoSpec
 
 CLOCK = MonotonicClock()
 CYCLE = 0.004

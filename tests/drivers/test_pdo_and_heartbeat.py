@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.emergency import error_text, parse_emergency
-from winchkit.drivers.can.heartbeat import HeartbeatProducer, HeartbeatWatch, NmtState
-from winchkit.drivers.can.pdo import MappedObject, PdoCodec, parse_object
+from winchkit.drivers.can.canopen.emergency import error_text, parse_emergency
+from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.pdo import MappedObject, PdoCodec, parse_object
 from winchkit.errors import FileError
-from winchkit.schema.device_servo import PdoSpec
+from winchkit.schema.devices.servo import PdoSpec
 
 
 @st.composite

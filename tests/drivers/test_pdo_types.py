@@ -11,15 +11,15 @@ import pytest
 from drive_on_bus import DriveOnBus, bus_spec, device
 from hand_made import Objects, codec
 
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.commission import WatchSpec
-from winchkit.drivers.can.pdo_setup import cob_id, set_up
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.pdo_parameters import cob_id, set_up
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused, FileError
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_servo import PdoSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.servo import PdoSpec
 from winchkit.schema.read import read_device
 
 CLOCK = MonotonicClock()

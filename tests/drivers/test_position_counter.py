@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit import catalog
-from winchkit.drivers.can.cia402 import Wish
-from winchkit.drivers.can.node import SdoNode
-from winchkit.drivers.can.pdo import PdoCodec
-from winchkit.drivers.can.position_counter import PositionCounter
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo import PdoCodec
+from winchkit.drivers.can.cia402.position_counter import PositionCounter
+from winchkit.drivers.can.cia402.state_machine import Wish
 from winchkit.errors import NotPermitted
-from winchkit.schema.device_servo import PdoSpec
+from winchkit.schema.devices.servo import PdoSpec
 
 ENABLED = 0x0237
 I32 = (-(2**31), 2**31 - 1)

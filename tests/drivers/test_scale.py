@@ -7,9 +7,9 @@ from hand_made import Objects
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.scale import Scale, Units, read_scale, scale_of
+from winchkit.drivers.can.cia402.units import Scale, Units, read_scale, scale_of
 from winchkit.errors import NotPermitted
-from winchkit.schema.device_servo import ServoSpec
+from winchkit.schema.devices.servo import ServoSpec
 
 SERVO = ServoSpec("x.eds", ("CSV",), increments_per_turn=10_000, rated_torque=3.0)
 RPM = 0.10471975511965977

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_cia402_machine import STOPS, transition
 
-from winchkit.drivers.can.cia402 import TRANSITIONS, State, Wish, control_word
+from winchkit.drivers.can.cia402.state_machine import TRANSITIONS, State, Wish, control_word
 
 ENERGISING = {2, 3, 4, 16}
 RAMP_CYCLES = 3

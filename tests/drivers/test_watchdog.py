@@ -9,11 +9,11 @@ from collections.abc import Iterator
 import pytest
 from drive_on_bus import DriveOnBus, bus_spec, device
 
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import State, Wish
-from winchkit.drivers.can.commission import WatchSpec
-from winchkit.drivers.can.heartbeat import NmtState
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.nmt import NmtState
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import NotPermitted
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.effects import Effect, Term, load_catalogue
-from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
+from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
-from winchkit.schema.winch import DrumSpec, WinchProfile
+from winchkit.schema.profiles.winch import DrumSpec, WinchProfile
 
 CATALOGUE = load_catalogue()
 EFFECTS = [effect for effect in CATALOGUE if not effect.of_robots]

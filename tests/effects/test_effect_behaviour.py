@@ -10,8 +10,8 @@ from effect_lines import DRUMS, EFFECTS, IDS, predict, profile_with, standard_on
 
 from winchkit.effects import Effect, Term
 from winchkit.effects.card import signature, usual_values
-from winchkit.effects.coordinates import Coordinates
-from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.model.line import Line
 from winchkit.model.stages import Modifier, Signals
 

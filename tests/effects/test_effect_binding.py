@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from winchkit.effects import check_profile, line_of, terms_of
-from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
+from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.errors import FileError
-from winchkit.schema.winch import CableSpec, EffectTable, GearboxSpec, WinchProfile
+from winchkit.schema.profiles.winch import CableSpec, EffectTable, GearboxSpec, WinchProfile
 
 
 def with_effects(*tables: EffectTable) -> WinchProfile:

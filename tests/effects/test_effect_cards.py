@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 from effect_lines import ALL_IDS, CATALOGUE, MINE
 
-from winchkit.cli.effects import command
+from winchkit.cli.model.effects import command
 from winchkit.effects import Effect
 from winchkit.effects.card import card, card_data, signature, sparkline
 from winchkit.errors import UsageError

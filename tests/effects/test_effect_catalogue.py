@@ -10,8 +10,8 @@ import pytest
 from effect_lines import CATALOGUE, EFFECTS, IDS
 
 from winchkit.effects import Effect
-from winchkit.effects.coordinates import Coordinates
 from winchkit.effects.effect import Need
+from winchkit.effects.parametrization import Coordinates
 from winchkit.units import dimension_of
 
 # Parameters with unit and null as the interface has them; "shape" where null is a default.

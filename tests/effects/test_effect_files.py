@@ -13,8 +13,8 @@ from effect_lines import ALL_IDS, MINE
 
 import winchkit.effects.catalogue as module
 from winchkit.effects import Effect, Term, line_of, load_catalogue
-from winchkit.effects.own_file import check_own
-from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
+from winchkit.effects.effect_template import check_own
+from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.errors import FileError, UsageError
 from winchkit.model.line import Line
 

@@ -11,7 +11,7 @@ import pytest
 from effect_lines import CATALOGUE, IDS, predict
 from scipy.optimize import brentq
 
-from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
+from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 
 G = 9.80665
 RADIUS, GROWTH, RATIO, DEAD, LENGTH, TURNS = 0.06, 0.006, 20.4, 1.5, 6.0, 4.3

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from winchkit.cli import main
 from winchkit.effects import Effect, load_catalogue
 from winchkit.effects.empirical import EMPIRICAL
-from winchkit.effects.probe import broken_promises
+from winchkit.effects.user_effects import broken_promises
 from winchkit.errors import FileError
 
 FILE = '''"""An effect of one's own."""

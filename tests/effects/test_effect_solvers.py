@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from winchkit.effects.on_length.drum_winding_tension import stored
-from winchkit.effects.standard import STANDARD_PROFILE
+from winchkit.effects.reference_motion import STANDARD_PROFILE
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 

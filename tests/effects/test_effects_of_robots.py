@@ -11,9 +11,9 @@ from effect_lines import CATALOGUE, ROBOT_EFFECTS
 from winchkit.effects import Effect, Term, robot_with_effects, robot_with_terms
 from winchkit.effects.bind_robot import check_robot, robot_terms
 from winchkit.effects.card import usual_values
-from winchkit.effects.coordinates import Coordinates
-from winchkit.effects.placed import at_line, placements
-from winchkit.effects.standard_robot import STANDARD_ROBOT, robot_changes, standard_poses
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.placement import at_line, placements
+from winchkit.effects.reference_robot import STANDARD_ROBOT, robot_changes, standard_poses
 from winchkit.errors import FileError
 from winchkit.model.robot import robot_of, rotation_of, wrap_angle
 from winchkit.schema.read import read_robot

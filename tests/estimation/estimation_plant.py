@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 
 from winchkit.sim.physics.pulley import PreslidingPulleys
-from winchkit.sim.state import State
+from winchkit.sim.physics.state import State
 
 WRAPS = (pi / 2, pi, pi / 3)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from winchkit.errors import UsageError
 from winchkit.estimation import compiled
-from winchkit.estimation.batch import dahl_batch
+from winchkit.estimation.dahl_batch import dahl_batch
 from winchkit.model.friction import dahl, dahl_constant, dahl_step
 
 shapes = st.sampled_from([0.0, 0.5, 1.0, 1.3, 2.0])

@@ -11,11 +11,15 @@ from estimation_plant import WRAPS, cell_readings, wander
 from winchkit.catalog import find
 from winchkit.errors import RunError, UsageError
 from winchkit.estimation import DahlEstimator
-from winchkit.estimation.identify import Record, identify_dahl, record_of
-from winchkit.estimation.spread import correlation_time, covariance_of
+from winchkit.estimation.dahl_identification import (
+    Record,
+    correlation_time,
+    covariance_of,
+    identify_dahl,
+    record_of,
+)
 from winchkit.runs.run import Channel, Run
-from winchkit.schema.read import read_programme, read_simbench, read_winch
-from winchkit.schema.winch import (
+from winchkit.schema.profiles.winch import (
     CableSpec,
     DrumSpec,
     GearboxSpec,
@@ -23,6 +27,7 @@ from winchkit.schema.winch import (
     ReferenceSpec,
     WinchProfile,
 )
+from winchkit.schema.read import read_programme, read_simbench, read_winch
 from winchkit.sim.record import record
 
 PROFILE = WinchProfile(

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from winchkit.effects import Effect, Term, load_catalogue
-from winchkit.effects.standard import STANDARD_PROFILE
-from winchkit.estimation.rope_now import RopeNow, RopeState, Sample
+from winchkit.effects.reference_motion import STANDARD_PROFILE
+from winchkit.estimation.cable_state import RopeNow, RopeState, Sample
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals, Stage
 

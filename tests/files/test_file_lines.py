@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.schema.read_lines import Key, line_of, lines_of_keys
+from winchkit.schema.reading.lines import Key, line_of, lines_of_keys
 
 BARE = st.text("abcXYZ019_-", min_size=1, max_size=6)
 ODD = st.text("ab.#[]{}= ,'", min_size=1, max_size=6)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from winchkit.catalog import find, names
 from winchkit.errors import FileError, UsageError
 from winchkit.schema.bench import BenchSpec
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import (
     load,
     read_bench,
@@ -23,7 +24,6 @@ from winchkit.schema.read import (
     read_simbench,
     read_winch,
 )
-from winchkit.schema.winch import WinchProfile
 from winchkit.units import UNITS, format_quantity, parse
 
 ROOT = Path(__file__).parents[2]

@@ -22,8 +22,7 @@ from winchkit import catalog
 from winchkit.cli import main
 from winchkit.errors import Fault, one_line, printable
 from winchkit.runs import open_writer
-from winchkit.runs.mcap_file import McapFile
-from winchkit.runs.mcap_layout import COLUMNS, METADATA, PROFILE
+from winchkit.runs.formats.mcap_file import COLUMNS, METADATA, PROFILE, McapFile
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x1b[31m\r\u202egpj\x9b2Kend"
 """Renames the window, rings, clears the screen, colours, returns, turns the text around, CSI."""

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from winchkit.errors import FileError
-from winchkit.schema.programme import Programme, Step
-from winchkit.schema.programme_file import write_programme
+from winchkit.schema.programme import Programme, Step, write_programme
 from winchkit.schema.read import read_programme
 
 

@@ -19,12 +19,12 @@ from slave import Slave, State
 from slave.rig import Rig as World
 
 from winchkit import catalog
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import Wish
-from winchkit.drivers.can.commission import WatchSpec
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.state_machine import Wish
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 

@@ -10,12 +10,12 @@ import pytest
 from guarded_rig import CYCLE, HEARTBEAT, HOST, generic, rig
 from slave import Reactions, Slave
 
+from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.host_loss.mechanism import Terms
 from winchkit.drivers.can.host_loss.watch import HostWatch
-from winchkit.drivers.can.node import SdoNode
 from winchkit.errors import NotPermitted
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_servo import PdoSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.servo import PdoSpec
 
 FOLDER = Path(os.environ.get("WINCHKIT_MAKERS_EDS", Path(__file__).parents[3] / "shared/data/eds"))
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the makers' EDS files are not here")

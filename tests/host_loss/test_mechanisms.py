@@ -8,8 +8,8 @@ import pytest
 from guarded_rig import CYCLE, HEARTBEAT, eds_of, generic, rig
 from slave import Nmt, Reactions, Slave, State
 
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import Wish
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.cia402.state_machine import Wish
 from winchkit.drivers.can.host_loss.guarding import GuardingWatch
 from winchkit.errors import NotPermitted
 from winchkit.schema.host_loss import VendorObject, VendorWatchdog

@@ -8,7 +8,7 @@ import numpy as np
 
 from winchkit.effects import Term, load_catalogue
 from winchkit.model.line import Line
-from winchkit.schema.winch import (
+from winchkit.schema.profiles.winch import (
     CableSpec,
     DrumSpec,
     GearboxSpec,

@@ -10,7 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.model.drum import Archimedean, Grooved, Spiral, Squared, drum_of
-from winchkit.schema.winch import CableSpec, DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
+from winchkit.schema.profiles.winch import (
+    CableSpec,
+    DrumSpec,
+    GearboxSpec,
+    ReferenceSpec,
+    WinchProfile,
+)
 
 TURN = 2 * pi
 radii = st.floats(0.01, 1.0)

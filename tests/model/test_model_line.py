@@ -13,7 +13,7 @@ from model_lines import line_with, profile_with, swing
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import GRAVITY, Line
 from winchkit.model.stages import ROBOT_STAGES, Modifier, Signals, Stage
-from winchkit.schema.winch import (
+from winchkit.schema.profiles.winch import (
     ReferenceSpec,
 )
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.model.turning import with_turning_points
+from winchkit.model.derivatives import with_turning_points
 
 
 @given(st.floats(0.02, 0.97), st.floats(0.5, 40.0))

@@ -23,14 +23,14 @@ from winchkit.model.capacity import (
     turns_at,
     wrap_ratio,
 )
-from winchkit.schema.read import read_winch
-from winchkit.schema.winch import (
+from winchkit.schema.profiles.winch import (
     CableSpec,
     DrumSpec,
     GearboxSpec,
     ReferenceSpec,
     WinchProfile,
 )
+from winchkit.schema.read import read_winch
 
 
 def winch(drum: DrumSpec, turns: float = 4.0, length: float | None = 8.0) -> WinchProfile:

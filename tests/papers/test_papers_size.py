@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from winchkit.cli import main
 from winchkit.errors import FileError, UsageError
-from winchkit.model.sizing import Row, sized
-from winchkit.model.sizing_parts import belt_length, centre_distance
-from winchkit.model.sizing_row import down, up
+from winchkit.model.sizing.parts import belt_length, centre_distance
+from winchkit.model.sizing.row import down, up
+from winchkit.model.sizing.sizing import Row, sized
+from winchkit.schema.profiles.sizing import SizeSpec, WormSpec
 from winchkit.schema.read import read_size
-from winchkit.schema.size import SizeSpec, WormSpec
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "winding-device.toml"
 PAPER = read_size(EXAMPLE)

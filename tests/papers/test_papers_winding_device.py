@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from winchkit.model import sizing_parts as parts
 from winchkit.model.drum import Grooved
 from winchkit.model.friction import dahl_step, normal_force
 from winchkit.model.gearbox import worm_stage
+from winchkit.model.sizing import parts
 
 angles = st.floats(-1.5, 1.5)
 RPM = pi / 30

@@ -17,16 +17,16 @@ from can_bridge import Bridge
 from npm_install import install
 
 from winchkit import catalog
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.heartbeat import HeartbeatWatch, NmtState
-from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import NoiseSpec
-from winchkit.sim.live import LiveBench
-from winchkit.sim.object_dictionary import Entry, ObjectDictionary
+from winchkit.sim.drive.object_dictionary import Entry, ObjectDictionary
+from winchkit.sim.live.bench import LiveBench
 
 pytestmark = pytest.mark.realtime
 

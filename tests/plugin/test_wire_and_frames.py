@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from winchkit.catalog import find
 from winchkit.errors import UsageError
 from winchkit.schema.read import read_device
-from winchkit.sim.wire import Carried, Wire
+from winchkit.sim.live.buses import Carried, Wire
 from winchkit.testing.frames import FrameNames
 
 HOST, NODE = 127, 3

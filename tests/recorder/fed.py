@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from winchkit.bench.recorder import Recorder
-from winchkit.bench.snapshot import BenchSnapshot, Phase, Trip, WinchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot, Phase, Trip, WinchSnapshot
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import FileError
-from winchkit.runs.rotation import Rotation
+from winchkit.runs.recording.rotation import Rotation
 
 BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
 if BENCHMARKS not in sys.path:

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from fed import Fed, SetClock
 
-from winchkit.bench.live_sinks import JsonLines, UdpJson
-from winchkit.bench.snapshot import to_dict
+from winchkit.bench.control.snapshot import to_dict
+from winchkit.bench.recording.live_sinks import JsonLines, UdpJson
 from winchkit.errors import ConnectionLost, UsageError
 
 

@@ -14,11 +14,11 @@ from click.testing import CliRunner, Result
 from fed import recording
 
 from winchkit import catalog
-from winchkit.bench.origin import git_state, origin
+from winchkit.bench.recording.provenance import git_state, origin
 from winchkit.cli import main
-from winchkit.cli.counter_table import HEADS, counter_rows, counter_table
+from winchkit.cli.core.terminal import HEADS, counter_rows, counter_table
 from winchkit.runs import read_run
-from winchkit.runs.rotation import Rotation
+from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.read import read_simbench
 
 

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from fed import BENCHMARKS, Fed, SetClock, recording
 
-from winchkit.bench.recorder import Recorder
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import open_writer, read_run, write_run
 from winchkit.runs.read import read_log
+from winchkit.runs.recording.rotation import Rotation, part_path
 from winchkit.runs.recover import recover
-from winchkit.runs.rotation import Rotation, part_path
 
 SUFFIXES = pytest.mark.parametrize("suffix", ["csv", "mcap"])
 PARTS = Rotation(duration=1.0)
@@ -170,9 +170,9 @@ import sys, time
 sys.path[:0] = [{tests!r}, {benchmarks!r}]
 from pathlib import Path
 from fed import Fed, SetClock
-from winchkit.bench.recorder import Recorder
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.errors import UsageError
-from winchkit.runs.rotation import Rotation
+from winchkit.runs.recording.rotation import Rotation
 clock = SetClock()
 fed = Fed(clock, "A")
 path, number = Path(sys.argv[1]), int(sys.argv[2])

@@ -12,11 +12,11 @@ import pytest
 from click.testing import CliRunner
 from fed import Fed, recording
 
-from winchkit.bench.recorder import Recorder
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.cli import main
 from winchkit.runs import read_run, write_csv
 from winchkit.runs.read import read_log
-from winchkit.runs.rotation import Rotation
+from winchkit.runs.recording.rotation import Rotation
 
 mcap_reader = pytest.importorskip("mcap.reader")
 OF_HOST = "12.5 N of the host, the device does not say whether it is tared"

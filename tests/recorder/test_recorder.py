@@ -16,13 +16,13 @@ import pytest
 from fed import BENCHMARKS, CYCLE, DELAY, Fed, SetClock, angle, give, recording, tension
 from small_disk import run_on_small_disk
 
-from winchkit.bench.recorder import Recorder
-from winchkit.bench.snapshot import Phase
+from winchkit.bench.control.snapshot import Phase
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.drivers.reading import Quality
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import read_run
 from winchkit.runs.read import read_log
-from winchkit.runs.rotation import Rotation
+from winchkit.runs.recording.rotation import Rotation
 
 
 @pytest.mark.parametrize("suffix", ["csv", "mcap"])
@@ -144,7 +144,7 @@ FULL_AT_ONCE = """
 import sys
 sys.path[:0] = [{tests!r}, {benchmarks!r}]
 from fed import Fed, SetClock
-from winchkit.bench.recorder import Recorder
+from winchkit.bench.recording.recorder import Recorder
 (disk / "other").write_bytes(bytes(60_000))
 fed = Fed(SetClock())
 try:
@@ -180,7 +180,7 @@ FILLING = """
 import logging, resource, sys
 sys.path.insert(0, {tests!r})
 from fed import Fed, SetClock
-from winchkit.bench.recorder import Recorder
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.errors import FileError
 logging.basicConfig(format="%(message)s")
 {limit}
@@ -271,7 +271,7 @@ def test_an_event_is_told_when_a_log_ends(tmp_path: Path, caplog: pytest.LogCapt
 
 
 def test_what_nobody_takes_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("winchkit.bench.feed._WAITING", 100)
+    monkeypatch.setattr("winchkit.bench.recording.feed._WAITING", 100)
     with recording(tmp_path / "a.mcap", "A") as (fed, recorder):
         while recorder.counters()["log"]["drops"] == 0:
             fed.run(recorder, 1.0)

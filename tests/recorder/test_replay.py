@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from fed import CYCLE, DELAY, SetClock, angle, recording, tension
 
-from winchkit.bench.replay import open_replay
-from winchkit.bench.snapshot import BenchSnapshot, Phase
+from winchkit.bench.control.snapshot import BenchSnapshot, Phase
+from winchkit.bench.recording.replay import open_replay
 from winchkit.errors import RunError
 
 

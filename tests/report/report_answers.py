@@ -8,7 +8,7 @@ from functools import cache
 
 from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import Answer, diagnose
-from winchkit.diagnosis.result import Diagnosis, Estimate, OutputFit, Step, Where
+from winchkit.diagnosis.results import Diagnosis, Estimate, OutputFit, Step, Where
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_programme, read_simbench, read_winch
 from winchkit.sim.bench import profiles_of, programme_path

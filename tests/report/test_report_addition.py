@@ -13,13 +13,13 @@ from report_parsed import HOSTILE, Page
 
 from winchkit.catalog import find
 from winchkit.diagnosis.add import Addition, Grown, add, grow
-from winchkit.diagnosis.report.addition_sections import addition_sentence
-from winchkit.diagnosis.report.page import addition_html
-from winchkit.diagnosis.result import Estimate, OutputFit
+from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.report.pages.addition import addition_sentence
+from winchkit.report.pages.pages import addition_html
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_winch
-from winchkit.schema.winch import WinchProfile
 
 STRETCH = "cable-elongation-linear"
 

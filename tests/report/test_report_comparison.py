@@ -13,11 +13,11 @@ from report_parsed import HOSTILE, Page
 
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import Compared, compare, compared
-from winchkit.diagnosis.follows import Followed
-from winchkit.diagnosis.report.comparison_sections import distance_text
-from winchkit.diagnosis.report.page import comparison_html
-from winchkit.diagnosis.report.plots import Residuals, plots_of
-from winchkit.diagnosis.result import OutputError
+from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.results import OutputError
+from winchkit.report.figures.plots import Residuals, plots_of
+from winchkit.report.pages.comparison import distance_text
+from winchkit.report.pages.pages import comparison_html
 from winchkit.schema.read import read_winch
 
 STRETCHED = OutputError("m", 100, None, 2.5, 1.6e-3, 4e-3, 0.0, 0.4e-3, (("load", 0.82),))

@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner
 from report_parsed import Page
 
-from winchkit.cli.effects import command
-from winchkit.diagnosis.report.effect_page import effects_html
+from winchkit.cli.model.effects import command
 from winchkit.effects.card import signature
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.report.pages.effects import effects_html
 
 CATALOGUE = load_catalogue()
 EFFECTS = tuple(CATALOGUE)

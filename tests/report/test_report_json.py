@@ -9,9 +9,9 @@ import pytest
 from report_answers import answer_of, answered, recorded_both
 from report_parsed import Page
 
-from winchkit.cli.output import to_json
-from winchkit.diagnosis.report.as_json import report_json
-from winchkit.diagnosis.report.page import report_html
+from winchkit.cli.core.output import to_json
+from winchkit.report.as_json import report_json
+from winchkit.report.pages.pages import report_html
 
 
 def test_the_ladder_begins_and_ends_with_the_errors_of_the_answer() -> None:

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_parsed import HOSTILE, Page
 
-from winchkit.diagnosis.ladder import Rung
-from winchkit.diagnosis.report.ladder_page import ladder_html
-from winchkit.diagnosis.report.phrases import interval_text
-from winchkit.diagnosis.report.wording import between, plain
-from winchkit.diagnosis.result import Estimate
+from winchkit.diagnosis.results import Estimate
+from winchkit.profile_edit.history import Rung
+from winchkit.report.pages.history import ladder_html
+from winchkit.report.words.numbers import between, plain
+from winchkit.report.words.vocabulary import interval_text
 
 RUNS = ("a.csv", "b.csv")
 NOISE = {"tension": 0.8}

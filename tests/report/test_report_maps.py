@@ -14,14 +14,13 @@ from report_parsed import Page
 
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import Compared, compared
-from winchkit.diagnosis.follows import follows
-from winchkit.diagnosis.maps import ResidualMap, residual_maps, same_cells
-from winchkit.diagnosis.report.axes import reading
-from winchkit.diagnosis.report.chart import Axis, Chart, axis_over
-from winchkit.diagnosis.report.map_words import map_text
-from winchkit.diagnosis.report.page import comparison_html
-from winchkit.diagnosis.report.text import compare_text
-from winchkit.diagnosis.report.wording import Scale
+from winchkit.diagnosis.residuals.attribution import follows
+from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
+from winchkit.report.figures.maps import map_text
+from winchkit.report.html.chart import Axis, Chart, axis_over, reading
+from winchkit.report.pages.pages import comparison_html
+from winchkit.report.text import compare_text
+from winchkit.report.words.numbers import Scale
 from winchkit.schema.read import read_winch
 
 PROFILE = read_winch(find("profiles", "bench-spiral"))

@@ -13,11 +13,11 @@ from report_answers import FRICTION, answer_of, answered, recorded
 from report_parsed import HOSTILE, Page
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.report.page import report_html, residuals_of
-from winchkit.diagnosis.report.plots import plots_of
-from winchkit.diagnosis.report.sentence import sentence
-from winchkit.diagnosis.report.waterfall import waterfall_of
+from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.report.figures.plots import plots_of
+from winchkit.report.figures.waterfall import waterfall_of
+from winchkit.report.pages.pages import report_html, residuals_of
+from winchkit.report.words.sentence import sentence
 
 
 def renamed(inquiry: Inquiry) -> Inquiry:

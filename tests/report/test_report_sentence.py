@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 from report_answers import CALM, FIVE_CORNERS, FRICTION, NOISY, RUBBING, STRETCH, told
 
-from winchkit.diagnosis.report.phrases import clause, estimate_text, kind, listed
-from winchkit.diagnosis.report.sentence import sentence, telling, where_text
-from winchkit.diagnosis.result import Estimate, Step, Where
+from winchkit.diagnosis.results import Estimate, Step, Where
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.report.words.sentence import sentence, telling, where_text
+from winchkit.report.words.vocabulary import clause, estimate_text, kind, listed
 
 
 def test_one_effect_is_told_with_its_value_and_what_it_buys() -> None:

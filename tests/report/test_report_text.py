@@ -22,10 +22,10 @@ from winchkit.catalog import find
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.report.sentence import changes_text, sentence
-from winchkit.diagnosis.report.shown import unseen, visible
-from winchkit.diagnosis.report.text import addition_text, compare_text, report_text
-from winchkit.diagnosis.result import Comparison, Diagnosis, NextRun, OutputError
+from winchkit.diagnosis.results import Comparison, Diagnosis, NextRun, OutputError
+from winchkit.report.detectability import unseen, visible
+from winchkit.report.text import addition_text, compare_text, report_text
+from winchkit.report.words.sentence import changes_text, sentence
 from winchkit.schema.read import read_winch
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.diagnosis.report.thin import bin_means, filled_edges, thin, thin_points
+from winchkit.report.figures.reduction import bin_means, filled_edges, thin, thin_points
 
 
 @given(st.integers(1, 5000), st.integers(10, 400), st.integers(0, 2**32 - 1))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.diagnosis.report.wording import (
+from winchkit.report.words.numbers import (
     percent,
     quantity,
     scale_for,

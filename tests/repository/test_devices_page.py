@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from winchkit.catalog import find, names
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
 
 ROOT = Path(__file__).parents[2]

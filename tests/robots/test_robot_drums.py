@@ -21,7 +21,7 @@ from winchkit.model.robot import (
     flat_pose,
     robot_of,
 )
-from winchkit.schema.winch import DrumSpec
+from winchkit.schema.profiles.winch import DrumSpec
 
 Array = np.ndarray
 DRUMS = {

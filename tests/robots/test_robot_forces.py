@@ -22,7 +22,7 @@ from winchkit.model.robot import (
     wrench_feasibility,
 )
 from winchkit.model.robot.rotation import rotation_by
-from winchkit.schema.robot import PlatformSpec
+from winchkit.schema.profiles.robot import PlatformSpec
 
 Array = np.ndarray
 seeds = st.integers(0, 10_000)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
-from winchkit.runs.log_writer import open_log
-from winchkit.runs.rotation import Rotation
+from winchkit.runs.recording.rotation import Rotation
+from winchkit.runs.recording.writer import open_log
 
 OFFSET = 1_700_000_000_123_456_789
 OPENED = 1000.0

@@ -13,8 +13,8 @@ from mcap.stream_reader import StreamReader
 
 from winchkit.errors import RunError
 from winchkit.runs import read_run
+from winchkit.runs.formats.mcap_file import McapFile
 from winchkit.runs.info import info_of
-from winchkit.runs.mcap_file import McapFile
 from winchkit.runs.read import read_log
 
 

@@ -11,7 +11,7 @@ from logs import CELL, DRIVE, written
 from winchkit.errors import RunError, UsageError
 from winchkit.runs import read_run
 from winchkit.runs.read import read_log
-from winchkit.runs.rotation import Rotation, part_path, parts_beside
+from winchkit.runs.recording.rotation import Rotation, part_path, parts_beside
 
 SECOND = Rotation(duration=1.05)
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from winchkit.errors import RunError
 from winchkit.runs import Run, read_run, write_csv
-from winchkit.runs.summary import summary_of
+from winchkit.runs.info import summary_of
 
 PLAIN = "time [s],motor_angle [rad],tension [N]\n0,0,10\n0.1,1,11\n0.2,2,12\n"
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from winchkit.errors import RunError
-from winchkit.runs.csv_read import read_csv
+from winchkit.runs.formats.csv_read import read_csv
 
 ROWS = 30_000
 HEADER = "time [s],motor_angle [rad],tension [N],load [N],remark"

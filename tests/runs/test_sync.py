@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from winchkit.runs.sync import SYNC_PERIOD, Syncer
+from winchkit.runs.recording.sync import SYNC_PERIOD, Syncer
 
 
 def test_the_promise_is_kept_by_the_period() -> None:

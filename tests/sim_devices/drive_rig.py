@@ -10,11 +10,11 @@ from typing import Any
 import canopen
 
 from winchkit.catalog import find
-from winchkit.schema.device_servo import QuirkSpec, ServoSpec
+from winchkit.schema.devices.servo import QuirkSpec, ServoSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.drive import SimDrive
-from winchkit.sim.object_dictionary import ObjectDictionary, read_eds
-from winchkit.sim.servo import DriveCommand
+from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
+from winchkit.sim.plant.servo import DriveCommand
 
 NODE = 5
 HOST = 127

@@ -11,8 +11,8 @@ from drive_rig import COUNT, HOST, NODE, SERVO, Flywheel, Rig, with_quirks
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.schema.device_servo import QuirkSpec
-from winchkit.sim.drive_brake import HoldingBrake
+from winchkit.schema.devices.servo import QuirkSpec
+from winchkit.sim.drive.shaft import HoldingBrake
 
 PV, CSV = 3, 9
 SPEED = 200_000

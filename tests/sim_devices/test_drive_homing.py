@@ -9,7 +9,7 @@ from drive_rig import COUNT, Flywheel, Rig, with_quirks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.schema.device_servo import QuirkSpec
+from winchkit.schema.devices.servo import QuirkSpec
 
 HM, PP, CSV = 6, 1, 9
 REACHED, ATTAINED, ERROR = 0x400, 0x1000, 0x2000

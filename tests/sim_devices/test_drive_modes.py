@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from winchkit.catalog import find
 from winchkit.schema.read import read_winch
 from winchkit.schema.simbench import WinchTruth
-from winchkit.sim.drive_smooth import MovingAverage
-from winchkit.sim.plant import WinchPlant
+from winchkit.sim.drive.cyclic_modes import MovingAverage
+from winchkit.sim.plant.plant import WinchPlant
 
 PP, PV, CSP, CSV = 1, 3, 8, 9
 

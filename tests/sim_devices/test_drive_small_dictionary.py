@@ -9,8 +9,8 @@ import pytest
 from drive_rig import ENTRIES, NODE, SERVO, Flywheel
 
 from winchkit.errors import FileError
-from winchkit.sim.drive import SimDrive
-from winchkit.sim.object_dictionary import Entry, Key, ObjectDictionary, read_eds
+from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.object_dictionary import Entry, Key, ObjectDictionary, read_eds
 
 LEAST = {0x1000, 0x1001, 0x1018, 0x6040, 0x6041, 0x6060, 0x6061, 0x6064}
 TARGETS = {"CSV": 0x60FF, "PV": 0x60FF, "CSP": 0x607A, "PP": 0x607A, "CST": 0x6071, "PT": 0x6071}

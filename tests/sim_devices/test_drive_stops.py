@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from winchkit.catalog import find
 from winchkit.schema.read import read_winch
 from winchkit.schema.simbench import WinchTruth
-from winchkit.sim.plant import WinchPlant
+from winchkit.sim.plant.plant import WinchPlant
 
 PV, CSP, CSV = 3, 8, 9
 SLOW, QUICK, HARD = 400_000, 2_000_000, 10_000_000

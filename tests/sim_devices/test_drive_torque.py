@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from winchkit.catalog import find
 from winchkit.schema.read import read_winch
 from winchkit.schema.simbench import WinchTruth
-from winchkit.sim.plant import WinchPlant
-from winchkit.sim.servo import DriveCommand, Servo
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.sim.plant.servo import DriveCommand, Servo
 
 PT, CSV, CST = 4, 9, 10
 RATED = 2.0

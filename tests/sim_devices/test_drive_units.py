@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from drive_rig import ENTRIES, SERVO, Flywheel, Rig
 
-from winchkit.sim.drive_units import SCALES, units_of
-from winchkit.sim.object_dictionary import Entry, Key, ObjectDictionary
+from winchkit.sim.drive.object_dictionary import Entry, Key, ObjectDictionary
+from winchkit.sim.drive.units import SCALES, units_of
 
 CSV = 9
 

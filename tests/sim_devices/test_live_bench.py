@@ -19,9 +19,9 @@ from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NotPermitt
 from winchkit.schema.programme import Step
 from winchkit.schema.read import read_bench, read_simbench
 from winchkit.schema.simbench import FaultSpec, NoiseSpec, SimBench
-from winchkit.sim.live import LiveBench
-from winchkit.sim.live_client import address_file, answer, is_simulated, tell
-from winchkit.sim.live_control import ControlServer, obey
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.client import address_file, answer, is_simulated, tell
+from winchkit.sim.live.control import ControlServer, obey
 
 COUNT = 2 * 3.141592653589793 / 65536
 

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 
 from winchkit.catalog import find
 from winchkit.errors import UsageError
-from winchkit.schema.device_modbus import FieldSpec, ModbusSpec, ReadBlock
+from winchkit.schema.devices.modbus import FieldSpec, ModbusSpec, ReadBlock
 from winchkit.schema.read import read_device
-from winchkit.sim.modbus_instrument import ModbusInstrument, in_unit_of
-from winchkit.sim.modbus_registers import counts_of, encode
+from winchkit.sim.instruments.modbus import ModbusInstrument, counts_of, encode, in_unit_of
 
 ORDERS = {"ABCD": "ABCD", "CDAB": "CDAB", "BADC": "BADC", "DCBA": "DCBA"}
 

@@ -16,10 +16,10 @@ from pymodbus.exceptions import ModbusException
 
 from winchkit.catalog import find
 from winchkit.errors import ConnectionLost
-from winchkit.schema.device_modbus import ModbusSpec
+from winchkit.schema.devices.modbus import ModbusSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.modbus import ModbusLine
-from winchkit.sim.modbus_instrument import ModbusInstrument
+from winchkit.sim.instruments.modbus import ModbusInstrument
+from winchkit.sim.instruments.modbus_line import ModbusLine
 
 
 def spec(name: str) -> ModbusSpec:

@@ -15,7 +15,7 @@ import can
 import pytest
 
 from winchkit.schema.read import read_bench
-from winchkit.sim.live_client import address_file, tell
+from winchkit.sim.live.client import address_file, tell
 
 COMMAND = [sys.executable, "-c", "from winchkit.cli import main; main()", "sim", "serve"]
 

@@ -16,8 +16,8 @@ from winchkit.runs import read_run
 from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.can_bus import SimulatedCanBus
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
-from winchkit.sim.wire import Carried, Wire
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.buses import Carried, Wire
 
 
 def test_time_advances_by_what_is_waited_for() -> None:

@@ -6,9 +6,7 @@ from dataclasses import replace
 from math import pi
 
 from winchkit.schema.bench import BenchSpec, DeviceRef, LimitSpec, WinchWiring
-from winchkit.schema.programme import Programme, Step
-from winchkit.schema.simbench import HiddenSpec, NoiseSpec, SimBench, WinchTruth
-from winchkit.schema.winch import (
+from winchkit.schema.profiles.winch import (
     CableSpec,
     DrumSpec,
     GearboxSpec,
@@ -17,8 +15,10 @@ from winchkit.schema.winch import (
     ReferenceSpec,
     WinchProfile,
 )
-from winchkit.sim.plant import WinchPlant
-from winchkit.sim.servo import DriveCommand
+from winchkit.schema.programme import Programme, Step
+from winchkit.schema.simbench import HiddenSpec, NoiseSpec, SimBench, WinchTruth
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.sim.plant.servo import DriveCommand
 
 GRAVITY = 9.80665
 

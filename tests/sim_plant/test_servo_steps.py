@@ -5,8 +5,8 @@ import pytest
 from plant_benches import GRAVITY, SPIRAL, plant
 from scipy.integrate import solve_ivp
 
-from winchkit.sim.plant import WinchPlant
-from winchkit.sim.servo import DriveCommand, Servo
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.sim.plant.servo import DriveCommand, Servo
 
 
 def test_two_lags_as_an_ode_solver_has_them() -> None:

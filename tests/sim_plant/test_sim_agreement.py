@@ -17,7 +17,7 @@ from winchkit.model.stages import Signals
 from winchkit.schema.read import read_programme, read_simbench
 from winchkit.schema.simbench import NoiseSpec
 from winchkit.sim.bench import hiding, profiles_of, programme_path
-from winchkit.sim.numbers import number_names
+from winchkit.sim.physics.parameters import number_names
 from winchkit.sim.physics.table import PHYSICS
 from winchkit.sim.record import record
 

@@ -16,9 +16,9 @@ from winchkit.sim.bench import (
     profiles_of,
     programme_path,
 )
-from winchkit.sim.kinematics import Kinematics
 from winchkit.sim.physics.table import build, scaled
-from winchkit.sim.plant import WinchPlant
+from winchkit.sim.plant.kinematics import Kinematics
+from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.schedule import schedule
 
 BENCHES = [row["name"] for row in listed_benches()]

@@ -11,9 +11,9 @@ from plant_benches import GROOVED, SPIRAL
 from scipy.integrate import quad
 
 from winchkit.errors import UsageError
-from winchkit.schema.winch import CableSpec, DrumSpec
-from winchkit.sim.drum import CLIMB, Drum, drum_of
-from winchkit.sim.kinematics import Kinematics
+from winchkit.schema.profiles.winch import CableSpec, DrumSpec
+from winchkit.sim.plant.drum import CLIMB, Drum, drum_of
+from winchkit.sim.plant.kinematics import Kinematics
 
 KINDS = {
     "spiral": DrumSpec("spiral", 0.06, layer_growth=0.0005),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from plant_benches import GRAVITY
 from scipy.integrate import solve_ivp
 
-from winchkit.sim.hanging import _DAMPING_RATIO, HangingLoad
+from winchkit.sim.plant.hanging_load import _DAMPING_RATIO, HangingLoad
 
 MASS, COMPLIANCE = 20.0, 2.5e-5
 

@@ -7,9 +7,9 @@ import pytest
 from plant_benches import GROOVED, hide
 
 from winchkit.schema.simbench import NoiseSpec, WinchTruth
-from winchkit.sim.noise import Noise
-from winchkit.sim.plant import Measurement, WinchPlant
-from winchkit.sim.servo import DriveCommand
+from winchkit.sim.plant.plant import Measurement, WinchPlant
+from winchkit.sim.plant.sensors import Noise
+from winchkit.sim.plant.servo import DriveCommand
 
 COUNT = 40_000
 

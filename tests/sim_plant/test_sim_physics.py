@@ -9,10 +9,10 @@ from plant_benches import GRAVITY, GROOVED, SPIRAL, cruise, hide, plant
 
 from winchkit.errors import FileError
 from winchkit.schema.simbench import HiddenSpec
-from winchkit.sim.numbers import number_names, read_numbers, with_unit
+from winchkit.sim.physics.parameters import number_names, read_numbers, with_unit
 from winchkit.sim.physics.table import PHYSICS, listed_physics, scaled
-from winchkit.sim.plant import WinchPlant
-from winchkit.sim.servo import DriveCommand
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.sim.plant.servo import DriveCommand
 
 SCALES = {"cable_length": 1e-4, "tension": 0.1, "motor_torque": 1e-3}
 """Differences that count as visible."""

@@ -9,12 +9,12 @@ import pytest
 from plant_benches import GRAVITY, GROOVED, SPIRAL, cruise, hide, plant
 
 from winchkit.errors import FileError, UsageError
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import HiddenSpec, WinchTruth
-from winchkit.schema.winch import WinchProfile
-from winchkit.sim.kinematics import Kinematics
-from winchkit.sim.plant import WinchPlant
-from winchkit.sim.servo import DriveCommand
-from winchkit.sim.trajectory import plan
+from winchkit.sim.plant.kinematics import Kinematics
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.sim.plant.servo import DriveCommand
+from winchkit.sim.plant.trajectory import plan
 
 
 def lift(

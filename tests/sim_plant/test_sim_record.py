@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 from plant_benches import GRAVITY, GROOVED, bench, hide, programme
 
-from winchkit.cli.sim import command
+from winchkit.cli.sim.group import command
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import read_run
 from winchkit.schema.bench import BenchSpec, LimitSpec

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from winchkit.errors import UsageError
-from winchkit.sim.trajectory import plan
+from winchkit.sim.plant.trajectory import plan
 
 distances = st.floats(-20, 20)
 limits = st.floats(0.01, 10)

@@ -17,9 +17,9 @@ from slave.held_key import jogging, observe
 from slave.rig import Rig
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.conditions import BENCH_CONDITIONS
-from winchkit.bench.loop import ControlLoop
-from winchkit.bench.snapshot import Trip
-from winchkit.bench.supervisor import Supervisor
+from winchkit.bench.control.loop import ControlLoop
+from winchkit.bench.control.snapshot import Trip
+from winchkit.bench.control.supervisor import Supervisor
 from winchkit.errors import LimitTripped, NotPermitted
 
 _WITHIN = 0.15

@@ -15,8 +15,8 @@ import pytest
 
 from winchkit.bench.control.conditions import CONDITIONS, Condition
 from winchkit.bench.control.observation import Instrumented, Supervised, WinchInput
-from winchkit.bench.snapshot import Direction
-from winchkit.bench.supervisor import Supervisor
+from winchkit.bench.control.snapshot import Direction
+from winchkit.bench.control.supervisor import Supervisor
 from winchkit.schema.bench import LimitSpec
 
 _CYCLE = 0.004

@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.health import BusState
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.bus.health import BusState
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec

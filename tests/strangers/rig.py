@@ -13,12 +13,12 @@ from slave import Slave
 from slave.on_bus import SlavesOnBus
 
 from winchkit import catalog
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.commission import WatchSpec
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
 
 GENERIC = catalog.find("devices", "generic-cia402")

@@ -12,8 +12,8 @@ from slave.held_key import HeldKey
 from slave.rig import Rig, bench_text
 from slave.wire import GENERIC
 
-from winchkit.drivers.can.scale import Scale
-from winchkit.drivers.can.standstill import Standstill
+from winchkit.drivers.can.cia402.standstill import Standstill
+from winchkit.drivers.can.cia402.units import Scale
 from winchkit.errors import NotPermitted
 
 RPM = 2 * math.pi / 60

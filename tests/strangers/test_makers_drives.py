@@ -20,7 +20,7 @@ from slave.on_bus import SlavesOnBus
 from slave.rig import Rig, bench_text
 
 from winchkit import open_bench
-from winchkit.cli.check import command
+from winchkit.cli.files.check import command
 from winchkit.errors import NotPermitted
 
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the makers' files are not at hand")

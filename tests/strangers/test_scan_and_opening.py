@@ -12,7 +12,7 @@ from rig import Host, axis_on, generic, opened
 from slave import Nmt, State
 
 from winchkit.drivers.can.canopen.communication import set_communication
-from winchkit.drivers.can.scan import Found, scan
+from winchkit.drivers.can.tools.scan import Found, scan
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, NotPermitted
 from winchkit.schema.bench import BusSpec

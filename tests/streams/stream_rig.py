@@ -15,11 +15,11 @@ from winchkit.drivers.stream.line import StreamLine
 from winchkit.drivers.stream.port import Chunk
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_stream import StreamSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.stream import StreamSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.stream_instrument import StreamInstrument as SimInstrument
-from winchkit.sim.stream_instrument import shown_by
+from winchkit.sim.instruments.stream import StreamInstrument as SimInstrument
+from winchkit.sim.instruments.stream import shown_by
 
 DEVICES = (
     "laumas-tlb-ascii",

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from winchkit.errors import FileError, UsageError
-from winchkit.schema.device_stream import LinkSpec, StreamSpec
+from winchkit.schema.devices.stream import LinkSpec, StreamSpec
 from winchkit.schema.read import read_bench, read_device
 from winchkit.schema.template import Part, length_of, parts_of
 

@@ -17,7 +17,7 @@ from winchkit.errors import UsageError
 from winchkit.schema.bench import DeviceRef
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import NoiseSpec
-from winchkit.sim.live import LiveBench
+from winchkit.sim.live.bench import LiveBench
 
 pytestmark = [
     pytest.mark.realtime,

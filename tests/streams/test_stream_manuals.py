@@ -10,7 +10,7 @@ from stream_rig import DEVICES, device
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.decoder import Decoded, Meaning, check_sum
 from winchkit.drivers.stream.parser import StreamParser
-from winchkit.schema.device_stream import ChecksumSpec
+from winchkit.schema.devices.stream import ChecksumSpec
 
 G = 9.80665
 GOOD, UNSTABLE = Quality.GOOD, Quality.UNSTABLE

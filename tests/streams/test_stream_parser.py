@@ -17,7 +17,7 @@ from winchkit.drivers.stream.framing import BinaryFraming, TextFraming
 from winchkit.drivers.stream.matcher import Matcher, fits
 from winchkit.drivers.stream.parser import Item, StreamParser
 from winchkit.schema.template import parts_of
-from winchkit.sim.stream_speech import Speech, State
+from winchkit.sim.instruments.stream_frames import Speech, State
 
 PARSED = {name: device(name) for name in DEVICES}
 TEXT = tuple(name for name in DEVICES if name != "hbm-aed-binary")

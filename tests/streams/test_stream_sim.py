@@ -6,10 +6,9 @@ import pytest
 from stream_rig import stream
 
 from winchkit.errors import FileError, UsageError
-from winchkit.schema.device_stream import StreamSpec
-from winchkit.sim.stream_encode import NumberStyle, style_of
-from winchkit.sim.stream_instrument import StreamInstrument, shown_by
-from winchkit.sim.stream_speech import Speech, State
+from winchkit.schema.devices.stream import StreamSpec
+from winchkit.sim.instruments.stream import StreamInstrument, shown_by
+from winchkit.sim.instruments.stream_frames import NumberStyle, Speech, State, style_of
 
 
 def state(number: float, **more: object) -> State:

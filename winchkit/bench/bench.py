@@ -9,32 +9,32 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from winchkit.bench.cell_desk import CellDesk
+from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.commissioning.validity import require_commissioned, trust_record
+from winchkit.bench.common_move import begin_together, wait_together
 from winchkit.bench.control.latch import LatchFile
+from winchkit.bench.control.loop import Callback, ControlLoop
 from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
 from winchkit.bench.control.release import NotReleased, ReleaseGuard
-from winchkit.bench.loop import Callback, ControlLoop
-from winchkit.bench.origin import origin
-from winchkit.bench.owner import Ownership
-from winchkit.bench.recorder import Recorder
-from winchkit.bench.remote.commander import Client, Commanders, NotCommander, client_name
-from winchkit.bench.remote.handover import own
-from winchkit.bench.resetting import reset
-from winchkit.bench.server import StationServer
-from winchkit.bench.snapshot import BenchSnapshot, Direction
-from winchkit.bench.together import begin_together, wait_together
-from winchkit.bench.waiting import (
+from winchkit.bench.control.snapshot import BenchSnapshot, Direction
+from winchkit.bench.hardware import Wired, wire
+from winchkit.bench.lifecycle import (
     await_cycles,
     await_feedback,
     await_rest,
     await_sensors,
+    reset,
 )
+from winchkit.bench.ownership import Ownership
+from winchkit.bench.recording.provenance import origin
+from winchkit.bench.recording.recorder import Recorder
+from winchkit.bench.remote.commander import Client, Commanders, NotCommander, client_name
+from winchkit.bench.remote.handover import own
+from winchkit.bench.remote.server import StationServer
 from winchkit.bench.winch import Winch
-from winchkit.bench.wiring import Wired, wire
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.health import BusHealth
-from winchkit.drivers.can.scan import Found, named_after, scan
+from winchkit.drivers.can.bus.health import BusHealth
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.tools.scan import Found, named_after, scan
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.reading import Sensor
 from winchkit.errors import (
@@ -45,7 +45,7 @@ from winchkit.errors import (
     NotPermitted,
     UsageError,
 )
-from winchkit.runs.rotation import Rotation
+from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
 from winchkit.units import suggest
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from winchkit import catalog
-from winchkit.drivers.can.bus import CanBus
-from winchkit.drivers.can.cia402 import QUICK_STOP, State, state_of
-from winchkit.drivers.can.node import SdoNode
-from winchkit.drivers.can.standstill import PolledStandstill
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.cia402.standstill import PolledStandstill
+from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, state_of
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec, WinchWiring
-from winchkit.schema.device_servo import ServoSpec
+from winchkit.schema.devices.servo import ServoSpec
 
 __all__ = ["Stopped", "stop_on_bus"]
 

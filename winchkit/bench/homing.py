@@ -7,12 +7,12 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from winchkit.bench.motion import Target
-from winchkit.bench.rope import RopeMap
-from winchkit.bench.snapshot import Direction
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.modes import Homing
-from winchkit.drivers.can.profile import HERE, HomingSpec, check_homing
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.motion import Target
+from winchkit.bench.control.snapshot import Direction
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.modes import Homing
+from winchkit.drivers.can.cia402.profile_parameters import HERE, HomingSpec, check_homing
 from winchkit.errors import DeviceRefused, DriveFault, NotPermitted, UsageError
 
 if TYPE_CHECKING:

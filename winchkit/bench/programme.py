@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from winchkit.bench.bench import Bench
-from winchkit.bench.recorder import Recorder
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.bench.winch import Winch
 from winchkit.errors import RunError, UsageError
 from winchkit.schema.programme import Programme, Step

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from winchkit.bench.cell_tares import host_tare
-from winchkit.bench.device_tare import await_device_tare
+from winchkit.bench.cells.device_tare import await_device_tare
+from winchkit.bench.cells.tares import host_tare
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.motion import DEAD_MAN, Jog, MotionSource, Move, StartGate, Trim
+from winchkit.bench.control.snapshot import Phase, WinchSnapshot
+from winchkit.bench.control.supervisor import direction_of
+from winchkit.bench.control.winch_state import WinchParts
 from winchkit.bench.direction import no_positional, paid_out
 from winchkit.bench.homing import HomingRequest, homing
-from winchkit.bench.motion import DEAD_MAN, Jog, MotionSource, Move
-from winchkit.bench.parts import WinchParts
-from winchkit.bench.rope import RopeMap
-from winchkit.bench.snapshot import Phase, WinchSnapshot
-from winchkit.bench.start_gate import StartGate
-from winchkit.bench.supervisor import direction_of
-from winchkit.bench.trim import Trim
 from winchkit.drivers.reading import Sensor
 from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
 from winchkit.schema.bench import WinchWiring
@@ -274,7 +272,7 @@ class Winch:
         """Tare the load cell at rest; returns the tension that it then reads, N.
 
         By its own volatile command where it has one, else the host subtracts what hangs there
-        (:func:`~winchkit.bench.cell_tares.host_tare`). Its EEPROM is not touched. Raises
+        (:func:`~winchkit.bench.cells.tares.host_tare`). Its EEPROM is not touched. Raises
         NotPermitted, DeviceRefused.
         """
         cell = self.sensors.get("cell")

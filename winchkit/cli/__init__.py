@@ -8,8 +8,8 @@ from typing import Any, NoReturn
 import click
 
 from winchkit import __version__
-from winchkit.cli.lazy import At, LazyGroup
-from winchkit.cli.outcome import finish
+from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.outcome import finish
 
 __all__ = ["main"]
 
@@ -19,37 +19,41 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 COMMANDS: dict[str, At] = {
-    "demo": At("winchkit.cli.demo", "Find a hidden effect on a simulated bench, start to end."),
-    "check": At("winchkit.cli.check", "Check files of any kind and list every fault."),
-    "size": At("winchkit.cli.size", "Size a winch: every requirement, its limit, the verdict."),
-    "effects": At("winchkit.cli.effects", "List the physical effects, or show one's card."),
-    "compare": At("winchkit.cli.compare", "Compare runs with a model: where does it fail?"),
-    "diagnose": At("winchkit.cli.diagnose", "Name the physical effect that the model lacks."),
-    "calibrate": At("winchkit.cli.calibrate", "Calibrate a cable robot from measured poses."),
-    "plan": At("winchkit.cli.plan", "Propose the next motion programme."),
-    "add": At("winchkit.cli.add", "Fit an effect and write it into a profile."),
-    "remove": At("winchkit.cli.remove", "Take an effect out of a profile."),
-    "undo": At("winchkit.cli.undo", "Take back the last step of a profile's ledger."),
-    "ledger": At("winchkit.cli.ledger", "Show how a profile grew, step by step."),
-    "export": At("winchkit.cli.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
-    "sim": At("winchkit.cli.sim", "Simulated benches: record, serve, list."),
-    "jog": At("winchkit.cli.jog", "Move a winch by hand."),
-    "commission": At("winchkit.cli.commission", "Commission a bench: try, confirm, record."),
-    "move": At("winchkit.cli.move", "Move a winch, or all as one, to a cable length."),
-    "home": At("winchkit.cli.home", "Find the drive's zero, or define the present length."),
-    "run": At("winchkit.cli.run", "Execute a motion programme and log it."),
-    "log": At("winchkit.cli.log", "Log a bench; look into, recover, replay logs."),
-    "monitor": At("winchkit.cli.monitor", "Show a bench live."),
-    "stop": At("winchkit.cli.stop", "Stop every winch of a bench, now."),
-    "reset": At("winchkit.cli.reset", "Clear trips and drive faults; nothing is enabled."),
-    "scan": At("winchkit.cli.scan", "Who is on the CAN bus?"),
-    "info": At("winchkit.cli.info", "What a drive says of itself."),
-    "config": At("winchkit.cli.config", "Drive settings: save, load, diff, store, restore."),
-    "lss": At("winchkit.cli.lss", "Give a drive its node number and bit rate."),
-    "busload": At("winchkit.cli.busload", "CAN load of a bench, and the fastest SYNC that fits."),
-    "tare": At("winchkit.cli.tare", "Tare a load cell."),
-    "cell": At("winchkit.cli.cell", "Load cells: info, rate, diagnose, tare, calibrate."),
-    "completion": At("winchkit.cli.completion", "Print the completion script of a shell."),
+    "demo": At("winchkit.cli.sim.demo", "Find a hidden effect on a simulated bench, start to end."),
+    "check": At("winchkit.cli.files.check", "Check files of any kind and list every fault."),
+    "size": At(
+        "winchkit.cli.model.size", "Size a winch: every requirement, its limit, the verdict."
+    ),
+    "effects": At("winchkit.cli.model.effects", "List the physical effects, or show one's card."),
+    "compare": At("winchkit.cli.model.compare", "Compare runs with a model: where does it fail?"),
+    "diagnose": At("winchkit.cli.model.diagnose", "Name the physical effect that the model lacks."),
+    "calibrate": At("winchkit.cli.model.calibrate", "Calibrate a cable robot from measured poses."),
+    "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
+    "add": At("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
+    "remove": At("winchkit.cli.model.remove", "Take an effect out of a profile."),
+    "undo": At("winchkit.cli.model.undo", "Take back the last step of a profile's ledger."),
+    "ledger": At("winchkit.cli.model.ledger", "Show how a profile grew, step by step."),
+    "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
+    "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
+    "jog": At("winchkit.cli.bench.jog", "Move a winch by hand."),
+    "commission": At("winchkit.cli.bench.commission", "Commission a bench: try, confirm, record."),
+    "move": At("winchkit.cli.bench.move", "Move a winch, or all as one, to a cable length."),
+    "home": At("winchkit.cli.bench.home", "Find the drive's zero, or define the present length."),
+    "run": At("winchkit.cli.bench.run", "Execute a motion programme and log it."),
+    "log": At("winchkit.cli.log.log", "Log a bench; look into, recover, replay logs."),
+    "monitor": At("winchkit.cli.bench.monitor", "Show a bench live."),
+    "stop": At("winchkit.cli.bench.stop", "Stop every winch of a bench, now."),
+    "reset": At("winchkit.cli.bench.reset", "Clear trips and drive faults; nothing is enabled."),
+    "scan": At("winchkit.cli.drive.scan", "Who is on the CAN bus?"),
+    "info": At("winchkit.cli.drive.info", "What a drive says of itself."),
+    "config": At("winchkit.cli.drive.config", "Drive settings: save, load, diff, store, restore."),
+    "lss": At("winchkit.cli.drive.lss", "Give a drive its node number and bit rate."),
+    "busload": At(
+        "winchkit.cli.drive.busload", "CAN load of a bench, and the fastest SYNC that fits."
+    ),
+    "tare": At("winchkit.cli.bench.tare", "Tare a load cell."),
+    "cell": At("winchkit.cli.cell.group", "Load cells: info, rate, diagnose, tare, calibrate."),
+    "completion": At("winchkit.cli.files.completion", "Print the completion script of a shell."),
 }
 
 

@@ -6,25 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from winchkit.diagnosis.admit import OUTPUT_UNITS
-from winchkit.diagnosis.dataset import Dataset, prepare
-from winchkit.diagnosis.denoise import contrasts
-from winchkit.diagnosis.follows import Followed, follows, harmonics
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.maps import residual_maps
-from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.result import Comparison, OutputError
-from winchkit.diagnosis.spectrum import WHOLE_FILTER, low_pass
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.input_denoising import contrasts
+from winchkit.diagnosis.data.spectrum import WHOLE_FILTER, low_pass
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.residuals.attribution import Followed, follows, harmonics
+from winchkit.diagnosis.residuals.maps import residual_maps
+from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
+from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.runs.run import Run
-from winchkit.schema.winch import WinchProfile
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Compared", "begin_hypothesis", "compare", "compared", "repeat_noise", "signal_rms"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

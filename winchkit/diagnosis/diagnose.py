@@ -8,35 +8,35 @@ from itertools import pairwise, zip_longest
 import numpy as np
 
 from winchkit.diagnosis.compare import begin_hypothesis
-from winchkit.diagnosis.confusion import Confusion, confusion_of, pairs_of
-from winchkit.diagnosis.dataset import Dataset, prepare
-from winchkit.diagnosis.doubt import judge_and_doubt
-from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.follows import follows, harmonics
-from winchkit.diagnosis.gate import held_out
-from winchkit.diagnosis.hypothesis import Hypothesis
-from winchkit.diagnosis.inquiry import Inquiry
-from winchkit.diagnosis.limits import what_runs_cannot_show
-from winchkit.diagnosis.next_run import next_runs
-from winchkit.diagnosis.noise import Noise
-from winchkit.diagnosis.power import Bar, detectable
-from winchkit.diagnosis.problem import Problem
-from winchkit.diagnosis.result import (
+from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.design.detectability import Bar, detectable
+from winchkit.diagnosis.design.discrimination import next_runs
+from winchkit.diagnosis.design.excitation import what_runs_cannot_show
+from winchkit.diagnosis.regression.cross_validation import held_out
+from winchkit.diagnosis.regression.exclusion import calmed
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.residuals.attribution import follows, harmonics
+from winchkit.diagnosis.results import (
     Candidate,
     Diagnosis,
     Estimate,
     Step,
     Where,
 )
-from winchkit.diagnosis.search import Found, search
-from winchkit.diagnosis.shaken import calmed
-from winchkit.diagnosis.uncertainty import estimates, spread_of
-from winchkit.diagnosis.verdict import Judgement, by_best_weights
+from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.stepwise import Found, search
+from winchkit.diagnosis.verdict.decision import Judgement, by_best_weights
+from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
+from winchkit.diagnosis.verdict.specification_test import judge_and_doubt
 from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
-from winchkit.effects.coordinates import Coordinates
+from winchkit.effects.parametrization import Coordinates
 from winchkit.runs.run import Run
-from winchkit.schema.winch import WinchProfile
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Answer", "Told", "candidates_of", "diagnose", "inquire", "silent", "steps_of"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from winchkit.drivers.reading import Quality
-from winchkit.schema.modbus_parts import StatusMeaning
+from winchkit.schema.devices.modbus import StatusMeaning
 
 __all__ = ["StatusWord"]
 

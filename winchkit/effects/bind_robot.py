@@ -12,12 +12,12 @@ from dataclasses import replace
 from winchkit.effects.bind import Term, not_in, terms_of, values_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
-from winchkit.effects.placed import HOME, at_line, line_of_effect
+from winchkit.effects.placement import HOME, at_line, line_of_effect
 from winchkit.errors import Fault, FileError
 from winchkit.model.robot import Robot, robot_of
 from winchkit.model.stages import Modifier, Stage
-from winchkit.schema.robot import RobotProfile
-from winchkit.schema.winch import EffectTable, WinchProfile
+from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.schema.profiles.winch import EffectTable, WinchProfile
 from winchkit.units import suggest
 
 __all__ = [

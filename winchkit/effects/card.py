@@ -9,12 +9,12 @@ from textwrap import fill, wrap
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.effects.standard import STANDARD_PROFILE, standard_motion
-from winchkit.effects.standard_robot import robot_changes
+from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
+from winchkit.effects.reference_robot import robot_changes
 from winchkit.model.line import Line
 
 __all__ = [
@@ -29,7 +29,6 @@ __all__ = [
     "usual_values",
 ]
 
-Array = NDArray[np.float64]
 _PLACES = {"all": "all lines alike", "one": "one line", "platform": "the platform"}
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"

@@ -84,7 +84,7 @@ def _from_file(path: Path) -> list[Effect]:
         raise FileError(Fault(f"cannot be run: {error!r}", str(path), line)) from error
     effects = _effects_in(module, str(path))
     # Cards are drawn with effects that are bound, and binding wants a catalogue.
-    from winchkit.effects.probe import broken_promises
+    from winchkit.effects.user_effects import broken_promises
 
     faults = [
         Fault(f"effect '{effect.id}' {broken}", str(path))

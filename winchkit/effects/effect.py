@@ -15,7 +15,16 @@ from numpy.typing import NDArray
 
 from winchkit.model.stages import ROBOT_STAGES, At, Stage
 
-__all__ = ["Effect", "Need", "Parameter", "Placement", "Values", "told_apart"]
+__all__ = [
+    "MOTOR_ORDERS",
+    "Effect",
+    "Need",
+    "Parameter",
+    "Placement",
+    "Values",
+    "order_per_turn",
+    "told_apart",
+]
 
 Values = Mapping[str, float]
 Need = Literal[
@@ -134,3 +143,16 @@ def told_apart(first: Effect, second: Effect) -> str:
     if second.id not in first.confused_with and first.id in second.confused_with:
         return second.told_apart
     return first.told_apart
+
+
+_MOST = 1000.0
+MOTOR_ORDERS = (*map(float, range(1, 13)), 18.0, 24.0, 36.0)
+"""Orders per motor turn at which poles, slots and teeth are looked for."""
+
+
+def order_per_turn(orders: tuple[float, ...], typical: float) -> Parameter:
+    """The parameter ``order``, looked for at ``orders``; a free one would fit anything periodic."""
+    return Parameter(
+        "order", "1", null=1.0, typical=typical, low=1.0, high=_MOST,
+        role="shape", grid=orders, whole=True,
+    )  # fmt: skip

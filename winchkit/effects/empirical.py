@@ -10,16 +10,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from winchkit.effects.effect import Effect, Need, Output, Parameter, Values
-from winchkit.effects.order import order_per_turn
+from winchkit.arrays import Array
+from winchkit.effects.effect import Effect, Need, Output, Parameter, Values, order_per_turn
 from winchkit.model.stages import At, Stage
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLE_UNITS, VARIABLES
 
 __all__ = ["EMPIRICAL", "KNOTS", "empirical_id", "heights", "knots", "placed", "variable_of"]
 
-Array = NDArray[np.float64]
 KNOTS = 9
 """Of a curve over one variable; over two at once twice as many."""
 _VALUE = "value_"

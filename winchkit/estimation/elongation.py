@@ -19,8 +19,8 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.robot import (
     PLAIN,
@@ -35,8 +35,6 @@ from winchkit.model.robot import (
 )
 
 __all__ = ["ElongationCorrection", "Stretch"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from winchkit.model.drum import drum_of
-from winchkit.schema.winch import WinchProfile
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = [
     "DEAD_WRAPS",

@@ -8,9 +8,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Clock", "is_calmer", "smooth_sign"]
+from winchkit.arrays import Array
 
-Array = NDArray[np.float64]
+__all__ = [
+    "Clock",
+    "is_calmer",
+    "shifted",
+    "smooth_sign",
+    "with_turning_points",
+]
+
 _LEAVES_BEHIND = 2.0
 _CREEP_SHARE = 0.02
 _CREEP_LEAST = 1e-3
@@ -104,3 +111,33 @@ def _by_number(x: Array) -> Array:
         one, two, three = (x[3 + k : len(x) - 3 + k] - x[3 - k : len(x) - 3 - k] for k in (1, 2, 3))
         out[3:-3] = (45 * one - 9 * two + three) / 60
     return np.asarray(out)
+
+
+def shifted(signal: Array, time: Array, later: float) -> Array:
+    """The signal ``later`` seconds on, by cubic Hermite interpolation; held at the run's ends."""
+    if later == 0.0 or len(time) < 2:
+        return signal
+    slope = np.gradient(signal, time)
+    asked = np.clip(time + later, time[0], time[-1])
+    left = np.clip(np.searchsorted(time, asked, side="right") - 1, 0, len(time) - 2)
+    step = time[left + 1] - time[left]
+    u = (asked - time[left]) / step
+    rise = signal[left + 1] - signal[left]
+    start, end = slope[left] * step - rise, rise - slope[left + 1] * step
+    return np.asarray(signal[left] + u * rise + u * (1 - u) * ((1 - u) * start + u * end))
+
+
+def with_turning_points(x: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Samples (n,) with the turning points between them, and where the samples stand in that.
+
+    What turned between two samples went further than either, and a loop or a play remembers how
+    far: parabolas through the three samples about a turn tell.
+    """
+    step = np.diff(x)
+    turns = 1 + np.flatnonzero(step[:-1] * step[1:] < 0)
+    slope, bend = (step[turns] + step[turns - 1]) / 2, step[turns] - step[turns - 1]
+    at = -slope / bend
+    where = turns + (at > 0)
+    count = np.arange(len(x))
+    own = count + np.searchsorted(where, count, side="right")
+    return np.insert(x, where, x[turns] + slope * at / 2), own

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from winchkit.schema.winch import WinchProfile
+from winchkit.arrays import Array
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Archimedean", "Drum", "Grooved", "Spiral", "Squared", "drum_of"]
 
-Array = NDArray[np.float64]
 _TURN = 2 * np.pi
 
 

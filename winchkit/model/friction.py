@@ -12,8 +12,9 @@ from itertools import pairwise
 from math import copysign, exp
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from winchkit.arrays import Array
 from winchkit.model.recurrence import linear
 
 __all__ = [
@@ -28,7 +29,6 @@ __all__ = [
     "tension_after",
 ]
 
-Array = NDArray[np.float64]
 _FALLEN = 1.5
 """Speed over the Stribeck speed at which e^(−(v/vs)²) is a tenth."""
 

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from math import isfinite, pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.capacity import capacity, turns_at
-from winchkit.schema.winch import WinchProfile
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["FLEET_LIMIT", "Guide", "guide_of", "guide_warnings"]
 
-Array = NDArray[np.float64]
 _TURN = 2 * pi
 FLEET_LIMIT = {"grooved": np.deg2rad(2.0), "smooth": np.deg2rad(1.5)}
 """Fleet angle up to which a wire rope lies well, rad: 2° on grooves, 1.5° on a smooth drum.

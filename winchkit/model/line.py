@@ -12,16 +12,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.model.derivatives import Clock, is_calmer, smooth_sign
 from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage, Way
-from winchkit.schema.winch import WinchProfile
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["GRAVITY", "Line", "Motion"]
 
-Array = NDArray[np.float64]
 GRAVITY = 9.80665
 _CREEP_SPEED = 1e-3
 _CREEP_RATE = 0.5

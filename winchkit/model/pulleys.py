@@ -14,8 +14,9 @@ from math import cos, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.friction import (
     capstan_ratio,
@@ -26,7 +27,6 @@ from winchkit.model.friction import (
 
 __all__ = ["Bearings", "Eyelets", "Presliding", "eq27_tension", "over_pulleys", "presliding_step"]
 
-Array = NDArray[np.float64]
 Step = Callable[[float, float, float, float, float], float]
 PulleyStep = Callable[..., Any]
 _NEWTON_STEPS = 8

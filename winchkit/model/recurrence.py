@@ -7,11 +7,11 @@ so that all partial compositions follow from doubling (Hillis and Steele, 1986).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from winchkit.arrays import Array
 
 __all__ = ["first_order_lag", "linear", "play"]
 
-Array = NDArray[np.float64]
 _FORGOTTEN = 1e-18
 
 

@@ -7,14 +7,26 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from winchkit.arrays import Array
+from winchkit.schema.profiles.winch import WinchProfile
 
-from winchkit.schema.winch import WinchProfile
+__all__ = [
+    "OUTPUTS",
+    "OUTPUT_UNITS",
+    "ROBOT_STAGES",
+    "At",
+    "LinePlace",
+    "Modifier",
+    "Path",
+    "Signals",
+    "Stage",
+    "Way",
+]
 
-__all__ = ["ROBOT_STAGES", "At", "LinePlace", "Modifier", "Path", "Signals", "Stage", "Way"]
 
-Array = NDArray[np.float64]
+OUTPUT_UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
+"""Outputs of a winch model, in the order of reports, with their SI units."""
+OUTPUTS = tuple(OUTPUT_UNITS)
 
 
 class Stage(IntEnum):
@@ -51,7 +63,7 @@ class Stage(IntEnum):
     HOME_LENGTH = 15
     """Value: rope of a robot's line at home, m."""
     PAYLOAD = 16
-    """Value: the :class:`~winchkit.schema.robot.PlatformSpec` of a robot."""
+    """Value: the :class:`~winchkit.schema.profiles.robot.PlatformSpec` of a robot."""
 
 
 ROBOT_STAGES = frozenset({Stage.LINE_PLACE, Stage.HOME_LENGTH, Stage.PAYLOAD})

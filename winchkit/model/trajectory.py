@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from winchkit.arrays import Array
 from winchkit.errors import UsageError
 
 __all__ = ["Trajectory", "plan"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

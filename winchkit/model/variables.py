@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.model.recurrence import play
 from winchkit.model.stages import At
 
 __all__ = ["ANGLES", "COMPOUND", "VARIABLES", "VARIABLE_UNITS"]
 
-Array = NDArray[np.float64]
 _CREEP = 1e-4
 
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.runs.layout import Layout, RowRule, Source
 
 __all__ = ["PATIENCE", "Aligner", "Moments", "Series", "values_at"]
 
-Array = NDArray[np.float64]
 
 PATIENCE = 0.5
 """A row waits no longer than this for a source that has gone silent, s."""

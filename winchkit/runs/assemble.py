@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.columns import POSE_DIMENSIONS, column_dimension, near_miss, unit_fault
 from winchkit.runs.run import Channel, Run
@@ -16,7 +16,6 @@ from winchkit.units import UNITS, convert, factor, parse, suggest
 
 __all__ = ["Recording", "assemble", "refuse"]
 
-Array = NDArray[np.float64]
 _SHOWN = 20
 _LATEST = 9.2e9
 """Largest time stamp, s: nanoseconds in 64 bits, as MCAP and most instruments count."""

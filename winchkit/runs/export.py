@@ -30,11 +30,11 @@ def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> 
     log = None if len(paths) == 1 and suffix != ".mf4" else read_log(paths)
     run = (read_run(paths[0]) if log is None else aligned(log)).of_winch(winch)
     if log is not None and suffix == ".mf4":
-        from winchkit.runs.mf4_write import write_mf4
+        from winchkit.runs.formats.tables import write_mf4
 
         write_mf4(log_of_run(run) if winch else log, output)
     elif suffix == ".parquet":
-        from winchkit.runs.parquet_write import write_parquet
+        from winchkit.runs.formats.tables import write_parquet
 
         write_parquet(run, output)
     else:

@@ -8,13 +8,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 
 __all__ = ["Layout", "RowRule", "Samples", "Signal", "Source", "read_layout", "write_layout"]
 
-Array = NDArray[np.float64]
 _LARGEST = 1 << 62
 
 

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.csv_read import read_csv
+from winchkit.runs.formats.csv_read import read_bytes, read_csv
 from winchkit.runs.log import Log, aligned, joined, log_of_run
-from winchkit.runs.rotation import parts_beside
+from winchkit.runs.recording.rotation import parts_beside
 from winchkit.runs.run import Run
-from winchkit.runs.text import read_bytes
 
 __all__ = ["SUFFIXES", "read_log", "read_run"]
 
@@ -49,8 +48,8 @@ def _has_begun(path: Path) -> bool:
     data = read_bytes(path, may_be_empty=True)
     if _format_of(path) == ".csv":
         return any(line.strip() and line[:1] != b"#" for line in data.split(b"\n")[:-1])
-    from winchkit.runs.mcap_content import read_content
-    from winchkit.runs.mcap_layout import COLUMNS, LOG, MARK
+    from winchkit.runs.formats.mcap_file import COLUMNS, LOG, MARK
+    from winchkit.runs.formats.mcap_read import read_content
 
     if MARK.startswith(data):
         return False
@@ -69,7 +68,7 @@ def _format_of(path: str | Path) -> str:
 def _read_run(path: Path) -> Run:
     if _format_of(path) == ".csv":
         return read_csv(path)
-    from winchkit.runs.mcap_read import read_mcap
+    from winchkit.runs.formats.mcap_read import read_mcap
 
     return read_mcap(path)
 
@@ -77,6 +76,6 @@ def _read_run(path: Path) -> Run:
 def _read_log(path: Path, *, is_part: bool) -> Log:
     if _format_of(path) == ".csv":
         return log_of_run(read_csv(path, is_part=is_part), closed=None)
-    from winchkit.runs.mcap_read import read_mcap_log
+    from winchkit.runs.formats.mcap_read import read_mcap_log
 
     return read_mcap_log(path)

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from winchkit.errors import Fault, RunError, UsageError
-from winchkit.runs.mcap_file import McapFile
-from winchkit.runs.mcap_layout import MARK, PROFILE
-from winchkit.runs.mcap_records import (
+from winchkit.runs.files import write_whole
+from winchkit.runs.formats.csv_read import read_bytes
+from winchkit.runs.formats.mcap_file import MARK, PROFILE, McapFile
+from winchkit.runs.formats.mcap_records import (
     Body,
     Damage,
     Messages,
@@ -21,8 +22,6 @@ from winchkit.runs.mcap_records import (
     is_intact,
     records,
 )
-from winchkit.runs.text import read_bytes
-from winchkit.runs.whole_file import write_whole
 
 __all__ = ["Recovered", "recover", "recovered_path"]
 

@@ -6,14 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.units import parse, suggest
 
 __all__ = ["CHANNEL_DIMENSIONS", "Channel", "Run"]
 
-Array = NDArray[np.float64]
 
 CHANNEL_DIMENSIONS: dict[str, str] = {
     "motor_angle": "angle",

@@ -11,8 +11,8 @@ from types import TracebackType
 from typing import BinaryIO, Self
 
 from winchkit.errors import UsageError
+from winchkit.runs.files import abandoned
 from winchkit.runs.recording.log_file import require_in_place
-from winchkit.runs.whole_file import abandoned
 from winchkit.units import suggest
 
 __all__ = ["Clock", "Columns", "RunWriter"]

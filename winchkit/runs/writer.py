@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from winchkit.errors import UsageError
-from winchkit.runs.csv_write import CsvWriter
+from winchkit.runs.formats.csv_write import CsvWriter
 from winchkit.runs.read import SUFFIXES
 from winchkit.runs.recording.log_file import create
 from winchkit.runs.run import Run
@@ -58,7 +58,7 @@ def write_csv(run: Run, path: str | Path) -> None:
 
 def write_mcap(run: Run, path: str | Path) -> None:
     """Write a run as MCAP, whatever the file is called."""
-    from winchkit.runs.mcap_write import McapWriter
+    from winchkit.runs.formats.mcap_write import McapWriter
 
     _write(run, path, McapWriter)
 
@@ -79,7 +79,7 @@ def kind_for(path: str | Path) -> type[RunWriter]:
     if suffix == ".csv":
         return CsvWriter
     if suffix == ".mcap":
-        from winchkit.runs.mcap_write import McapWriter
+        from winchkit.runs.formats.mcap_write import McapWriter
 
         return McapWriter
     message = f"'{suffix}' is no format of a run; use one of {', '.join(SUFFIXES)}"

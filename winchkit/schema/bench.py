@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from winchkit.schema.device_servo import OptionSpec
+from winchkit.schema.devices.servo import OptionSpec
 from winchkit.schema.quantity import (
     Flag,
     Force,

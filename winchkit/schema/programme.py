@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
+from winchkit.errors import Fault, FileError
 from winchkit.schema.quantity import (
     Length,
     PositiveAcceleration,
@@ -17,8 +19,13 @@ from winchkit.schema.quantity import (
     Whole,
 )
 from winchkit.schema.table import Rule, Table
+from winchkit.units import format_quantity
 
-__all__ = ["Programme", "Step"]
+__all__ = [
+    "Programme",
+    "Step",
+    "write_programme",
+]
 
 _RUN_UP = 0.1
 """Over which a programme's first place is approached, m."""
@@ -109,3 +116,47 @@ class Programme(Table):
         """A programme without a step does nothing."""
         if not self.step:
             yield "step", "a programme needs at least one [[step]]"
+
+
+_UNITS = {
+    "to": "m",
+    "by": "m",
+    "speed": "m/s",
+    "acceleration": "m/s^2",
+    "hold": "s",
+    "load_mass": "kg",
+    "temperature": "degC",
+}
+_ORDER = ("ask", "load_mass", "temperature", "to", "by", "speed", "acceleration", "hold")
+
+
+def write_programme(programme: Programme, path: Path) -> None:
+    """Write a programme file; raises FileError."""
+    import tomlkit
+
+    document = tomlkit.document()
+    document["schema"] = 1
+    document["kind"] = "programme"
+    document["name"] = programme.name
+    document["repeat"] = programme.repeat
+    if programme.description:
+        document["description"] = programme.description
+    steps = tomlkit.aot()
+    for step in programme.step:
+        table = tomlkit.table()
+        table.update(_written(step))
+        steps.append(table)
+    document["step"] = steps
+    try:
+        path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    except OSError as error:
+        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from error
+
+
+def _written(step: Step) -> dict[str, Any]:
+    out: dict[str, Any] = {} if step.winch == "all" else {"winch": step.winch}
+    for key in _ORDER:
+        value = getattr(step, key)
+        if value is not None:
+            out[key] = format_quantity(value, _UNITS[key]) if key in _UNITS else value
+    return out

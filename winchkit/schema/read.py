@@ -14,18 +14,18 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from winchkit.errors import Fault, FileError
-from winchkit.schema import read_bench as benches
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.calibration import CellCalibration, TareBook
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.schema.profiles.sizing import SizeSpec
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme
-from winchkit.schema.read_lines import Key
-from winchkit.schema.read_parts import Reading
-from winchkit.schema.read_source import open_source
-from winchkit.schema.robot import RobotProfile
+from winchkit.schema.reading import bench as benches
+from winchkit.schema.reading.lines import Key
+from winchkit.schema.reading.parts import Reading
+from winchkit.schema.reading.source import open_source
 from winchkit.schema.simbench import SimBench
-from winchkit.schema.size import SizeSpec
-from winchkit.schema.winch import WinchProfile
 
 __all__ = [
     "Declaration",

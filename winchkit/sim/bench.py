@@ -10,8 +10,8 @@ from random import Random
 from winchkit.catalog import find, folder, names
 from winchkit.errors import FileError
 from winchkit.regular_file import file_kind
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import HiddenSpec, SimBench
-from winchkit.schema.winch import WinchProfile
 from winchkit.sim.physics.table import build, scaled
 from winchkit.units import suggest
 

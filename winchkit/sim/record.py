@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 from winchkit.errors import UsageError
 from winchkit.schema.bench import WinchWiring
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme
 from winchkit.schema.simbench import SimBench, WinchTruth
-from winchkit.schema.winch import WinchProfile
-from winchkit.sim.kinematics import Kinematics
-from winchkit.sim.plant import MAX_STEP, Measurement, WinchPlant
+from winchkit.sim.plant.kinematics import Kinematics
+from winchkit.sim.plant.plant import MAX_STEP, Measurement, WinchPlant
+from winchkit.sim.plant.servo import DriveCommand
 from winchkit.sim.schedule import RunPlan, schedule
-from winchkit.sim.servo import DriveCommand
 
 if TYPE_CHECKING:
     from winchkit.runs.run import Run

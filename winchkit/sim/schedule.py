@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from winchkit.errors import Fault, FileError
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.programme import Programme, Step
-from winchkit.sim.trajectory import SCurve, plan
+from winchkit.sim.plant.trajectory import SCurve, plan
 from winchkit.units import suggest
 
 __all__ = ["Leg", "RunPlan", "schedule"]

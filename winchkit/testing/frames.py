@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from winchkit.drivers.can.decode import KnownNode, decode, known_node
-from winchkit.drivers.can.emergency import parse_emergency
-from winchkit.drivers.can.pdo_setup import cob_id
-from winchkit.schema.device import DeviceSpec
-from winchkit.sim.wire import Carried
+from winchkit.drivers.can.canopen.emergency import parse_emergency
+from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+from winchkit.drivers.can.tools.decode import KnownNode, decode, known_node
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.sim.live.buses import Carried
 
 __all__ = ["Frame", "FrameNames"]
 

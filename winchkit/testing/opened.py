@@ -9,12 +9,12 @@ from types import TracebackType
 from typing import Self
 
 from winchkit.bench.bench import Bench, open_bench
-from winchkit.drivers.can.cia402 import state_of
+from winchkit.drivers.can.cia402.state_machine import state_of
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live import LiveBench
-from winchkit.sim.pace import PacedClock
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.paced_clock import PacedClock
 from winchkit.testing.frames import Frame
 from winchkit.testing.recording import Recording
 

@@ -9,7 +9,7 @@ from winchkit.catalog import find
 from winchkit.errors import UsageError, suggest
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.wire import Carried, Wire
+from winchkit.sim.live.buses import Carried, Wire
 from winchkit.testing.frames import Frame, FrameNames
 
 __all__ = ["Recording"]

@@ -15,6 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from winchkit import __version__
 from winchkit.bench.bench import Bench
+from winchkit.bench.cells.instruments import device_of, eds_of
 from winchkit.bench.commissioning.dialogue import Dialogue, confirm
 from winchkit.bench.commissioning.motions import Motions
 from winchkit.bench.commissioning.record import (
@@ -28,7 +29,6 @@ from winchkit.bench.commissioning.record import (
 )
 from winchkit.bench.commissioning.trial import Trial, Trials
 from winchkit.bench.commissioning.validity import drive_record
-from winchkit.bench.instruments import device_of, eds_of
 from winchkit.bench.remote.commander import client_name
 from winchkit.bench.remote.handover import own
 from winchkit.drivers.clock import Clock

@@ -13,12 +13,18 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Self
 
+from winchkit.bench.control.cable import RopeMap
 from winchkit.bench.control.latch import LatchFile
-from winchkit.bench.rope import RopeMap
-from winchkit.bench.wiring import Wired, wire
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.cia402 import DISABLE_VOLTAGE, QUICK_STOP, State, Wish, state_of
-from winchkit.drivers.can.heartbeat import HeartbeatProducer, NmtState
+from winchkit.bench.hardware import Wired, wire
+from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.state_machine import (
+    DISABLE_VOLTAGE,
+    QUICK_STOP,
+    State,
+    Wish,
+    state_of,
+)
 from winchkit.drivers.can.host_loss.mechanism import Silence
 from winchkit.drivers.can.host_loss.proof import bring_back
 from winchkit.drivers.clock import Clock

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
 
+from winchkit.bench.cells.instruments import device_of, eds_of
 from winchkit.bench.commissioning.record import (
     DriveRecord,
     FileHash,
@@ -14,10 +15,9 @@ from winchkit.bench.commissioning.record import (
     hash_of,
     read_record,
 )
-from winchkit.bench.instruments import device_of, eds_of
-from winchkit.drivers.can.axis import Cia402Axis
-from winchkit.drivers.can.objects import Objects
-from winchkit.drivers.can.scan import identity_of
+from winchkit.drivers.can.canopen.node import Objects
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import FileError, NotPermitted
 from winchkit.schema.bench import BenchSpec, BusSpec, WinchWiring
 

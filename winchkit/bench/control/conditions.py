@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from winchkit.bench.control.observation import Instrumented, Memory, Supervised, WinchInput
-from winchkit.bench.snapshot import Direction
+from winchkit.bench.control.snapshot import Direction
 
 __all__ = ["BENCH_CONDITIONS", "CONDITIONS", "BenchCondition", "Condition"]
 

@@ -17,7 +17,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from winchkit.bench.snapshot import Trip
+from winchkit.bench.control.snapshot import Trip
 from winchkit.errors import NotPermitted
 
 __all__ = ["LatchFile"]

@@ -29,7 +29,7 @@ from winchkit.bench.control.computer import (
     scheduling_remedy,
     threads,
 )
-from winchkit.bench.snapshot import BenchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.errors import NotPermitted
 
 __all__ = ["NOT_REQUESTED", "RealTime", "Request", "RestCollector", "acquire"]

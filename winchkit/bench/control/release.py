@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from winchkit.bench.dead_man import FIRST_PRESS
+from winchkit.bench.control.dead_man import FIRST_PRESS
 from winchkit.errors import NotPermitted
 
 __all__ = ["NotReleased", "ReleaseGuard"]

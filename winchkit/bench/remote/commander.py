@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from winchkit.bench.dead_man import FIRST_PRESS
+from winchkit.bench.control.dead_man import FIRST_PRESS
 from winchkit.drivers.clock import Clock
 from winchkit.errors import MotionError, NotPermitted
 

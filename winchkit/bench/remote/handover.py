@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 
-from winchkit.bench.client import RemoteStation
-from winchkit.bench.owner import Ownership, connect_to_owner
+from winchkit.bench.ownership import Ownership, connect_to_owner
+from winchkit.bench.remote.client import RemoteStation
 from winchkit.errors import ConnectionLost, NotPermitted
 from winchkit.schema.bench import BenchSpec
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TextIO
 
 from winchkit import errors
-from winchkit.bench.owner import log_path
+from winchkit.bench.ownership import log_path
 from winchkit.bench.remote.commander import client_name
 from winchkit.bench.remote.handover import own_or_find
 from winchkit.bench.remote.interruption import interrupted_by_signals

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from winchkit.bench.client import OwnerGone
-from winchkit.bench.session import at_station
+from winchkit.bench.remote.client import OwnerGone
+from winchkit.bench.remote.session import at_station
 
 if TYPE_CHECKING:
-    from winchkit.bench.station import Station
+    from winchkit.bench.remote.station import Station
 
 __all__ = ["watch"]
 

@@ -8,17 +8,35 @@ or shows another text than is there. While a command runs, standard output and s
 from __future__ import annotations
 
 import io
+import math
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TextIO, cast
+
+import click
 
 from winchkit.errors import one_line, printable
 
 if TYPE_CHECKING:
+    from rich.table import Table
     from rich.text import Text
 
-__all__ = ["EscapedStream", "cell", "escaped_output", "screen"]
+    from winchkit.bench.recording.live_sinks import LiveSink
+
+__all__ = [
+    "HEADS",
+    "EscapedStream",
+    "cell",
+    "counter_rows",
+    "counter_table",
+    "escaped_output",
+    "live_sinks",
+    "progress_bar",
+    "screen",
+    "status_line",
+]
 
 
 class EscapedStream:
@@ -97,3 +115,118 @@ def escaped_output() -> Iterator[None]:
 def _escaped(stream: object) -> TextIO:
     escaped = stream if isinstance(stream, EscapedStream) else EscapedStream(cast("TextIO", stream))
     return cast("TextIO", escaped)
+
+
+def status_line(status: dict[str, Any]) -> str:
+    """Length, cable speed (positive pays out), tension and phase of each winch of a status.
+
+    Beside the length that the profile says, what an instrument shows, where there is one.
+    """
+    parts = []
+    for name, winch in status["winch"].items():
+        text = f"{name}: {_decimals(winch['cable_length'])} m"
+        if winch["length"] is not None:
+            text += f" (measured {_decimals(winch['length'], 4)} m)"
+        text += f" {_decimals(winch['cable_speed'])} m/s"
+        if winch["rope_tension"] is not None:
+            text += f" {_decimals(winch['rope_tension'], 1)} N"
+        parts.append(f"{text} {winch['phase']}")
+    return "  ".join(parts)
+
+
+def _decimals(value: float | None, digits: int = 3) -> str:
+    return "—" if value is None else f"{value:.{digits}f}"
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str, float], None]]:
+    """Gives a function that is told what is begun and which share (0 to 1) is done."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}", markup=False),
+    )
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("reading", total=1.0)
+
+        def told(what: str, share: float) -> None:
+            bar.update(task, description=one_line(what), completed=share)
+
+        yield told
+
+
+@contextmanager
+def live_sinks(*, jsonl: bool, udp: str | None) -> Iterator[list[LiveSink]]:
+    """The sinks that were asked for; says at the end what could not be sent."""
+    from winchkit.bench.recording.live_sinks import JsonLines, UdpJson
+
+    datagrams = None if udp is None else UdpJson(udp, time.time)
+    sinks: list[LiveSink] = [JsonLines(sys.stdout)] if jsonl else []
+    try:
+        yield sinks if datagrams is None else [*sinks, datagrams]
+    finally:
+        if datagrams is not None:
+            datagrams.close()
+            if datagrams.dropped:
+                click.echo(f"{udp}: {datagrams.dropped} pictures could not be sent", err=True)
+
+
+HEADS: dict[str, tuple[str, str]] = {
+    "rate": ("Hz", "rate in Hz"),
+    "readings": ("read", "readings"),
+    "drops": ("drop", "drops"),
+    "duplicates": ("dup", "duplicates"),
+    "crc": ("CRC", "CRC errors"),
+    "timeouts": ("t/o", "timeouts"),
+    "late": ("late", "late replies"),
+    "resynchronised": ("sync", "resynchronised bytes"),
+    "reconnects": ("recon", "reconnects"),
+    "latency": ("p50/p99/max ms", "latency p50/p99/max in ms"),
+}
+"""Short head and full words by counter."""
+_LOG = "log"
+
+
+def counter_rows(counters: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    """A row of texts per instrument, in the order of :data:`HEADS` after the name."""
+    return [
+        [name, *(_text(key, counted.get(key)) for key in HEADS)]
+        for name, counted in counters.items()
+        if name != _LOG
+    ]
+
+
+def counter_table(counters: Mapping[str, Mapping[str, Any]]) -> Table:
+    """All of them, with the log itself below."""
+    from rich.table import Table
+
+    log = counters.get(_LOG, {})
+    table = Table(
+        box=None, caption=", ".join(f"{key} {value}" for key, value in log.items()) or None
+    )
+    table.add_column("instrument")
+    for head, _ in HEADS.values():
+        table.add_column(head, justify="right", no_wrap=True)
+    for row in counter_rows(counters):
+        table.add_row(*map(cell, row))
+    return table
+
+
+def _text(key: str, value: Any) -> str:
+    if key == "latency":
+        times = (value or {}).values()
+        return "/".join(_number(item, 1e3) for item in times) if times else "—"
+    if key == "rate":
+        return _number(value, 1.0)
+    return "—" if value is None else str(value)
+
+
+def _number(value: float | None, factor: float) -> str:
+    return "—" if value is None or math.isnan(value) else f"{value * factor:.3g}"

@@ -5,22 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from winchkit.diagnosis.add import Addition
-from winchkit.diagnosis.fit import Fit
-from winchkit.diagnosis.robot.figures import Errors, Shown, errors_of, figures
-from winchkit.diagnosis.robot.places import lacking, needless
-from winchkit.diagnosis.robot.problem import RobotProblem
-from winchkit.diagnosis.robot.study import Study, study_of
-from winchkit.diagnosis.uncertainty import estimates, spread_of
+from winchkit.diagnosis.add import Addition, Removal
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.robot.candidates import lacking, needless
+from winchkit.diagnosis.robot.errors import Errors, Shown, errors_of, figures
+from winchkit.diagnosis.robot.preparation import Study, study_of
+from winchkit.diagnosis.robot.regression import RobotProblem
 from winchkit.effects.bind_robot import declared_terms, robot_terms
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
-from winchkit.effects.placed import at_line
+from winchkit.effects.placement import at_line
 from winchkit.errors import UsageError
 from winchkit.runs.run import Run
-from winchkit.schema.robot import RobotProfile
+from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["RobotGrown", "add_to_robot", "grow_robot"]
+__all__ = [
+    "RobotGrown",
+    "add_to_robot",
+    "grow_robot",
+    "remove_from_robot",
+]
 
 
 @dataclass(frozen=True)
@@ -103,3 +108,39 @@ def _added(study: Study, effect: Effect) -> RobotGrown:
     was, now = (errors_of(problem, problem.at(fit.hypothesis)) for fit in (begin, final))
     addition = Addition(figures(before, after, study.noise), terms, study.dataset.notes)
     return RobotGrown(problem, (was, now), addition)
+
+
+def remove_from_robot(
+    effect_id: str,
+    runs: Sequence[Run],
+    profile: RobotProfile,
+    catalogue: Catalogue | None = None,
+) -> Removal:
+    """Refit a robot's effects on poses without one of them, ``EFFECT`` or ``EFFECT/LINE``.
+
+    ``home-length`` alone takes out those of all lines. Raises UsageError for an effect that the
+    profile itself does not have, RunError with every fault of every run.
+    """
+    catalogue = catalogue or load_catalogue()
+    own = [term.effect.id for term in declared_terms(profile, catalogue)]
+    gone = [name for name in own if name == effect_id]
+    if not gone and effect_id == "home-length":
+        gone = [name for name in own if name.startswith("home-length/")]
+    if not gone:
+        has = ", ".join(own) or "none"
+        raise UsageError(f"robot '{profile.name}' has no effect '{effect_id}'; it has {has}")
+    study = study_of(runs, profile, catalogue)
+    inquiry = study.as_filed()
+    begin, noise = inquiry.settle(inquiry.begin)
+    hypothesis = begin.hypothesis
+    for index in reversed(range(len(hypothesis.terms))):
+        if hypothesis.terms[index].effect.id in gone:
+            hypothesis = hypothesis.without(index)
+    final, _ = inquiry.settle(hypothesis)
+    problem = inquiry.robot_problem
+    before, after = (Shown(problem, fit, noise, inquiry.groups) for fit in (begin, final))
+    found = estimates(problem, final, spread_of(problem, final, noise, inquiry.blocks))
+    # What a line's winch brings along is refitted beside them and stays in the winch's own profile.
+    left = tuple(item for item in found if item[0].effect.id in own)
+    outputs = figures(before, after, study.noise)
+    return Removal(effect_id, outputs, left, study.dataset.notes)

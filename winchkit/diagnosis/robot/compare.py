@@ -6,24 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from winchkit.diagnosis.follows import Followed
-from winchkit.diagnosis.result import Comparison, OutputError
+from winchkit.arrays import Array
+from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.results import Comparison, OutputError
+from winchkit.diagnosis.robot.attribution import follows_of
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
-from winchkit.diagnosis.robot.figures import UNITS, Errors, errors_of, rms, signals
-from winchkit.diagnosis.robot.noise import START, contrasts
-from winchkit.diagnosis.robot.problem import RobotProblem, Standing
-from winchkit.diagnosis.robot.where import follows_of
+from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
+from winchkit.diagnosis.robot.regression import RobotProblem, Standing
+from winchkit.diagnosis.robot.variance_components import START, contrasts
 from winchkit.effects.bind_robot import robot_terms, robot_with_effects
 from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
-from winchkit.schema.robot import RobotProfile
+from winchkit.schema.profiles.robot import RobotProfile
 
 __all__ = ["RobotCompared", "compare_robot", "compared_robot"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.diagnosis.dataset import Dataset
-from winchkit.diagnosis.repeats import Repeats
-from winchkit.effects.robot_poses import Measured, read_poses
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.errors import Fault, RunError
+from winchkit.runs.poses import Measured, read_poses
 from winchkit.runs.run import Run
-from winchkit.schema.robot import RobotProfile
-from winchkit.schema.winch import WinchProfile
+from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["RobotDataset", "prepare_poses"]
 
-Array = NDArray[np.float64]
 _FEWEST = 10
 _ANGLES_AGREE = 0.02
 _TENSIONS_AGREE = 0.03

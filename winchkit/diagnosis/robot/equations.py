@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.model.line import Line
 from winchkit.model.robot import (
@@ -35,7 +36,6 @@ from winchkit.model.stages import At, Stage
 
 __all__ = ["POSED", "Equations", "placed_by", "start_pose"]
 
-Array = NDArray[np.float64]
 Sigma = Mapping[str, float]
 POSED = ("rope", "position", "rotation", "swivel", "gauge")
 """Kinds that change with the pose, in their order."""

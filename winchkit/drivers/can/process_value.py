@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import struct
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
-from winchkit.drivers.can.node import SdoNode
-from winchkit.drivers.can.pdo import parse_object
-from winchkit.drivers.reading import Quality
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo import PdoCodec, parse_object
+from winchkit.drivers.can.canopen.pdo_parameters import cob_id, codecs, set_up
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.publisher import Publisher, Publishing, Sampled
+from winchkit.drivers.reading import Quality, Sensor
 from winchkit.drivers.status_word import StatusWord
-from winchkit.errors import Fault, FileError
-from winchkit.schema.device import DeviceSpec
+from winchkit.errors import ConnectionLost, DeviceRefused, Fault, FileError, NoReply, NotPermitted
+from winchkit.schema.devices.device import DeviceSpec
 from winchkit.units import convert, dimension_of
 
-__all__ = ["ProcessDecoder"]
+__all__ = [
+    "ProcessDecoder",
+    "ProcessInstrument",
+    "ProcessLine",
+]
 
 _REAL32_BITS = 32
 _TINIEST = 1e-30
@@ -55,3 +66,201 @@ class ProcessDecoder:
         """Whether no device in good order shows this number."""
         beyond = self.spec.limit is not None and abs(counts) > self.spec.limit
         return beyond or (self.spec.type == "f32" and 0 < abs(counts) < _TINIEST)
+
+
+_PRE_OPERATIONAL, _START = 0x80, 0x01
+_SILENT_PERIODS = 10
+_RETRY = 0.5
+_FRAME = 135 / 1e6
+"""The longest frame with eight bytes at 1 Mbit/s, s: what a value is older for having been sent."""
+_SERIAL = (0x1018, 4)
+
+
+class ProcessInstrument(Publishing):
+    """An instrument on an open CAN bus. ``latest`` is what other threads read."""
+
+    def __init__(self, name: str, device: DeviceSpec, node: int, bus: CanBus, clock: Clock) -> None:
+        """Attach to a node; nothing is sent yet. Raises FileError for an unusable device file."""
+        if device.process is None:
+            raise FileError(Fault("is no CANopen instrument", device.path))
+        self.name = name
+        self.spec = spec = device.process
+        self.period = 1 / spec.rate
+        self.max_age = _SILENT_PERIODS * self.period
+        """A reading older than this is stale, s."""
+        self.publisher = Publisher(spec.rate)
+        self.problem: ConnectionLost | None = None
+        """Why there is no new reading, while there is none."""
+        self.may_store = False
+        """Whether commands that write the device's EEPROM are let through."""
+        self.status = 0
+        self._bus, self._clock = bus, clock
+        self._node = SdoNode(bus, node, Path(device.path).parent / spec.eds)
+        self._decoder = ProcessDecoder(device, self._node)
+        self._codecs = codecs(self._node, spec.tpdo)
+        self._heard = clock.now()
+        self._was_set_up = False
+
+    @property
+    def tared(self) -> bool | None:
+        """Whether the device says that it shows a net value; None where it does not say."""
+        return self._decoder.status.has("net", self.status) if "net" in self.spec.bits else None
+
+    @property
+    def sends(self) -> bool:
+        """Whether it sends its values itself."""
+        return bool(self._codecs)
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing has come for too long."""
+        return self._clock.now() - self._heard > self.max_age
+
+    def set_up(self) -> None:
+        """Map its TPDOs and start it; raises NoReply, DeviceRefused, ConnectionLost."""
+        node = self._node
+        if self.sends:
+            self._bus.nmt(_PRE_OPERATIONAL, node.node)
+            set_up(node, "tpdo", self._codecs)
+            for codec in self._codecs:
+                identifier = cob_id("tpdo", codec.spec.number, node.node)
+                self._bus.on(identifier, self._receiver(codec))
+        self._bus.nmt(_START, node.node)
+        self.publisher.tally.reconnects += self._was_set_up
+        self._was_set_up, self._heard = True, self._clock.now()
+
+    def ask(self) -> None:
+        """Read status and value by SDO, in this order and the status again; raises as above."""
+        t_request = self._clock.now()
+        before = self._read(self.spec.status)
+        raw = self._read(self.spec.value)
+        after = self._read(self.spec.status)
+        self._publish(raw, before | after, t_request, self._clock.now())
+
+    def failed(self, error: ConnectionLost) -> None:
+        """Keep and count a failure."""
+        tally = self.publisher.tally
+        tally.drops += 1
+        tally.timeouts += isinstance(error, NoReply)
+        tally.exceptions += isinstance(error, DeviceRefused)
+        self.problem = error
+
+    def fell_silent(self) -> NoReply:
+        """The error that says so."""
+        return NoReply(
+            f"{self.name}: no process value for {self.max_age:g} s; check power, wiring, node id "
+            "and that nobody has stopped the node"
+        )
+
+    def command(self, name: str) -> None:
+        """Send a command of the device file; raises NotPermitted, NoReply, DeviceRefused."""
+        commands = self.spec.command
+        if name not in commands:
+            known = ", ".join(commands) or "none"
+            raise NotPermitted(f"{self.name} has no command '{name}'; its device file has {known}")
+        command = commands[name]
+        if command.permanent and not self.may_store:
+            raise NotPermitted(
+                f"{self.name}: '{name}' writes the device's EEPROM, which wears out; "
+                f"`winchkit cell store --command {name}` does it on purpose"
+            )
+        self._node.write(*parse_object(command.object), command.value)
+
+    async def confirm(self, name: str) -> None:
+        """Wait for the status that a command must bring or end; raises DeviceRefused."""
+        command = self.spec.command[name]
+        if command.comes is None and command.goes is None:
+            return
+        sent = self._clock.now()
+        while self._clock.now() < sent + command.within:
+            await asyncio.sleep(self.period / 2)
+            reading, has = self.latest, self._decoder.status.has
+            came = command.comes is None or has(command.comes, self.status)
+            gone = command.goes is None or not has(command.goes, self.status)
+            if reading is not None and reading.t_request > sent and came and gone:
+                return
+        raise DeviceRefused(
+            f"{self.name} took the command '{name}' but did not obey within {command.within:g} s"
+        )
+
+    def identify(self) -> dict[str, float]:
+        """Its serial number, where it has one; raises NoReply."""
+        serial = self._node.read_if_there(*_SERIAL)
+        return {} if serial is None else {"serial number": float(serial)}
+
+    def _read(self, place: str | None) -> int:
+        return 0 if place is None else self._node.read(*parse_object(place))
+
+    def _receiver(self, codec: PdoCodec) -> Callable[[bytes, float], None]:
+        value = codec.position.get(parse_object(self.spec.value))
+        at = self.spec.status
+        status = None if at is None else codec.position.get(parse_object(at))
+
+        def receive(data: bytes, now: float) -> None:
+            numbers = codec.decode(data)
+            if numbers is None:
+                self.publisher.tally.malformed += 1
+            elif value is not None:
+                word = 0 if status is None else numbers[status]
+                self._publish(numbers[value], word, now - _FRAME, now)
+
+        return receive
+
+    def _publish(self, raw: int, status: int, t_request: float, t_receive: float) -> None:
+        value, counts, quality = self._decoder.decode(raw, status)
+        delay = self.spec.filter_delay
+        when = Sampled(t_request, t_receive, t_request - delay - self.period, t_receive - delay)
+        self.problem, self.status, self._heard = None, status, t_receive
+        self.publisher.publish(value, value, counts, quality, when)
+
+
+class ProcessLine:
+    """The instruments of one CAN bus; a line of :class:`~winchkit.drivers.slow.SlowDevices`."""
+
+    def __init__(self, name: str, instruments: tuple[ProcessInstrument, ...], clock: Clock) -> None:
+        """Remember what hangs on the bus, which somebody else opens and closes."""
+        self.name = name
+        self.sensors: Sequence[ProcessInstrument] = instruments
+        self._clock = clock
+        self._closing = False
+
+    async def serve(self) -> None:
+        """Keep the readings new until closed."""
+        await asyncio.gather(*(self._serve(one) for one in self.sensors))
+
+    async def command(self, sensor: Sensor, name: str) -> None:
+        """Send a command to one of its instruments, and see it obeyed."""
+        instrument = self._own(sensor)
+        await asyncio.to_thread(instrument.command, name)
+        await instrument.confirm(name)
+
+    async def identify(self, sensor: Sensor) -> dict[str, float]:
+        """Ask one of its instruments for its serial number."""
+        return await asyncio.to_thread(self._own(sensor).identify)
+
+    def close(self) -> None:
+        """Ask no more; the bus is its owner's."""
+        self._closing = True
+
+    def _own(self, sensor: Sensor) -> ProcessInstrument:
+        return next(item for item in self.sensors if item is sensor)
+
+    async def _serve(self, instrument: ProcessInstrument) -> None:
+        """Set one instrument up, and again whenever it has fallen silent."""
+        while not self._closing:
+            try:
+                await asyncio.to_thread(instrument.set_up)
+                await self._watch(instrument)
+            except ConnectionLost as error:
+                instrument.failed(error)
+                await asyncio.sleep(_RETRY)
+
+    async def _watch(self, instrument: ProcessInstrument) -> None:
+        due = self._clock.now()
+        while not self._closing:
+            if not instrument.sends:
+                await asyncio.to_thread(instrument.ask)
+            elif instrument.silent:
+                raise instrument.fell_silent()
+            due = max(due + instrument.period, self._clock.now())
+            await asyncio.sleep(due - self._clock.now())

@@ -23,7 +23,7 @@ from winchkit.drivers.modbus.frames import AnswerGate, Event
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.modbus_parts import ReadBlock
+from winchkit.schema.devices.modbus import ReadBlock
 
 __all__ = ["ModbusClient"]
 

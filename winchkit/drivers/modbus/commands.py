@@ -9,7 +9,7 @@ from winchkit.drivers.modbus.client import ModbusClient
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.words import number_of, words_of
 from winchkit.errors import DeviceRefused, NotPermitted
-from winchkit.schema.modbus_parts import REGISTERS, CommandSpec, ReadBlock
+from winchkit.schema.devices.modbus import REGISTERS, CommandSpec, ReadBlock
 
 __all__ = ["command_of", "confirm", "identity", "send"]
 

@@ -10,9 +10,8 @@ from winchkit.drivers.modbus.words import number_of
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.status_word import StatusWord
 from winchkit.errors import Fault, FileError
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_modbus import FieldSpec, ModbusSpec, ReadBlock
-from winchkit.schema.modbus_parts import Order
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.modbus import FieldSpec, ModbusSpec, Order, ReadBlock
 from winchkit.units import convert, dimension_of
 
 __all__ = ["Decoded", "Decoder"]

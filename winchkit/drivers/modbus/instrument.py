@@ -14,8 +14,8 @@ from winchkit.drivers.modbus.late_replies import LISTENING, LateReplies
 from winchkit.drivers.publisher import Publisher, Publishing, Sampled
 from winchkit.drivers.reading import Quality
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.modbus_parts import ReadBlock
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.modbus import ReadBlock
 
 __all__ = ["Instrument"]
 

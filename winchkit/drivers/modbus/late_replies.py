@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from winchkit.drivers.reading import REPLY_HORIZON
-from winchkit.schema.modbus_parts import ReadBlock
+from winchkit.schema.devices.modbus import ReadBlock
 
 __all__ = ["LISTENING", "LateReplies"]
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from winchkit.drivers.modbus.late_replies import LISTENING
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device_modbus import ModbusSpec
-from winchkit.schema.modbus_parts import ReadBlock
+from winchkit.schema.devices.modbus import ModbusSpec, ReadBlock
 
 __all__ = ["Exchange", "exchange", "silence_of", "wire_times"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 
-from winchkit.schema.modbus_parts import REGISTERS, Order, ValueType
+from winchkit.schema.devices.modbus import REGISTERS, Order, ValueType
 
 __all__ = ["number_of", "words_of"]
 

@@ -17,7 +17,7 @@ from winchkit.drivers.stream.parser import Item, StreamParser
 from winchkit.drivers.stream.port import Chunk, Port
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 from winchkit.schema.bench import BusSpec
-from winchkit.schema.device_stream import AskSpec
+from winchkit.schema.devices.stream import AskSpec
 
 __all__ = ["Conversation", "exchange_time"]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.matcher import Match, Matcher, fits
 from winchkit.errors import Fault, FileError
-from winchkit.schema.device_stream import ChecksumSpec, Says, StreamSpec
+from winchkit.schema.devices.stream import ChecksumSpec, Says, StreamSpec
 from winchkit.schema.template import parts_of
 from winchkit.units import convert
 

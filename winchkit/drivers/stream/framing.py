@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
-from winchkit.schema.device_stream import StreamSpec
+from winchkit.schema.devices.stream import StreamSpec
 
 __all__ = ["BinaryFraming", "Framing", "Piece", "TextFraming", "framing_of"]
 

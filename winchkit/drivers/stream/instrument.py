@@ -17,7 +17,7 @@ from winchkit.drivers.stream.parser import (
     talking,
 )
 from winchkit.errors import ConnectionLost
-from winchkit.schema.device import DeviceSpec
+from winchkit.schema.devices.device import DeviceSpec
 
 __all__ = ["StreamInstrument", "Wire"]
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from winchkit.drivers.stream.decoder import Decoder, Heard, Meaning
 from winchkit.drivers.stream.framing import framing_of
 from winchkit.errors import Fault, FileError
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_stream import StreamSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.stream import StreamSpec
 
 __all__ = [
     "Item",

@@ -1,12 +1,10 @@
 """cable-elongation-exponential: a rope that is soft when slack and stiff when tight."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(length: Array, at: At, values: Values) -> Array:

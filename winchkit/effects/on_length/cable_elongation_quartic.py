@@ -5,12 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.polynomial.polynomial import polyval
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
 
-Array = NDArray[np.float64]
 _SOFTEST = 0.1
 _TABLE = 513
 _NEWTON_STEPS = 4

@@ -1,14 +1,13 @@
 """cable-hysteresis: strands rub, so that the strain depends on where the tension came from."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.derivatives import with_turning_points
 from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
-from winchkit.model.turning import with_turning_points
 
-Array = NDArray[np.float64]
 _STUCK = 0.5
 
 

@@ -1,12 +1,9 @@
 """cable-thermal: the rope grows with its temperature."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
 
-Array = NDArray[np.float64]
 _AT_DECLARED_LENGTH = 20.0
 
 

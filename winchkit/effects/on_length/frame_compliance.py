@@ -1,12 +1,10 @@
 """frame-compliance: the frame gives under the rope's force."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(length: Array, at: At, values: Values) -> Array:

@@ -8,11 +8,11 @@ there is fitted.
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.recurrence import play
 from winchkit.model.stages import At, Path, Stage
 
-Array = NDArray[np.float64]
 _ON_THE_FLANK = 0.98
 """Of the way to a flank: what is nearer bears, though the encoder's noise may say otherwise."""
 

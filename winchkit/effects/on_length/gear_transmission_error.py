@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.effects.order import MOTOR_ORDERS, order_per_turn
+from winchkit.effects.effect import MOTOR_ORDERS, Effect, Parameter, Values, order_per_turn
 from winchkit.model.stages import At, Path, Stage
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
-from winchkit.schema.robot import PlatformSpec
+from winchkit.schema.profiles.robot import PlatformSpec
 
 
 def apply(platform: PlatformSpec, at: At, values: Values) -> PlatformSpec:

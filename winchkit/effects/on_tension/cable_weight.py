@@ -2,14 +2,10 @@
 
 from math import sin
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.line import GRAVITY
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

@@ -1,13 +1,9 @@
 """cell-creep: the reading goes on changing after a step of the load."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.recurrence import first_order_lag
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

@@ -1,14 +1,13 @@
 """cell-hysteresis: the load cell reads less while loaded up than while unloaded."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.derivatives import with_turning_points
 from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
-from winchkit.model.turning import with_turning_points
 
-Array = NDArray[np.float64]
 _REACH = 0.1
 
 

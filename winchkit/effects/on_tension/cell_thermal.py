@@ -1,12 +1,9 @@
 """cell-thermal: the load cell's zero moves with temperature."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
 
-Array = NDArray[np.float64]
 _AT_CALIBRATION = 20.0
 
 

@@ -1,13 +1,9 @@
 """pulley-capstan: the rope slides around a pulley that does not turn."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.friction import capstan_ratio
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

@@ -1,13 +1,11 @@
 """pulley-dahl: pulley friction that builds up with distance after a reversal (presliding)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.friction import coulomb_ratio, dahl
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

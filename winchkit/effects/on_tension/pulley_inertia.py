@@ -1,12 +1,10 @@
 """pulley-inertia: the rope must turn every pulley faster or slower."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

@@ -1,13 +1,9 @@
 """pulley-stribeck: a pulley holds harder at creep speed than when it runs."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.friction import coulomb_ratio, has_fallen, stribeck
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

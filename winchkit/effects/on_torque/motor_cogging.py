@@ -1,13 +1,10 @@
 """motor-cogging: the magnets pull the rotor to the teeth, in a whole order of the motor turn."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.effects.order import MOTOR_ORDERS, order_per_turn
+from winchkit.arrays import Array
+from winchkit.effects.effect import MOTOR_ORDERS, Effect, Parameter, Values, order_per_turn
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:

@@ -1,12 +1,8 @@
 """motor-coulomb-asymmetry: friction differs between the two directions."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:

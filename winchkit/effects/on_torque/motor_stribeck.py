@@ -1,13 +1,11 @@
 """motor-stribeck: the motor holds harder at creep speed."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.friction import has_fallen
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:

@@ -1,12 +1,8 @@
 """rotor-inertia: the motor must accelerate its own rotor."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:

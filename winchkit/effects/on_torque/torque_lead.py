@@ -1,13 +1,9 @@
 """torque-lead: the torque on record is what the drive was told, before the motor has it."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.shifted import shifted
+from winchkit.model.derivatives import shifted
 from winchkit.model.stages import At, Stage
-
-Array = NDArray[np.float64]
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.errors import UsageError
 
 __all__ = [
@@ -24,7 +24,6 @@ __all__ = [
     "wrench_feasibility",
 ]
 
-Array = NDArray[np.float64]
 _RANK = 1e-9
 _BALANCE = 1e-9
 _WITHIN = 1e-9

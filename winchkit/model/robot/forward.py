@@ -17,17 +17,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.line import GRAVITY
 from winchkit.model.robot.hessian import length_hessian
 from winchkit.model.robot.kinematics import Geometry, Pose, lengths, linearised
 from winchkit.model.robot.rotation import rotation_by
 from winchkit.model.robot.wrench import gravity_wrench, weight_hessian
-from winchkit.schema.robot import PlatformSpec
+from winchkit.schema.profiles.robot import PlatformSpec
 
 __all__ = ["Found", "forward"]
 
-Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
 _RANK = 1e-7
 _FLAT = 1e-9

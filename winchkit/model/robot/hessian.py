@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.model.robot.kinematics import Geometry, sensitivities, wrap_angle
 from winchkit.model.robot.rotation import skew
 
 __all__ = ["length_hessian"]
-
-Array = NDArray[np.float64]
 
 
 def length_hessian(geometry: Geometry, position: Array, rotation: Array) -> Array:

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.model.robot.rotation import angles_of, rotation_of
 
 if TYPE_CHECKING:
-    from winchkit.schema.robot import RobotProfile
+    from winchkit.schema.profiles.robot import RobotProfile
 
 __all__ = [
     "Geometry",
@@ -40,7 +40,6 @@ __all__ = [
     "wrap_angle",
 ]
 
-Array = NDArray[np.float64]
 _CHUNK = 1024
 _BEHIND = -1e-6
 

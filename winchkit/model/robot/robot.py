@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
 from winchkit.model.line import Line
@@ -24,12 +24,11 @@ from winchkit.model.robot.kinematics import (
 )
 from winchkit.model.robot.wrench import gravity_wrench
 from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
-from winchkit.schema.robot import PlatformSpec, RobotProfile
-from winchkit.schema.winch import WinchProfile
+from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Robot", "robot_of", "ropes_of", "standing"]
 
-Array = NDArray[np.float64]
 _TURN = 2 * np.pi
 _NEWTON_STEPS = 5
 

@@ -7,7 +7,9 @@ base frame: R' = exp([ω]×) R.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from winchkit.arrays import Array
 
 __all__ = [
     "angle_rates",
@@ -19,8 +21,6 @@ __all__ = [
     "rotation_vector",
     "skew",
 ]
-
-Array = NDArray[np.float64]
 
 
 def rotation_of(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:

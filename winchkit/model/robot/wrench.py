@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from winchkit.arrays import Array
 from winchkit.model.line import GRAVITY
-from winchkit.schema.robot import PlatformSpec
+from winchkit.schema.profiles.robot import PlatformSpec
 
 __all__ = ["gravity_wrench", "weight_hessian"]
 
-Array = NDArray[np.float64]
 _DOWN = np.array([0.0, 0.0, -GRAVITY])
 
 

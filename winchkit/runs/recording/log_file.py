@@ -19,7 +19,7 @@ from typing import BinaryIO
 
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.regular_file import regular
-from winchkit.runs.rotation import parts_beside
+from winchkit.runs.recording.rotation import parts_beside
 
 __all__ = ["begin_log", "create", "is_written", "refuse_written", "require_in_place"]
 

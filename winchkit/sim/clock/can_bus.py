@@ -9,7 +9,7 @@ from itertools import count
 from typing import Any
 
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.wire import Wire
+from winchkit.sim.live.buses import Wire
 
 __all__ = ["SimulatedCanBus", "SimulatedCanPort"]
 

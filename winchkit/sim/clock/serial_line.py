@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.stream_instrument import StreamInstrument
+from winchkit.sim.instruments.stream import StreamInstrument
 
 __all__ = ["SimulatedSerialLine"]
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from math import tanh
 from typing import Annotated, ClassVar
 
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Quantity
-from winchkit.schema.winch import WinchProfile
-from winchkit.sim.state import State
+from winchkit.sim.physics.state import State
 
 __all__ = [
     "HOOKS",

@@ -16,7 +16,7 @@ from winchkit.schema.quantity import (
     Quantity,
 )
 from winchkit.sim.physics.base import Physics, Stiffness, rope_direction
-from winchkit.sim.state import State
+from winchkit.sim.physics.state import State
 
 __all__ = [
     "ClippingCell",

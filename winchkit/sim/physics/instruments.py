@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from winchkit.schema.quantity import Force, Number, PositiveDuration
 from winchkit.sim.physics.base import ForceDrift, Physics, ThermalForce
-from winchkit.sim.state import State
+from winchkit.sim.physics.state import State
 
 __all__ = [
     "BentCell",

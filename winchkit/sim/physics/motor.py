@@ -21,7 +21,7 @@ from winchkit.sim.physics.base import (
     motor_direction,
     rope_direction,
 )
-from winchkit.sim.state import State
+from winchkit.sim.physics.state import State
 
 __all__ = [
     "Cogging",

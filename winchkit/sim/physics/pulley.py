@@ -9,7 +9,7 @@ from typing import ClassVar
 from winchkit.schema.quantity import Mass, Number, PositiveNumber, PositiveSpeed
 from winchkit.sim.physics.base import Physics, Stiffness, Viscosity, rope_direction
 from winchkit.sim.physics.presliding import relax
-from winchkit.sim.state import State
+from winchkit.sim.physics.state import State
 
 __all__ = ["CreepPulleys", "HeavyPulleys", "PreslidingPulleys", "StickyPulleys", "ViscousPulleys"]
 

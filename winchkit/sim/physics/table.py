@@ -6,11 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from winchkit.errors import Fault, FileError
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import HiddenSpec
-from winchkit.schema.winch import WinchProfile
-from winchkit.sim.numbers import number_names, read_numbers, with_unit
-from winchkit.sim.physics import beyond, instruments, motor, pulley, rope, winding
+from winchkit.sim.physics import beyond, instruments, motor, pulley, winding
+from winchkit.sim.physics import cable as rope
 from winchkit.sim.physics.base import Physics
+from winchkit.sim.physics.parameters import number_names, read_numbers, with_unit
 from winchkit.units import suggest
 
 __all__ = ["PHYSICS", "build", "declared", "listed_physics", "scaled"]

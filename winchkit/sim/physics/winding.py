@@ -7,10 +7,10 @@ from math import cos, hypot, pi, sin
 from typing import ClassVar
 
 from winchkit.errors import FileError
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Angle, Duration, Length, Number, PositiveNumber, Torque
-from winchkit.schema.winch import WinchProfile
 from winchkit.sim.physics.base import Physics, motor_direction
-from winchkit.sim.state import State
+from winchkit.sim.physics.state import State
 
 __all__ = [
     "EccentricDrum",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from winchkit.drivers.can.node import SdoNode
+from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.errors import DeviceRefused, NotPermitted
 
 __all__ = ["set_communication"]

@@ -19,10 +19,10 @@ from winchkit.drivers.can.canopen.declared import (
     unmappable,
     writable,
 )
-from winchkit.drivers.can.fitting import Identity
-from winchkit.drivers.can.modes import MODES, modes_of
-from winchkit.drivers.can.objects import object_name
-from winchkit.drivers.can.options import OPTIONS
+from winchkit.drivers.can.canopen.identity import Identity
+from winchkit.drivers.can.canopen.node import object_name
+from winchkit.drivers.can.cia402.modes import MODES, modes_of
+from winchkit.drivers.can.cia402.option_codes import OPTIONS
 
 __all__ = [
     "ALWAYS",

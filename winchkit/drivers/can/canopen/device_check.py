@@ -9,15 +9,15 @@ from typing import Any
 
 from winchkit.drivers.can.canopen.declared import declared, fixed_mapping, unmappable
 from winchkit.drivers.can.canopen.description import ALWAYS, NEEDED, HostLoss, host_loss_ways
-from winchkit.drivers.can.eds import read_eds
-from winchkit.drivers.can.modes import MODES
-from winchkit.drivers.can.options import OPTIONS
-from winchkit.drivers.can.pdo import parse_object
+from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.drivers.can.canopen.pdo import parse_object
+from winchkit.drivers.can.cia402.modes import MODES
+from winchkit.drivers.can.cia402.option_codes import OPTIONS
 from winchkit.errors import Fault, FileError
-from winchkit.schema.device import DeviceSpec
-from winchkit.schema.device_servo import PdoSpec, ServoSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.servo import PdoSpec, ServoSpec
 from winchkit.schema.host_loss import HARDWARE, VENDOR
-from winchkit.schema.read_source import open_source
+from winchkit.schema.reading.source import open_source
 
 __all__ = ["EdsReport", "check_drive", "host_loss_problem"]
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from winchkit.drivers.can.canopen.pdo import PdoCodec
+from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, Mechanism, Silence
-from winchkit.drivers.can.modes import MODES
-from winchkit.drivers.can.pdo import PdoCodec
-from winchkit.drivers.can.pdo_setup import cob_id
 
 __all__ = ["RPDO_TIMEOUT", "RpdoTimeout", "SyncLoss"]
 

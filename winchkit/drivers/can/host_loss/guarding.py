@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from winchkit.drivers.can.heartbeat import HeartbeatWatch
+from winchkit.drivers.can.canopen.nmt import HeartbeatWatch
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, Mechanism, Silence
 from winchkit.errors import NotPermitted
 

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from winchkit.drivers.can.heartbeat import NmtState
-from winchkit.drivers.can.node import SdoNode
-from winchkit.drivers.can.pdo import PdoCodec
+from winchkit.drivers.can.canopen.nmt import NmtState
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo import PdoCodec
 from winchkit.drivers.clock import Clock
 
 __all__ = [

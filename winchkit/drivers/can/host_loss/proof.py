@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
-from winchkit.drivers.can.cia402 import DISABLE_VOLTAGE, FAULT_RESET, State, state_of
-from winchkit.drivers.can.emergency import Emergency
-from winchkit.drivers.can.heartbeat import HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.emergency import Emergency
+from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.cia402.option_codes import OptionCode
+from winchkit.drivers.can.cia402.state_machine import DISABLE_VOLTAGE, FAULT_RESET, State, state_of
 from winchkit.drivers.can.host_loss.guarding import Guarding
 from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
-from winchkit.drivers.can.node import SdoNode
-from winchkit.drivers.can.options import OptionCode
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NoReply, NotPermitted
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from winchkit.drivers.can.heartbeat import NmtState
+from winchkit.drivers.can.canopen.nmt import NmtState
+from winchkit.drivers.can.canopen.pdo import parse_object
 from winchkit.drivers.can.host_loss.cyclic import RpdoTimeout
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, Mechanism, Silence
-from winchkit.drivers.can.pdo import parse_object
 from winchkit.schema.host_loss import VENDOR, VendorObject, VendorWatchdog
 
 __all__ = ["VendorWatch"]

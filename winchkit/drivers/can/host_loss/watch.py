@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 
-from winchkit.drivers.can.emergency import Emergency
-from winchkit.drivers.can.heartbeat import HeartbeatProducer, HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.emergency import Emergency
+from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo_parameters import codecs
+from winchkit.drivers.can.cia402.option_codes import OptionCode
 from winchkit.drivers.can.host_loss.cyclic import RpdoTimeout, SyncLoss
 from winchkit.drivers.can.host_loss.guarding import Guarding, GuardingWatch
 from winchkit.drivers.can.host_loss.mechanism import Heartbeat, Mechanism, Silence, Terms
 from winchkit.drivers.can.host_loss.proof import HostLoss, Proof, bring_back, prove, reaction
 from winchkit.drivers.can.host_loss.vendor import VendorWatch
-from winchkit.drivers.can.node import SdoNode
-from winchkit.drivers.can.options import OptionCode
-from winchkit.drivers.can.pdo_setup import codecs
 from winchkit.drivers.clock import Clock
 from winchkit.errors import ConnectionLost, NotPermitted
-from winchkit.schema.device_servo import ServoSpec
+from winchkit.schema.devices.servo import ServoSpec
 from winchkit.schema.host_loss import HARDWARE, VENDOR
 
 __all__ = ["HostWatch"]

@@ -1,0 +1,1 @@
+"""The slow instruments of a bench: readings, commands, tares and reports."""

@@ -1,0 +1,233 @@
+"""Instruments of a wiring file by winch and role, and the lines that they hang on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from winchkit import catalog
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.host_scale import HostScale
+from winchkit.drivers.modbus.instrument import Instrument
+from winchkit.drivers.modbus.line import ModbusLine
+from winchkit.drivers.publisher import Publisher
+from winchkit.drivers.reading import Sensor
+from winchkit.drivers.slow import SlowLine
+from winchkit.drivers.stream.instrument import StreamInstrument
+from winchkit.drivers.stream.line import StreamLine
+from winchkit.errors import Fault, FileError
+from winchkit.schema.bench import BenchSpec, BusSpec, DeviceRef
+from winchkit.schema.calibration import CellCalibration, TareBook, tare_book_path
+from winchkit.schema.devices.device import DeviceSpec
+
+if TYPE_CHECKING:
+    from winchkit.drivers.can.bus.bus import CanBus
+    from winchkit.drivers.can.process_value import ProcessInstrument
+
+__all__ = [
+    "ROLES",
+    "calibration_of",
+    "can_buses",
+    "device_of",
+    "eds_of",
+    "instruments",
+    "refs_of",
+    "tares_of",
+]
+
+ROLES = ("cell", "load", "length", "temperature")
+
+
+@dataclass(frozen=True)
+class _Wired:
+    """One instrument as the wiring file has it."""
+
+    label: str
+    ref: DeviceRef
+    scale: HostScale
+    moving: Callable[[], bool]
+
+    def prepare(self, publisher: Publisher) -> None:
+        """Give what turns its values into readings the host's share of it."""
+        publisher.scale, publisher.moving = self.scale, self.moving
+
+
+def device_of(spec: BenchSpec, ref: DeviceRef) -> DeviceSpec:
+    """The device file that a wiring file refers to."""
+    from winchkit.schema.read import read_device
+
+    return read_device(catalog.find("devices", ref.device, spec.path or None))
+
+
+def eds_of(device: DeviceSpec) -> Path:
+    """EDS file of a servo's device file."""
+    assert device.servo is not None, "the reader has checked it"
+    return Path(device.path).parent / device.servo.eds
+
+
+def calibration_of(spec: BenchSpec, ref: DeviceRef) -> CellCalibration | None:
+    """The calibration that a wiring file names for an instrument; raises FileError."""
+    if ref.calibration is None:
+        return None
+    from winchkit.schema.read import read_calibration
+
+    beside = Path(spec.path).parent if spec.path else Path()
+    return read_calibration(beside / ref.calibration)
+
+
+def tares_of(spec: BenchSpec) -> TareBook:
+    """The host's tares, from the file beside the wiring file where there is one."""
+    from winchkit.schema.read import read_tares
+
+    path = tare_book_path(spec.path)
+    return read_tares(path) if spec.path and Path(path).is_file() else TareBook(spec.name)
+
+
+def refs_of(spec: BenchSpec) -> dict[tuple[str, str], DeviceRef]:
+    """Instruments as they are wired, by winch and role."""
+    return {
+        (name, role): ref
+        for name, winch in spec.winch.items()
+        for role in ROLES
+        if (ref := getattr(winch, role)) is not None
+    }
+
+
+def can_buses(spec: BenchSpec) -> list[str]:
+    """The CAN buses that instruments are on."""
+    used = dict.fromkeys(ref.bus for ref in refs_of(spec).values())
+    return [name for name in used if spec.bus[name].kind == "can"]
+
+
+def instruments(
+    spec: BenchSpec,
+    clock: Clock,
+    buses: Mapping[str, CanBus] | None = None,
+    moving: Mapping[str, Callable[[], bool]] | None = None,
+) -> tuple[dict[str, dict[str, Sensor]], list[SlowLine]]:
+    """Instruments by winch and role; two roles on one device share the instrument.
+
+    ``buses`` are the open CAN buses, for instruments on one of them; ``moving`` says of a winch
+    whether it moves, so that counts that stand still meanwhile are seen to be frozen.
+    """
+    wired: dict[tuple[str, int | None], _Wired] = {}
+    placed: dict[str, dict[str, tuple[str, int | None]]] = {name: {} for name in spec.winch}
+    tares = tares_of(spec)
+    for (name, role), ref in refs_of(spec).items():
+        key = placed[name][role] = _address(spec, ref)
+        label = f"{role} of winch {name} (bus '{key[0]}'{_spoken(ref)})"
+        calibration = calibration_of(spec, ref)
+        tare = tares.tare.get(f"{name}.{role}")
+        scale = HostScale(
+            calibration.coefficients if calibration else (0.0, 1.0), tare.value if tare else 0.0
+        )
+        moves = (moving or {}).get(name, _never) if role != "temperature" else _never
+        wired.setdefault(key, _Wired(label, ref, scale, moves))
+    found: dict[tuple[str, int | None], Sensor] = {}
+    lines = []
+    for bus in dict.fromkeys(key[0] for key in wired):
+        mine = {key: one for key, one in wired.items() if key[0] == bus}
+        line = _line(spec, bus, list(mine.values()), clock, buses or {})
+        found.update(zip(mine, line.sensors, strict=True))
+        lines.append(line)
+    sensors = {
+        name: {role: found[key] for role, key in roles.items()} for name, roles in placed.items()
+    }
+    return sensors, lines
+
+
+def _address(spec: BenchSpec, ref: DeviceRef) -> tuple[str, int | None]:
+    """Bus and address: a node on CAN, a unit on Modbus, a unit or nothing on a serial line."""
+    kind = spec.bus[ref.bus].kind
+    if kind == "can":
+        return ref.bus, ref.node
+    if kind == "serial":
+        return ref.bus, ref.unit
+    return ref.bus, ref.unit or 1
+
+
+def _never() -> bool:
+    return False
+
+
+def _spoken(ref: DeviceRef) -> str:
+    if ref.node is not None:
+        return f" node {ref.node}"
+    return "" if ref.unit is None else f" unit {ref.unit}"
+
+
+def _line(
+    spec: BenchSpec, bus: str, wired: list[_Wired], clock: Clock, buses: Mapping[str, CanBus]
+) -> SlowLine:
+    """The line of a bus with its instruments, in the order of ``wired``."""
+    bus_spec = spec.bus[bus]
+    if bus_spec.kind == "can":
+        return _can_line(spec, bus, wired, clock, buses)
+    if bus_spec.kind == "serial":
+        streams = tuple(_stream(spec, one, bus_spec, clock) for one in wired)
+        return StreamLine(bus, bus_spec, streams, clock)
+    registers = tuple(_modbus(spec, one, bus_spec, clock) for one in wired)
+    return ModbusLine(bus, bus_spec, registers, clock)
+
+
+def _modbus(spec: BenchSpec, one: _Wired, bus: BusSpec, clock: Clock) -> Instrument:
+    device = _of_kind(spec, one, "modbus")
+    found = Instrument(
+        one.label,
+        device,
+        one.ref.unit or 1,
+        clock,
+        rate=one.ref.rate or inf,
+        timeout=bus.timeout,
+    )
+    one.prepare(found.publisher)
+    return found
+
+
+def _stream(spec: BenchSpec, one: _Wired, bus: BusSpec, clock: Clock) -> StreamInstrument:
+    device = _of_kind(spec, one, "stream")
+    found = StreamInstrument(
+        one.label,
+        device,
+        one.ref.unit,
+        clock,
+        rate=one.ref.rate or inf,
+        timeout=bus.timeout,
+    )
+    one.prepare(found.publisher)
+    return found
+
+
+def _can_line(
+    spec: BenchSpec, bus: str, wired: list[_Wired], clock: Clock, buses: Mapping[str, CanBus]
+) -> SlowLine:
+    from winchkit.drivers.can.process_value import ProcessInstrument, ProcessLine
+
+    if bus not in buses:
+        raise FileError(Fault(f"{wired[0].label}: its CAN bus is not open", spec.path))
+    found: list[ProcessInstrument] = []
+    for one in wired:
+        if one.ref.node is None:
+            raise FileError(Fault(f"{one.label}: needs its node number", spec.path))
+        device = _of_kind(spec, one, "process")
+        found.append(ProcessInstrument(one.label, device, one.ref.node, buses[bus], clock))
+        one.prepare(found[-1].publisher)
+    return ProcessLine(bus, tuple(found), clock)
+
+
+def _of_kind(spec: BenchSpec, one: _Wired, table: str) -> DeviceSpec:
+    """The device file, whose kind must fit the bus."""
+    device = device_of(spec, one.ref)
+    if getattr(device, table) is None:
+        kind = spec.bus[one.ref.bus].kind
+        raise FileError(
+            Fault(
+                f"{one.label}: '{device.name}' has no [{table}] table, which a bus of kind "
+                f"'{kind}' needs",
+                spec.path,
+            )
+        )
+    return device

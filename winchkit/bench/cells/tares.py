@@ -1,0 +1,105 @@
+"""Tares and zeros of instruments: on the host, in a file beside the bench, or by the device."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+from winchkit.bench.cells.desk import CellDesk, steady
+from winchkit.bench.cells.instruments import tares_of
+from winchkit.calibration.cell.files import tares_toml, write_text
+from winchkit.errors import UsageError
+from winchkit.schema.calibration import HostTare, TareBook, tare_book_path
+
+__all__ = ["clear_device_tare", "clear_tare", "device_tare", "device_zero", "host_tare"]
+
+_CHECK = 0.3
+
+
+def host_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Add the mean of the present value to the host's tare; raises NotPermitted, NoReply.
+
+    It is kept beside the wiring file; a bench without one keeps it until it is closed.
+    """
+    desk.permit(name)
+    _refuse_temperature(name)
+    seen = steady(desk.readings(name, duration))
+    book = tares_of(desk.spec)
+    value = seen.mean + desk.publisher(name).scale.tare
+    taken = datetime.now(UTC).replace(microsecond=0)
+    _keep(desk, book, {**book.tare, name: HostTare(value, seen.std, taken)})
+    _apply(desk, name, value)
+    after = steady(desk.readings(name, max(duration, _CHECK)))
+    return {
+        "before": seen.mean,
+        "std": seen.std,
+        "readings": seen.readings,
+        "tare": value,
+        "after": after.mean,
+        "file": _book_path(desk),
+    }
+
+
+def clear_tare(desk: CellDesk, name: str) -> dict[str, Any]:
+    """Take the host's tare of an instrument away; raises UsageError where it has none."""
+    book, removed = tares_of(desk.spec), desk.publisher(name).scale.tare
+    if name not in book.tare and not removed:
+        raise UsageError(
+            f"{name} has no tare of the host; a tare of the device itself, which `winchkit tare` "
+            "sets where the device has one, is cleared by `winchkit cell tare --device --clear`"
+        )
+    desk.permit(name)
+    _keep(desk, book, {other: tare for other, tare in book.tare.items() if other != name})
+    _apply(desk, name, 0.0)
+    return {"removed": removed, "file": _book_path(desk)}
+
+
+def device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Send the device its own tare; raises NotPermitted, NoReply, DeviceRefused."""
+    return _by_device(desk, name, "tare", duration)
+
+
+def clear_device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Let the device count gross again; raises NotPermitted, NoReply, DeviceRefused."""
+    return _by_device(desk, name, "gross", duration)
+
+
+def device_zero(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Send the device its own zero; raises NotPermitted, NoReply, DeviceRefused."""
+    return _by_device(desk, name, "zero", duration)
+
+
+def _by_device(desk: CellDesk, name: str, command: str, duration: float) -> dict[str, Any]:
+    desk.permit(name)
+    before = steady(desk.readings(name, duration))
+    desk.command(name, command)
+    desk.clock.sleep(_CHECK)
+    after = steady(desk.readings(name, duration))
+    return {
+        "before": before.mean,
+        "std": before.std,
+        "readings": before.readings,
+        "after": after.mean,
+        "host_tare": desk.publisher(name).scale.tare,
+    }
+
+
+def _keep(desk: CellDesk, book: TareBook, tares: dict[str, HostTare]) -> None:
+    if (path := _book_path(desk)) is not None:
+        write_text(path, tares_toml(TareBook(book.name, tares)))
+
+
+def _book_path(desk: CellDesk) -> str | None:
+    """Where tares are kept; None for a bench without a wiring file."""
+    return tare_book_path(desk.spec.path) if desk.spec.path else None
+
+
+def _apply(desk: CellDesk, name: str, value: float) -> None:
+    publisher = desk.publisher(name)
+    publisher.scale = replace(publisher.scale, tare=value)
+
+
+def _refuse_temperature(name: str) -> None:
+    if name.endswith(".temperature"):
+        raise UsageError(f"{name} is a thermometer; taring it makes no sense")

@@ -1,0 +1,97 @@
+"""What can be asked of an instrument by name, in this process or in the one that owns the bench."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import Any, Protocol
+
+from winchkit.bench.cells.desk import CellDesk, full_name, indicated
+from winchkit.bench.cells.report import about, counters_told, rate_report
+from winchkit.bench.cells.tares import (
+    clear_device_tare,
+    clear_tare,
+    device_tare,
+    device_zero,
+    host_tare,
+)
+from winchkit.drivers.reading import Quality, Reading
+from winchkit.errors import UsageError
+from winchkit.schema.bench import BenchSpec
+
+__all__ = ["TASKS", "Cells", "LocalCells", "do", "readings_of"]
+
+
+class Cells(Protocol):
+    """The instruments of a bench, here or at its owner."""
+
+    spec: BenchSpec
+
+    def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """One of TASKS for an instrument by its full name; raises what that raises."""
+
+
+class LocalCells:
+    """Instruments that this process has opened."""
+
+    def __init__(self, desk: CellDesk) -> None:
+        self.spec, self._desk = desk.spec, desk
+
+    def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """One of TASKS for an instrument."""
+        return do(self._desk, task, name, *arguments)
+
+
+def do(desk: CellDesk, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+    """Carry out a task; what it returns is plain enough for JSON. Raises UsageError if unknown."""
+    if task not in TASKS:
+        raise UsageError(f"no task '{task}' for an instrument; there are {', '.join(TASKS)}")
+    return TASKS[task](desk, full_name(desk.spec, name), *arguments)
+
+
+def readings_of(told: Mapping[str, Any]) -> list[Reading]:
+    """The readings that the task "watch" tells."""
+    return [Reading(**{**row, "quality": Quality(row["quality"])}) for row in told["readings"]]
+
+
+def _identify(desk: CellDesk, name: str) -> dict[str, Any]:
+    """Its device file, and what the device says of itself."""
+    return {"device": desk.device(name).name, "identity": desk.identify(name)}
+
+
+def _watch(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
+    """Readings of the next ``duration`` s, and what was counted meanwhile."""
+    before = counters_told(desk.sensors[name].counters)
+    readings = desk.readings(name, duration)
+    after = counters_told(desk.sensors[name].counters)
+    rows = [{**asdict(item), "quality": item.quality.value} for item in readings]
+    return {"readings": rows, "counters": {key: after[key] - before[key] for key in after}}
+
+
+def _indicated(desk: CellDesk, name: str, wait: float, duration: float) -> dict[str, Any]:
+    """The mean of what the device itself shows, after a while."""
+    desk.clock.sleep(wait)
+    return asdict(indicated(desk.readings(name, duration), desk.publisher(name).scale))
+
+
+def _store(desk: CellDesk, name: str, command: str) -> dict[str, Any]:
+    """A command that writes its EEPROM."""
+    desk.permit(name)
+    desk.store(name, command)
+    return {}
+
+
+TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
+    "about": about,
+    "clear device tare": clear_device_tare,
+    "clear tare": clear_tare,
+    "device tare": device_tare,
+    "host tare": host_tare,
+    "identify": _identify,
+    "indicated": _indicated,
+    "rate": rate_report,
+    "store": _store,
+    "watch": _watch,
+    "zero": device_zero,
+}
+"""Each takes a desk, the full name of an instrument and numbers in SI."""

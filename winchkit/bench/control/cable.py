@@ -1,0 +1,149 @@
+"""Between motor and rope, quick enough for every control cycle."""
+
+from __future__ import annotations
+
+from math import isfinite, nan
+from typing import NamedTuple, Protocol
+
+from winchkit.errors import FileError
+from winchkit.estimation.cable_state import RopeNow, Sample
+
+__all__ = ["LineModel", "RopeMap"]
+
+_FAR = 5e-3
+"""Of rope, after which length and arm are taken anew, m."""
+_SOON = 0.02
+"""After which tension and memory are asked anew, s."""
+
+
+class LineModel(Protocol):
+    """The part of ``winchkit.model.line.Line`` that moving a winch needs."""
+
+    def cable_length(self, motor_angle: float) -> float:
+        """Free length at a motor angle, m."""
+
+    def motor_angle(self, cable_length: float) -> float:
+        """Motor angle (rad) at a free length."""
+
+    def arm(self, motor_angle: float) -> float:
+        """Rope wound in per motor angle, m/rad; positive angle times arm winds in."""
+
+
+class _Here(NamedTuple):
+    """The rope near one motor angle."""
+
+    angle: float = nan
+    length: float = nan
+    arm: float = nan
+
+
+class _Felt(NamedTuple):
+    """The rope as its effects had it when they were asked last."""
+
+    time: float = nan
+    angle: float = nan
+    length: float = nan
+    tension: float = nan
+    correction: float = 0.0
+
+
+class RopeMap:
+    """Cable length, arm and tension near the last angle; a line model of its own.
+
+    On the bare profile length and arm are renewed after every 5 mm of rope, within which the arm of
+    a drum changes by far less than a thousandth. Where the profile has effects (``now``), what they
+    make of tension and past is asked every 20 ms or 5 mm, whichever comes first.
+    """
+
+    def __init__(self, line: LineModel, now: RopeNow | None = None) -> None:
+        self._line, self._now = line, now
+        self._here = _Here()
+        self._felt = _Felt()
+        self.failure: FileError | None = None
+        """Why an effect of the profile, perhaps a user's own, could not be used any more."""
+
+    @classmethod
+    def of(cls, now: RopeNow) -> RopeMap:
+        """The map of a profile with its effects, if it has any that control can use."""
+        return cls(now.at_rest, None if now.trivial else now)
+
+    @property
+    def yields(self) -> bool:
+        """Whether the length depends on more than the motor angle."""
+        return self._now is not None and self._now.yields
+
+    @property
+    def bends(self) -> bool:
+        """Whether effects of the profile are to be asked in every cycle."""
+        return self._now is not None
+
+    def feel(self, sample: Sample) -> None:
+        """Take what was measured in this cycle."""
+        if self._now is None or not isfinite(sample.motor_angle):
+            return
+        felt = self._felt
+        moved = abs((sample.motor_angle - felt.angle) * self._here.arm)
+        if sample.time - felt.time < _SOON and moved < _FAR:
+            return
+        try:
+            state = self._now.update(sample)
+        except FileError as error:
+            self.failure = error
+            return
+        if not isfinite(state.length):
+            self.failure = FileError(
+                "the effects of the profile give no cable length (NaN) at motor angle "
+                f"{sample.motor_angle:g} rad, {sample.cell:g} N; mend them or leave them out"
+            )
+            return
+        arm = self._here.arm
+        if not moved < _FAR:
+            arm = self._line.arm(sample.motor_angle)
+        self._felt = _Felt(
+            sample.time, sample.motor_angle, state.length, state.tension, state.correction
+        )
+        self._here = _Here(sample.motor_angle, state.length, arm)
+
+    def tension(self, cell: float, load: float) -> float:
+        """At the platform end: the ``load`` where measured, else by the ``cell``, N."""
+        return load if isfinite(load) else cell + self._felt.correction
+
+    def at(self, motor_angle: float) -> tuple[float, float]:
+        """Cable length (m) and arm (m/rad) at a motor angle (rad)."""
+        here = self._here
+        change = (motor_angle - here.angle) * here.arm
+        if self._now is None and not abs(change) < _FAR:
+            here = _Here(
+                motor_angle, self._line.cable_length(motor_angle), self._line.arm(motor_angle)
+            )
+            self._here, change = here, 0.0
+        elif not isfinite(change):
+            return self._line.cable_length(motor_angle), self._line.arm(motor_angle)
+        return here.length - change, here.arm
+
+    def cable_length(self, motor_angle: float) -> float:
+        """Length at a motor angle under the tension that there is, m."""
+        return self._pulled(motor_angle) + self._remembered()
+
+    def motor_angle(self, cable_length: float) -> float:
+        """Motor angle (rad) for a length under the tension that there is."""
+        if self._now is None:
+            return self._line.motor_angle(cable_length)
+        return self._now.at_rest.motor_angle(cable_length - self._remembered(), self._force())
+
+    def arm(self, motor_angle: float) -> float:
+        """Rope wound in per motor angle, m/rad."""
+        return self._line.arm(motor_angle)
+
+    def _pulled(self, motor_angle: float) -> float:
+        if self._now is None:
+            return self._line.cable_length(motor_angle)
+        return self._now.at_rest.cable_length(motor_angle, self._force())
+
+    def _force(self) -> float:
+        return self._felt.tension if isfinite(self._felt.tension) else 0.0
+
+    def _remembered(self) -> float:
+        """What memory and temperature add to the length, m."""
+        felt = self._felt
+        return felt.length - self._pulled(felt.angle) if isfinite(felt.length) else 0.0

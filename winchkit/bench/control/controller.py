@@ -1,0 +1,463 @@
+"""One winch in the control loop: which wish and target its drive gets in each cycle."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass
+from typing import Protocol
+
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.motion import MotionSource, RunDown, StartGate, Target
+from winchkit.bench.control.snapshot import Phase
+from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
+from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
+from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, State, Wish
+from winchkit.schema.bench import LimitSpec
+
+__all__ = ["AxisPort", "Controller"]
+
+_ENABLE_TIME = 2.0
+_GATE_TIME = 5.0
+"""How long an enabled drive waits for others that are to start with it, s."""
+_RESET_TIME = 1.0
+_RUN_DOWN_MARGIN = 1.0
+_FRESH_SYNCS = 2
+"""A status word of these SYNCs was sampled after the stop was sent."""
+_ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
+
+
+class AxisPort(Protocol):
+    """What the loop needs of an axis; ``Cia402Axis`` is one."""
+
+    heartbeat: HeartbeatWatch
+
+    @property
+    def feedback(self) -> AxisFeedback | None:
+        """Newest feedback."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the motor stands still."""
+
+    @property
+    def operational(self) -> bool:
+        """Whether its PDOs run."""
+
+    @property
+    def mode_kept(self) -> bool:
+        """Whether it is still in its mode."""
+
+    @property
+    def fault_text(self) -> str:
+        """Its fault in words."""
+
+    @property
+    def nmt_text(self) -> str:
+        """NMT state of its heartbeat in words."""
+
+    @property
+    def position_mode(self) -> bool:
+        """Whether it is moved by target positions and not by speeds."""
+
+    @property
+    def moves_alone(self) -> bool:
+        """Whether it makes the motion under way by itself (HM, PP)."""
+
+    @property
+    def alarms(self) -> tuple[int, ...]:
+        """Emergency codes in force without a fault."""
+
+    @property
+    def alarm_text(self) -> str:
+        """They in words."""
+
+    @property
+    def stops_on_nmt(self) -> bool:
+        """Whether commissioning saw it leave operation enabled on NMT stop."""
+
+    @property
+    def sdo_refused(self) -> bool:
+        """Whether it aborted the stop by SDO that is under way."""
+
+    @property
+    def sdo_state(self) -> State | None:
+        """Power state that it told by SDO since that stop began."""
+
+    def stop_by_sdo(self) -> None:
+        """Quick stop by SDO; without waiting."""
+
+    def stop_by_nmt(self) -> None:
+        """NMT stop."""
+
+    def end_stop(self) -> None:
+        """The stop by SDO is over."""
+
+    def emergency_stop(self, *, sdo: bool) -> None:
+        """Send the prepared quick stop by RPDO, and by SDO where asked to."""
+
+    def fall_silent(self) -> bool:
+        """End the life signs that the drive watches; whether SYNC is one of them."""
+
+    def begin_cycle(self, sync: int, now: float) -> None:
+        """Note a SYNC."""
+
+    def send(
+        self,
+        wish: Wish,
+        *,
+        velocity: float = 0.0,
+        angle: float | None = None,
+        start: bool = False,
+    ) -> int:
+        """Send a command; ``start`` lets the drive make a motion of its own."""
+
+
+@dataclass(frozen=True)
+class _Order:
+    """A motion that is asked for."""
+
+    source: MotionSource
+    gate: StartGate | None
+
+    def may_start(self, time: float) -> bool:
+        """Whether nobody has to be waited for in this cycle."""
+        return self.gate is None or self.gate.open(time)
+
+
+class Controller:
+    """Phases from disabled over moving back to disabled.
+
+    ``begin``, ``run_down`` and ``stop`` may be called from any thread; they take effect in the
+    next ``step``.
+    """
+
+    def __init__(self, axis: AxisPort, rope: RopeMap, limits: LimitSpec) -> None:
+        self.axis = axis
+        self.rope = rope
+        self.limits = limits
+        self.phase = Phase.DISABLED
+        self.source: MotionSource | None = None
+        self.done = True
+        """Whether the last source has finished."""
+        self.failure = ""
+        """Why the last source could not go on, when the drive is to blame."""
+        self.stopped = False
+        """Whether somebody stopped the last source before its end."""
+        self.reason = ""
+        """Why, where another winch is to blame."""
+        self.commanded = 0.0
+        """Winding speed commanded last, m/s."""
+        self._velocity = 0.0
+        self.uncommanded = ""
+        """What the drive did to its power state unasked; taken once by the control loop."""
+        self.escalation = StopEscalation()
+        self._wanted: _Order | None = None
+        self._begun: _Order | None = None
+        self._ordered: Phase | None = None
+        self._lock = threading.Lock()
+        self._down = RunDown(rope, limits)
+        self._angle = 0.0
+        self._held: float | None = None
+        self._told = True
+        self._since = self._time = 0.0
+        self._word = 0
+        self._sync = self._stop_sync = 0
+
+    def new_failure(self) -> str:
+        """Why the drive could not go on, told once; empty where it could."""
+        told, self._told = self._told, True
+        return "" if told else self.failure
+
+    def begin(self, source: MotionSource, gate: StartGate | None = None) -> None:
+        """Start a source, enabling the drive first where needed; replaces the one before.
+
+        With a ``gate`` it waits, enabled and holding its place, until the gate opens.
+        """
+        with self._lock:
+            self.done = self.stopped = False
+            self.failure = self.reason = ""
+            self._wanted = _Order(source, gate)
+
+    def ready_for(self, source: MotionSource) -> bool:
+        """Whether the drive is enabled, at rest, and waits for nothing but this source."""
+        feedback = self.axis.feedback
+        if feedback is None or feedback.state is not State.OPERATION_ENABLED:
+            return False
+        if self.phase is Phase.ENABLING:
+            return self.source is source
+        waits = self._wanted is not None and self._wanted.source is source
+        return waits and self.phase in (Phase.MOVING, Phase.RUN_DOWN) and self.commanded == 0.0
+
+    def run_down(self) -> None:
+        """Ramp to rest, then disable."""
+        self._order(Phase.RUN_DOWN)
+
+    def stop(self, reason: str = "") -> None:
+        """Quick stop, then disable; ``reason`` names another winch that is to blame."""
+        self._order(Phase.STOPPING, reason)
+
+    def reset(self) -> None:
+        """Clear a drive's fault; it stays disabled."""
+        self._order(Phase.RESETTING)
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing is left to stop this drive but its own host-loss reaction."""
+        return self.escalation.rung is Rung.SILENCE
+
+    @property
+    def pending(self) -> bool:
+        """Whether a motion was ordered that has not begun."""
+        return self._wanted is not None
+
+    @property
+    def follows(self) -> bool:
+        """Whether the drive is to follow the commanded speed in this cycle."""
+        return self.phase in (Phase.MOVING, Phase.RUN_DOWN) and not self.axis.moves_alone
+
+    @property
+    def target_speed(self) -> float:
+        """Winding speed of the velocity target sent last, m/s; NaN where the drive has none.
+
+        Position targets that are lost leave the drive at the last of them.
+        """
+        feedback = self.axis.feedback
+        if feedback is None or not self.follows or self.axis.position_mode:
+            return math.nan
+        return self._velocity * self.rope.at(feedback.angle)[1]
+
+    @property
+    def following_error(self) -> float:
+        """Target less measured position in cable, m; zero unless it is position-controlled.
+
+        It counts only while the drive :attr:`follows`.
+        """
+        feedback = self.axis.feedback
+        if feedback is None or not self.axis.position_mode:
+            return 0.0
+        return (self._angle - feedback.angle) * self.rope.at(feedback.angle)[1]
+
+    def take_uncommanded(self) -> str:
+        """What the drive did unasked, told once."""
+        words, self.uncommanded = self.uncommanded, ""
+        return words
+
+    def step(self, now: float, time: float, sync: int = 0) -> None:
+        """Send this cycle's command; ``time`` is that of motion, one cycle a cycle.
+
+        ``sync`` is the number of the SYNC that was just sent.
+        """
+        self._time, self._sync = time, sync
+        self._take_orders(now)
+        feedback = self.axis.feedback
+        if feedback is None:
+            return
+        match self.phase:
+            case Phase.DISABLED:
+                self._stay_disabled(now, feedback)
+            case Phase.ENABLING:
+                self._enable(now, feedback)
+            case Phase.MOVING:
+                self._move(now, feedback)
+            case Phase.RUN_DOWN:
+                self._slow_down(now, feedback)
+            case Phase.STOPPING:
+                self._stop(now, feedback)
+            case Phase.RESETTING:
+                self._reset(now, feedback)
+
+    def settle(self) -> None:
+        """Follow the drive's state without commanding it, after the control loop has failed."""
+        feedback = self.axis.feedback
+        self.source, self.commanded, self.done = None, 0.0, True
+        self.escalation.end()
+        rests = feedback is not None and feedback.state not in _ENABLED and self.axis.at_rest
+        self.phase = Phase.DISABLED if rests else Phase.STOPPING
+
+    def _order(self, phase: Phase, reason: str = "") -> None:
+        with self._lock:
+            if self._wanted is not None or (self.source is not None and not self.done):
+                self.stopped, self.reason = True, reason
+            self._wanted = None
+            if self._ordered is not Phase.STOPPING:
+                self._ordered = phase
+
+    def _take_orders(self, now: float) -> None:
+        with self._lock:
+            ordered, self._ordered = self._ordered, None
+            wanted = self._wanted
+        if ordered is Phase.STOPPING:
+            self._enter(Phase.STOPPING, now)
+        elif ordered is Phase.RESETTING and self.phase is Phase.DISABLED:
+            self._enter(Phase.RESETTING, now)
+        elif ordered is Phase.RUN_DOWN and self.phase in (Phase.ENABLING, Phase.MOVING):
+            self._begin_run_down(now)
+        if wanted is not None and self._take(wanted, now):
+            with self._lock:
+                if self._wanted is wanted:
+                    self._wanted = None
+
+    def _take(self, wanted: _Order, now: float) -> bool:
+        """Start a source now where that is smooth, else get ready for it; whether it is taken."""
+        feedback = self.axis.feedback
+        if feedback is not None and self.phase in (Phase.MOVING, Phase.RUN_DOWN):
+            if wanted.source.joins or self.commanded == 0.0:
+                if not wanted.may_start(self._time):
+                    return False
+                wanted.source.start(self._time, feedback.angle, self.commanded)
+                self.source, self.done = wanted.source, False
+                self.phase, self._since = Phase.MOVING, now
+                return True
+            if self.phase is Phase.MOVING:
+                self._begin_run_down(now)
+        elif self.phase in (Phase.DISABLED, Phase.ENABLING):
+            self.phase, self.source, self._since = Phase.ENABLING, wanted.source, now
+            self._begun, self._held = wanted, None
+            return True
+        return False
+
+    def _enter(self, phase: Phase, now: float) -> None:
+        if phase is Phase.STOPPING and self.phase is not Phase.STOPPING:
+            self.escalation.begin(now, nmt=self.axis.stops_on_nmt)
+            self._stop_sync = self._sync
+        self.phase, self._since = phase, now
+        if phase in (Phase.STOPPING, Phase.DISABLED, Phase.RESETTING):
+            self.source, self.commanded, self._velocity = None, 0.0, 0.0
+            self.done = self._wanted is None
+
+    def _fail(self, reason: str, now: float) -> None:
+        self.failure, self._told = reason, False
+        self._enter(Phase.STOPPING, now)
+
+    def _stay_disabled(self, now: float, feedback: AxisFeedback) -> None:
+        if feedback.state is State.OPERATION_ENABLED:
+            self.uncommanded = "the drive was enabled without a command from here"
+            self._enter(Phase.STOPPING, now)
+            self._stop(now, feedback)
+            return
+        self._word = self.axis.send(Wish.DISABLE)
+
+    def _leave(self, now: float, feedback: AxisFeedback) -> None:
+        """The drive has left operation enabled although it was commanded to stay."""
+        self.uncommanded = (
+            f"the drive left operation enabled without a command from here and is now "
+            f"{feedback.state} (STO or enable input, another master, or the drive itself)"
+        )
+        self._fail(self.uncommanded, now)
+        self._stop(now, feedback)
+
+    def _enable(self, now: float, feedback: AxisFeedback) -> None:
+        enabled = feedback.state is State.OPERATION_ENABLED
+        if enabled and self._begun is not None and self._begun.may_start(self._time):
+            self._begun.source.start(self._time, feedback.angle, 0.0)
+            self._angle = feedback.angle
+            self._enter(Phase.MOVING, now)
+            self._move(now, feedback)
+            return
+        if self._held is not None and not enabled:
+            self._leave(now, feedback)
+            return
+        if enabled and self._held is None:
+            self._held = feedback.angle
+        self._word = self.axis.send(Wish.ENABLE, angle=self._held)
+        if now - self._since > (_GATE_TIME if enabled else _ENABLE_TIME):
+            waiting = "waits for a winch that was to start with it"
+            stays = f"the drive stays {feedback.state} for {_ENABLE_TIME:g} s"
+            self._fail(waiting if enabled else stays, now)
+
+    def _move(self, now: float, feedback: AxisFeedback) -> None:
+        if self.source is None or feedback.state is not State.OPERATION_ENABLED:
+            self._leave(now, feedback)
+            return
+        target = self.source.target(self._time, feedback.angle, now)
+        self._follow(target, feedback)
+        if target.done:
+            self.done = True
+            if not self.source.holds:
+                self._begin_run_down(now)
+
+    def _follow(self, target: Target, feedback: AxisFeedback) -> None:
+        fastest = self.limits.speed / abs(self.rope.at(feedback.angle)[1])
+        velocity = self._velocity = max(-fastest, min(fastest, target.velocity))
+        self.commanded = target.winding_speed
+        if target.angle is not None:
+            self._angle = target.angle
+        self._word = self.axis.send(
+            Wish.ENABLE, velocity=velocity, angle=target.angle, start=target.start
+        )
+
+    def _begin_run_down(self, now: float) -> None:
+        self._down = RunDown(self.rope, self.limits)
+        self._down.start(self._time, self._angle, self.commanded)
+        self._enter(Phase.RUN_DOWN, now)
+        self.source, self.done = None, self._wanted is None
+
+    def _slow_down(self, now: float, feedback: AxisFeedback) -> None:
+        target = self._down.target(self._time, feedback.angle, now)
+        self.commanded = target.winding_speed
+        left = feedback.state is not State.OPERATION_ENABLED
+        if left and _keeps_enabled(self._word):
+            self._leave(now, feedback)
+            return
+        late = now - self._since > self._down.duration + _RUN_DOWN_MARGIN
+        settled = target.done and self.axis.at_rest and self._wanted is None
+        if settled or late or left:
+            self._enter(Phase.STOPPING, now)
+            self._stop(now, feedback)
+            return
+        self._angle = target.angle if target.angle is not None else self._angle
+        self._velocity = target.velocity
+        self._word = self.axis.send(Wish.RUN_DOWN, velocity=target.velocity, angle=target.angle)
+
+    def _stop(self, now: float, feedback: AxisFeedback) -> None:
+        self._word = self.axis.send(Wish.DISABLE)
+        sampled = feedback.sync > self._stop_sync
+        if self.escalation.rung is not None:
+            self._escalate(now, feedback)
+        elif sampled and feedback.state is State.OPERATION_ENABLED:
+            self.uncommanded = "the drive was enabled while it was being stopped"
+            self.axis.end_stop()
+            self._stop_sync = self._sync
+            self.escalation.begin(now, nmt=self.axis.stops_on_nmt)
+        if sampled and feedback.state not in _ENABLED and self.axis.at_rest:
+            self.escalation.end()
+            self.axis.end_stop()
+            self._enter(Phase.DISABLED, now)
+
+    def _escalate(self, now: float, feedback: AxisFeedback) -> None:
+        """Use the way to stop that is due in this cycle."""
+        axis = self.axis
+        fresh = feedback.sync > self._stop_sync and feedback.sync >= self._sync - _FRESH_SYNCS
+        left = fresh and _has_left(feedback.state)
+        told = axis.sdo_state
+        left = left or (told is not None and _has_left(told))
+        if self.escalation.rung is Rung.NMT:
+            left = left or not heard_by_sdo(axis.nmt_text)
+        answers = heard_by_sdo(axis.nmt_text) and not axis.sdo_refused
+        rung = self.escalation.step(now, StopEvidence(left, axis.operational, answers))
+        if rung is Rung.SDO:
+            axis.stop_by_sdo()
+        elif rung is Rung.NMT:
+            axis.stop_by_nmt()
+
+    def _reset(self, now: float, feedback: AxisFeedback) -> None:
+        self._word = self.axis.send(Wish.RESET)
+        if feedback.state is not State.FAULT or now - self._since > _RESET_TIME:
+            self._enter(Phase.DISABLED, now)
+
+
+def _keeps_enabled(word: int) -> bool:
+    """Whether a control word keeps a drive in operation enabled."""
+    return word & ENABLE_OPERATION == ENABLE_OPERATION
+
+
+def _has_left(state: State) -> bool:
+    """Whether a status word says that the drive is not in operation enabled."""
+    return state not in (State.OPERATION_ENABLED, State.UNKNOWN)
+
+
+def heard_by_sdo(nmt: str) -> bool:
+    """Whether a drive in this NMT state answers SDOs: in all but stopped (CiA 301)."""
+    return nmt != str(NmtState.STOPPED)

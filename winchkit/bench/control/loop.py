@@ -1,0 +1,397 @@
+"""The control loop: SYNC, newest feedback, supervision, motion, commands, once a cycle."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from winchkit.bench.control.latch import LatchFile
+from winchkit.bench.control.observation import WinchInput
+from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Phase, Trip
+from winchkit.bench.control.supervisor import Supervisor
+from winchkit.bench.control.winch_state import WinchParts, known, picture
+from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
+from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.scheduling import Thread, event_of, thread_of
+from winchkit.errors import ConnectionLost, MotionError, WinchkitError
+
+__all__ = ["BusPort", "Callback", "ControlLoop"]
+
+Callback = Callable[[BenchSnapshot], Mapping[str, float] | None]
+
+_LOGGER = logging.getLogger(__name__)
+_STOPPED = (Phase.DISABLED, Phase.STOPPING, Phase.RESETTING)
+_DEAF = (
+    "the drive does not heed the stop, neither by RPDO nor by SDO; the host's heartbeat is "
+    "withheld, so that the watchdogs of all drives stop them; look at the drive before the reset"
+)
+_DRIVES_NOTICE = 1.25
+"""Of the longest gap, which is 2 heartbeats: after 2.5 the drives count the host as lost."""
+_LATE = 5
+"""Cycles: after a longer gap the frames that wait are read within as many."""
+_ANEW = 0.1
+"""A judgement is put off once in this time at most, s."""
+_HEARD_WITHIN = 0.1
+"""After the control loop has failed, drives that are still enabled then are left to silence, s."""
+
+
+class BusPort(Protocol):
+    """What the loop needs of a CAN bus."""
+
+    @property
+    def fault(self) -> str | None:
+        """Why it died."""
+
+    def sync(self) -> None:
+        """Send SYNC."""
+
+    def heartbeat(self, node: int, state: int) -> None:
+        """Send the host's heartbeat."""
+
+
+class ControlLoop:
+    """Runs ``step`` once a cycle on its own thread, or as its owner calls it in a test."""
+
+    def __init__(
+        self,
+        buses: Sequence[tuple[BusPort, int, float]],
+        winches: Mapping[str, WinchParts],
+        supervisor: Supervisor,
+        clock: Clock,
+        cycle: float,
+        *,
+        stop_together: bool = True,
+        latch: LatchFile | None = None,
+        longest_gap: float = math.inf,
+    ) -> None:
+        """Take buses with the host's node id and heartbeat period, and winches by name.
+
+        With ``stop_together`` all winches stop where the drive of one cannot go on. ``latch`` keeps
+        trips for later processes. Between two cycles at most ``longest_gap`` (s) may pass.
+        """
+        self.winches = winches
+        self.supervisor = supervisor
+        self.callbacks: list[Callback] = []
+        self.on_jog: Callable[[str, float], None] = lambda _name, _winding_speed: None
+        self.samplers: list[Callable[[BenchSnapshot], None]] = []
+        self.failure: BaseException | None = None
+        """What a callback or an effect of a profile raised."""
+        self.broken: BaseException | None = None
+        """What the loop itself raised: it sends stops only, until it is closed."""
+        self.snapshot: BenchSnapshot | None = None
+        self.thread_id = 0
+        """Native id of the control thread, once it runs."""
+        self.overruns = 0
+        self.ordering = threading.Lock()
+        """Hold it to order several winches: what is ordered under it takes effect in one cycle."""
+        self.beating = True
+        """Whether the host's heartbeat is sent."""
+        self.listening = True
+        """Whether it ends where a drive heeds no stop; not while drives are set up anew."""
+        self._sync_watched = False
+        """Whether a drive that is to notice the silence does so by the loss of SYNC."""
+        self._stop_together = stop_together
+        self._buses = [(bus, node, HeartbeatProducer(period)) for bus, node, period in buses]
+        self.cycle = cycle
+        """Period of control, s."""
+        self._clock, self._count = clock, 0
+        self._latch = latch or LatchFile("")
+        self._kept: tuple[Trip, ...] = supervisor.tripped
+        self._longest_gap = longest_gap
+        self._before = math.nan
+        self._resumed = self._catching_up = -math.inf
+        self._broken_at = math.inf
+        self._warnings: dict[str, Trip] = {}
+        self._stopping = event_of(clock)
+        self._thread: Thread | None = None
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread = thread_of(self._clock, self._run, "control")
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread; the drives notice by their heartbeat consumers."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join(timeout=2.0)
+
+    @property
+    def count(self) -> int:
+        """Cycles so far."""
+        return self._count
+
+    @property
+    def alive(self) -> bool:
+        """Whether the thread runs."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def step(self, now: float) -> BenchSnapshot:
+        """One control cycle at ``now`` (s)."""
+        self._count += 1
+        self._watch_clock(now)
+        self._listen_for_stops()
+        self._send_sync(now)
+        count = self._count
+        resumed = now if now < self._catching_up else self._resumed
+        inputs = {name: known(parts, now, count, resumed) for name, parts in self.winches.items()}
+        self._note_failed_ropes()
+        blocked = self.supervisor.check(now, inputs)
+        # Before anything is stopped: whoever sees a motion ended must see the trip that ended it.
+        self.snapshot = snapshot = self._picture(now, inputs, blocked)
+        self._ask_callbacks(snapshot)
+        with self.ordering:
+            reason = self._failing()
+            if self.supervisor.tripped or self.failure is not None or reason:
+                self._stop_all(reason)
+            self._command(now)
+        if self.supervisor.tripped is not self._kept:
+            self._keep_trips()
+        self._sample(snapshot)
+        return snapshot
+
+    def restore(self, trips: Sequence[Trip]) -> None:
+        """Latch what an earlier process has latched."""
+        for trip in trips:
+            self.supervisor.latch(trip)
+        self._kept = self.supervisor.tripped
+
+    def clear_latch(self) -> None:
+        """Clear the latch here and on disk; raises NotPermitted where that cannot be written."""
+        self._latch.clear()
+        self.supervisor.clear()
+        self._kept = self.supervisor.tripped
+
+    def _stop_all(self, reason: str) -> None:
+        """Stop what moves, and what was ordered to."""
+        for parts in self.winches.values():
+            if parts.controller.phase not in _STOPPED or parts.controller.pending:
+                parts.controller.stop(reason)
+
+    def _watch_clock(self, now: float) -> None:
+        """Recognise a standstill of this computer by its own clock, before anything is blamed."""
+        gap, self._before = now - self._before, now
+        late = gap > _LATE * self.cycle
+        if late and now > self._catching_up + _ANEW:
+            # Frames that came meanwhile are read first: until then nobody's silence is judged.
+            self._catching_up = now + _LATE * self.cycle
+        if not (gap > self._longest_gap or gap < 0):
+            return
+        self._resumed = now
+        moving = any(p.controller.phase not in _STOPPED for p in self.winches.values())
+        if moving or gap < 0 or gap > _DRIVES_NOTICE * self._longest_gap:
+            self.supervisor.latch(
+                Trip(
+                    "computer",
+                    "",
+                    f"this computer stood still for {gap:.2f} s (limit {self._longest_gap:.2f} s): "
+                    "other programs, a suspended process, or a clock that was set; see "
+                    "'A computer for a bench' in docs/realtime.md, then reset",
+                    latches=True,
+                )
+            )
+
+    def _keep_trips(self) -> None:
+        """Write the latch to its file."""
+        trips = self.supervisor.tripped
+        problem = self._latch.keep(trips)
+        if problem is not None:
+            self.supervisor.latch(problem)
+        self._kept = self.supervisor.tripped
+
+    def _sample(self, snapshot: BenchSnapshot) -> None:
+        """Give the cycle to the recorders; one that fails is a warning and no stop."""
+        for sample in tuple(self.samplers):
+            try:
+                sample(snapshot)
+            except Exception as error:
+                if not isinstance(error, WinchkitError):  # else the recorder has said it
+                    _LOGGER.exception("a recorder failed")
+                self.warn(Trip("recorder", "", f"logging failed: {error}", Direction.NONE))
+                self.samplers.remove(sample)
+
+    def warn(self, warning: Trip) -> None:
+        """Show a warning until the next reset."""
+        self._warnings.setdefault(warning.kind, warning)
+
+    def forget_warnings(self) -> None:
+        """A reset has shown them."""
+        self._warnings.clear()
+
+    def _listen_for_stops(self) -> None:
+        """Fall silent where a drive does not heed a stop: its own watchdog is what is left."""
+        if not (self.beating and self.listening):
+            return
+        for name, parts in self.winches.items():
+            if parts.controller.silent:
+                self._fall_silent()
+                self.supervisor.latch(Trip("deaf", name, _DEAF, latches=True))
+
+    def _fall_silent(self) -> None:
+        """End every life sign that a drive watches."""
+        self.beating = False
+        watched = [each.axis.fall_silent() for each in self.winches.values()]
+        self._sync_watched = any(watched)
+
+    def _note_failed_ropes(self) -> None:
+        """A rope whose effects fail is known no better than it was: everything stops."""
+        for parts in self.winches.values():
+            self.failure = self.failure or parts.rope.failure
+
+    def _failing(self) -> str:
+        """Which winch must go down because its drive could not go on, and why, in words."""
+        new = [
+            f"winch {name}: {failure}"
+            for name, parts in self.winches.items()
+            if (failure := parts.controller.new_failure())
+        ]
+        return "; ".join(new) if self._stop_together else ""
+
+    def _run(self) -> None:
+        self.thread_id = threading.get_native_id()
+        due = self._clock.now()
+        while not self._stopping.is_set():
+            now = self._clock.now()
+            if self.broken is None:
+                try:
+                    self.step(now)
+                except BaseException as error:  # noqa: BLE001 - named in a trip, everything stops
+                    self.fail(error, now)
+            else:
+                self.stop_step(now)
+            due += self.cycle
+            late = self._clock.now() - due
+            if late > self.cycle:
+                self.overruns += 1
+                due += late
+            self._clock.sleep(due - self._clock.now())
+
+    def fail(self, error: BaseException, now: float) -> None:
+        """Stop every drive from prepared frames, and do nothing else from now on."""
+        self.broken, self._broken_at = error, now
+        for parts in self.winches.values():
+            _attempt(parts.axis.emergency_stop, sdo=False)
+        for bus, _, _ in self._buses:
+            _attempt(bus.sync)
+        for parts in self.winches.values():
+            _attempt(parts.axis.stop_by_sdo)
+        _LOGGER.error("the control loop failed", exc_info=error)
+        self.supervisor.latch(
+            Trip(
+                "loop",
+                "",
+                f"the control loop failed ({type(error).__name__}: {error}) and sends quick stops "
+                "only; close the bench, report it if it is a defect, open it again and reset",
+                latches=True,
+            )
+        )
+        _attempt(self._keep_trips)
+        self._show_trips()
+
+    def stop_step(self, now: float) -> None:
+        """A cycle after the loop has failed: RPDOs with 02h, SYNC, the host's heartbeat.
+
+        The heartbeat ends where a drive stays in operation enabled.
+        """
+        self._count += 1
+        for parts in self.winches.values():
+            _attempt(parts.axis.begin_cycle, self._count, now)
+        for bus, node, producer in self._buses:
+            if self.beating or not self._sync_watched:
+                _attempt(bus.sync)
+            if self.beating and producer.due(now):
+                _attempt(bus.heartbeat, node, NmtState.OPERATIONAL)
+        for parts in self.winches.values():
+            if self.beating:
+                _attempt(parts.axis.emergency_stop, sdo=False)
+            _attempt(parts.controller.settle)
+            if (
+                parts.controller.phase is not Phase.DISABLED
+                and now - self._broken_at < _HEARD_WITHIN
+            ):
+                _attempt(parts.axis.stop_by_sdo)
+        rest = all(p.controller.phase is Phase.DISABLED for p in self.winches.values())
+        if now - self._broken_at > _HEARD_WITHIN and not rest and not self._ramping():
+            _attempt(self._fall_silent)
+        self._show_trips()
+
+    def _ramping(self) -> bool:
+        """Whether every drive has left operation enabled, as far as it says."""
+        said = [parts.axis.feedback for parts in self.winches.values()]
+        return all(item is not None and item.state is not State.OPERATION_ENABLED for item in said)
+
+    def _show_trips(self) -> None:
+        """The newest picture with the trips of now, and the phases."""
+        if self.snapshot is not None:
+            winches = {
+                name: item._replace(phase=self.winches[name].controller.phase)
+                for name, item in self.snapshot.winch.items()
+            }
+            self.snapshot = replace(
+                self.snapshot, tripped=self.supervisor.tripped, winch=winches, cycle=self._count
+            )
+
+    def _send_sync(self, now: float) -> None:
+        for parts in self.winches.values():
+            parts.axis.begin_cycle(self._count, now)
+        for bus, node, producer in self._buses:
+            try:
+                if self.beating or not self._sync_watched:
+                    bus.sync()
+                if producer.due(now) and self.beating:
+                    bus.heartbeat(node, NmtState.OPERATIONAL)
+            except ConnectionLost as error:
+                self._latch_bus(error)
+            if bus.fault:
+                self._latch_bus(ConnectionLost(f"CAN bus: {bus.fault}; reset opens it again"))
+
+    def _command(self, now: float) -> None:
+        for name, parts in self.winches.items():
+            try:
+                parts.controller.step(now, self._count * self.cycle, self._count)
+            except ConnectionLost as error:
+                self._latch_bus(error)
+            except MotionError as error:
+                # A target that the drive cannot take: stopped at once, by what needs no target.
+                self.supervisor.latch(Trip("target", name, f"{error}; reset", latches=True))
+                parts.controller.stop()
+                parts.axis.emergency_stop(sdo=False)
+
+    def _latch_bus(self, error: ConnectionLost) -> None:
+        self.supervisor.latch(Trip("bus", "", str(error), latches=True))
+
+    def _ask_callbacks(self, snapshot: BenchSnapshot) -> None:
+        """Call the user's functions; the winding speeds that they return are a live dead-man."""
+        for callback in list(self.callbacks):
+            try:
+                for name, winding_speed in (callback(snapshot) or {}).items():
+                    self.on_jog(name, winding_speed)
+            except BaseException as error:  # noqa: BLE001 - kept, and raised in the owner's thread
+                self.callbacks.remove(callback)
+                self.failure = error
+
+    def _picture(
+        self, now: float, inputs: Mapping[str, WinchInput], blocked: tuple[Trip, ...]
+    ) -> BenchSnapshot:
+        return BenchSnapshot(
+            time=now,
+            cycle=self._count,
+            winch={name: picture(parts, inputs[name], now) for name, parts in self.winches.items()},
+            tripped=self.supervisor.tripped,
+            blocked=blocked,
+            overruns=self.overruns,
+            warnings=(*self._warnings.values(), *self.supervisor.warnings),
+        )
+
+
+def _attempt(action: Callable[..., object], *arguments: object, **options: object) -> None:
+    """Do one part of a stop; what it raises must not keep the others from being done."""
+    try:
+        action(*arguments, **options)
+    except BaseException:
+        _LOGGER.exception("a part of the stop failed")

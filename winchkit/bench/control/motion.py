@@ -1,0 +1,345 @@
+"""Motion sources: what asks a winch to move, evaluated once a cycle and free of any bus.
+
+A ``winding_speed`` is of the cable in m/s, positive winding in; angles are of the motor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
+
+from winchkit.bench.control.cable import LineModel, RopeMap
+from winchkit.bench.control.dead_man import DEAD_MAN, FIRST_PRESS
+from winchkit.errors import NotPermitted
+from winchkit.model.trajectory import Trajectory, plan
+from winchkit.schema.bench import LimitSpec
+
+__all__ = [
+    "DEAD_MAN",
+    "FIRST_PRESS",
+    "Jog",
+    "MotionSource",
+    "Move",
+    "Ramp",
+    "RunDown",
+    "StartGate",
+    "Target",
+    "Trim",
+]
+
+_CALM = 0.5
+"""Waited for the tension before the length is judged, s."""
+_CLOSE = 1e-4
+"""Of rope, within which nothing is corrected, m."""
+_TRIES = 3
+_MOST = 0.1
+"""Of rope, beyond which the profile's effects are not to be believed, m."""
+_SPEED, _ACCELERATION, _JERK = 0.05, 0.2, 1.0
+"""Of a correction, m/s, m/s^2, m/s^3, where the winch's own are not lower."""
+
+
+class Trim:
+    """Corrects where a move to a length has ended; evaluated once a cycle."""
+
+    def __init__(self, rope: RopeMap, length: float, limits: LimitSpec) -> None:
+        """End at a cable length, m."""
+        self._rope, self._length, self._limits = rope, length, limits
+        self._plan: Trajectory | None = None
+        self._angle = self._slope = 0.0
+        self._since: float | None = None
+        self._tries = 0
+        self.done = False
+
+    def at(self, time: float, angle: float) -> tuple[float, float, float]:
+        """Motor angle (rad), its velocity (rad/s) and the winding speed (m/s).
+
+        ``time`` in s, ``angle`` (rad) where the move has ended; they are evaluated once a cycle.
+        """
+        if self._since is None:
+            self._since, self._angle = time, angle
+        elapsed = time - self._since
+        if self._plan is None:
+            if not self.done and elapsed >= _CALM:
+                self._judge(time)
+            return self._angle, 0.0, 0.0
+        position, speed, _ = (float(value) for value in self._plan.at(elapsed))
+        if elapsed < self._plan.duration:
+            return self._angle + position * self._slope, speed * self._slope, -speed
+        self._angle += self._plan.distance * self._slope
+        self._plan, self._since = None, time
+        return self._angle, 0.0, 0.0
+
+    def _judge(self, time: float) -> None:
+        """Plan the next correction, if there is anything to correct."""
+        length, arm = self._rope.at(self._angle)
+        missing = self._length - length
+        if not _CLOSE < abs(missing) <= _MOST or self._tries == _TRIES:
+            self.done = True
+            return
+        self._tries += 1
+        # Positive angle times arm winds in, and what is missing is to be paid out.
+        self._slope, self._since = -1.0 / arm, time
+        limits = self._limits
+        ramp = min(_ACCELERATION, limits.acceleration)
+        self._plan = plan(missing, min(_SPEED, limits.speed), ramp, _JERK)
+
+
+JERK_TIME = 0.3
+"""Time in which a move's acceleration builds up, s."""
+_GAIN = 8.0
+"""Of the position loop around a speed-controlled drive, 1/s."""
+_MARGIN = 2e-3
+"""Of rope, kept to a length limit, m."""
+_SETTLED = 1e-4
+"""Of rope, from the target of a move that counts as done, m."""
+_SETTLE_TIME = 1.0
+"""A move counts as done this long after its end at the latest, s."""
+
+
+class Target(NamedTuple):
+    """What a drive is to do in this cycle."""
+
+    velocity: float
+    """Of the motor, rad/s."""
+    angle: float | None
+    """Of the motor, for a position-controlled drive, rad."""
+    winding_speed: float
+    """Of the cable, m/s, positive winding in."""
+    done: bool = False
+    start: bool = False
+    """Whether the drive is to make a motion of its own, a homing."""
+
+
+class MotionSource(Protocol):
+    """Says where to be at each cycle; ``done`` ends it."""
+
+    holds: bool
+    """Whether the winch stays enabled, holding its place, after the source is done."""
+    joins: bool
+    """Whether it can take over a rope that moves."""
+
+    def start(self, time: float, angle: float, winding_speed: float) -> None:
+        """Begin at a motor angle (rad) and a winding speed (m/s)."""
+
+    def target(self, time: float, angle: float, now: float) -> Target:
+        """Target at ``time`` (s), the motor being at ``angle`` (rad).
+
+        Time of motion advances by exactly one cycle a cycle, so that a late cycle makes no jump;
+        ``now`` (s) is the true time, for whatever expires.
+        """
+
+
+class Ramp:
+    """Speed that follows a wish with limited acceleration, in rope units."""
+
+    def __init__(self, acceleration: float, speed: float = 0.0) -> None:
+        self.speed = speed
+        self._acceleration = acceleration
+        self._time: float | None = None
+
+    def follow(self, wish: float, time: float) -> float:
+        """Speed at ``time``; the first call starts the clock."""
+        step = 0.0 if self._time is None else (time - self._time) * self._acceleration
+        self._time = time
+        self.speed += max(-step, min(step, wish - self.speed))
+        return self.speed
+
+
+class Jog:
+    """Moves at a speed while someone keeps saying so; silence brings it to rest."""
+
+    holds = False
+    joins = True
+
+    def __init__(self, rope: RopeMap, limits: LimitSpec) -> None:
+        self._rope, self._limits = rope, limits
+        self._ramp = Ramp(limits.acceleration)
+        self._wish = 0.0
+        self._expires = -math.inf
+        self._angle = self._last = 0.0
+
+    def refresh(self, winding_speed: float, expires: float) -> None:
+        """Keep going at ``winding_speed`` (m/s) until ``expires`` (s on the bench's clock)."""
+        self._wish = max(-self._limits.speed, min(self._limits.speed, winding_speed))
+        self._expires = expires
+
+    def start(self, time: float, angle: float, winding_speed: float) -> None:
+        """Begin with the speed that the cable has."""
+        self._ramp = Ramp(self._limits.acceleration, winding_speed)
+        self._angle, self._last = angle, time
+
+    def target(self, time: float, angle: float, now: float) -> Target:
+        """Follow the wish, slow down before a length limit, end once expired and at rest."""
+        live = now < self._expires
+        length, arm = self._rope.at(angle)
+        wish = self._within(self._wish, length) if live else 0.0
+        speed = self._ramp.follow(wish, time)
+        velocity = speed / arm
+        self._angle += velocity * (time - self._last)
+        self._last = time
+        return Target(velocity, self._angle, speed, done=not live and speed == 0.0)
+
+    def _within(self, wish: float, length: float) -> float:
+        """The wish, no faster than what can still be braked before a length limit."""
+        if self._limits.length is None:
+            return wish
+        low, high = self._limits.length
+        room = length - low if wish > 0 else high - length
+        fastest = math.sqrt(2 * self._limits.acceleration * max(0.0, room - _MARGIN))
+        return math.copysign(min(abs(wish), fastest), wish)
+
+
+class RunDown:
+    """From a speed to rest with the winch's acceleration."""
+
+    holds = False
+    joins = True
+
+    def __init__(self, rope: RopeMap, limits: LimitSpec) -> None:
+        self.duration = 0.0
+        self._rope, self._acceleration = rope, limits.acceleration
+        self._ramp = Ramp(self._acceleration)
+        self._angle = self._last = 0.0
+
+    def start(self, time: float, angle: float, winding_speed: float) -> None:
+        """Begin from the target angle and the speed that were in force."""
+        self._ramp = Ramp(self._acceleration, winding_speed)
+        self._ramp.follow(0.0, time)
+        self.duration = abs(winding_speed) / self._acceleration
+        self._angle, self._last = angle, time
+
+    def target(self, time: float, angle: float, _now: float) -> Target:
+        """Slower by one cycle's worth."""
+        before, speed = self._ramp.speed, self._ramp.follow(0.0, time)
+        arm = self._rope.at(angle)[1]
+        self._angle += (before + speed) / 2 / arm * (time - self._last)
+        self._last = time
+        return Target(speed / arm, self._angle, speed, done=speed == 0.0)
+
+
+class Move:
+    """A planned S-curve to a cable length; holds there when asked to."""
+
+    joins = False
+
+    def __init__(
+        self,
+        line: LineModel,
+        limits: LimitSpec,
+        length: float,
+        *,
+        speed: float | None = None,
+        acceleration: float | None = None,
+        holds: bool = False,
+        trim: Trim | None = None,
+    ) -> None:
+        """Raise NotPermitted for a target or a speed beyond the winch's limits.
+
+        ``trim`` corrects the end for what the rope has become on the way.
+        """
+        self.holds = holds
+        self._trim = trim
+        self.length = length
+        self._line = line
+        self._limits = limits
+        self._speed = _within("speed", speed, limits.speed, "m/s")
+        self._acceleration = _within("acceleration", acceleration, limits.acceleration, "m/s^2")
+        if limits.length is not None and not limits.length[0] <= length <= limits.length[1]:
+            raise NotPermitted(
+                f"a cable length of {length:g} m is beyond the limits {limits.length[0]:g} m to "
+                f"{limits.length[1]:g} m; change its limits.length only if the rope allows it"
+            )
+        if not math.isfinite(length):
+            raise NotPermitted("a cable length must be a finite number of metres")
+        self._start = 0.0
+        self._from = length
+        self._knots: list[float] = []
+        self._stretched = 0.0
+        self._ended = False
+
+    def prepare(self, angle: float) -> None:
+        """Plan from a motor angle (rad); called off the control thread, before ``start``."""
+        self._from = self._line.cable_length(angle)
+        jerk = self._acceleration / JERK_TIME
+        self._plan = plan(self.length - self._from, self._speed, self._acceleration, jerk)
+        count = max(2, math.ceil(abs(self.length - self._from) / 0.02) + 1)
+        step = (self.length - self._from) / (count - 1)
+        self._knots = [self._line.motor_angle(self._from + k * step) for k in range(count)]
+
+    @property
+    def duration(self) -> float:
+        """Time of the planned move, s; known once prepared."""
+        return max(self._plan.duration, self._stretched)
+
+    def stretch(self, duration: float) -> None:
+        """Take ``duration`` (s) where the plan is quicker; slower in the same proportion."""
+        self._stretched = duration
+
+    def start(self, time: float, angle: float, _winding_speed: float) -> None:
+        """Begin at rest; plans anew where the winch has moved since ``prepare``."""
+        if not self._knots or abs(self._knots[0] - angle) > 0.5:
+            self.prepare(angle)
+        self._start = time
+
+    def target(self, time: float, angle: float, _now: float) -> Target:
+        """Where the plan is, with the position loop's correction for speed control."""
+        if self._trim is not None and self._ended:
+            return self._trimmed(self._trim, time, angle)
+        elapsed = time - self._start
+        pace = self._plan.duration / self.duration if self._stretched else 1.0
+        position, speed, _ = (float(value) for value in self._plan.at(elapsed * pace))
+        speed *= pace
+        planned, slope = self._angle_at(position)
+        velocity = speed * slope + _GAIN * (planned - angle)
+        late = elapsed - self.duration
+        arrived = late >= 0 and abs(planned - angle) <= _SETTLED * abs(slope)
+        self._ended = arrived or late >= _SETTLE_TIME
+        done = self._ended and self._trim is None
+        return Target(velocity, planned, -speed, done=done)
+
+    def _trimmed(self, trim: Trim, time: float, angle: float) -> Target:
+        """Where the correction after the plan's end is."""
+        planned, velocity, speed = trim.at(time, self._knots[-1])
+        return Target(velocity + _GAIN * (planned - angle), planned, speed, done=trim.done)
+
+    def _angle_at(self, position: float) -> tuple[float, float]:
+        """Motor angle at a distance from the start, and its derivative by that distance."""
+        knots = self._knots
+        span = self._plan.distance / (len(knots) - 1)
+        if span == 0.0:
+            return knots[-1], 0.0
+        index = min(int(position / span), len(knots) - 2)
+        slope = (knots[index + 1] - knots[index]) / span
+        return knots[index] + slope * (position - index * span), slope
+
+
+def _within(name: str, asked: float | None, limit: float, unit: str) -> float:
+    """The asked value, or the limit; raises NotPermitted beyond it."""
+    if asked is None:
+        return limit
+    if not 0 < asked <= limit:
+        raise NotPermitted(
+            f"{name} {asked:g} {unit} is not within the winch's limit of {limit:g} {unit}"
+        )
+    return asked
+
+
+class StartGate:
+    """Opens for all members at once, in the first cycle in which each of them is ready.
+
+    The members ask one after another within a cycle while feedback keeps coming in; they are all
+    told what the first of them was told.
+    """
+
+    def __init__(self, ready: Sequence[Callable[[], bool]]) -> None:
+        self._ready = ready
+        self._asked = -math.inf
+        self._open = False
+
+    def open(self, time: float) -> bool:
+        """Whether to start in the cycle of this time of motion (s)."""
+        if not self._open and time != self._asked:
+            self._asked = time
+            self._open = all(ready() for ready in self._ready)
+        return self._open

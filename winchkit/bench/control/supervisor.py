@@ -1,0 +1,113 @@
+"""Watches every winch each cycle: what forbids motion now, and what has stopped it.
+
+Free of buses and threads: it is given the time and what is known, and remembers only what a
+condition needs (debounce, rates, boot-ups) and the trips that it latched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from winchkit.bench.control.conditions import CONDITIONS, Condition
+from winchkit.bench.control.observation import Memory, Supervised, WinchInput
+from winchkit.bench.control.snapshot import Direction, Trip
+
+__all__ = ["Supervisor", "direction_of"]
+
+_BY_CELL = ("cell", "tension_high", "tension_slack", "tension_rate")
+"""Needs of conditions that are tested only where there is a load cell."""
+
+
+class Supervisor:
+    """The conditions on all winches of a bench, and the latch."""
+
+    def __init__(
+        self,
+        winches: Mapping[str, Supervised],
+        conditions: Sequence[Condition] = CONDITIONS,
+    ) -> None:
+        """Take what each winch is held to, and the table of conditions."""
+        self.tripped: tuple[Trip, ...] = ()
+        self.warnings: tuple[Trip, ...] = ()
+        """Conditions that hold and forbid nothing."""
+        self._memory = {name: Memory(own) for name, own in winches.items()}
+        self._rows = {
+            name: tuple((row.holds, row) for row in conditions if _applies(row, own))
+            for name, own in winches.items()
+        }
+        self._without = {
+            name: tuple((holds, row) for holds, row in rows if row.needs not in _BY_CELL)
+            for name, rows in self._rows.items()
+        }
+        """The same for a winch whose load cell is not there."""
+
+    def check(self, now: float, inputs: Mapping[str, WinchInput]) -> tuple[Trip, ...]:
+        """Everything that forbids motion now; latches what must stop a motion under way."""
+        found: list[Trip] = []
+        for name, item in inputs.items():
+            memory = self._memory[name]
+            memory.observe(item)
+            own, rows = memory.own, self._rows if item.tension is not None else self._without
+            held = [row for holds, row in rows[name] if holds(item, own, memory)]
+            if held or memory.since:
+                for row in _debounced(held, memory.since, now):
+                    words = row.words(item, own, memory)
+                    found.append(Trip(row.kind, name, words, row.blocks, row.latches))
+        if not found:
+            self.warnings = ()
+            return ()
+        self.warnings = tuple(trip for trip in found if not trip.blocks)
+        blocked = tuple(trip for trip in found if trip.blocks)
+        for trip in blocked:
+            if trip.latches or self._stops(trip, inputs):
+                self.latch(trip)
+        return blocked
+
+    def latch(self, trip: Trip) -> None:
+        """Add a trip; the first of its kind on a winch stands."""
+        if not any((old.kind, old.winch) == (trip.kind, trip.winch) for old in self.tripped):
+            self.tripped = (*self.tripped, trip)
+
+    def acknowledge(self, boot_ups: Mapping[str, int]) -> None:
+        """Forget what a reset has dealt with, boot-ups up to now; the latch stays."""
+        for name, memory in self._memory.items():
+            self._memory[name] = Memory(memory.own, boot_ups.get(name, memory.boot_ups))
+
+    def clear(self) -> None:
+        """Clear the latch."""
+        self.tripped = ()
+
+    def _stops(self, trip: Trip, inputs: Mapping[str, WinchInput]) -> bool:
+        """Whether a motion under way is one that the trip forbids."""
+        for name, item in inputs.items():
+            if not item.moving:
+                continue
+            if name != trip.winch or trip.blocks is Direction.BOTH:
+                return True
+            if direction_of(item.commanded) & trip.blocks:
+                return True
+        return False
+
+
+def _debounced(
+    held: Sequence[Condition], since: dict[str, float], now: float
+) -> Iterator[Condition]:
+    """Those of the conditions that hold now which have held for as long as their debounce wants."""
+    kinds = {row.kind for row in held if row.debounce}
+    for kind in since.keys() - kinds:
+        del since[kind]
+    for row in held:
+        if not row.debounce or now - since.setdefault(row.kind, now) >= row.debounce:
+            yield row
+
+
+def _applies(row: Condition, own: Supervised) -> bool:
+    """Whether the bench file declares the limit that a condition compares with."""
+    return getattr(own.limits, row.needs, True) not in (None, ())
+
+
+def direction_of(speed: float) -> Direction:
+    """Direction of a winding speed, positive winding in."""
+    if speed == 0:
+        return Direction.NONE
+    return Direction.WIND_IN if speed > 0 else Direction.PAY_OUT

@@ -1,0 +1,191 @@
+"""One winch as the control loop sees it: its parts, and what they know in a cycle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.controller import AxisPort, Controller
+from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
+from winchkit.bench.control.observation import Instrumented, WinchInput
+from winchkit.bench.control.snapshot import Phase, WinchSnapshot
+from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.reading import Reading
+from winchkit.errors import ConnectionLost
+from winchkit.estimation.cable_state import Sample
+
+__all__ = ["SensorPort", "WinchParts", "known", "picture"]
+
+_IDLE = (Phase.DISABLED, Phase.RESETTING)
+_ANSWERED = 2
+"""SYNCs that a drive may leave unanswered and still counts as heard."""
+_FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
+_NOTHING = AxisFeedback(math.nan, 0, State.UNKNOWN, 0, math.nan, math.nan, math.nan)
+"""What is shown of a drive that has said nothing yet."""
+
+
+class SensorPort(Protocol):
+    """What the loop needs of an instrument."""
+
+    max_age: float
+    """A reading older than this is stale, s."""
+
+    @property
+    def latest(self) -> Reading | None:
+        """Newest reading."""
+
+    @property
+    def problem(self) -> ConnectionLost | None:
+        """Why there is no new reading, while there is none."""
+
+
+@dataclass
+class WinchParts:
+    """One winch as the loop sees it."""
+
+    axis: AxisPort
+    rope: RopeMap
+    controller: Controller
+    sensors: Mapping[str, SensorPort] = field(default_factory=dict)
+    """By role: cell, load, length, temperature."""
+    frozen: FrozenCell | None = None
+    """The test of its load cell, if it has one."""
+    load: HangingLoad = field(default_factory=lambda: HangingLoad(math.nan))
+    """Predicts the tension for that test."""
+    commander: str = ""
+    """Name of the client that commands it."""
+
+
+def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) -> WinchInput:
+    """What the supervisor needs to know of a winch; its cable takes the cycle's measurements.
+
+    Silence counts from ``resumed`` (s) on at the earliest: before, this computer stood still.
+    """
+    axis, feedback, controller = parts.axis, parts.axis.feedback, parts.controller
+    length = speed = math.nan
+    fault = False
+    if feedback is not None:
+        if parts.rope.bends:
+            parts.rope.feel(_sample(parts, feedback, now))
+        length, arm = parts.rope.at(feedback.angle)
+        speed = feedback.velocity * arm
+        fault = feedback.state in _FAULTS
+        if not feedback.turns_known:
+            length = math.nan
+    sensors = {role: _instrumented(sensor, now, resumed) for role, sensor in parts.sensors.items()}
+    operational = axis.operational
+    alarms = () if fault else axis.alarms
+    missed = sync if feedback is None else sync - 1 - feedback.sync
+    # What a silent drive said last must not be compared with what it is told now.
+    follows = controller.follows and missed <= _ANSWERED
+    return WinchInput(
+        feedback_age=math.inf if feedback is None else now - max(feedback.time, resumed),
+        missed_syncs=missed,
+        heartbeat_lost=axis.heartbeat.lost(now, resumed),
+        boot_ups=axis.heartbeat.boot_ups,
+        operational=operational,
+        mode_kept=axis.mode_kept,
+        fault=axis.fault_text if fault else "",
+        winding_speed=speed,
+        commanded=controller.commanded,
+        cable_length=length,
+        moving=controller.phase not in _IDLE,
+        tension=sensors.get("cell"),
+        nmt="" if operational else axis.nmt_text,
+        uncommanded=controller.take_uncommanded(),
+        disabled=controller.phase is Phase.DISABLED,
+        follows=follows,
+        target_speed=controller.target_speed if follows else math.nan,
+        following_error=controller.following_error if follows else 0.0,
+        length=_fresh(sensors["length"], now) if "length" in sensors else math.nan,
+        emergencies=alarms,
+        emergency_text=axis.alarm_text if alarms else "",
+        frozen=_frozen(parts, now, speed),
+        turns_known=feedback is None or feedback.turns_known,
+        unstable="" if parts.frozen is None else parts.frozen.unstable,
+        sensors=sensors,
+    )
+
+
+def _frozen(parts: WinchParts, now: float, speed: float) -> str:
+    """What shows that the load cell is frozen."""
+    cell = parts.sensors.get("cell")
+    if parts.frozen is None or cell is None:
+        return ""
+    controller = parts.controller
+    predicted = parts.load.tension(now, controller.commanded, speed)
+    moving = controller.phase not in _IDLE
+    finding = parts.frozen.update(cell.latest, now, predicted, moving=moving)
+    return "" if finding is None else str(finding)
+
+
+def _fresh(sensor: Instrumented, now: float) -> float:
+    """Newest reading of a sensor; NaN where it is too old."""
+    return sensor.value if now - sensor.received <= sensor.max_age else math.nan
+
+
+def _instrumented(sensor: SensorPort, now: float, resumed: float) -> Instrumented:
+    """Newest reading of a sensor and its age."""
+    reading, trouble = sensor.latest, sensor.problem
+    problem = "" if trouble is None else str(trouble)
+    if reading is None:
+        return Instrumented(math.nan, math.inf, sensor.max_age, "", math.nan, problem)
+    return Instrumented(
+        value=reading.value,
+        age=now - max(reading.t_receive, resumed),
+        received=reading.t_receive,
+        max_age=sensor.max_age,
+        quality=str(reading.quality),
+        time=reading.t_sample,
+        problem=problem,
+        gross=reading.gross,
+    )
+
+
+def _sample(parts: WinchParts, feedback: AxisFeedback, now: float) -> Sample:
+    """What the rope is judged by; NaN for a reading that is too old."""
+    fresh = {
+        role: sensor.latest.value
+        for role, sensor in parts.sensors.items()
+        if sensor.latest is not None and now - sensor.latest.t_receive <= sensor.max_age
+    }
+    return Sample(
+        now,
+        feedback.angle,
+        feedback.velocity,
+        cell=fresh.get("cell", math.nan),
+        load=fresh.get("load", math.nan),
+        temperature=fresh.get("temperature", math.nan),
+    )
+
+
+def picture(parts: WinchParts, seen: WinchInput, now: float) -> WinchSnapshot:
+    """The winch in this cycle, as others get to see it."""
+    feedback = parts.axis.feedback or _NOTHING
+    fresh = {role: _fresh(item, now) for role, item in seen.sensors.items()}
+    cell, load = fresh.get("cell", math.nan), fresh.get("load", math.nan)
+    return WinchSnapshot(
+        phase=parts.controller.phase,
+        state=str(feedback.state),
+        time=feedback.time,
+        motor_angle=feedback.angle,
+        motor_velocity=feedback.velocity,
+        motor_torque=feedback.torque,
+        cable_length=seen.cable_length,
+        cable_speed=0.0 - seen.winding_speed,
+        tension=cell,
+        load=load,
+        rope_tension=parts.rope.tension(cell, load),
+        length=fresh.get("length", math.nan),
+        temperature=fresh.get("temperature", math.nan),
+        quality={
+            role: item.quality if now - item.received <= item.max_age else "stale"
+            for role, item in seen.sensors.items()
+        },
+        turns_known=feedback.turns_known,
+        commander=parts.commander,
+    )

@@ -1,0 +1,307 @@
+"""Turns a wiring file into open buses, commissioned drives, polled sensors and a control loop."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from winchkit import __version__, catalog
+from winchkit.bench.cells.instruments import can_buses, device_of, instruments
+from winchkit.bench.commissioning.hardware import tell_hardware
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.controller import Controller
+from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
+from winchkit.bench.control.latch import LatchFile
+from winchkit.bench.control.loop import ControlLoop
+from winchkit.bench.control.observation import Supervised
+from winchkit.bench.control.snapshot import Direction, Phase, Trip
+from winchkit.bench.control.supervisor import Supervisor
+from winchkit.bench.control.winch_state import WinchParts
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.limits import LimitsAtShaft
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.reading import Sensor
+from winchkit.drivers.slow import SlowDevices, SlowLine
+from winchkit.errors import ConnectionLost, Fault, FileError
+from winchkit.model.line import GRAVITY
+from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
+from winchkit.schema.plausible import doubts
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["Wired", "wire"]
+
+_STALE_BEATS = 2
+"""Feedback may be this many heartbeats old: the bench file says how soon silence must count."""
+_LEAST_GAP = 6
+"""Cycles that may be late in any case: with a slow cycle two heartbeats are too short."""
+_FURTHER = 0.02
+"""Of rope, by which the drive's own length limits lie beyond the bench's, m."""
+_FELT = 0.02
+"""Rope speed at which the counts of a good cell cannot stand still, m/s."""
+_FASTEST = 1.5
+"""Motor speed over that of ``limits.speed`` at which a drive may be missed turning."""
+_HEADROOM = 4.0
+"""Of a drive's own ramps in a profile mode over those that the host makes."""
+
+
+@dataclass(frozen=True)
+class Wired:
+    """What is behind an open bench."""
+
+    loop: ControlLoop
+    axes: Mapping[str, Cia402Axis]
+    buses: Mapping[str, CanBus]
+    sensors: Mapping[str, Mapping[str, Sensor]]
+    lines: Sequence[SlowLine]
+    slow: SlowDevices
+    metadata: Mapping[str, str]
+
+    def disarm(self) -> None:
+        """Tell the drives that are at rest not to mind that the host's heartbeat ends.
+
+        Any other keeps its watchdog, which stops it.
+        """
+        for name, axis in self.axes.items():
+            if self.loop.winches[name].controller.phase is Phase.DISABLED:
+                with suppress(ConnectionLost):
+                    axis.disarm()
+
+
+def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> Wired:
+    """Open everything; what is open is closed by ``stack``."""
+    from winchkit.effects import load_catalogue, terms_of
+    from winchkit.estimation.cable_state import RopeNow
+
+    profiles = {name: _profile(spec, winch) for name, winch in spec.winch.items()}
+    catalogue = load_catalogue(spec.effect_files)
+    ropes = {
+        name: RopeMap.of(RopeNow(profile, terms_of(profile, catalogue), _weight(spec.winch[name])))
+        for name, profile in profiles.items()
+    }
+    buses = _open_buses(spec, clock, stack)
+    axes = {
+        name: _axis(spec, winch, ropes[name], buses, clock) for name, winch in spec.winch.items()
+    }
+    sensors, lines = instruments(
+        spec, clock, buses, {name: _moving(axes[name], ropes[name]) for name in spec.winch}
+    )
+    slow = SlowDevices(lines, clock)
+    stack.callback(slow.close)
+    _commission(axes)
+    tell_hardware(spec)
+    _tell_notes(spec, axes, buses)
+    winches = _winches(spec, axes, ropes, sensors)
+    stale = max(_STALE_BEATS * spec.bus[name].heartbeat for name in buses)
+    supervisor = _supervisor(spec, stale, axes, ropes, profiles)
+    hosts = [(bus, spec.bus[name].node, spec.bus[name].heartbeat) for name, bus in buses.items()]
+    loop = ControlLoop(
+        hosts,
+        winches,
+        supervisor,
+        clock,
+        spec.cycle,
+        stop_together=spec.stop_together,
+        latch=latch,
+        longest_gap=max(stale, _LEAST_GAP * spec.cycle),
+    )
+    _warn_of_sync(buses, loop)
+    return Wired(loop, axes, buses, sensors, lines, slow, _metadata(spec, profiles))
+
+
+def _supervisor(
+    spec: BenchSpec,
+    stale: float,
+    axes: Mapping[str, Cia402Axis],
+    ropes: Mapping[str, RopeMap],
+    profiles: Mapping[str, WinchProfile],
+) -> Supervisor:
+    """What holds each winch to its limits; feedback counts as stale after ``stale`` s."""
+    return Supervisor(
+        {
+            name: Supervised(
+                winch.limits,
+                stale,
+                spec.cycle,
+                _resolution(axes[name], ropes[name]),
+                _safe_length(profiles[name]),
+            )
+            for name, winch in spec.winch.items()
+        }
+    )
+
+
+def _winches(
+    spec: BenchSpec,
+    axes: Mapping[str, Cia402Axis],
+    ropes: Mapping[str, RopeMap],
+    sensors: Mapping[str, Mapping[str, Sensor]],
+) -> dict[str, WinchParts]:
+    """Each winch as the loop sees it."""
+    return {
+        name: WinchParts(
+            axes[name],
+            ropes[name],
+            Controller(axes[name], ropes[name], winch.limits),
+            sensors[name],
+            _frozen_cell(spec, winch),
+            HangingLoad(math.nan if winch.load_mass is None else winch.load_mass),
+        )
+        for name, winch in spec.winch.items()
+    }
+
+
+def _resolution(axis: Cia402Axis, rope: RopeMap) -> float:
+    """Of the measured cable speed, m/s: one count of 606Ch."""
+    return 0.0 if axis.drive is None else abs(axis.drive.scale.velocity * rope.arm(0.0))
+
+
+def _safe_length(profile: WinchProfile) -> float:
+    """Cable length (m) that leaves the last dead wraps on the drum, where the profile tells it."""
+    from winchkit.model.capacity import safe_lengths
+
+    longest = safe_lengths(profile)[1] if profile.reference.wound_turns else math.inf
+    return longest if math.isfinite(longest) else math.inf
+
+
+def _commission(axes: Mapping[str, Cia402Axis]) -> None:
+    """Set every drive up; undo what some did while the host was silent to all, to prove one."""
+    for axis in axes.values():
+        axis.commission()
+    if any(axis.host.disturbs for axis in axes.values()):
+        for axis in axes.values():
+            axis.host.settle()
+
+
+def _warn_of_sync(buses: Mapping[str, CanBus], loop: ControlLoop) -> None:
+    """Show that somebody else sends SYNC as a warning until the next reset."""
+    for bus in buses.values():
+        bus.on_foreign_sync = lambda words: loop.warn(Trip("sync", "", words, Direction.NONE))
+
+
+def _tell_notes(
+    spec: BenchSpec, axes: Mapping[str, Cia402Axis], buses: Mapping[str, CanBus]
+) -> None:
+    """Say which limits are missing, what was changed in the drives, and who else sends SYNC."""
+    notes = [f"{'.'.join(key)}: {message} (warning)" for key, message in doubts(spec)]
+    notes += [note for axis in axes.values() if axis.drive for note in axis.drive.notes]
+    notes += [note for bus in buses.values() if (note := bus.foreign_sync)]
+    for note in notes:
+        sys.stderr.write(f"{note}\n")
+
+
+def _weight(winch: WinchWiring) -> float | None:
+    """Of the load that the wiring file declares, N."""
+    return None if winch.load_mass is None else winch.load_mass * GRAVITY
+
+
+def _frozen_cell(spec: BenchSpec, winch: WinchWiring) -> FrozenCell | None:
+    """The test of a winch's load cell, with the numbers of its device file."""
+    if winch.cell is None:
+        return None
+    device = device_of(spec, winch.cell)
+    table = device.modbus or device.stream or device.process
+    if table is None:
+        return None
+    return FrozenCell(table.rate, correlation=table.filter_delay)
+
+
+def _moving(axis: Cia402Axis, rope: RopeMap) -> Callable[[], bool]:
+    """Whether a winch moves fast enough for its cells to feel it."""
+
+    def moves() -> bool:
+        feedback = axis.feedback
+        if feedback is None:
+            return False
+        return abs(feedback.velocity * rope.arm(feedback.angle)) > _FELT
+
+    return moves
+
+
+def _profile(spec: BenchSpec, winch: WinchWiring) -> WinchProfile:
+    from winchkit.schema.read import read_winch
+
+    return read_winch(catalog.find("profiles", winch.profile, spec.path or None))
+
+
+def _open_buses(spec: BenchSpec, clock: Clock, stack: ExitStack) -> dict[str, CanBus]:
+    """Every CAN bus that a servo or an instrument is on."""
+    buses: dict[str, CanBus] = {}
+    servos = dict.fromkeys(winch.servo.bus for winch in spec.winch.values())
+    for name in servos:
+        if spec.bus[name].kind != "can":
+            raise FileError(Fault(f"servos need a CAN bus; '{name}' is none", spec.path))
+    for name in servos | dict.fromkeys(can_buses(spec)):
+        buses[name] = CanBus(spec.bus[name], name, clock)
+        stack.callback(buses[name].close)
+    return buses
+
+
+def _axis(
+    spec: BenchSpec,
+    winch: WinchWiring,
+    rope: RopeMap,
+    buses: Mapping[str, CanBus],
+    clock: Clock,
+) -> Cia402Axis:
+    ref = winch.servo
+    bus = spec.bus[ref.bus]
+    if ref.node is None:
+        raise FileError(Fault(f"servo '{ref.device}' needs its node number", spec.path))
+    arm = abs(rope.arm(0.0))
+    acceleration = _HEADROOM * winch.limits.acceleration / arm
+    watch = WatchSpec(
+        bus.node,
+        bus.heartbeat,
+        spec.cycle,
+        winch.brake,
+        acceleration,
+        limits=_at_shaft(rope, winch.limits),
+        speed=_FASTEST * winch.limits.speed / arm,
+        options=winch.options,
+        hardware=winch.host_loss_description if winch.host_loss else "",
+    )
+    return Cia402Axis(buses[ref.bus], ref.node, device_of(spec, ref), watch, clock)
+
+
+def _at_shaft(rope: RopeMap, limits: LimitSpec) -> LimitsAtShaft:
+    """What the drive itself is to keep, where the wiring file says so."""
+    angle = None
+    if limits.in_drive and limits.length is not None:
+        low, high = limits.length
+        ends = (max(0.0, low - _FURTHER), high + _FURTHER)
+        first, second = sorted(map(rope.motor_angle, ends))
+        angle = (first, second)
+    error = limits.following_error
+    following = None if error is None else error / abs(rope.arm(0.0))
+    return LimitsAtShaft(angle=angle, following_error=following, torque=limits.torque)
+
+
+def _metadata(spec: BenchSpec, profiles: Mapping[str, WinchProfile]) -> dict[str, str]:
+    """What a log says about where it came from."""
+    about = {
+        "bench": spec.name,
+        "recorded": datetime.now(UTC).isoformat(timespec="seconds"),
+        "winchkit": __version__,
+        "wiring": json.dumps(dataclasses.asdict(spec), default=str),
+        "profile": ", ".join(item.name for item in profiles.values()),
+        "declared": json.dumps(
+            {name: dataclasses.asdict(item) for name, item in profiles.items()}, default=str
+        ),
+    }
+    about |= {
+        f"host_loss.{name}": f"hardware: {winch.host_loss_description}"
+        for name, winch in spec.winch.items()
+        if winch.host_loss
+    }
+    masses = {winch.load_mass for winch in spec.winch.values()}
+    if len(spec.winch) == 1 and None not in masses:
+        about["load_mass"] = f"{masses.pop():g} kg"
+    return about

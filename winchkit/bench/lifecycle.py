@@ -1,0 +1,177 @@
+"""Brings a bench back after trips, faults and lost buses; enables nothing.
+
+The latch is cleared last, once nothing forbids motion: a reset that fails leaves it as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from winchkit.bench.control.loop import ControlLoop
+from winchkit.bench.control.snapshot import Direction, Phase
+from winchkit.bench.hardware import Wired
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.reading import Sensor
+from winchkit.errors import LimitTripped, MotionError, NoReply, NotPermitted, WinchkitError
+from winchkit.schema.bench import BenchSpec
+
+__all__ = [
+    "await_cycles",
+    "await_feedback",
+    "await_rest",
+    "await_sensors",
+    "clear_faults",
+    "reset",
+]
+
+_POLL = 0.01
+_FIRST_FEEDBACK = 2.0
+_FIRST_READING = 1.5
+_REST_TIME = 5.0
+_HANGS = 1.0
+_RESET_TIME = 2.0
+
+
+def await_cycles(loop: ControlLoop, clock: Clock, count: int) -> None:
+    """Let the loop take notice of what was just ordered; raises WinchkitError when it hangs."""
+    start, deadline = loop.count, clock.now() + _HANGS
+    while loop.alive and loop.count < start + count:
+        if clock.now() > deadline:
+            raise WinchkitError("the control loop hangs; the drives stop by their heartbeat")
+        clock.sleep(loop.cycle / 2)
+
+
+def await_feedback(loop: ControlLoop, axes: Mapping[str, Cia402Axis], clock: Clock) -> None:
+    """Wait until every drive answers to SYNC; raises NoReply."""
+    deadline = clock.now() + _FIRST_FEEDBACK
+    for name, axis in axes.items():
+        while axis.feedback is None or loop.snapshot is None:
+            if loop.failure is not None:
+                raise loop.failure
+            if clock.now() > deadline:
+                raise NoReply(
+                    f"winch {name} ({axis.name}): the drive answers SDO but sends no PDOs on "
+                    f"SYNC within {_FIRST_FEEDBACK:g} s; check its PDO mapping and SYNC id 80h"
+                )
+            clock.sleep(_POLL)
+    await_cycles(loop, clock, 2)
+
+
+def await_sensors(sensors: Iterable[Sensor], clock: Clock) -> None:
+    """Give every sensor time for its first answer; a silent one is told when it matters."""
+    deadline, waiting = clock.now() + _FIRST_READING, list(sensors)
+    while any(item.latest is None and item.problem is None for item in waiting):
+        if clock.now() > deadline:
+            return
+        clock.sleep(_POLL)
+
+
+def await_rest(loop: ControlLoop, names: Iterable[str], clock: Clock) -> None:
+    """Return when these winches are disabled and stand still; raises MotionError if not."""
+    deadline = clock.now() + _REST_TIME
+    controllers = {name: loop.winches[name].controller for name in names}
+    await_cycles(loop, clock, 2)
+    while loop.alive:
+        assert loop.snapshot is not None, "it has had a cycle"
+        seen = loop.snapshot.winch
+        busy = [
+            name
+            for name, item in controllers.items()
+            if item.phase is not Phase.DISABLED or seen[name].phase is not Phase.DISABLED
+        ]
+        if not busy:
+            return
+        if clock.now() > deadline:
+            for name in busy:
+                controllers[name].stop()
+            raise MotionError(
+                f"winch {busy[0]} did not come to rest within {_REST_TIME:g} s (drive: "
+                f"{seen[busy[0]].state}); use the emergency stop and look at the drive"
+            )
+        clock.sleep(_POLL)
+
+
+def clear_faults(loop: ControlLoop, clock: Clock) -> None:
+    """Let every drive clear its fault, and give it time for that."""
+    controllers = [parts.controller for parts in loop.winches.values()]
+    for controller in controllers:
+        controller.reset()
+    await_cycles(loop, clock, 3)
+    deadline = clock.now() + _RESET_TIME
+    while clock.now() < deadline and any(c.phase is Phase.RESETTING for c in controllers):
+        clock.sleep(_POLL)
+
+
+_UNHEARD = ("boot-up", "heartbeat", "nmt", "mode", "feedback", "deaf", "computer", "bus")
+"""Trips after which a drive may have lost its set-up."""
+
+
+def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
+    """Clear trips and drive faults, open buses that went down, set lost drives up again.
+
+    Returns what was cleared, in words. Raises LimitTripped naming what still forbids any motion,
+    NotPermitted where the control loop has failed or the latch file cannot be written,
+    ConnectionLost.
+    """
+    if wired.loop.broken is not None:
+        raise NotPermitted(
+            "the control loop has failed and only sends stops; close the bench, open it again, "
+            "then reset"
+        )
+    wired.loop.listening = False
+    try:
+        return _reset(wired, spec, clock)
+    finally:
+        wired.loop.listening = True
+
+
+def _reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
+    loop, axes = wired.loop, wired.axes
+    assert loop.snapshot is not None, "an open bench has had a cycle"
+    seen = loop.snapshot
+    cleared = [str(trip) for trip in seen.tripped]
+    troubled = {trip.winch for trip in (*seen.tripped, *seen.blocked) if trip.kind in _UNHEARD}
+    if "" in troubled:
+        troubled = {name for name in axes if axes[name].lost_set_up} | troubled - {""}
+    troubled |= _on_reopened(wired, spec)
+    if not loop.beating:
+        # Every drive has missed the heartbeat, and its watchdog is proved anew.
+        troubled, loop.beating = set(axes), True
+    if any(axes[name].host.disturbs for name in troubled):
+        # The proof of one is a silence towards all: each of them is set up anew.
+        troubled = set(axes)
+    lost = [name for name in axes if name in troubled]
+    # What a drive without its mapping said last stays: only commissioning tells how it is.
+    await_rest(loop, [name for name in axes if name not in lost], clock)
+    for name in lost:
+        axes[name].commission()
+    if any(axes[name].host.disturbs for name in lost):
+        for name in lost:
+            axes[name].host.settle()
+    await_feedback(loop, axes, clock)
+    await_rest(loop, lost, clock)
+    faults = {name: axis.fault_text for name, axis in axes.items() if axis.state is State.FAULT}
+    told = {trip.winch for trip in seen.tripped if trip.kind == "fault"}
+    cleared += [f"winch {name}: drive fault: {faults[name]}" for name in faults if name not in told]
+    clear_faults(loop, clock)
+    for axis in axes.values():
+        axis.forget_alarms()
+    loop.supervisor.acknowledge({name: axis.heartbeat.boot_ups for name, axis in axes.items()})
+    await_cycles(loop, clock, 3)
+    still = [trip for trip in loop.snapshot.blocked if trip.blocks is Direction.BOTH]
+    if still:
+        raise LimitTripped("still not free to move: " + "; ".join(map(str, still)))
+    loop.clear_latch()
+    loop.forget_warnings()
+    await_cycles(loop, clock, 2)
+    return cleared
+
+
+def _on_reopened(wired: Wired, spec: BenchSpec) -> set[str]:
+    """Open buses that went down again; returns the winches on them."""
+    down = {name for name, bus in wired.buses.items() if bus.fault}
+    for name in down:
+        wired.buses[name].reopen()
+    return {name for name, winch in spec.winch.items() if winch.servo.bus in down}

@@ -1,0 +1,1 @@
+"""Recording of a running bench: feed, recorder, live sinks, provenance and replay."""

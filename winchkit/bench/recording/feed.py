@@ -1,0 +1,170 @@
+"""What a recorder takes from a running bench: cheap to give, in pieces by source."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import fields
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from winchkit.bench.control.snapshot import BenchSnapshot, Phase
+from winchkit.drivers.reading import Reading, Sensor
+from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+
+__all__ = ["CHANNELS", "TARED", "Feed"]
+
+CHANNELS: dict[str, tuple[str, str]] = {
+    "cell": ("tension", "N"),
+    "load": ("load", "N"),
+    "length": ("cable_length", "m"),
+    "temperature": ("temperature", "degC"),
+}
+"""Channel and unit by role of the sensor."""
+TARED = ("cell", "load", "length")
+"""Roles whose instruments can be tared; a row holds the gross value beside the net one."""
+
+_DRIVE = {"motor_angle": "rad", "motor_velocity": "rad/s", "motor_torque": "N m"}
+_OF_PROFILE = {"cable_length": "m", "cable_speed": "m/s"}
+"""Of the rope, from the motor angle; a log keeps what the bench showed, a run does not."""
+_of_drive = attrgetter("time", *_DRIVE, *_OF_PROFILE, "phase")
+_TORQUE = 1 + list(_DRIVE).index("motor_torque")
+_TIMES = ("t_request", "t_receive", "t_sample", "t_uncertainty")
+_NUMBERS = tuple(
+    item.name for item in fields(Reading) if item.type == "float" and item.name not in _TIMES[1:3]
+)
+_of_reading = attrgetter("t_sample", "t_receive", *_NUMBERS)
+_FAST_GAP = 0.1
+_BARE_PERIOD = 0.0095
+"""Rows of a bench without instruments: a hundredth of a second, less the jitter of a cycle."""
+_UNPOWERED = (Phase.DISABLED, Phase.ENABLING, Phase.RESETTING)
+_WAITING = 65_536
+"""Cycles, and readings of an instrument, that may wait for a slow disk: a minute at 1 kHz."""
+
+
+class Feed:
+    """Collects snapshots and readings; one thread gives, another takes."""
+
+    def __init__(self, sensors: Mapping[str, Mapping[str, Sensor]], opened: float) -> None:
+        """Listen to winches with their sensors by role from ``opened`` (s) on."""
+        prefix = {name: f"{name}." if len(sensors) > 1 else "" for name in sensors}
+        self.lost = 0
+        """Cycles and readings that were dropped because nobody took them in time."""
+        self._snapshots: deque[BenchSnapshot] = deque(maxlen=_WAITING)
+        self._readings: dict[str, deque[Reading]] = {}
+        self._listening: list[tuple[Sensor, Callable[[Reading], None]]] = []
+        self._drives = {name: f"/{name}/drive" for name in sensors}
+        sources = [_drive_source(topic, prefix[name]) for name, topic in self._drives.items()]
+        topics: dict[int, str] = {}
+        base = _slowest(sensors)
+        for name, by_role in sensors.items():
+            for role, instrument in by_role.items():
+                topic = f"/{name}/{role}"
+                topics.setdefault(id(instrument), topic)
+                sources.append(_sensor_source(topic, prefix[name], role, instrument))
+                self._listen(topic, instrument)
+        rule = (
+            RowRule(next(iter(self._drives.values())), opened, _BARE_PERIOD)
+            if base is None
+            else RowRule(topics[id(base)], opened)
+        )
+        self.layout = Layout(tuple(sources), rule)
+
+    def give(self, snapshot: BenchSnapshot) -> None:
+        """Take a cycle; for the control thread."""
+        if len(self._snapshots) == _WAITING:
+            self.lost += 1
+        self._snapshots.append(snapshot)
+
+    def take(self) -> tuple[dict[str, Samples], list[BenchSnapshot]]:
+        """What came since the last time: samples by topic, and the snapshots themselves."""
+        snapshots = [self._snapshots.popleft() for _ in range(len(self._snapshots))]
+        pieces = {}
+        for name, topic in self._drives.items():
+            rows = [_of_drive(snapshot.winch[name]) for snapshot in snapshots]
+            pieces[topic] = _drive_samples(rows)
+        for topic, waiting in self._readings.items():
+            pieces[topic] = _samples([waiting.popleft() for _ in range(len(waiting))])
+        return {topic: samples for topic, samples in pieces.items() if len(samples)}, snapshots
+
+    def close(self) -> None:
+        """Stop listening; the recorder's own thread may come to it at the same time."""
+        with suppress(IndexError):
+            while True:
+                instrument, listener = self._listening.pop()
+                instrument.listeners.remove(listener)
+
+    def abandon(self) -> None:
+        """Stop listening and drop what nobody will take."""
+        self.close()
+        self._snapshots.clear()
+        for waiting in self._readings.values():
+            waiting.clear()
+
+    def _listen(self, topic: str, instrument: Sensor) -> None:
+        waiting = self._readings.setdefault(topic, deque(maxlen=_WAITING))
+
+        def take(reading: Reading) -> None:
+            if len(waiting) == _WAITING:
+                self.lost += 1
+            waiting.append(reading)
+
+        self._listening.append((instrument, take))
+        instrument.listeners.append(take)
+
+
+def _drive_source(topic: str, prefix: str) -> Source:
+    measured = [Signal(name, unit, prefix + name) for name, unit in _DRIVE.items()]
+    shown = [Signal(name, unit) for name, unit in _OF_PROFILE.items()]
+    return Source(topic, (*measured, *shown), _FAST_GAP)
+
+
+def _sensor_source(topic: str, prefix: str, role: str, instrument: Sensor) -> Source:
+    channel, unit = CHANNELS[role]
+    units = {"value": unit, "gross": unit, "raw": "1"}
+    columns = {"value": prefix + channel}
+    if role in TARED:
+        columns["gross"] = f"{prefix}{channel}_gross"
+    signals = [
+        Signal(
+            channel if name == "value" else name,
+            units.get(name, "s" if name in _TIMES else unit),
+            columns.get(name, ""),
+        )
+        for name in _NUMBERS
+    ]
+    return Source(topic, (*signals, Signal("quality", "1")), max(_FAST_GAP, 5 * instrument.period))
+
+
+def _drive_samples(rows: list[tuple[Any, ...]]) -> Samples:
+    """Values of a drive; each SYNC's once."""
+    if not rows:
+        return Samples.joined([], len(_DRIVE) + len(_OF_PROFILE))
+    unpowered = [row[-1] in _UNPOWERED for row in rows]
+    table = np.array([row[:-1] for row in rows])
+    # While the brake holds the rope the drive's torque says nothing of it.
+    table[unpowered, _TORQUE] = math.nan
+    known = np.isfinite(table[:, 0])
+    known[1:] &= table[1:, 0] != table[:-1, 0]
+    table = table[known]
+    return Samples(table[:, 0], table[:, 0], table[:, 1:])
+
+
+def _samples(readings: list[Reading]) -> Samples:
+    if not readings:
+        return Samples.joined([], len(_NUMBERS) + 1)
+    table = np.array([(*_of_reading(item), item.quality.value) for item in readings], dtype=float)
+    return Samples(table[:, 0], table[:, 1], table[:, 2:])
+
+
+def _slowest(sensors: Mapping[str, Mapping[str, Sensor]]) -> Sensor | None:
+    """The instrument that sets the rows: the slowest load cell, else length, else load."""
+    for role in ("cell", "length", "load"):
+        there = [by_role[role] for by_role in sensors.values() if role in by_role]
+        if there:
+            return max(there, key=lambda item: item.period)
+    return None

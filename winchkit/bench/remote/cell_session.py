@@ -1,0 +1,54 @@
+"""Where a command finds a bench's instruments: at the owner, else opened here without any drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from winchkit.bench.cells.desk import CellDesk
+from winchkit.bench.cells.instruments import can_buses, instruments
+from winchkit.bench.cells.tasks import Cells, LocalCells
+from winchkit.bench.remote.client import RemoteCells, attach
+from winchkit.bench.remote.commander import client_name
+from winchkit.bench.remote.handover import own
+from winchkit.drivers.clock import Clock, MonotonicClock
+from winchkit.drivers.slow import SlowDevices
+from winchkit.schema.bench import BenchSpec
+
+__all__ = ["at_cells"]
+
+
+@contextmanager
+def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[Cells]:
+    """The instruments of a bench, by its owner or as its owner.
+
+    Raises FileError, ConnectionLost, and NotPermitted where the owner lets nobody in.
+    """
+    from winchkit.schema.read import read_bench
+
+    spec = read_bench(bench_file)
+    remote = attach(spec)
+    if remote is not None:
+        try:
+            yield RemoteCells(spec, remote)
+        finally:
+            remote.close()
+        return
+    with ExitStack() as stack:
+        stack.callback(own(spec, client_name("cell")).close)
+        yield LocalCells(_opened(spec, clock or MonotonicClock(), stack))
+
+
+def _opened(spec: BenchSpec, clock: Clock, stack: ExitStack) -> CellDesk:
+    """Instruments with their lines, closed by ``stack``; no drive needs to be there."""
+    buses = {}
+    for name in can_buses(spec):
+        from winchkit.drivers.can.bus.bus import CanBus
+
+        buses[name] = CanBus(spec.bus[name], name, clock)
+        stack.callback(buses[name].close)
+    sensors, lines = instruments(spec, clock, buses)
+    slow = SlowDevices(lines, clock)
+    stack.callback(slow.close)
+    return CellDesk(spec, clock, lines, slow, sensors)

@@ -1,0 +1,263 @@
+"""A station at a bench that another process owns."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from contextlib import suppress
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from winchkit import errors
+from winchkit.bench.ownership import connect_to_owner
+from winchkit.bench.remote.commander import client_name
+from winchkit.errors import ConnectionLost, WinchkitError
+from winchkit.schema.bench import BenchSpec
+
+if TYPE_CHECKING:
+    from winchkit.drivers.can.tools.scan import Found
+
+__all__ = ["OwnerGone", "RemoteCells", "RemoteStation", "attach"]
+
+_ANSWER_TIME = 10.0
+_CELL_TIME = 20.0
+"""Longer than any command to an instrument with the readings before and after it, s."""
+
+
+class OwnerGone(ConnectionLost):
+    """The process that owned the bench has ended, or does not answer any more."""
+
+
+def attach(
+    spec: BenchSpec,
+    patience: float = _ANSWER_TIME,
+    *,
+    name: str = "",
+    observer: bool = False,
+) -> RemoteStation | None:
+    """A station at the bench's owner; None when nobody owns it.
+
+    ``patience`` (s) is how long it waits for an answer, ``name`` what others see of this client;
+    an ``observer`` never keeps another program from owning the bench. Raises ConnectionLost when
+    the owner does not take it.
+    """
+    connection = connect_to_owner(spec)
+    if connection is None:
+        return None
+    return RemoteStation(connection, patience, name=name, observer=observer)
+
+
+class RemoteStation:
+    """Calls the owner for everything; its errors are raised here. A context manager."""
+
+    def __init__(
+        self,
+        connection: socket.socket,
+        patience: float = _ANSWER_TIME,
+        *,
+        name: str = "",
+        observer: bool = False,
+    ) -> None:
+        """Take a place at the owner; raises ConnectionLost where it takes nobody in."""
+        connection.settimeout(patience)
+        self._patience = patience
+        self._connection = connection
+        self._stream = connection.makefile("rwb")
+        self._lock = threading.Lock()
+        self._gone = self._owed = False
+        try:
+            told = self._call("introduce", name or client_name(), observer)
+        except BaseException:
+            self._hang_up()
+            raise
+        self.owner = str(told["owner"])
+        """Name of the process that owns the bench."""
+        self.lends = bool(told["lends"])
+        """Whether the owner is a bench process, which ends with its last client."""
+        self.digest = str(told["digest"])
+        """Of the files that the owner opened the bench with."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def hand_over(self) -> str:
+        """Ask the owner to end for this client's sake; raises NotPermitted where it does not."""
+        return str(self._call("hand_over"))
+
+    def take_over(self, winch: str | None) -> None:
+        """Command a winch that another client commands."""
+        self._call("take_over", winch)
+
+    def names(self) -> list[str]:
+        """Winches there are."""
+        return [str(name) for name in self._call("names")]
+
+    def status(self) -> dict[str, Any]:
+        """Newest snapshot as JSON has it."""
+        return dict(self._call("status"))
+
+    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
+        """Keep moving for ``hold`` seconds."""
+        self._call("jog", winch, winding_speed, hold)
+
+    def step(self, winch: str | None, change: float, speed: float | None) -> None:
+        """Start to change the cable length."""
+        self._call("step", winch, change, speed)
+
+    def move(
+        self,
+        winch: str | None,
+        to: float | None,
+        by: float | None,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start a move to a cable length, or by a change of it."""
+        self._call("move", winch, to, by, speed, acceleration)
+
+    def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
+        """Bytes of an object of a drive."""
+        found = self._call("read_object", winch, index, sub)
+        return None if found is None else bytes.fromhex(found)
+
+    def scan(self) -> list[Found]:
+        """Who is on the buses."""
+        from winchkit.drivers.can.canopen.identity import Identity
+        from winchkit.drivers.can.tools.scan import Found
+
+        return [
+            Found(**{**item, "identity": Identity(**item["identity"])})
+            for item in self._call("scanned")
+        ]
+
+    def moving(self, winch: str | None) -> bool:
+        """Whether a motion is under way."""
+        return bool(self._call("moving", winch))
+
+    def home(
+        self, winch: str | None, method: int | None, at: float | None, speed: float | None
+    ) -> None:
+        """Start to home a winch."""
+        self._call("home", winch, method, at, speed)
+
+    def homing(self) -> bool:
+        """Whether the homing is under way."""
+        return bool(self._call("homing"))
+
+    def stop(self) -> None:
+        """Quick-stop every winch."""
+        self._call("stop")
+
+    def reset(self) -> list[str]:
+        """Clear trips and faults; returns what was cleared, in words."""
+        return [str(item) for item in self._call("reset")]
+
+    def tare(self, winch: str | None) -> float:
+        """Tare a load cell."""
+        return float(self._call("tare", winch))
+
+    def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
+        """Log to a file in the owner's process."""
+        self._call("start_log", path, rotate, replace)
+
+    def log_rows(self) -> int:
+        """Rows written so far."""
+        return int(self._call("log_rows"))
+
+    def end_log(self) -> int:
+        """Finish the log."""
+        return int(self._call("end_log"))
+
+    def counters(self) -> dict[str, dict[str, Any]]:
+        """What was counted by instrument, and for the log."""
+        return dict(self._call("counters"))
+
+    def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """Something with an instrument, e.g. "zero"; ``arguments`` are times (s), or words."""
+        watched = sum(item for item in arguments if isinstance(item, float))
+        self._connection.settimeout(_CELL_TIME + 3 * watched)
+        try:
+            return dict(self._call("cell", task, name, *arguments))
+        finally:
+            self._connection.settimeout(self._patience)
+
+    def close(self) -> None:
+        """Leave; returns when what was started here has ended and stands still.
+
+        Raises MotionError where it does not come to rest. Twice does no harm.
+        """
+        try:
+            if not self._gone:
+                self._call("leave")
+        except OwnerGone:
+            pass  # it stops everything when it ends
+        finally:
+            self._hang_up()
+
+    def _hang_up(self) -> None:
+        with self._lock:
+            self._gone = True
+            with suppress(OSError):
+                self._stream.close()
+            self._connection.close()
+
+    def _call(self, operation: str, *arguments: Any) -> Any:
+        request = json.dumps({"op": operation, "args": arguments}).encode() + b"\n"
+        with self._lock:
+            if self._gone:
+                raise OwnerGone("this station at the bench was left; attach again")
+            answer = self._exchange(request)
+        if "error" in answer:
+            raise _error(answer["error"], answer["message"])
+        return answer["ok"]
+
+    def _exchange(self, request: bytes) -> dict[str, Any]:
+        """Send a request, and wait for its answer; an earlier one that was interrupted comes first.
+
+        Raises OwnerGone.
+        """
+        try:
+            if self._owed:
+                self._stream.readline()
+            self._stream.write(request)
+            self._stream.flush()
+            self._owed = True
+            line = self._stream.readline()
+            self._owed = False
+            if line:
+                return dict(json.loads(line))
+        except ConnectionError:
+            pass
+        except (OSError, ValueError) as error:
+            self._gone = True
+            raise OwnerGone(f"the bench's owner does not answer: {error}") from error
+        self._gone = True
+        raise OwnerGone("the process that owned the bench has ended; its drives stop") from None
+
+
+class RemoteCells:
+    """The instruments of a bench that another process owns."""
+
+    def __init__(self, spec: BenchSpec, station: RemoteStation) -> None:
+        self.spec, self._station = spec, station
+
+    def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """One of :data:`~winchkit.bench.cells.tasks.TASKS`, done by the owner."""
+        return self._station.cell(task, name, *arguments)
+
+
+def _error(name: str, message: str) -> WinchkitError:
+    """The owner's error as the same class here."""
+    kind = getattr(errors, name, WinchkitError)
+    if isinstance(kind, type) and issubclass(kind, WinchkitError):
+        return kind(message)
+    return WinchkitError(message)

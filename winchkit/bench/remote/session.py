@@ -1,0 +1,152 @@
+"""Where a command works: at the owner of the bench, at a bench process, or as its owner."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from winchkit.bench.commissioning.hardware import tell_hardware
+from winchkit.bench.ownership import digest_of
+from winchkit.bench.remote.client import RemoteStation
+from winchkit.bench.remote.client import attach as attach_to_owner
+from winchkit.bench.remote.commander import Client, client_name
+from winchkit.bench.remote.process import can_spawn, spawn
+from winchkit.errors import ConnectionLost, NotPermitted, UsageError, WinchkitError
+from winchkit.schema.bench import BenchSpec
+
+if TYPE_CHECKING:
+    from winchkit.bench.remote.station import Station
+
+__all__ = ["at_station", "attach"]
+
+_PATIENCE = 15.0
+"""For an owner that opens, closes or hands over the bench, s."""
+_POLL = 0.05
+
+
+def attach(
+    bench: str | Path, effects: Sequence[str | Path] = (), *, name: str = "", observer: bool = False
+) -> RemoteStation:
+    """A station at a bench; a bench process is started where nobody owns it.
+
+    ``name`` is what others see of this program; an ``observer`` never keeps another program from
+    owning the bench. Use it in a ``with`` block: leaving it stops what was started here. Raises
+    the errors of ``open_bench``; NotPermitted for a bench on the interface ``virtual`` that
+    nobody in this process owns.
+    """
+    from winchkit.schema.read import read_bench
+
+    spec = read_bench(bench)
+    files = [str(file) for file in effects]
+    station = _attached(spec, files, name or client_name(), observer=observer)
+    if station is None:
+        raise NotPermitted(
+            f"bench '{spec.name}' is owned by nobody, and no process can be started for it (a bus "
+            "of the interface 'virtual' lives in one process); own it with open_bench"
+        )
+    return station
+
+
+@contextmanager
+def at_station(
+    bench_file: str | Path,
+    effects: Sequence[str] = (),
+    *,
+    client: str = "",
+    observer: bool = False,
+) -> Iterator[Station]:
+    """A station at the bench for a command: attached, or owning it where nobody else can.
+
+    ``effects`` are files with effects of the user's own, ``client`` is the command's name. Raises
+    FileError, ConnectionLost, NotPermitted, UsageError for effects that come too late.
+    """
+    from winchkit.schema.read import read_bench
+
+    spec, name = read_bench(bench_file), client_name(client or None)
+    remote = _attached(spec, effects, name, observer=observer)
+    if remote is not None:
+        # The process that opened it may have no terminal.
+        tell_hardware(spec)
+        with remote:
+            yield remote
+        return
+    from winchkit.bench.bench import open_bench
+    from winchkit.bench.remote.station import LocalStation
+
+    with open_bench(spec, effects=effects, name=name, realtime="try") as bench:
+        station = LocalStation(bench, Client(name, observer=observer))
+        try:
+            yield station
+        finally:
+            station.close()
+
+
+def _attached(
+    spec: BenchSpec, effects: Sequence[str], name: str, *, observer: bool
+) -> RemoteStation | None:
+    """A station at the owner, starting a bench process where there is none; None where none can be.
+
+    Two commands that come at once start two processes; one of them owns the bench, and both
+    commands attach to it.
+    """
+    deadline = time.monotonic() + _PATIENCE
+    while True:
+        late = time.monotonic() > deadline
+        problem: WinchkitError | None
+        station, problem = _owner(spec, name, observer=observer)
+        if station is not None and _serves(station, spec, effects, observer=observer):
+            return station
+        if station is None and problem is None:
+            if not can_spawn(spec):
+                return None
+            try:
+                spawned = spawn(spec, effects)
+            except OSError:
+                return None
+            problem = spawned.error
+            if problem is not None:
+                raise problem
+        if late:
+            raise problem or ConnectionLost(
+                f"bench '{spec.name}': its owner takes nobody in for {_PATIENCE:g} s"
+            )
+        time.sleep(_POLL)
+
+
+def _owner(
+    spec: BenchSpec, name: str, *, observer: bool
+) -> tuple[RemoteStation | None, ConnectionLost | None]:
+    """A station at whoever owns the bench, or why its owner takes nobody in."""
+    try:
+        return attach_to_owner(spec, name=name, observer=observer), None
+    except ConnectionLost as error:
+        return None, error
+
+
+def _serves(
+    station: RemoteStation, spec: BenchSpec, effects: Sequence[str], *, observer: bool
+) -> bool:
+    """Whether the owner has the bench as it is asked for; else it was told to end, or it raises.
+
+    A bench process that opened the bench before its files were changed is started anew.
+    """
+    changed = station.lends and not observer and station.digest != digest_of(spec)
+    if not changed and not effects:
+        return True
+    wanted = digest_of(spec.with_effects(effects))
+    if station.lends and station.digest == wanted:
+        return True
+    try:
+        if not station.lends:
+            raise UsageError(
+                f"the bench is owned by {station.owner}, with its own effects; leave --effects out"
+            )
+        station.hand_over()
+    except NotPermitted as error:
+        raise NotPermitted(f"the bench was opened with other files than these; {error}") from None
+    finally:
+        station.close()
+    return False

@@ -1,0 +1,271 @@
+"""What an operator can do with a bench, the same in the owner's process and from outside it."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import AbstractContextManager
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Protocol
+
+from winchkit.bench.cells.tasks import do
+from winchkit.bench.control.snapshot import to_dict
+from winchkit.bench.homing import HomingRequest, homing
+from winchkit.bench.recording.recorder import Recorder, counters_of
+from winchkit.bench.remote.commander import Client, client_name
+from winchkit.bench.winch import Winch
+from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench
+
+__all__ = ["ALL", "LocalStation", "Station"]
+
+ALL = "all"
+"""Stands for every winch, as in a motion programme."""
+
+
+class Station(Protocol):
+    """An operator's place at a bench. Closing it ends what it has started."""
+
+    def names(self) -> list[str]:
+        """Winches there are."""
+
+    def status(self) -> dict[str, Any]:
+        """Newest snapshot and the health of the CAN buses, as JSON has them."""
+
+    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
+        """Keep moving for ``hold`` seconds at a winding speed (m/s, positive winds in)."""
+
+    def step(self, winch: str | None, change: float, speed: float | None) -> None:
+        """Start to change the cable length by ``change`` (m, positive pays out)."""
+
+    def move(
+        self,
+        winch: str | None,
+        to: float | None,
+        by: float | None,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start a move to a cable length, or by a change of it (m, positive pays out).
+
+        "all" moves all as one.
+        """
+
+    def take_over(self, winch: str | None) -> None:
+        """Command a winch, or "all", that another client commands; its motion ends by a ramp."""
+
+    def moving(self, winch: str | None) -> bool:
+        """Whether a motion is under way; raises what stopped it, and who has taken it over."""
+
+    def home(
+        self, winch: str | None, method: int | None, at: float | None, speed: float | None
+    ) -> None:
+        """Start to home a winch: a method of 6098h, the cable length (m) there, speed (m/s)."""
+
+    def homing(self) -> bool:
+        """Whether the homing is under way, and lead it on; raises what ended it."""
+
+    def stop(self) -> None:
+        """Quick-stop every winch; returns at rest."""
+
+    def reset(self) -> list[str]:
+        """Clear trips and faults; returns what was cleared, in words."""
+
+    def tare(self, winch: str | None) -> float:
+        """Tare a load cell; returns the tension after it, N."""
+
+    def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
+        """Log to a file in the owner's process, in parts of a size such as ``100MB``."""
+
+    def log_rows(self) -> int:
+        """Rows written so far."""
+
+    def end_log(self) -> int:
+        """Finish the log; returns its rows."""
+
+    def counters(self) -> dict[str, dict[str, Any]]:
+        """What was counted by instrument (``A.cell``), and for the log of this station."""
+
+    def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """Something with an instrument by name: one of the tasks of ``winchkit.bench.cells.tasks``.
+
+        Raises what that raises, and NotPermitted where it would change a moving winch's tension.
+        """
+
+    def close(self) -> None:
+        """Stop what was started here, finish the log."""
+
+
+class LocalStation:
+    """A station in the process that owns the bench."""
+
+    def __init__(self, bench: Bench, client: Client | None = None) -> None:
+        """A place for ``client``; without one for a nameless station of this process."""
+        self.client = client or Client(client_name("station"))
+        self._bench = bench
+        self._recorder: Recorder | None = None
+        self._homing: Generator[None] | None = None
+
+    def names(self) -> list[str]:
+        """Winches there are."""
+        return list(self._bench.winch)
+
+    def status(self) -> dict[str, Any]:
+        """Newest snapshot as JSON has it."""
+        buses = {name: asdict(item) for name, item in self._bench.bus_health.items()}
+        for item in buses.values():
+            item["state"] = item["state"].value
+        return {
+            **to_dict(self._bench.snapshot),
+            "bus": buses,
+            "realtime": [asdict(item) for item in self._bench.realtime.items],
+            "not_commissioned": self._bench.not_commissioned,
+            "owner": self._bench.commanders.owner.name,
+            "clients": [client.name for client in self._bench.stations.clients],
+        }
+
+    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
+        """Keep moving for ``hold`` seconds."""
+        with self._acting():
+            self._bench.named(winch).keep_jogging(winding_speed, hold)
+
+    def step(self, winch: str | None, change: float, speed: float | None) -> None:
+        """Start to change the cable length."""
+        chosen = self._bench.named(winch)
+        with self._acting():
+            chosen.move_to(chosen.cable_length + change, speed, wait=False)
+
+    def move(
+        self,
+        winch: str | None,
+        to: float | None,
+        by: float | None,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start a move to a cable length, or by a change of it."""
+        if (to is None) == (by is None):
+            raise UsageError("a move goes either to a cable length or by a change of it")
+        lengths = {
+            item.name: item.cable_length + by if by is not None else float(to or 0.0)
+            for item in self._chosen(winch)
+        }
+        with self._acting():
+            self._bench.move_together(lengths, speed, acceleration, wait=False)
+
+    def take_over(self, winch: str | None) -> None:
+        """Command a winch that another client commands."""
+        with self._acting():
+            for item in self._chosen(winch):
+                self._bench.commanders.take_over(item.name)
+
+    def moving(self, winch: str | None) -> bool:
+        """Whether a motion is under way."""
+        chosen = self._chosen(winch)
+        with self._acting():
+            for item in chosen:
+                self._bench.commanders.raise_taken(item.name)
+            if any(item.moving for item in chosen):
+                return True
+            for item in chosen:
+                item.wait()
+        return False
+
+    def home(
+        self, winch: str | None, method: int | None, at: float | None, speed: float | None
+    ) -> None:
+        """Start to home a winch."""
+        asked = HomingRequest(method, at, speed)
+        with self._acting():
+            self._homing = homing(self._bench, self._bench.named(winch), asked)
+            next(self._homing, None)
+
+    def homing(self) -> bool:
+        """Whether the homing is under way, and lead it on."""
+        if self._homing is None:
+            return False
+        with self._acting():
+            for _ in self._homing:
+                return True
+        self._homing = None
+        return False
+
+    def stop(self) -> None:
+        """Quick-stop every winch."""
+        with self._acting():
+            self._bench.stop_now()
+
+    def reset(self) -> list[str]:
+        """Clear trips and faults; returns what was cleared, in words."""
+        return self._bench.reset()
+
+    def tare(self, winch: str | None) -> float:
+        """Tare a load cell."""
+        return self._bench.named(winch).tare()
+
+    def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
+        """Start a log, ending the one before."""
+        self.end_log()
+        self._recorder = self._bench.log(path, rotate=rotate, replace=replace)
+
+    def log_rows(self) -> int:
+        """Rows written so far; raises what has ended the writing."""
+        if self._recorder is None:
+            return 0
+        self._recorder.check()
+        return self._recorder.rows
+
+    def end_log(self) -> int:
+        """Finish the log."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is None:
+            return 0
+        recorder.close()
+        return recorder.rows
+
+    def read_object(self, winch: str, index: int, sub: int) -> str | None:
+        """Bytes of an object of a winch's drive in hexadecimal; None where it has none."""
+        name = self._bench.named(winch).name
+        data = self._bench.axes[name].objects.upload_if_there(index, sub)
+        return None if data is None else data.hex()
+
+    def scanned(self) -> list[dict[str, Any]]:
+        """Who is on the buses, as JSON has it."""
+        return [asdict(item) for item in self._bench.scan()]
+
+    def counters(self) -> dict[str, dict[str, Any]]:
+        """What was counted by instrument, and for the log."""
+        if self._recorder is not None:
+            return self._recorder.counters()
+        return counters_of({name: winch.sensors for name, winch in self._bench.winch.items()})
+
+    def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
+        """Something with an instrument by name."""
+        return do(self._bench.cells, task, name, *arguments)
+
+    def close(self) -> None:
+        """Ramp down what this station set in motion, finish its log; returns at rest.
+
+        With it stop the winches that nobody commands, unless ``stop_together`` is false.
+        """
+        commanders = self._bench.commanders
+        moved = [name for name in commanders.held_by(self.client) if self._bench.winch[name].moving]
+        try:
+            with self._acting():
+                if self._homing is not None:
+                    self._homing.close()
+                if moved:
+                    self._bench.stop_commanded(moved)
+        finally:
+            commanders.leave(self.client)
+            self.end_log()
+
+    def _acting(self) -> AbstractContextManager[None]:
+        """Orders within it are this station's client's."""
+        return self._bench.commanders.acting(self.client)
+
+    def _chosen(self, winch: str | None) -> list[Winch]:
+        """One winch, or with "all" every one."""
+        every = list(self._bench.winch.values())
+        return every if winch == ALL else [self._bench.named(winch)]

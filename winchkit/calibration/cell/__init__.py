@@ -1,0 +1,1 @@
+"""Calibration of load cells by known weights: order of weighing, fit, files, health."""

@@ -1,0 +1,213 @@
+"""Fits the calibration of a load cell to known loads, with what an expert asks of it.
+
+The true force is a line or a parabola of the indicated one, fitted to every point, up and down, by
+least squares. Definitions as in ISO 376 and OIML R 60, shares of the span that was covered:
+
+- non-linearity: largest departure of a load's mean from the straight line through all points;
+- hysteresis: largest difference between down and up at the same load;
+- repeatability: standard deviation at the same load and direction between series.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.errors import RunError
+from winchkit.schema.calibration import CalibrationPoint
+
+__all__ = ["CellFit", "Figure", "fit_cell"]
+
+_FEWEST_LOADS = 5
+_FOLLOWS = 5.0
+"""Standard deviations of the slope."""
+_FAR = 3.0
+"""Standard deviations."""
+_SAME_LOAD = 1e-3
+"""Loads that differ by less than this share of the span are the same weights hung again."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of merit with its standard uncertainty, shares of the span; NaN where unknown."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True)
+class CellFit:
+    """A fitted calibration."""
+
+    coefficients: tuple[float, ...]
+    """c0 in N, c1, and for a parabola c2 in 1/N: true force of the indicated one."""
+    covariance: tuple[tuple[float, ...], ...]
+    residuals: tuple[float, ...]
+    """True less fitted, N, in the order of the points."""
+    residual_std: float
+    """N, with the degrees of freedom taken into account."""
+    span: float
+    """N."""
+    nonlinearity: Figure
+    hysteresis: Figure
+    repeatability: Figure
+    warnings: tuple[str, ...]
+
+    @property
+    def std(self) -> tuple[float, ...]:
+        """Standard uncertainties of the coefficients."""
+        return tuple(math.sqrt(row[k]) for k, row in enumerate(self.covariance))
+
+
+def fit_cell(
+    points: Sequence[CalibrationPoint], order: Literal["linear", "quadratic"] = "linear"
+) -> CellFit:
+    """Fit a calibration; raises RunError where the points cannot carry it."""
+    degree = 1 if order == "linear" else 2
+    load = np.array([point.load for point in points])
+    indicated = np.array([point.indicated for point in points])
+    _refuse(load, indicated, degree)
+    span = float(np.ptp(load))
+    coefficients, covariance, residuals, std = _least_squares(indicated, load, degree)
+    line, line_covariance, from_line, _ = _least_squares(indicated, load, 1)
+    _refuse_slope(float(line[1]), math.sqrt(float(line_covariance[1, 1])))
+    groups = _groups(load, span)
+    return CellFit(
+        tuple(float(c) for c in coefficients),
+        tuple(tuple(float(c) for c in row) for row in covariance),
+        tuple(float(r) for r in residuals),
+        std,
+        span,
+        _nonlinearity(from_line, groups, span),
+        _hysteresis(points, from_line, groups, span),
+        _repeatability(points, from_line, groups, span),
+        tuple(_warnings(points, groups, residuals, std)),
+    )
+
+
+def _refuse(load: Array, indicated: Array, degree: int) -> None:
+    if not (np.isfinite(load).all() and np.isfinite(indicated).all()):
+        raise RunError("a calibration point is no number; repeat it")
+    different = len(np.unique(load))
+    if different < degree + 2:
+        raise RunError(
+            f"{different} different loads for {degree + 1} coefficients; hang at least "
+            f"{degree + 2}, better {_FEWEST_LOADS}, up and down"
+        )
+    if np.ptp(indicated) == 0:
+        raise RunError("the cell shows the same at every load; check that it carries them")
+
+
+def _refuse_slope(slope: float, std: float) -> None:
+    """A cell must follow its loads, and in their direction."""
+    if abs(slope) < _FOLLOWS * std:
+        raise RunError(
+            f"what the cell indicates does not follow the loads (slope {slope:.3g} ± {std:.2g}); "
+            "check that the weights hang on this cell"
+        )
+    if slope < 0:
+        raise RunError(
+            f"the cell indicates less at more load (slope {slope:.3g}): turn it round, or swap "
+            "its signal wires"
+        )
+
+
+def _least_squares(x: Array, y: Array, degree: int) -> tuple[Array, Array, Array, float]:
+    """Coefficients with covariance, residuals and their standard deviation."""
+    scale = float(np.max(np.abs(x)))
+    matrix = np.vander(x / scale, degree + 1, increasing=True)
+    inverse = np.linalg.pinv(matrix.T @ matrix)
+    scaled = inverse @ matrix.T @ y
+    residuals = y - matrix @ scaled
+    free = len(x) - degree - 1
+    variance = float(residuals @ residuals) / free if free > 0 else math.nan
+    units = scale ** -np.arange(degree + 1.0)
+    return scaled * units, variance * inverse * np.outer(units, units), residuals, variance**0.5
+
+
+def _groups(load: Array, span: float) -> list[Array]:
+    """Indices of the points at the same load, in ascending load."""
+    order = np.argsort(load, kind="stable")
+    breaks = np.flatnonzero(np.diff(load[order]) > _SAME_LOAD * span) + 1
+    return list(np.split(order, breaks))
+
+
+def _nonlinearity(from_line: Array, groups: list[Array], span: float) -> Figure:
+    means = np.array([from_line[group].mean() for group in groups])
+    worst = int(np.argmax(np.abs(means)))
+    spread = _pooled(from_line, groups) / math.sqrt(len(groups[worst]))
+    return Figure(float(abs(means[worst])) / span, spread / span)
+
+
+def _hysteresis(
+    points: Sequence[CalibrationPoint], from_line: Array, groups: list[Array], span: float
+) -> Figure:
+    """Down less up at the same load, the largest of all loads."""
+    differences = []
+    for group in groups:
+        up = [from_line[k] for k in group if points[k].going == "up"]
+        down = [from_line[k] for k in group if points[k].going == "down"]
+        if up and down:
+            differences.append((abs(np.mean(down) - np.mean(up)), 1 / len(up) + 1 / len(down)))
+    if not differences:
+        return Figure(math.nan, math.nan)
+    largest, weight = max(differences)
+    spread = _pooled(from_line, _split(points, groups))
+    return Figure(float(largest) / span, spread * math.sqrt(weight) / span)
+
+
+def _repeatability(
+    points: Sequence[CalibrationPoint], from_line: Array, groups: list[Array], span: float
+) -> Figure:
+    split = _split(points, groups)
+    free = sum(len(group) - 1 for group in split)
+    std = _pooled(from_line, split)
+    return Figure(std / span, std / span / math.sqrt(2 * free) if free > 0 else math.nan)
+
+
+def _split(points: Sequence[CalibrationPoint], groups: list[Array]) -> list[Array]:
+    """The groups, parted by direction."""
+    return [
+        np.array(part)
+        for group in groups
+        for going in ("up", "down")
+        if (part := [k for k in group if points[k].going == going])
+    ]
+
+
+def _pooled(residuals: Array, groups: list[Array]) -> float:
+    """Standard deviation within groups; NaN where no load was hung twice."""
+    free = sum(len(group) - 1 for group in groups)
+    if free <= 0:
+        return math.nan
+    squares = sum(float(np.sum((residuals[g] - residuals[g].mean()) ** 2)) for g in groups)
+    return math.sqrt(squares / free)
+
+
+def _warnings(
+    points: Sequence[CalibrationPoint],
+    groups: list[Array],
+    residuals: Array,
+    std: float,
+) -> list[str]:
+    """What is to be said in words."""
+    found = []
+    if len(groups) < _FEWEST_LOADS:
+        found.append(f"only {len(groups)} loads; at least {_FEWEST_LOADS} are usual")
+    if {point.going for point in points} != {"up", "down"}:
+        found.append("loads go one way only, so hysteresis is unknown")
+    if max(point.series for point in points) == 1:
+        found.append("one series only, so repeatability is unknown")
+    found += [
+        f"the point at {point.load:g} N is {residual:+.3g} N off"
+        for point, residual in zip(points, residuals, strict=True)
+        if abs(residual) > _FAR * std > 0
+    ]
+    if max(point.std for point in points) > std > 0:
+        found.append("readings scatter more than the points: let loads come to rest for longer")
+    return found

@@ -1,0 +1,266 @@
+"""What a few seconds of readings say about a load cell, in the manner of Klipper's diagnostic.
+
+Everything is computed from the raw counts or the values at their estimated sampling times; nothing
+is filled in where readings are missing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.errors import RunError
+
+__all__ = ["Creep", "Health", "Hum", "Samples", "examine", "samples_of"]
+
+_MAINS = (50.0, 60.0)
+_FEWEST = 20
+_SIGNIFICANT = 4.0
+"""Standard errors."""
+_SETTLED = 0.5
+"""After a change of load only what comes later than this is creep, s."""
+_LONG_ENOUGH = 5.0
+"""A shorter look takes slow noise for a drift, s."""
+_STEP = 20.0
+"""A change of load is larger than this many standard deviations of the noise."""
+_THIRTY_MINUTES = 1800.0
+_ONE_MINUTE = 60.0
+_FADED = 0.05
+_ALIASED = 0.02
+"""Nearer to zero or half the rate than this share of it a tone cannot be told from the rest."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Readings as arrays of one length; values in SI, NaN where unusable."""
+
+    time: Array
+    raw: Array
+    value: Array
+    usable: NDArray[np.bool_]
+    saturated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Hum:
+    """A tone of the mains in the readings."""
+
+    frequency: float
+    """Of the mains, Hz."""
+    amplitude: float
+    """SI; NaN where it cannot be told at this rate."""
+    std: float
+
+    @property
+    def there(self) -> bool:
+        """Whether it stands out of the noise."""
+        return self.amplitude > _SIGNIFICANT * self.std
+
+
+@dataclass(frozen=True)
+class Creep:
+    """What follows a change of load."""
+
+    step: float
+    """The change, SI."""
+    since: float
+    """How long the readings go on after it, s."""
+    change: float
+    """Change of the value between 1 and 30 minutes, from its slope over the logarithm of time."""
+    std: float
+
+
+@dataclass(frozen=True)
+class Health:
+    """The findings."""
+
+    readings: int
+    usable: int
+    saturated: int
+    rate: float
+    """Readings a second."""
+    longest_gap: float
+    """s."""
+    unique: int
+    """Different raw counts."""
+    duplicates: float
+    """Share of readings that repeat the count before."""
+    longest_still: float
+    """Longest time without a change of the raw counts, s."""
+    mean: float
+    low: float
+    high: float
+    noise: float
+    """Standard deviation about a straight line, SI."""
+    noise_counts: float
+    drift: float
+    """SI per s."""
+    drift_std: float
+    hum: tuple[Hum, ...]
+    creep: Creep | None
+    remarks: tuple[str, ...]
+
+
+def examine(samples: Samples) -> Health:
+    """Look at a stretch of readings; raises RunError where there are too few."""
+    good = samples.usable & np.isfinite(samples.value)
+    if int(good.sum()) < _FEWEST:
+        raise RunError(
+            f"{int(good.sum())} usable readings of {len(good)}; at least {_FEWEST} are needed"
+        )
+    time, value, raw = samples.time[good], samples.value[good], samples.raw[good]
+    at = _step_at(value)
+    creep = None
+    if at is not None:
+        creep = _creep(time, value, at)
+        time, value, raw = (part[at + 1 :] for part in (time, value, raw))
+        late = time > time[0] + _SETTLED
+        if int(late.sum()) >= _FEWEST:
+            time, value, raw = time[late], value[late], raw[late]
+    slope, slope_std, rest = _line(time, value)
+    still = np.diff(raw) == 0
+    scale = _scale(raw, value)
+    health = Health(
+        readings=len(good),
+        usable=int(good.sum()),
+        saturated=int(samples.saturated.sum()),
+        rate=(len(good) - 1) / float(np.ptp(samples.time)),
+        longest_gap=float(np.diff(samples.time).max()),
+        unique=len(np.unique(raw)),
+        duplicates=float(still.mean()),
+        longest_still=_longest_still(time, raw),
+        mean=float(value.mean()),
+        low=float(value.min()),
+        high=float(value.max()),
+        noise=float(rest.std(ddof=2)),
+        noise_counts=float(rest.std(ddof=2)) / scale if scale > 0 else math.nan,
+        drift=slope,
+        drift_std=slope_std,
+        hum=tuple(_hum(time, rest, frequency) for frequency in _MAINS),
+        creep=creep,
+        remarks=(),
+    )
+    return _with_remarks(health, float(np.ptp(samples.time)))
+
+
+def _step_at(value: Array) -> int | None:
+    """The largest change between neighbours, where it is a change of load; its first index."""
+    if len(value) < 2 * _FEWEST:
+        return None
+    changes = np.diff(value)
+    noise = 1.4826 * float(np.median(np.abs(changes - np.median(changes))))
+    at = int(np.argmax(np.abs(changes)))
+    rest = len(value) - at - 1
+    before = np.median(value[max(0, at - _FEWEST) : at + 1])
+    after = np.median(value[at + 1 : at + 1 + _FEWEST])
+    lasting = abs(after - before) > 0.5 * abs(changes[at])
+    big = abs(changes[at]) > _STEP * max(noise, 1e-12)
+    return at if big and lasting and at >= _FEWEST and rest >= _FEWEST else None
+
+
+def _creep(time: Array, value: Array, at: int) -> Creep | None:
+    """Slope over the logarithm of the time since the step, as change from 1 to 30 minutes."""
+    since = time - (time[at] + time[at + 1]) / 2
+    late = since > _SETTLED
+    if int(late.sum()) < _FEWEST:
+        return None
+    slope, std, _ = _line(np.log(since[late]), value[late])
+    decades = math.log(_THIRTY_MINUTES / _ONE_MINUTE)
+    step = float(np.median(value[late]) - np.median(value[: at + 1]))
+    return Creep(step, float(since[-1]), slope * decades, std * decades)
+
+
+def _line(x: Array, y: Array) -> tuple[float, float, Array]:
+    """Slope with its standard error, in which slow noise counts, and the rest."""
+    centred = x - x.mean()
+    spread = float(centred @ centred)
+    slope = float(centred @ y) / spread
+    rest = y - y.mean() - slope * centred
+    std = math.sqrt(float(rest.var(ddof=2)) / spread * _memory(rest))
+    return slope, std, rest
+
+
+def _memory(rest: Array) -> float:
+    """How many readings say as little as one alone, for noise that remembers itself."""
+    if not rest.any():
+        return 1.0
+    power = np.abs(np.fft.rfft(rest, 2 * len(rest))) ** 2
+    correlation = np.fft.irfft(power)[: max(2, len(rest) // 4)]
+    correlation /= correlation[0]
+    faded = np.flatnonzero(correlation < _FADED)
+    last = faded[0] if len(faded) else len(correlation)
+    return max(1.0, 1.0 + 2.0 * float(correlation[1:last].sum()))
+
+
+def _hum(time: Array, rest: Array, frequency: float) -> Hum:
+    """Amplitude of a tone by least squares at the true times of the readings."""
+    rate = (len(time) - 1) / float(np.ptp(time))
+    apparent = abs(frequency - rate * round(frequency / rate))
+    if apparent < _ALIASED * rate or apparent > (0.5 - _ALIASED) * rate:
+        return Hum(frequency, math.nan, math.nan)
+    phase = 2 * np.pi * frequency * (time - time[0])
+    matrix = np.column_stack([np.cos(phase), np.sin(phase)])
+    pair, *_ = np.linalg.lstsq(matrix, rest, rcond=None)
+    left = rest - matrix @ pair
+    return Hum(frequency, float(np.hypot(*pair)), float(left.std()) * math.sqrt(2 / len(rest)))
+
+
+def _longest_still(time: Array, raw: Array) -> float:
+    changes = np.flatnonzero(np.diff(raw) != 0) + 1
+    edges = np.concatenate([[0], changes, [len(raw) - 1]])
+    return float(np.diff(time[edges]).max())
+
+
+def _scale(raw: Array, value: Array) -> float:
+    """SI of one count, where raw and value go together."""
+    spread = float(np.ptp(raw))
+    return float(np.ptp(value)) / spread if spread > 0 else math.nan
+
+
+def _with_remarks(health: Health, duration: float) -> Health:
+    """The findings in words, worst first."""
+    remarks: list[str] = []
+    lost = health.readings - health.usable
+    if health.saturated:
+        remarks.append(f"{health.saturated} readings are saturated: overload or a broken wire")
+    if lost > health.saturated:
+        remarks.append(f"{lost - health.saturated} readings are unusable")
+    if health.unique == 1:
+        remarks.append("the counts never change: a frozen cell, or a division far above its noise")
+    elif health.noise_counts < 0.5:
+        remarks.append("the noise is below half a count: the division is too coarse to see it")
+    if health.duplicates > 0.5 and health.unique > 1:
+        remarks.append(
+            f"{health.duplicates:.0%} of the readings repeat the one before: it is polled faster "
+            "than it converts, or filtered"
+        )
+    remarks += [
+        f"hum of the mains at {hum.frequency:g} Hz: check shield and grounding"
+        for hum in health.hum
+        if hum.there and hum.amplitude > 0.3 * health.noise
+    ]
+    if abs(health.drift) > _SIGNIFICANT * health.drift_std:
+        over = abs(health.drift) * duration
+        if over > health.noise and duration > _LONG_ENOUGH:
+            remarks.append("it drifts by more than its noise while watched: let it warm up")
+    if health.creep and abs(health.creep.change) > _SIGNIFICANT * health.creep.std:
+        share = abs(health.creep.change / health.creep.step)
+        remarks.append(f"it creeps after the change of load: {share:.2%} of it in 30 minutes")
+    return replace(health, remarks=tuple(remarks))
+
+
+def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> Samples:
+    """Samples from rows of time, raw, value, usable, saturated."""
+    time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
+    return Samples(
+        time.astype(float),
+        raw.astype(float),
+        value.astype(float),
+        usable.astype(bool),
+        saturated.astype(bool),
+    )

@@ -1,0 +1,297 @@
+"""Calibrates a cable robot: geometry and winches from poses of which anything was measured.
+
+    result = calibrate(robot, read_poses(runs, robot.profile))
+    result.estimates["1.exit_point.x"].value
+
+A maximum of the posterior over all poses and parameters at once. The paper (Lessanibahri et al.)
+searches every pose again inside each evaluation; here the pose is an unknown beside the
+parameters, so that also the rope equations that a searched pose would drop are used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.calibration.robot.cable_forces import RopeForces
+from winchkit.calibration.robot.candidate_effects import Candidate, candidates
+from winchkit.calibration.robot.equations import Equations, State
+from winchkit.calibration.robot.identifiability import (
+    Observability,
+    observability,
+    outside_bounds,
+    refuse_unfit,
+)
+from winchkit.calibration.robot.least_squares import Loss, Solution, Weights, place, solve
+from winchkit.calibration.robot.outliers import gross_errors
+from winchkit.calibration.robot.parameters import (
+    EFFECTS,
+    Parameter,
+    Parameters,
+    own_effects,
+    parameters_of,
+)
+from winchkit.calibration.robot.prediction import PoseErrors, errors_at, start_of
+from winchkit.calibration.robot.variance_components import NOISE, re_estimated
+from winchkit.errors import UsageError
+from winchkit.model.robot import Robot
+from winchkit.runs.poses import Measured
+
+__all__ = ["Calibrated", "Estimated", "Options", "calibrate", "equations_of", "split"]
+
+Told = Callable[[str], None]
+
+_EVERY = 10
+_NOISE_ROUNDS = 8
+_SETTLED = 0.03
+_COARSE = 5.0
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to calibrate."""
+
+    effects: tuple[str, ...] = ()
+    """Effects of the catalogue that join the geometry."""
+    loss: Loss = "least-squares"
+    sigma: Mapping[str, float] | None = None
+    """Standard deviations by kind of equation, SI; what is not given is estimated."""
+    middle_force: float | None = None
+    """N; rope forces near it where no tension was measured and an effect needs them."""
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """One parameter after the fit, in the unit of files."""
+
+    parameter: Parameter
+    nominal: float
+    value: float
+    std: float
+    """Posterior standard deviation."""
+    bound: str
+    """``low`` or ``high`` where the fit stopped at a bound, else empty."""
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A robot's calibration."""
+
+    equations: Equations
+    solution: Solution
+    weights: Weights
+    estimates: Mapping[str, Estimated]
+    fit_before: PoseErrors
+    fit_after: PoseErrors
+    validation_before: PoseErrors
+    validation_after: PoseErrors
+    observed: Observability
+    candidates: tuple[Candidate, ...]
+    """Effects that would explain much of what is left over."""
+    seconds: float
+    warnings: tuple[str, ...]
+
+    @property
+    def values(self) -> Array:
+        """Parameters, (q,), as they are fitted."""
+        return self.solution.state.values
+
+
+def split(measured: Measured) -> tuple[Measured, Measured]:
+    """Poses to fit, and every tenth to hold out; none where there are fewer than ten."""
+    held = np.arange(len(measured)) % _EVERY == _EVERY - 1
+    return measured[~held], measured[held]
+
+
+def calibrate(
+    robot: Robot,
+    fit: Measured,
+    validation: Measured,
+    options: Options | None = None,
+    tell: Told = lambda text: None,
+) -> Calibrated:
+    """Fit the robot to poses, and judge it on others.
+
+    Raises UsageError where the poses leave nothing to fit parameters with, or an effect lacks what
+    it needs.
+    """
+    options = options or Options()
+    effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
+    begin = perf_counter()
+    equations = equations_of(robot, fit, options)
+    refuse_unfit(equations)
+    equations, state = _start(equations, options)
+    solution, weights = _fit(equations, state, options, tell)
+    observed = observability(equations, solution, weights)
+    seconds = perf_counter() - begin
+    judged = replace(equations, measured=validation, forces=_forces(validation, options))
+    nominal = equations.parameters.nominal
+    values = solution.state.values
+    after = errors_at(judged, values)
+    return Calibrated(
+        equations=equations,
+        solution=solution,
+        weights=weights,
+        estimates=_estimates(equations.parameters, solution, observed),
+        fit_before=errors_at(equations, nominal),
+        fit_after=errors_at(equations, values),
+        validation_before=errors_at(judged, nominal),
+        validation_after=after,
+        observed=observed,
+        candidates=candidates(equations, solution, weights, effects),
+        seconds=seconds,
+        warnings=_warnings(equations, solution, weights, observed, after.unfound),
+    )
+
+
+def equations_of(robot: Robot, measured: Measured, options: Options) -> Equations:
+    """The equations of a robot's poses with the instruments and effects that there are."""
+    parameters = parameters_of(
+        robot,
+        options.effects,
+        swivel=bool(np.any(np.isfinite(measured.swivel))),
+        length_offset=bool(np.any(np.isfinite(measured.cable_length)))
+        and not measured.length_zeroed,
+    )
+    tension = bool(np.any(np.isfinite(measured.tension)))
+    needing = [e for e in options.effects if e.startswith(("cable-elongation", "payload"))]
+    if needing and not tension and options.middle_force is None:
+        raise UsageError(
+            f"{needing[0]} needs rope forces: record 'LINE.tension [N]', or give the forces that "
+            "the robot keeps near, e.g. --middle-force '60 N'"
+        )
+    if options.middle_force is not None and not options.middle_force > 0:
+        raise UsageError(
+            f"--middle-force is {options.middle_force:g} N; ropes only pull, so that it is above 0"
+        )
+    payload = [e for e in options.effects if e.startswith("payload")]
+    if payload and len(robot.names) < 6:
+        raise UsageError(
+            f"{payload[0]} needs ropes that hold all six freedoms; the robot has "
+            f"{len(robot.names)} lines"
+        )
+    if payload and not tension and parameters.law is None:
+        raise UsageError(
+            f"{payload[0]} shows in tensions, or in elongation by computed forces: record "
+            "'LINE.tension [N]', or add an elongation effect"
+        )
+    return Equations(robot, parameters, measured, _forces(measured, options))
+
+
+def _forces(measured: Measured, options: Options) -> RopeForces:
+    return RopeForces(measured.tension, options.middle_force)
+
+
+def _start(equations: Equations, options: Options) -> tuple[Equations, State]:
+    """Nominal parameters within bounds, poses found with them, instruments' zeros from both."""
+    low, high = equations.parameters.bounds
+    values = np.clip(equations.parameters.nominal, low, high)
+    blind = Weights({**_sigma(equations, options), "swivel": np.inf, "cable_length": np.inf})
+    state = place(equations, State(values, start_of(equations)), blind)
+    parameters = equations.parameters
+    for kind, block in (("swivel", "swivel_zero"), ("cable_length", "length_offset")):
+        if block in parameters.block:
+            parameters = parameters.starting(block, equations.offsets(kind, state))
+    equations = replace(equations, parameters=parameters)
+    return equations, State(np.clip(parameters.nominal, low, high), state.pose)
+
+
+def _sigma(equations: Equations, options: Options) -> dict[str, float]:
+    given = options.sigma or {}
+    return {kind: given.get(kind, NOISE[kind].start) for kind in equations.kinds}
+
+
+def _fit(
+    equations: Equations, state: State, options: Options, tell: Told
+) -> tuple[Solution, Weights]:
+    """Fit, judge the instruments by what is left, and fit again until both agree."""
+    given = options.sigma or {}
+    weights = Weights(_sigma(equations, options))
+    solution = solve(equations, state, weights, _teller(tell, "fit"))
+    for _ in range(_NOISE_ROUNDS):
+        found = replace(re_estimated(solution, weights, given), loss=options.loss)
+        if found.loss == weights.loss and _settled(found.sigma, weights.sigma):
+            break
+        weights = found
+        solution = solve(equations, solution.state, weights, _teller(tell, "refit"))
+    return solution, weights
+
+
+def _teller(tell: Told, word: str) -> Callable[[int, float], None]:
+    return lambda step, cost: tell(f"{word}: step {step}, cost {cost:.6g}")
+
+
+def _settled(new: Mapping[str, float], old: Mapping[str, float]) -> bool:
+    return all(abs(new[kind] - old[kind]) <= _SETTLED * old[kind] for kind in new)
+
+
+def _estimates(
+    parameters: Parameters, solution: Solution, observed: Observability
+) -> dict[str, Estimated]:
+    out = {}
+    values = solution.state.values
+    for i, parameter in enumerate(parameters):
+        if parameter.std > 0:
+            nominal, _ = parameter.shown(parameter.nominal, 0.0)
+            value, std = parameter.shown(float(values[i]), float(observed.std[i]))
+            bound = {-1: "low", 0: "", 1: "high"}[int(solution.held[i])]
+            out[parameter.name] = Estimated(parameter, nominal, value, std, bound)
+    return out
+
+
+def _left_out(equations: Equations) -> list[str]:
+    """Effects that the profiles have and this model has not."""
+    robot = equations.robot
+    tables = [*robot.profile.effect, *(table for winch in robot.winches for table in winch.effect)]
+    own = {table.id for table in robot.profile.effect if table.id in EFFECTS}
+    names = {table.id for table in tables} - own
+    if equations.parameters.law is None and any(w.cable.axial_stiffness for w in robot.winches):
+        names.add("cable-elongation-linear (cable.axial_stiffness)")
+    return [f"effects of the profile left out here: {', '.join(sorted(names))}"] if names else []
+
+
+def _disagreements(equations: Equations, weights: Weights) -> list[str]:
+    """Noise beyond the doubt in the points: poses of another robot, or read another way."""
+    doubt, sigma = float(equations.parameters.std[0]), weights.sigma
+    causes = {
+        "rope": "gearbox.direction, the lines' order, [home] and the motor angles there",
+        "position": "that the poses are of this robot, in its base frame",
+    }
+    # A camera may well be coarser than a drawing.
+    most = {"rope": doubt, "position": _COARSE * doubt}
+    return [
+        f"{kind}s and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the exit points "
+        f"are in doubt: check {cause}"
+        for kind, cause in causes.items()
+        if sigma.get(kind, 0.0) > most[kind]
+    ]
+
+
+def _warnings(
+    equations: Equations, solution: Solution, weights: Weights, observed: Observability, lost: int
+) -> tuple[str, ...]:
+    out = [*equations.measured.notes, *_left_out(equations)]
+    out += outside_bounds(equations.parameters)
+    # A robust fit has already done what would be advised.
+    out += gross_errors(equations, solution) if weights.loss == "least-squares" else []
+    if lost:
+        out.append(
+            f"{lost} held-out poses were not found from their motor angles: a tension is missing "
+            "that an effect needs, or the ropes contradict each other"
+        )
+    out += _disagreements(equations, weights)
+    if not solution.converged:
+        out.append(f"the fit had not settled after {solution.steps} steps")
+    held = [p.name for p, at in zip(equations.parameters, solution.held, strict=True) if at != 0]
+    if held:
+        out.append(f"stopped at a bound: {', '.join(held)}; is the bound right, or the model?")
+    if observed.weak:
+        out.append(
+            f"{observed.weak} of {observed.free} directions of the parameters get more from the "
+            "prior than from the data"
+        )
+    return tuple(out)

@@ -1,0 +1,249 @@
+"""What a robot's data say of its parameters, and what they cannot say, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.calibration.robot.equations import Equations, State
+from winchkit.calibration.robot.least_squares import Linear, Solution, Weights, linearise
+from winchkit.calibration.robot.parameters import Parameters
+from winchkit.errors import UsageError
+from winchkit.model.robot import Pose
+from winchkit.model.robot.rotation import rotation_by, rotation_vector, skew
+
+__all__ = [
+    "Observability",
+    "observability",
+    "outside_bounds",
+    "refuse_unfit",
+]
+
+_SEEN = 1e-11
+_SIGNIFICANT = 25.0
+_BESIDE = 0.1
+_NAMED = 4
+_LISTED = 6
+
+
+@dataclass(frozen=True)
+class Observability:
+    """Directions of the parameters by how much the data know of them."""
+
+    std: Array
+    """Posterior standard deviation, (q,), in the units that are fitted."""
+    information: Array
+    """Of the free directions, falling, in units of the prior's: 1 says as much as the prior."""
+    rank: int
+    """Directions of which the data say anything at all, were the noise ever so small."""
+    weak: int
+    """Directions that get less from the data than from the prior."""
+    unobservable: tuple[str, ...]
+
+    @property
+    def free(self) -> int:
+        """How many parameters are fitted."""
+        return len(self.information)
+
+
+def observability(equations: Equations, solution: Solution, weights: Weights) -> Observability:
+    """Rank, posterior and unobservable directions at the fit's end."""
+    scale = equations.parameters.std
+    data = solution.linear.information
+    inverse = np.linalg.inv(data + np.eye(len(data)))
+    std = scale * np.sqrt(np.maximum(np.diagonal(inverse), 0.0))
+    lasting = equations.parameters.lasting
+    calm = _calmed(equations, solution, weights)[np.ix_(lasting, lasting)]
+    values, vectors = np.linalg.eigh(calm)
+    unseen = values < _SEEN * values[-1]
+    words = tuple(_words(equations, calm, vectors[:, unseen], _SEEN * values[-1]))
+    return Observability(
+        std, values[::-1], int(np.count_nonzero(~unseen)), int(np.count_nonzero(values < 1)), words
+    )
+
+
+def _calmed(equations: Equations, solution: Solution, weights: Weights) -> Array:
+    """Information at poses whose rotations are freed of what is only noise.
+
+    Platforms that never turned seem to turn by the noise of their poses, and the data to tell
+    apart by it what they cannot. Zeros of instruments are eliminated as the poses are.
+    """
+    pose, many = solution.state.pose, len(solution.state.pose.rotation)
+    mean, home = _mean_rotation(pose.rotation), equations.robot.home.rotation[0]
+    turned = rotation_vector(pose.rotation @ mean.T)
+    noise = _rotation_noise(solution.linear)
+    off = rotation_vector(mean @ home.T)
+    middle = home if off @ off <= _SIGNIFICANT * np.trace(noise) else mean
+    size, axes = np.linalg.eigh(turned.T @ turned / many)
+    real = size > _SIGNIFICANT * np.einsum("ik,ij,jk->k", axes, noise, axes)
+    data = solution.linear.information
+    if not np.all(real):
+        kept = axes * real
+        calm = Pose(pose.position, rotation_by(turned @ kept @ kept.T) @ middle)
+        state = State(solution.state.values, calm)
+        data = linearise(equations, state, weights).information
+    zeros = equations.parameters.free & ~equations.parameters.lasting
+    if not np.any(zeros):
+        return data
+    coupled = data[:, zeros]
+    return np.asarray(data - coupled @ np.linalg.solve(data[np.ix_(zeros, zeros)], coupled.T))
+
+
+def _rotation_noise(linear: Linear) -> Array:
+    """Mean covariance of the poses' rotations, (3, 3), with what is unknown of the parameters."""
+    inverse = np.swapaxes(linear.factor, 1, 2) @ linear.factor
+    coupled = np.swapaxes(linear.stack.by_pose, 1, 2) @ linear.stack.by_values
+    follow = (inverse[:, 3:] @ coupled).reshape(-1, coupled.shape[2])
+    posterior = np.linalg.inv(linear.information + np.eye(len(linear.gradient)))
+    spread = (follow @ posterior).reshape(len(inverse), 3, -1)
+    spread = spread @ np.swapaxes(follow.reshape(len(inverse), 3, -1), 1, 2)
+    return np.asarray(np.mean(inverse[:, 3:, 3:] + spread, axis=0))
+
+
+def _mean_rotation(rotation: Array) -> Array:
+    """The rotation nearest to the mean of rotations (p, 3, 3)."""
+    left, _, right = np.linalg.svd(np.mean(rotation, axis=0))
+    return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
+
+
+def _words(equations: Equations, data: Array, unseen: Array, floor: float) -> Iterator[str]:
+    """Known reasons first; what they leave over by the names of its parameters."""
+    if not unseen.shape[1]:
+        return
+    lasting = equations.parameters.lasting
+    told = np.zeros((int(np.count_nonzero(lasting)), 0))
+    for text, directions in _reasons(equations):
+        own = [d[lasting] / np.linalg.norm(d[lasting]) for d in directions]
+        blind = np.array([d for d in own if d @ data @ d < floor]).reshape(-1, len(told))
+        new = _beyond(told, blind.T)
+        if count := new.shape[1]:
+            told = np.concatenate([told, new], axis=1)
+            yield text.format(count=count, s="s" if count > 1 else "")
+    names = [p.name for p in equations.parameters if p.std > 0 and not p.zero]
+    others = _beyond(told, unseen).T
+    for direction in others[:_LISTED]:
+        largest = np.argsort(-np.abs(direction))[:_NAMED]
+        listed = ", ".join(f"{direction[i]:+.2f} {names[i]}" for i in largest)
+        yield f"only the prior knows the combination {listed}"
+    if len(others) > _LISTED:
+        yield f"and {len(others) - _LISTED} more combinations of that kind"
+
+
+def _beyond(told: Array, directions: Array) -> Array:
+    """An orthonormal basis of what ``directions`` (q, k) span beside the basis ``told`` (q, m)."""
+    rest = directions - told @ (told.T @ directions)
+    left, size, _ = np.linalg.svd(rest, full_matrices=False)
+    return np.asarray(left[:, size > _BESIDE])
+
+
+def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
+    """Directions in scaled parameters that are blind for a reason that has a name."""
+    home, lines = equations.robot.home, len(equations.robot.names)
+    turn = home.rotation[0]
+
+    def points(shift: Array) -> Array:
+        """Exit points moved by (n, 3), and the anchor points with them as they lie at home."""
+        return _scaled(equations, {"exit_point": shift, "anchor_point": shift @ turn})
+
+    each = np.eye(3 * lines).reshape(3 * lines, lines, 3)
+    yield (
+        "no rotation in the data: exit and anchor points cannot be told apart "
+        "({count} direction{s}); turn the platform between poses",
+        [points(shift) for shift in each],
+    )
+    nominal = equations.robot.geometry
+    seen = nominal.exit_point - home.position
+    whole = [points(np.tile(axis, (lines, 1))) for axis in np.eye(3)]
+    for axis in np.eye(3):
+        spun = {
+            "exit_point": seen @ skew(axis).T,
+            "anchor_point": nominal.anchor_point @ (turn.T @ skew(axis) @ turn).T,
+        }
+        whole.append(_scaled(equations, spun))
+    yield (
+        "nothing measured ties the platform to the base frame: all exit and anchor points may be "
+        "shifted or turned together ({count} direction{s}); measure positions",
+        whole,
+    )
+    block = equations.parameters.block
+    if equations.parameters.free[block["layer_growth"][0]]:
+        gain, turned = equations.winding.gain, equations.winding.turned
+        weight = np.nansum(turned * turned, axis=0)
+        radius = -np.nansum(gain * turned, axis=0) / np.where(weight > 0, weight, 1.0)
+        yield (
+            "the ropes stay within one layer: the layer growth cannot be told from the winding "
+            "radii ({count} direction{s}); wind over more turns",
+            [_scaled(equations, {"winding_radius": radius, "layer_growth": np.ones(1)})],
+        )
+
+
+def _scaled(equations: Equations, shift: dict[str, Array]) -> Array:
+    """A shift of blocks of parameters, counted in standard deviations of their priors."""
+    scale = equations.parameters.std
+    out = np.zeros(len(scale))
+    for name, part in shift.items():
+        own = equations.parameters.block[name]
+        out[own] = np.divide(part, scale[own], out=np.zeros_like(part), where=scale[own] > 0)
+    return out
+
+
+_FEW, _MOST = 3, 20_000
+_REACH = 2.0
+
+
+def refuse_unfit(equations: Equations) -> None:
+    """Raise UsageError for poses that are too few, too many, or of another robot.
+
+    Something must be left over for parameters once the poses are found.
+    """
+    measured, many = equations.measured, len(equations.measured)
+    known = sum(
+        int(np.count_nonzero(np.isfinite(values)))
+        for values in (
+            measured.motor_angle,
+            measured.position,
+            measured.angles,
+            measured.swivel,
+            measured.cable_length,
+        )
+    )
+    lines = measured.motor_angle.shape[1]
+    if many > _MOST:
+        raise UsageError(
+            f"{many} rows: each is a pose at rest, and at most {_MOST} can be fitted; keep the "
+            "rows where the platform stood"
+        )
+    _near(equations)
+    if many < _FEW or known <= 6 * many:
+        cure = f"record more poses (90 is a good number, {_FEW} the least)"
+        if known <= 6 * many:
+            cure = "measure more at each: positions, rotations, swivel angles or rope lengths"
+        raise UsageError(
+            f"{many} poses with {known} measured values cannot calibrate a robot of {lines} lines: "
+            f"{6 * many} of them go into the poses themselves; {cure}"
+        )
+
+
+def _near(equations: Equations) -> None:
+    """Refuse positions that no robot of this size can reach: another unit, or another frame."""
+    exits, home = equations.robot.geometry.exit_point, equations.robot.home.position
+    size = float(np.max(np.linalg.norm(exits[:, None] - exits, axis=2)))
+    away = np.linalg.norm(equations.measured.position - home, axis=1)
+    away = away[np.isfinite(away)]
+    if len(away) and float(np.median(away)) > _REACH * size:
+        raise UsageError(
+            f"the positions measured lie {float(np.median(away)):.4g} m from home, in a robot "
+            f"whose exit points are at most {size:.4g} m apart; is platform_x … in its unit and in "
+            "the base frame?"
+        )
+
+
+def outside_bounds(parameters: Parameters) -> list[str]:
+    """Nominal values that their own bounds exclude: a bound, or the profile, is mistaken."""
+    names = [p.name for p in parameters if p.std > 0 and not p.low <= p.nominal <= p.high]
+    if not names:
+        return []
+    return [f"nominal values outside their bounds, begun from the bound: {', '.join(names)}"]

@@ -1,0 +1,272 @@
+"""Fits all poses and all parameters of a robot at once, with priors, bounds and a robust loss.
+
+Every equation belongs to one pose. The normal equations are therefore reduced to the parameters by
+the Schur complement over the poses (6 by 6 each), so that a step costs the square of the
+parameters a pose, and no pose is ever searched for within the search. Parameters are counted in
+standard deviations of their priors, so that the prior is the unit matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.calibration.robot.equations import Equations, State
+from winchkit.model.robot import Pose
+from winchkit.model.robot.rotation import rotation_by
+
+__all__ = [
+    "Linear",
+    "Loss",
+    "Progress",
+    "Solution",
+    "Weights",
+    "leverage",
+    "linearise",
+    "place",
+    "solve",
+]
+
+Mask = NDArray[np.bool_]
+Loss = Literal["least-squares", "huber", "cauchy"]
+Progress = Callable[[int, float], None]
+"""Called with a step's number and the cost after it."""
+
+_HUBER, _CAUCHY = 1.345, 2.385
+_STEPS = 60
+_DONE = 1e-3
+_POSE_DAMPING, _ROUNDING = 1.0, 1e-13
+_MOST_DAMPED = 1e8
+_PLACING, _STRIDE = 30, 0.3
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Standard deviation of each kind of equation, and how outliers count."""
+
+    sigma: Mapping[str, float]
+    loss: Loss = "least-squares"
+
+
+@dataclass(frozen=True)
+class Stack:
+    """The equations of all kinds beside each other, whitened and weighed by the loss."""
+
+    kinds: dict[str, slice]
+    known: Mask
+    """(p, r), where there is a measurement."""
+    residual: Array
+    """(p, r)."""
+    by_pose: Array
+    """(p, r, 6)."""
+    by_values: Array
+    """By the scaled parameters, (p, r, q)."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The equations at a state, reduced to the parameters."""
+
+    stack: Stack
+    cost: float
+    prior: Array
+    """How far the parameters are from their nominal values, in standard deviations, (q,)."""
+    factor: Array
+    """Inverse Cholesky factors of the poses' normal matrices, (p, 6, 6)."""
+    information: Array
+    """Of the scaled parameters by the data alone, (q, q)."""
+    gradient: Array
+    """Of the cost by the scaled parameters, poses moved along, prior included, (q,)."""
+
+    def damped(self, damping: float) -> Linear:
+        """The same equations with poses that are held back as the parameters are.
+
+        Where a pose is hardly measured, its own step is what goes too far.
+        """
+        return self if damping == 0.0 else _reduced(self.cost, self.prior, self.stack, damping)
+
+    @property
+    def pose_free(self) -> Array:
+        """Derivatives by the parameters that no move of the pose can undo, (p, r, q)."""
+        half = self.factor @ np.swapaxes(self.stack.by_pose, 1, 2)
+        return np.asarray(
+            self.stack.by_values - np.swapaxes(half, 1, 2) @ (half @ self.stack.by_values)
+        )
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the fit ended."""
+
+    state: State
+    linear: Linear
+    held: NDArray[np.int_]
+    """(q,): −1 at the lower bound, 1 at the upper one, 0 between."""
+    steps: int
+    converged: bool
+
+
+def place(equations: Equations, state: State, weights: Weights) -> State:
+    """Search the poses alone, from where they are, with the parameters as they are."""
+    for _ in range(_PLACING):
+        linear = linearise(equations, state, weights)
+        step = _pose_steps(linear, np.zeros(len(state.values)))
+        size = np.max(np.abs(step), axis=1, keepdims=True)
+        step *= np.minimum(1.0, _STRIDE / np.maximum(size, _STRIDE))
+        state = moved(state, state.values, step)
+        if np.max(size) < 1e-7:
+            break
+    return state
+
+
+def solve(
+    equations: Equations, state: State, weights: Weights, progress: Progress | None = None
+) -> Solution:
+    """Levenberg and Marquardt's method from a state; a step is taken only if the cost falls."""
+    scale = equations.parameters.std
+    linear = linearise(equations, state, weights)
+    damping, held = 0.0, np.zeros(len(scale), dtype=int)
+    for count in range(1, _STEPS + 1):
+        slow = linear.damped(damping)
+        values, held = _bounded_step(equations, state, slow, damping)
+        change = np.divide(values - state.values, scale, out=np.zeros_like(scale), where=scale > 0)
+        trial = moved(state, values, _pose_steps(slow, change))
+        found = linearise(equations, trial, weights)
+        gain = linear.cost - found.cost
+        if not gain >= -_DONE:
+            if damping > _MOST_DAMPED:
+                return Solution(state, linear, held, count, converged=False)
+            damping = max(10 * damping, 1e-3)
+            continue
+        state, linear, damping = trial, found, damping / 10 if damping > 1e-6 else 0.0
+        if progress is not None:
+            progress(count, linear.cost)
+        if gain < _DONE * (1 + 1e-6 * linear.cost):
+            return Solution(state, linear, held, count, converged=True)
+    return Solution(state, linear, held, _STEPS, converged=False)
+
+
+def moved(state: State, values: Array, step: Array) -> State:
+    """Another state: parameters as given, poses moved by (p, 6)."""
+    pose = Pose(state.pose.position + step[:, :3], rotation_by(step[:, 3:]) @ state.pose.rotation)
+    return State(values, pose)
+
+
+def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
+    """Whitened equations at a state and their reduction to the parameters."""
+    scale = equations.parameters.std
+    kinds, parts, at = {}, [], 0
+    for rows in equations.rows(state):
+        kinds[rows.kind] = slice(at, at + rows.residual.shape[1])
+        at += rows.residual.shape[1]
+        parts.append((rows, 1 / weights.sigma[rows.kind]))
+    residual = np.concatenate([rows.residual * w for rows, w in parts], axis=1)
+    by_pose = np.concatenate([rows.by_pose * w for rows, w in parts], axis=1)
+    by_values = np.zeros((*residual.shape, len(scale)))
+    for rows, w in parts:
+        if rows.by_values is not None:
+            np.multiply(rows.by_values, w * scale, out=by_values[:, kinds[rows.kind]])
+    known = np.isfinite(residual) & np.all(np.isfinite(by_pose), axis=2)
+    if not np.all(known):
+        residual[~known], by_pose[~known], by_values[~known] = 0.0, 0.0, 0.0
+    loss, weight = _loss(residual, weights.loss)
+    prior = np.divide(
+        state.values - equations.parameters.nominal,
+        scale,
+        out=np.zeros_like(scale),
+        where=scale > 0,
+    )
+    cost = 0.5 * (float(np.sum(loss)) + float(prior @ prior))
+    if weights.loss != "least-squares":
+        root = np.sqrt(weight)
+        residual, by_pose, by_values = (
+            residual * root,
+            by_pose * root[..., None],
+            by_values * root[..., None],
+        )
+    return _reduced(cost, prior, Stack(kinds, known, residual, by_pose, by_values))
+
+
+def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> Linear:
+    many, rows, count = stack.by_values.shape
+    turned = np.swapaxes(stack.by_pose, 1, 2)
+    normal = turned @ stack.by_pose
+    # A pose of which too little was measured stays where it is in what it is free to do.
+    firm = _POSE_DAMPING + _ROUNDING * np.trace(normal, axis1=1, axis2=2)
+    normal[:, range(6), range(6)] *= 1 + damping
+    normal[:, range(6), range(6)] += firm[:, None]
+    factor = np.linalg.inv(np.linalg.cholesky(normal))
+    half = factor @ turned
+    coupled = (half @ stack.by_values).reshape(6 * many, count)
+    flat = stack.by_values.reshape(many * rows, count)
+    information = flat.T @ flat - coupled.T @ coupled
+    seen = (half @ stack.residual[..., None]).reshape(6 * many)
+    gradient = flat.T @ stack.residual.reshape(-1) - coupled.T @ seen + prior
+    return Linear(stack, cost, prior, factor, information, gradient)
+
+
+def _pose_steps(linear: Linear, change: Array) -> Array:
+    """Steps of the poses that go with a change of the scaled parameters, (p, 6)."""
+    left = linear.stack.residual + linear.stack.by_values @ change
+    gradient = np.swapaxes(linear.stack.by_pose, 1, 2) @ left[..., None]
+    turned = np.swapaxes(linear.factor, 1, 2)
+    return np.asarray(-(turned @ (linear.factor @ gradient))[..., 0])
+
+
+def _bounded_step(
+    equations: Equations, state: State, linear: Linear, damping: float
+) -> tuple[Array, NDArray[np.int_]]:
+    """Parameters after a damped step that keeps to the bounds, and which it stops at.
+
+    What the step carries beyond a bound is put on it, and the others step again without it.
+    """
+    scale = equations.parameters.std
+    low, high = equations.parameters.bounds
+    held = np.zeros(len(scale), dtype=int)
+    matrix = linear.information + np.eye(len(scale))
+    matrix[range(len(scale)), range(len(scale))] *= 1 + damping
+    change = np.zeros(len(scale))
+    for _ in range(len(scale)):
+        free = held == 0
+        right = -linear.gradient - matrix[:, ~free] @ change[~free]
+        change[free] = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
+        values = state.values + scale * change
+        below, above = free & (values < low) & (scale > 0), free & (values > high) & (scale > 0)
+        if not np.any(below | above):
+            break
+        held[below], held[above] = -1, 1
+        limit = np.where(held < 0, low, high)
+        stopped = held != 0
+        change[stopped] = (limit[stopped] - state.values[stopped]) / scale[stopped]
+    values = state.values + scale * change
+    values[held < 0], values[held > 0] = low[held < 0], high[held > 0]
+    return values, held
+
+
+def _loss(residual: Array, loss: Loss) -> tuple[Array, Array]:
+    """ρ(r) and the weight ρ'(r)/2r of whitened residuals."""
+    square = residual**2
+    if loss == "huber":
+        size = np.abs(residual)
+        far = size > _HUBER
+        weight = np.where(far, _HUBER / np.where(far, size, 1.0), 1.0)
+        return np.where(far, 2 * _HUBER * size - _HUBER**2, square), weight
+    if loss == "cauchy":
+        ratio = square / _CAUCHY**2
+        return _CAUCHY**2 * np.log1p(ratio), 1 / (1 + ratio)
+    return square, np.ones_like(square)
+
+
+def leverage(linear: Linear) -> Array:
+    """Share of each equation that the fit itself uses up, (p, r), between 0 and 1."""
+    half = linear.factor @ np.swapaxes(linear.stack.by_pose, 1, 2)
+    rest = linear.pose_free
+    posterior = np.linalg.inv(linear.information + np.eye(len(linear.gradient)))
+    flat = rest.reshape(-1, rest.shape[2])
+    by_values = np.sum((flat @ posterior) * flat, axis=1).reshape(linear.stack.residual.shape)
+    return np.asarray(np.sum(half**2, axis=1) + by_values)

@@ -1,0 +1,315 @@
+"""The numbers that a robot's calibration fits: names, units, priors and bounds, in one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.calibration.robot.elongation import LAWS, LawParameter
+from winchkit.errors import Fault, FileError, UsageError, suggest
+from winchkit.model.drum import drum_of
+from winchkit.model.robot import Robot
+from winchkit.schema.profiles.robot import PriorName, PriorSpec, RobotProfile
+from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
+from winchkit.units import dimension_of, parse
+
+__all__ = [
+    "EFFECTS",
+    "GEOMETRY",
+    "PRIORS",
+    "Parameter",
+    "Parameters",
+    "own_effects",
+    "parameters_of",
+]
+
+_HOME = "home-length"
+
+
+def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
+    """Values by effect, SI: parameters of a law, home lengths by line.
+
+    Effects that a calibration does not fit are left out. Raises FileError for a value that cannot
+    be read.
+    """
+    out: dict[str, dict[str, float]] = {}
+    faults: list[Fault] = []
+    for table in profile.effect:
+        if table.id in LAWS and "line" not in table.values:
+            units = {p.name: p.unit for p in LAWS[table.id]}
+            given: Mapping[str, Any] = table.values
+        elif table.id == _HOME:
+            units = {line.name: "m" for line in profile.line}
+            lengths = table.values.get("length")
+            if not isinstance(lengths, Mapping):
+                lengths = {str(table.values.get("line")): lengths}
+            given = {**dict.fromkeys(units, "0 m"), **lengths}
+        else:
+            continue
+        try:
+            found = _values(given, units)
+            if before := out.get(table.id):
+                found = {name: value + before[name] for name, value in found.items()}
+            out[table.id] = found
+        except UsageError as error:
+            faults.append(_fault(table, str(error)))
+    if faults:
+        raise FileError(faults)
+    return out
+
+
+def _values(given: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, float]:
+    out = {}
+    for name, unit in units.items():
+        if name in given:
+            try:
+                out[name] = parse(given[name], dimension_of(unit) or "ratio")
+            except UsageError as error:
+                raise UsageError(f"{name}: {error}") from error
+    return out
+
+
+def _fault(table: EffectTable, message: str) -> Fault:
+    return Fault(message, table.path, table.line, f"effect {table.id}")
+
+
+Indices = NDArray[np.intp]
+
+PRIORS: dict[PriorName, float] = {
+    "exit_point": 5e-3,
+    "anchor_point": 5e-3,
+    "winding_radius": 0.5e-3,
+    "swivel_radius": 0.4e-3,
+    "layer_growth": 0.04e-3,
+}
+"""Standard deviations where a robot's file has none, m: CABTIVE paper, Table 4, whose bounds are
+read as two standard deviations."""
+
+GEOMETRY = ("exit-point", "anchor-point", "swivel-radius")
+"""Effects of the catalogue that every calibration fits."""
+EFFECTS = (*LAWS, "home-length", "payload-mass", "payload-centre")
+"""Effects that join by name."""
+
+_HOME_LENGTH = 1e-3
+_MASS_SHARE, _MASS_LEAST = 0.2, 0.1
+_CENTRE = 20e-3
+_ZERO, _OFFSET = 0.2, 0.05
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number, as it is fitted."""
+
+    name: str
+    """``LINE.exit_point.x``, ``layer_growth``, ``cable-elongation-linear.axial_stiffness`` …"""
+    unit: str
+    """Of the value as files have it."""
+    nominal: float
+    std: float
+    """Of the prior; zero for a number that stays as it is."""
+    low: float = -np.inf
+    high: float = np.inf
+    reciprocal: bool = False
+    """Files have 1/value."""
+    zero: bool = False
+    """The zero of an instrument, which is no part of the robot."""
+
+    def shown(self, value: float, std: float) -> tuple[float, float]:
+        """Value and standard deviation as files have them; an infinite stiffness has none."""
+        if not self.reciprocal:
+            return value, std
+        return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """All of them, and where each block of them stands."""
+
+    all: tuple[Parameter, ...]
+    block: dict[str, Indices]
+    """Indices by block; (n, 3) for points, (n,) for what a line has one of."""
+    law: str | None
+    """The law of elongation that is fitted."""
+
+    def __iter__(self) -> Iterator[Parameter]:
+        return iter(self.all)
+
+    def __len__(self) -> int:
+        return len(self.all)
+
+    @property
+    def nominal(self) -> Array:
+        """(q,)."""
+        return np.array([p.nominal for p in self.all])
+
+    @property
+    def std(self) -> Array:
+        """Of the priors, (q,)."""
+        return np.array([p.std for p in self.all])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """(q,) each."""
+        return np.array([p.low for p in self.all]), np.array([p.high for p in self.all])
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which of them are fitted at all."""
+        return np.array([p.std > 0 for p in self.all])
+
+    @property
+    def lasting(self) -> NDArray[np.bool_]:
+        """Which of them are fitted and are the robot's own."""
+        return np.array([p.std > 0 and not p.zero for p in self.all])
+
+    def starting(self, block: str, values: Array) -> Parameters:
+        """The same with other nominal values of a block."""
+        everything = list(self.all)
+        for at, value in zip(self.block[block].ravel(), values.ravel(), strict=True):
+            everything[at] = replace(everything[at], nominal=float(value))
+        return replace(self, all=tuple(everything))
+
+
+class _Builder:
+    """Lays parameters one after another."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.all: list[Parameter] = []
+        self.block: dict[str, Indices] = {}
+
+    def add(self, block: str, parameters: Sequence[Parameter], *shape: int) -> None:
+        """Append a block; its indices get ``shape``."""
+        start = len(self.all)
+        self.all += parameters
+        self.block[block] = np.arange(start, len(self.all)).reshape(shape or (-1,))
+
+    def prior(self, name: PriorName) -> PriorSpec:
+        """As the robot's file has it, else the paper's."""
+        return self.robot.profile.prior.get(name, PriorSpec(PRIORS[name]))
+
+    def points(self, name: PriorName, values: Array) -> None:
+        """Three coordinates a line."""
+        std = self.prior(name).std
+        found = [
+            Parameter(f"{line}.{name}.{axis}", "m", float(value), std)
+            for line, point in zip(self.robot.names, values, strict=True)
+            for axis, value in zip("xyz", point, strict=True)
+        ]
+        self.add(name, found, -1, 3)
+
+    def lengths(self, name: PriorName, values: Sequence[float], fitted: Sequence[bool]) -> None:
+        """One length a line; what is not fitted stays as it is."""
+        prior = self.prior(name)
+        low, high = prior.bounds or (0.0, np.inf)
+        found = [
+            Parameter(f"{line}.{name}", "m", value, prior.std * free, low, high)
+            for line, value, free in zip(self.robot.names, values, fitted, strict=True)
+        ]
+        self.add(name, found)
+
+    def zeros(self, name: str, unit: str, std: float, *, zero: bool) -> None:
+        """One number a line that starts at zero."""
+        found = [
+            Parameter(f"{line}.{name}", unit, 0.0, std, zero=zero) for line in self.robot.names
+        ]
+        self.add(name, found)
+
+
+def parameters_of(
+    robot: Robot,
+    effects: Sequence[str] = (),
+    *,
+    swivel: bool = False,
+    length_offset: bool = False,
+) -> Parameters:
+    """Geometry, winches, the effects named, and the zeros of instruments that there are.
+
+    An elongation law brings the home lengths with it, since the tension at home is unknown. Raises
+    UsageError for an effect that a robot's calibration does not know.
+    """
+    own = own_effects(robot.profile)
+    effects = tuple(dict.fromkeys((*effects, *own)))
+    _known(effects)
+    law = next((effect for effect in effects if effect in LAWS), None)
+    build = _Builder(robot)
+    build.points("exit_point", robot.geometry.exit_point)
+    build.points("anchor_point", robot.geometry.anchor_point)
+    winches = robot.winches
+    radii = [winch.drum.winding_radius for winch in winches]
+    build.lengths("winding_radius", radii, [True] * len(winches))
+    swivels = robot.geometry.swivel_radius.tolist()
+    build.lengths("swivel_radius", swivels, [radius > 0 for radius in swivels])
+    _growth(build, winches)
+    if law or "home-length" in effects:
+        build.zeros("home_length", "m", _HOME_LENGTH, zero=False)
+    if law:
+        build.add("law", [_of_law(law, p, own.get(law, {})) for p in LAWS[law]])
+    _payload(build, effects)
+    if swivel:
+        build.zeros("swivel_zero", "rad", _ZERO, zero=True)
+    if length_offset:
+        build.zeros("length_offset", "m", _OFFSET, zero=True)
+    found = Parameters(tuple(build.all), build.block, law)
+    if offsets := own.get("home-length"):
+        found = found.starting("home_length", np.array([offsets[n] for n in robot.names]))
+    return found
+
+
+def _of_law(law: str, spec: LawParameter, own: Mapping[str, float]) -> Parameter:
+    """A law's parameter, from where the robot's file has it."""
+    start = spec.start
+    if spec.name in own:
+        start = 1 / own[spec.name] if spec.reciprocal else own[spec.name]
+    return Parameter(
+        f"{law}.{spec.name}", spec.unit, start, spec.std, spec.low, spec.high, spec.reciprocal
+    )
+
+
+def _known(effects: Sequence[str]) -> None:
+    for effect in effects:
+        if effect not in (*GEOMETRY, *EFFECTS):
+            raise UsageError(
+                f"effect '{effect}' cannot join a robot's calibration; use one of "
+                f"{', '.join(EFFECTS)} ({', '.join(GEOMETRY)} are always in it)"
+                f"{suggest(effect, [*EFFECTS, *GEOMETRY])}"
+            )
+    laws = [effect for effect in effects if effect in LAWS]
+    if len(set(laws)) > 1:
+        raise UsageError(f"{' and '.join(laws)} are laws of the same rope; name one of them")
+
+
+def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
+    """One growth for all layered drums: they wind the same rope."""
+    growths = {
+        getattr(drum_of(winch), "growth", 0.0) for winch in winches if winch.drum.kind in LAYERED
+    }
+    if len(growths) > 1:
+        listed = ", ".join(f"{growth * 1e3:g} mm" for growth in sorted(growths))
+        raise UsageError(
+            f"the winches of '{build.robot.profile.name}' have the layer growths {listed}; the "
+            "lines of "
+            "one robot are calibrated with one, so give them the same rope"
+        )
+    prior = build.prior("layer_growth")
+    low, high = prior.bounds or (0.0, np.inf)
+    value = growths.pop() if growths else 0.0
+    std = prior.std if any(winch.drum.kind in LAYERED for winch in winches) else 0.0
+    build.add("layer_growth", [Parameter("layer_growth", "m", value, std, low, high)])
+
+
+def _payload(build: _Builder, effects: Sequence[str]) -> None:
+    platform = build.robot.profile.platform
+    std = max(_MASS_SHARE * platform.mass, _MASS_LEAST) * ("payload-mass" in effects)
+    build.add("payload_mass", [Parameter("payload-mass.mass", "kg", platform.mass, std, 0.0)])
+    std = _CENTRE * ("payload-centre" in effects)
+    found = [
+        Parameter(f"payload-centre.{axis}", "m", value, std)
+        for axis, value in zip("xyz", platform.center_of_mass, strict=True)
+    ]
+    build.add("payload_centre", found)

@@ -1,0 +1,92 @@
+"""Where a robot's model says its platform is: poses from motor angles alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.calibration.robot.equations import Equations
+from winchkit.model.robot import Pose, forward, rotation_of
+from winchkit.model.robot.rotation import rotation_vector
+from winchkit.schema.profiles.robot import PlatformSpec
+
+__all__ = ["PoseErrors", "errors_at", "rms", "start_of"]
+
+_ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class PoseErrors:
+    """Predicted against measured poses."""
+
+    distance: Array
+    """(p,), m; NaN where no position was measured or no pose was found."""
+    angle: Array
+    """(p,), rad; NaN where the rotation was not measured whole."""
+    place: NDArray[np.str_]
+    """Which row of which run each pose is, (p,)."""
+    unfound: int
+    """Poses that no search found from their rope lengths."""
+
+
+def errors_at(equations: Equations, values: Array) -> PoseErrors:
+    """Predict every pose from its motor angles with the parameters' ``values``, and compare."""
+    pose, unfound = _poses(equations, values)
+    measured = equations.measured
+    distance = np.linalg.norm(pose.position - measured.position, axis=1)
+    angle = np.full(len(distance), np.nan)
+    whole = np.all(np.isfinite(measured.angles), axis=1) & np.isfinite(pose.rotation[:, 0, 0])
+    seen = np.swapaxes(rotation_of(*measured.angles[whole].T), 1, 2)
+    angle[whole] = np.linalg.norm(rotation_vector(pose.rotation[whole] @ seen), axis=1)
+    return PoseErrors(distance, angle, measured.place, unfound)
+
+
+def rms(values: Sequence[float] | Array) -> float:
+    """Root of the mean square of what is known; NaN where nothing is."""
+    known = np.asarray(values)[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+def _poses(equations: Equations, values: Array) -> tuple[Pose, int]:
+    """Search from what was measured, else from home; a rope's strain is found along with it."""
+    geometry, slack = equations.geometry(values), equations.rope(values)
+    dead, measured = equations.robot.dead_length, equations.measured
+    start = start_of(equations)
+    given, platform = slack, _platform(equations, values)
+    rounds = 1 if equations.parameters.law is None or equations.forces.middle is None else _ROUNDS
+    for _ in range(rounds):
+        strain, _by = equations.strain(values, start)
+        given = (slack + strain * dead) / (1 - strain)
+        found = forward(geometry, given, start, platform)
+        # A pose that is lost is searched for once more from home.
+        start = _where(found.converged.astype(bool), found.pose, equations)
+    known = np.all(np.isfinite(measured.motor_angle), axis=1)
+    return found.pose, int(np.count_nonzero(known & ~found.converged.astype(bool)))
+
+
+def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
+    home = equations.robot.home
+    return Pose(
+        np.where(good[:, None], pose.position, home.position),
+        np.where(good[:, None, None], pose.rotation, home.rotation),
+    )
+
+
+def _platform(equations: Equations, values: Array) -> PlatformSpec:
+    block = equations.parameters.block
+    x, y, z = values[block["payload_centre"]].tolist()
+    return PlatformSpec(float(values[block["payload_mass"][0]]), (x, y, z))
+
+
+def start_of(equations: Equations) -> Pose:
+    """Measured positions and rotations, home's where there is none."""
+    home, measured = equations.robot.home, equations.measured
+    position = np.where(np.isfinite(measured.position), measured.position, home.position)
+    whole = np.all(np.isfinite(measured.angles), axis=1)
+    rotation = np.repeat(home.rotation, len(measured), axis=0)
+    rotation[whole] = rotation_of(*measured.angles[whole].T)
+    return Pose(position, rotation)

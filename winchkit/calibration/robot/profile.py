@@ -1,0 +1,143 @@
+"""Writes a calibrated robot into a copy of its profile, with where every number came from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from winchkit.calibration.robot.calibrate import Calibrated, Estimated
+from winchkit.calibration.robot.elongation import LAWS
+from winchkit.calibration.robot.prediction import rms
+from winchkit.catalog import find
+from winchkit.profile_edit.document import effect_tables, read_document, write_document
+from winchkit.schema.profiles.winch import LAYERED
+from winchkit.units import format_quantity
+
+__all__ = ["Provenance", "write_calibrated"]
+
+_SHOWN = {"m": "mm"}
+_DIGITS = 9
+_STD_DIGITS = 3
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What the numbers were fitted to."""
+
+    runs: Sequence[str]
+    date: date
+
+
+def write_calibrated(source: Path, found: Calibrated, out: Path, where: Provenance) -> None:
+    """Copy the robot's profile ``source`` to ``out`` with the numbers found.
+
+    Lines that named a winch get its tables for their own, since their radii now differ. Raises
+    FileError where a file cannot be read or written.
+    """
+    document = read_document(source)
+    for line in document["line"]:
+        _line(line, source, found)
+    _effects(document, found.estimates)
+    _platform(document, found.estimates)
+    document["fitted"] = _fitted(found, where)
+    write_document(document, out)
+
+
+def _line(line: Any, source: Path, found: Calibrated) -> None:
+    name, estimates = str(line["name"]), found.estimates
+    for point in ("exit_point", "anchor_point"):
+        line[point] = [_written(estimates[f"{name}.{point}.{axis}"]) for axis in "xyz"]
+    if (radius := estimates.get(f"{name}.swivel_radius")) is not None:
+        line["swivel_radius"] = _written(radius)
+    if isinstance(line["winch"], str):
+        line["winch"] = _tables_of(line["winch"], source)
+    drum = line["winch"]["drum"]
+    drum["winding_radius"] = _written(estimates[f"{name}.winding_radius"])
+    if drum["kind"] in LAYERED and (growth := estimates.get("layer_growth")) is not None:
+        drum["layer_growth"] = _written(growth)
+
+
+def _tables_of(winch: str, source: Path) -> Any:
+    """A winch's own tables, as a robot's line may hold them."""
+    tree = read_document(find("profiles", winch, beside=source)).unwrap()
+    table = tomlkit.table()
+    for key, value in tree.items():
+        if key not in {"schema", "kind", "description"}:
+            table[key] = value
+    return table
+
+
+def _effects(document: Any, estimates: Mapping[str, Estimated]) -> None:
+    for law in LAWS:
+        own = {
+            name.partition(".")[2]: estimate
+            for name, estimate in estimates.items()
+            if name.startswith(f"{law}.")
+        }
+        if own:
+            table = _effect(document, law)
+            for name, estimate in own.items():
+                if isfinite(estimate.value):
+                    table[name] = _written(estimate)
+                else:
+                    table.pop(name, None)
+    homes = {
+        name.rpartition(".")[0]: estimate
+        for name, estimate in estimates.items()
+        if name.endswith(".home_length")
+    }
+    if homes:
+        lengths = tomlkit.inline_table()
+        lengths.update({line: _written(estimate) for line, estimate in homes.items()})
+        _effect(document, "home-length")["length"] = lengths
+
+
+def _effect(document: Any, effect: str) -> Any:
+    """The table of an effect; a new one where there is none."""
+    tables = effect_tables(document)
+    for table in tables:
+        if table.get("id") == effect:
+            return table
+    tables.append(tomlkit.item({"id": effect}))
+    return tables[-1]
+
+
+def _platform(document: Any, estimates: Mapping[str, Estimated]) -> None:
+    platform = document.setdefault("platform", tomlkit.table())
+    if (mass := estimates.get("payload-mass.mass")) is not None:
+        platform["mass"] = _written(mass)
+    centre = [estimates.get(f"payload-centre.{axis}") for axis in "xyz"]
+    if all(centre):
+        platform["center_of_mass"] = [_written(c) for c in centre if c is not None]
+
+
+def _fitted(found: Calibrated, where: Provenance) -> Any:
+    table = tomlkit.table()
+    table["date"] = where.date
+    table["runs"] = list(where.runs)
+    table["poses"] = len(found.equations.measured)
+    for key, errors in (
+        ("position_rms", found.fit_after),
+        ("held_out_rms", found.validation_after),
+    ):
+        if isfinite(size := rms(errors.distance)):
+            table[key] = format_quantity(size, "mm", _STD_DIGITS)
+    std = tomlkit.table()
+    for name, estimate in found.estimates.items():
+        if isfinite(estimate.std) and not estimate.parameter.zero:
+            unit = estimate.parameter.unit
+            std[name] = format_quantity(estimate.std, _SHOWN.get(unit, unit), _STD_DIGITS)
+    table["std"] = std
+    return table
+
+
+def _written(estimate: Estimated) -> str | float:
+    unit = estimate.parameter.unit
+    text = format_quantity(estimate.value, _SHOWN.get(unit, unit), _DIGITS)
+    return float(text) if unit == "1" else text

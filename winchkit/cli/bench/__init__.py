@@ -1,0 +1,1 @@
+"""Commands that move, watch or stop a bench."""

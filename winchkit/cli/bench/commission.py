@@ -1,0 +1,49 @@
+"""``winchkit commission``: the guided commissioning of a bench, with a signed-off record."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+
+import click
+
+from winchkit.cli.core.options import complete_bench
+from winchkit.cli.core.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.argument("bench", shell_complete=complete_bench)
+@click.option(
+    "--answers",
+    metavar="FILE",
+    type=click.Path(exists=True, dir_okay=False),
+    help="Answers by key (TOML), for tests; the record says that nobody typed them.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the record as JSON.")
+def command(*, bench: str, answers: str | None, as_json: bool) -> None:
+    """Commission BENCH: directions, units, brake, cell sign, limits, and the loss of the host.
+
+    Asks on stderr and reads answers from stdin; enables one drive at a time and moves slowly. The
+    record is written beside the bench file. On real hardware nothing else moves without it, and a
+    changed drive, device file or bench file makes it stale. There is no --yes: what is confirmed
+    here somebody has seen.
+    """
+    from winchkit.bench.commissioning.dialogue import AnswerFile, Dialogue, TypedAnswers
+    from winchkit.bench.commissioning.procedure import commission_bench
+    from winchkit.drivers.clock import MonotonicClock
+    from winchkit.schema.read import read_bench
+
+    def say(text: str) -> None:
+        click.echo(text, err=True)
+
+    spec = read_bench(bench)
+    dialogue: Dialogue = (
+        TypedAnswers(say, sys.stdin.readline) if answers is None else AnswerFile(answers, say)
+    )
+    record = commission_bench(spec, dialogue, MonotonicClock())
+    if as_json:
+        echo_json({"schema": 1, "path": spec.record_file, **dataclasses.asdict(record)})
+    else:
+        click.echo(f"{spec.record_file}: commissioned by {record.by}, {record.date}")

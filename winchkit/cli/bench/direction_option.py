@@ -1,0 +1,78 @@
+"""The options ``--pay-out`` and ``--wind-in``: a direction with a positive speed or length."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+from winchkit.cli.core.quantities import dimension, quantity
+from winchkit.errors import UsageError
+
+__all__ = ["Directed", "direction_options", "magnitude", "read_direction"]
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+@dataclass(frozen=True)
+class Directed:
+    """A speed or a length with its direction, as somebody typed it."""
+
+    option: str
+    value: float
+    """In SI, above zero."""
+    pays_out: bool
+    dimension: str
+
+    @property
+    def change(self) -> float:
+        """Change of the cable length, m; raises UsageError for a speed."""
+        length = self._magnitude("length", "50mm")
+        return length if self.pays_out else -length
+
+    @property
+    def winding_speed(self) -> float:
+        """Speed (m/s), positive winding in; raises UsageError for a length."""
+        speed = self._magnitude("speed", "0.1m/s")
+        return -speed if self.pays_out else speed
+
+    def _magnitude(self, wanted: str, example: str) -> float:
+        if self.dimension != wanted:
+            raise UsageError(
+                f"{self.option} is a {self.dimension} here and must be a {wanted}, such as "
+                f"{self.option} {example}"
+            )
+        return self.value
+
+
+def direction_options(value: str) -> Decorator:
+    """Add --pay-out and --wind-in; ``value`` says what they take, e.g. ``SPEED|LENGTH``."""
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        function = click.option("--wind-in", metavar=value, help="Shorten the cable.")(function)
+        return click.option("--pay-out", metavar=value, help="Lengthen the cable.")(function)
+
+    return decorate
+
+
+def read_direction(pay_out: str | None, wind_in: str | None) -> Directed | None:
+    """What is given of the two; None for neither. Raises UsageError for both, or a sign."""
+    if pay_out is not None and wind_in is not None:
+        raise UsageError("--pay-out and --wind-in are opposite directions; give one of them")
+    option, text = ("--pay-out", pay_out) if wind_in is None else ("--wind-in", wind_in)
+    if text is None:
+        return None
+    kind = dimension(text, ("speed", "length"))
+    return Directed(option, magnitude(option, text, kind), pay_out is not None, kind)
+
+
+def magnitude(option: str, text: str, kind: str) -> float:
+    """A quantity above zero; raises UsageError for a sign, since an option is no direction."""
+    value = quantity(text, kind)
+    if not 0 < value < float("inf"):
+        raise UsageError(
+            f"{option} {text}: must be above zero; --pay-out and --wind-in tell the direction"
+        )
+    return value

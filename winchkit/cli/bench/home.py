@@ -1,0 +1,84 @@
+"""``winchkit home``: lets a drive find its zero, or defines the present cable length."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import click
+
+from winchkit.cli.core.options import (
+    bench_option,
+    dry_run_option,
+    effects_option,
+    take_over_option,
+    winch_argument,
+)
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import status_line
+from winchkit.errors import UsageError
+
+__all__ = ["command"]
+
+_POLL = 0.02
+
+
+@click.command()
+@winch_argument
+@bench_option
+@click.option("--here", metavar="LENGTH", help="The present cable length; nothing moves.")
+@click.option(
+    "--method",
+    type=click.IntRange(-128, 127),
+    help="Of 6098h: 17, 18 limit switch, 19 to 22 home switch, 33, 34 index; negative: maker's.",
+)
+@click.option("--at", metavar="LENGTH", help="With --method: cable length at the zero found.")
+@click.option(
+    "--speed", metavar="SPEED", help="Of the rope.  [default: a tenth of the winch's limit]"
+)
+@take_over_option
+@effects_option
+@dry_run_option
+@click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
+def command(
+    winch: str | None,
+    *,
+    bench: str,
+    here: str | None,
+    method: int | None,
+    at: str | None,
+    speed: str | None,
+    take_over: bool,
+    effects: Sequence[str],
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Home WINCH: by a method of its drive, or by telling it the present cable length.
+
+    The drive keeps the zero for as long as it is powered, one with an absolute encoder perhaps
+    longer. A search moves the rope by the drive's own means; speed, tension and faults are
+    supervised meanwhile, and Ctrl-C stops. Lengths are by the winch's profile.
+    """
+    from winchkit.cli.core.dry_run import station_for
+    from winchkit.cli.core.quantities import optional
+
+    if (here is None) == (method is None):
+        raise UsageError("how? give either --here LENGTH or --method NUMBER")
+    if at is not None and here is not None:
+        raise UsageError("--at belongs to --method; --here names the length already")
+    length = optional(here if here is not None else at, "length")
+    with station_for(
+        bench, client="home", dry_run=dry_run, as_json=as_json, effects=effects
+    ) as station:
+        if take_over:
+            station.take_over(winch)
+        station.home(winch, method, length, optional(speed, "speed"))
+        while station.homing():
+            time.sleep(_POLL)
+        status = station.status()
+    if dry_run:
+        return
+    if as_json:
+        echo_json(status)
+    else:
+        click.echo(status_line(status))

@@ -1,0 +1,156 @@
+"""``winchkit jog``: moves a winch by hand, for as long as somebody holds on."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.bench.direction_option import (
+    Directed,
+    direction_options,
+    magnitude,
+    read_direction,
+)
+from winchkit.cli.core.options import (
+    bench_option,
+    dry_run_option,
+    effects_option,
+    take_over_option,
+    winch_argument,
+)
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import status_line
+from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.bench.remote.station import Station
+
+__all__ = ["command"]
+
+_REFRESH = 0.05
+_HOLD = 0.2
+_SPEED = "0.05 m/s"
+_HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
+
+
+@click.command()
+@winch_argument
+@bench_option
+@direction_options("SPEED|LENGTH")
+@click.option(
+    "--for", "duration", metavar="TIME", help="With a SPEED: move for this long, then stop."
+)
+@click.option(
+    "--speed",
+    metavar="SPEED",
+    help=f"With keys, or with a LENGTH: how fast; no direction.  [default: {_SPEED}]",
+)
+@click.option("--reset", is_flag=True, help="First clear trips and drive faults.")
+@take_over_option
+@effects_option
+@dry_run_option
+@click.option(
+    "--json", "as_json", is_flag=True, help="Without keys: print where it stands as JSON."
+)
+def command(
+    winch: str | None,
+    *,
+    bench: str,
+    pay_out: str | None,
+    wind_in: str | None,
+    duration: str | None,
+    speed: str | None,
+    reset: bool,
+    take_over: bool,
+    effects: Sequence[str],
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Move WINCH (the only one where there is one) by hand.
+
+    --pay-out 0.1m/s --for 2s moves at a speed for a time, --wind-in 50mm by a length. Without
+    either, by the keyboard: hold the up arrow to wind in, the down arrow to pay out; releasing it
+    stops the winch within 0.2 s (0.7 s after a first short press, since a keyboard repeats late).
+    Key i: inch mode, 1, 10 or 100 mm a tap; Space stops, q stops and quits. No emergency stop.
+    """
+    from winchkit.cli.core.dry_run import station_for
+
+    asked = _read(pay_out, wind_in, duration, speed)
+    if asked.direction is None and (dry_run or not sys.stdin.isatty()):
+        raise UsageError(f"there is no terminal to hold a key on: {_HOW}")
+    with station_for(
+        bench, client="jog", dry_run=dry_run, as_json=as_json, effects=effects
+    ) as station:
+        if reset:
+            station.reset()
+        if take_over:
+            station.take_over(winch)
+        if asked.direction is None:
+            _jog_by_keys(station, winch, asked.speed)
+            return
+        if asked.duration is None:
+            station.step(winch, asked.direction.change, asked.speed)
+            _wait(station, winch)
+        else:
+            _jog_for(station, winch, asked.direction.winding_speed, asked.duration)
+        if as_json and not dry_run:
+            echo_json(station.status())
+        elif not dry_run:
+            click.echo(status_line(station.status()))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the options ask for."""
+
+    direction: Directed | None
+    """None: by keys."""
+    duration: float | None
+    """s; None for a length."""
+    speed: float
+    """Of keys and of a length, m/s."""
+
+
+def _read(
+    pay_out: str | None, wind_in: str | None, duration: str | None, speed: str | None
+) -> _Asked:
+    """The options in SI; raises UsageError for those that do not belong together."""
+    from winchkit.cli.core.quantities import seconds
+
+    direction, limit = read_direction(pay_out, wind_in), seconds(duration)
+    if limit is not None:
+        if direction is None:
+            raise UsageError("which way? --for needs --pay-out SPEED or --wind-in SPEED")
+        if speed is not None:
+            raise UsageError(f"--speed does not belong to --for: {_HOW}")
+        _ = direction.winding_speed
+    elif direction is not None and direction.dimension == "speed":
+        raise UsageError(f"for how long? {direction.option} SPEED needs --for TIME: {_HOW}")
+    return _Asked(direction, limit, magnitude("--speed", speed or _SPEED, "speed"))
+
+
+def _jog_for(station: Station, winch: str | None, winding_speed: float, duration: float) -> None:
+    """Keep a dead-man alive from here for a time."""
+    end = time.monotonic() + duration
+    while (left := end - time.monotonic()) > 0:
+        station.jog(winch, winding_speed, min(_HOLD, left + _REFRESH))
+        time.sleep(min(_REFRESH, left))
+    station.jog(winch, 0.0, _REFRESH)
+    _wait(station, winch)
+
+
+def _wait(station: Station, winch: str | None) -> None:
+    while station.moving(winch):
+        time.sleep(_REFRESH)
+
+
+def _jog_by_keys(station: Station, winch: str | None, speed: float) -> None:
+    from winchkit.cli.bench.keyboard_jog import KeyboardJog, open_keys
+
+    with open_keys() as keys:
+        KeyboardJog(station, winch, speed, time.monotonic).run(keys)

@@ -1,0 +1,219 @@
+"""Jogging by the keys of a terminal: hold to move, or inch by a fixed length a tap."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Protocol
+
+import click
+
+from winchkit.bench.control.dead_man import DEAD_MAN, FIRST_PRESS
+from winchkit.bench.control.snapshot import Phase
+from winchkit.bench.remote.interruption import Terminated
+from winchkit.cli.core.terminal import screen, status_line
+from winchkit.errors import ConnectionLost, MotionError, WinchkitError, printable
+
+if TYPE_CHECKING:
+    from winchkit.bench.remote.station import Station
+
+__all__ = [
+    "HELP",
+    "INCHES",
+    "HeldKey",
+    "KeyboardJog",
+    "Keys",
+    "open_keys",
+]
+
+_ARROWS = {"\x1b[A": "up", "\x1b[B": "down", "\x1bOA": "up", "\x1bOB": "down"}
+_WINDOWS_ARROWS = {"H": "up", "P": "down"}
+_POLL = 0.01
+
+
+class Keys(Protocol):
+    """A keyboard."""
+
+    def read(self, timeout: float) -> list[str]:
+        """Keys pressed within ``timeout`` s, oldest first; arrows as ``up`` and ``down``."""
+
+
+class HeldKey:
+    """Tells a key that is held, and repeats, from one that was pressed once.
+
+    A terminal shows no release: the first press holds for longer, since repeats start late, and
+    each repeat for as long as a dead-man may.
+    """
+
+    def __init__(self) -> None:
+        self._key = ""
+        self._until = float("-inf")
+
+    def hold(self, key: str, now: float) -> float:
+        """How long (s) the motion of this press may last without another."""
+        repeated = key == self._key and now < self._until
+        duration = DEAD_MAN if repeated else FIRST_PRESS
+        self._key, self._until = key, now + duration
+        return duration
+
+
+@contextmanager
+def open_keys() -> Iterator[Keys]:
+    """Read single keys from the terminal; its settings are restored at the end."""
+    if sys.platform == "win32":
+        yield _WindowsKeys()
+        return
+    import termios
+    import tty
+
+    descriptor = sys.stdin.fileno()
+    before = termios.tcgetattr(descriptor)
+    try:
+        tty.setcbreak(descriptor)
+        yield _PosixKeys(descriptor)
+    finally:
+        with suppress(termios.error):  # a terminal that was closed has no settings
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+class _PosixKeys:
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+
+    def read(self, timeout: float) -> list[str]:
+        """Keys pressed within ``timeout`` s."""
+        import select
+
+        ready, _, _ = select.select([self._descriptor], [], [], timeout)
+        if not ready:
+            return []
+        try:
+            typed = os.read(self._descriptor, 256).decode(errors="replace")
+        except OSError:  # the terminal was closed
+            typed = ""
+        if not typed:
+            raise Terminated
+        return split_keys(typed)
+
+
+class _WindowsKeys:
+    def read(self, timeout: float) -> list[str]:
+        """Keys pressed within ``timeout`` s."""
+        if sys.platform != "win32":
+            return []
+        import msvcrt
+
+        end = time.monotonic() + timeout
+        while not msvcrt.kbhit():
+            if time.monotonic() >= end:
+                return []
+            time.sleep(_POLL)
+        keys = []
+        while msvcrt.kbhit():
+            char = msvcrt.getwch()
+            keys.append(_WINDOWS_ARROWS.get(msvcrt.getwch(), "") if char in "\x00\xe0" else char)
+        return [key for key in keys if key]
+
+
+def split_keys(text: str) -> list[str]:
+    """Keys of what a terminal sent at once, e.g. ``"\\x1b[A\\x1b[A "``."""
+    keys = []
+    while text:
+        arrow = next((code for code in _ARROWS if text.startswith(code)), None)
+        keys.append(_ARROWS[arrow] if arrow else text[0])
+        text = text[len(arrow) if arrow else 1 :]
+    return keys
+
+
+HELP = (
+    "hold up: wind in, down: pay out · i: inch 1, 10, 100 mm a tap, then hold again · space: stop"
+    " · + −: speed · r: reset · q: stop and quit"
+)
+INCHES = (0.001, 0.01, 0.1)
+"""Steps of the inch mode, m."""
+_FASTER = 1.25
+_PICTURE = 0.1
+_WIND_IN, _PAY_OUT = "up", "down"
+
+
+class KeyboardJog:
+    """What each key does. In inch mode a tap is one step, and so is a key that is held."""
+
+    def __init__(
+        self, station: Station, winch: str | None, speed: float, now: Callable[[], float]
+    ) -> None:
+        """Begin in hold mode at ``speed`` (m/s, positive); ``now`` is the time in s."""
+        self._station, self._winch = station, winch
+        self._speed, self._now = speed, now
+        self._modes: tuple[float | None, ...] = (None, *INCHES)
+        self._held = HeldKey()
+
+    @property
+    def inch(self) -> float | None:
+        """Length of a tap, m; None in hold mode."""
+        return self._modes[0]
+
+    @property
+    def mode(self) -> str:
+        """The mode and its speed in words."""
+        if self.inch is None:
+            return f"hold, {self._speed:.3f} m/s"
+        return f"{1000 * self.inch:.0f} mm a tap, {self._speed:.3f} m/s"
+
+    def run(self, keys: Keys) -> None:
+        """Follow the keys until ``q``, showing where the bench stands."""
+        click.echo(HELP, err=True)
+        while True:
+            try:
+                for key in keys.read(_PICTURE):
+                    if key == "q":
+                        self._station.stop()
+                        click.echo("\nstopped", err=True)
+                        return
+                    self.press(key)
+                line = printable(status_line(self._station.status()))
+                click.echo(f"\r{line}  [{self.mode}]\x1b[K", nl=False, file=screen())
+            except ConnectionLost:
+                click.echo("\r\x1b[K", nl=False, file=screen())
+                raise
+            except OSError:  # the terminal was closed, and shows nothing any more
+                raise Terminated from None
+
+    def press(self, key: str) -> None:
+        """Do what a key says; what forbids it is shown, and the operator decides."""
+        try:
+            self._act(key)
+        except ConnectionLost:
+            raise
+        except WinchkitError as error:
+            click.echo(f"\n{error}", err=True)
+
+    def _act(self, key: str) -> None:
+        if key in (_WIND_IN, _PAY_OUT):
+            hold = self._held.hold(key, self._now())
+            if self.inch is None:
+                speed = self._speed if key == _WIND_IN else -self._speed
+                self._station.jog(self._winch, speed, hold)
+            elif hold == FIRST_PRESS:
+                self._step(-self.inch if key == _WIND_IN else self.inch)
+        elif key == "i":
+            self._modes = (*self._modes[1:], self._modes[0])
+            self._station.jog(self._winch, 0.0, _PICTURE)
+        elif key in "+-":
+            self._speed *= _FASTER if key == "+" else 1 / _FASTER
+        elif key == " ":
+            self._station.stop()
+        elif key == "r":
+            self._station.reset()
+
+    def _step(self, change: float) -> None:
+        """Change the cable length from rest, so that a tap is exactly one step."""
+        winches = self._station.status()["winch"]
+        name = next(iter(winches)) if self._winch is None else self._winch
+        phase = winches.get(name, {}).get("phase", Phase.DISABLED.value)
+        if phase != Phase.DISABLED.value:
+            raise MotionError(f"winch {name} is still {phase}; this tap was ignored")
+        self._station.step(self._winch, change, self._speed)

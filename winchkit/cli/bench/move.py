@@ -1,0 +1,91 @@
+"""``winchkit move``: moves a winch, or all as one, to a cable length."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.bench.direction_option import direction_options, read_direction
+from winchkit.cli.core.options import (
+    bench_option,
+    dry_run_option,
+    effects_option,
+    take_over_option,
+    winch_argument,
+)
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import status_line
+from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.bench.remote.station import Station
+
+__all__ = ["command"]
+
+_POLL = 0.05
+
+
+@click.command()
+@winch_argument
+@bench_option
+@click.option("--to", metavar="LENGTH", help="Cable length to go to.")
+@direction_options("LENGTH")
+@click.option(
+    "--speed", metavar="SPEED", help="How fast; no direction.  [default: the winch's limit]"
+)
+@click.option("--acceleration", metavar="ACCELERATION", help="[default: the winch's limit]")
+@take_over_option
+@effects_option
+@dry_run_option
+@click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
+def command(
+    winch: str | None,
+    *,
+    bench: str,
+    to: str | None,
+    pay_out: str | None,
+    wind_in: str | None,
+    speed: str | None,
+    acceleration: str | None,
+    take_over: bool,
+    effects: Sequence[str],
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Move WINCH to a cable length, or by one, on an S-curve; then disable it.
+
+    WINCH may be left out where there is one, and be "all": then all winches start in one control
+    cycle and arrive together. Ctrl-C stops. Attaches to the process that owns the bench where
+    there is one; then the motion ends with this command too.
+    """
+    from winchkit.cli.core.dry_run import station_for
+    from winchkit.cli.core.quantities import optional
+
+    direction = read_direction(pay_out, wind_in)
+    if (to is None) == (direction is None):
+        raise UsageError("where to? give one of --to, --pay-out and --wind-in, each a LENGTH")
+    target = optional(to, "length")
+    change = None if direction is None else direction.change
+    fastest, ramp = optional(speed, "speed"), optional(acceleration, "acceleration")
+    with station_for(
+        bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects
+    ) as station:
+        if take_over:
+            station.take_over(winch)
+        station.move(winch, target, change, fastest, ramp)
+        _wait(station, winch)
+        status = station.status()
+    if dry_run:
+        return
+    if as_json:
+        echo_json(status)
+    else:
+        click.echo(status_line(status))
+
+
+def _wait(station: Station, winch: str | None) -> None:
+    while station.moving(winch):
+        time.sleep(_POLL)

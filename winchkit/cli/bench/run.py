@@ -1,0 +1,157 @@
+"""``winchkit run``: executes a motion programme on a bench and logs it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.options import (
+    bench_option,
+    complete_programme,
+    dry_run_option,
+    effects_option,
+)
+from winchkit.cli.core.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.schema.programme import Programme, Step
+
+__all__ = ["command"]
+
+_POLL = 0.05
+
+
+@click.command()
+@click.argument("programme", shell_complete=complete_programme)
+@bench_option
+@click.option(
+    "-o",
+    "--out",
+    default=".",
+    show_default=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the runs.",
+)
+@click.option(
+    "--format", "suffix", default="csv", show_default=True, type=click.Choice(["csv", "mcap"])
+)
+@click.option(
+    "-y",
+    "--yes",
+    is_flag=True,
+    help="Answer every question with yes; a simulated bench does what is asked.",
+)
+@click.option("--replace", is_flag=True, help="Write over earlier runs of that programme.")
+@effects_option
+@dry_run_option
+@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
+def command(
+    programme: str,
+    *,
+    bench: str,
+    out: Path,
+    suffix: str,
+    yes: bool,
+    replace: bool,
+    effects: Sequence[str],
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Execute PROGRAMME (a file, or a shipped name) on a bench, one log per load and repeat.
+
+    Ctrl-C, a trip or a fault stops the winches; what was logged until then is kept.
+    """
+    from winchkit.schema.read import read_programme
+    from winchkit.sim.bench import programme_path
+
+    declared = read_programme(programme_path(programme))
+    if dry_run:
+        _rehearse(bench, declared, effects, as_json=as_json)
+        return
+    if not replace:
+        _refuse_to_lose(declared, out, f".{suffix}")
+    ask = partial(_agree, bench) if yes else _ask
+    written = _execute(bench, effects, declared, out, f".{suffix}", ask, replace=replace)
+    if as_json:
+        echo_json({"schema": 1, "programme": declared.name, "runs": written})
+    else:
+        for path in written:
+            click.echo(path)
+
+
+def _execute(
+    bench: str,
+    effects: Sequence[str],
+    programme: Programme,
+    out: Path,
+    suffix: str,
+    ask: Callable[[Step], None],
+    *,
+    replace: bool,
+) -> list[Path]:
+    """Run it as the bench's owner; other commands may attach meanwhile."""
+    from winchkit.bench.bench import open_bench
+    from winchkit.bench.programme import run_programme
+    from winchkit.bench.remote.commander import client_name
+
+    def tell(repeat: int, number: int, step: Step) -> None:
+        place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
+        click.echo(f"{place}: {_words(step)}", err=True)
+
+    name = client_name("run")
+    with open_bench(bench, effects=effects, name=name, realtime="try") as opened:
+        return run_programme(
+            opened, programme, out, ask, suffix=suffix, progress=tell, replace=replace
+        )
+
+
+def _refuse_to_lose(programme: Programme, out: Path, suffix: str) -> None:
+    """Raise UsageError where runs of an earlier time would be written over."""
+    from winchkit.bench.programme import earlier_runs
+
+    if held := earlier_runs(programme, out, suffix):
+        raise click.UsageError(
+            f"{held[0]} holds an earlier run of '{programme.name}'; "
+            "name another folder with --out, or --replace."
+        )
+
+
+def _rehearse(bench: str, programme: Programme, effects: Sequence[str], *, as_json: bool) -> None:
+    """Make the moves of one repeat on simulated drives, leaving out holds and questions."""
+    from winchkit.cli.core.dry_run import station_for
+
+    with station_for(
+        bench, client="run", dry_run=True, as_json=as_json, effects=effects
+    ) as station:
+        for step in programme.step:
+            if step.to is None and step.by is None:
+                continue
+            station.move(step.winch, step.to, step.by, step.speed, step.acceleration)
+            while station.moving(step.winch):
+                time.sleep(_POLL)
+
+
+def _ask(step: Step) -> None:
+    click.confirm(f"{step.ask}; done?", default=True, abort=True, err=True)
+
+
+def _agree(bench: str, step: Step) -> None:
+    """Say yes; where the bench is simulated, let the simulation do what is asked."""
+    from winchkit.sim.live.client import answer
+
+    done = answer(bench, step)
+    click.echo(f"{step.ask}: {'done by the simulation' if done else 'yes'}", err=True)
+
+
+def _words(step: Step) -> str:
+    if step.ask is not None:
+        return f"ask: {step.ask}"
+    if step.hold is not None:
+        return f"hold {step.hold:g} s"
+    where = f"to {step.to:g} m" if step.to is not None else f"by {step.by:g} m"
+    return f"winch {step.winch} {where}"

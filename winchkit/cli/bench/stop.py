@@ -1,0 +1,88 @@
+"""``winchkit stop``: stops every winch of a bench, now, and never asks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.options import bench_option, dry_run_option
+from winchkit.cli.core.output import echo_json
+from winchkit.errors import ConnectionLost, MotionError, WinchkitError
+
+if TYPE_CHECKING:
+    from winchkit.bench.emergency_stop import Stopped
+    from winchkit.schema.bench import BenchSpec
+
+__all__ = ["command"]
+
+_PATIENCE = 3.0
+"""With the owner, before the bus itself is used, s."""
+_BY_OWNER = "the bench's owner confirms it at rest"
+
+
+@click.command()
+@bench_option
+@dry_run_option
+@click.option("--json", "as_json", is_flag=True, help="Print who has confirmed as JSON.")
+def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
+    """Quick-stop every winch of a bench and wait until each drive confirms.
+
+    Goes through the process that owns the bench where there is one, else straight to the drives
+    on their bus; it never energises anything. Ends with 0 only when every drive has confirmed.
+    This is no emergency stop in the sense of EN 60204-1: that one takes the power away.
+    """
+    from winchkit.bench.emergency_stop import Stopped
+    from winchkit.bench.remote.client import attach
+    from winchkit.bench.remote.commander import client_name
+    from winchkit.schema.read import read_bench
+
+    spec = read_bench(bench)
+    if dry_run:
+        _show(spec, as_json=as_json)
+        return
+    try:
+        station = attach(spec, patience=_PATIENCE, name=client_name("stop"))
+        if station is not None:
+            station.stop()
+            station.close()
+            _tell([Stopped(name, True, _BY_OWNER) for name in spec.winch], as_json)
+            return
+    except WinchkitError as error:
+        click.echo(f"winchkit: {error}; acting on the bus itself", err=True)
+    _stop_on_bus(spec, as_json)
+
+
+def _show(spec: BenchSpec, *, as_json: bool) -> None:
+    """What goes to the drives themselves where nobody owns the bench."""
+    from winchkit.cli.core.dry_run import nodes_of, show_frames, writes
+    from winchkit.drivers.can.cia402.state_machine import QUICK_STOP
+
+    word = QUICK_STOP.to_bytes(2, "little")
+    servos = [winch.servo for winch in spec.winch.values()]
+    frames = [
+        frame for ref in servos for frame in writes(ref.bus, ref.node or 1, [(0x6040, 0, word)])
+    ]
+    show_frames(frames, nodes_of(spec), as_json=as_json)
+
+
+def _stop_on_bus(spec: BenchSpec, as_json: bool) -> None:
+    from winchkit.bench.emergency_stop import stop_on_bus
+
+    results = stop_on_bus(spec)
+    _tell(results, as_json)
+    missing = [result.winch for result in results if not result.confirmed]
+    if missing:
+        message = f"winch {', '.join(missing)} not confirmed at rest; use the emergency stop"
+        reached = any(result.confirmed for result in results)
+        raise MotionError(message) if reached else ConnectionLost(message)
+
+
+def _tell(results: Sequence[Stopped], as_json: bool) -> None:
+    if as_json:
+        echo_json({"schema": 1, "stopped": list(results)})
+        return
+    for result in results:
+        word = "stopped" if result.confirmed else "NOT CONFIRMED"
+        click.echo(f"winch {result.winch}: {word}: {result.message}", err=not result.confirmed)

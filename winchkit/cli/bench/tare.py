@@ -1,0 +1,35 @@
+"""``winchkit tare``: tares a load cell with its own volatile command."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.core.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.argument("winch", required=False)
+@click.option("-b", "--bench", required=True, metavar="FILE", help="Wiring file of the bench.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def command(winch: str | None, bench: str, as_json: bool) -> None:
+    """Tare the load cell of WINCH, at rest (the only winch where there is one).
+
+    Subtracts the present reading: by the device's own volatile tare where it has one, which
+    `winchkit cell tare --device --clear` takes away, else by the host, which `winchkit cell tare
+    --clear` takes away. Nothing is written into its EEPROM.
+    """
+    from winchkit.bench.remote.session import at_station
+
+    with at_station(bench, client="tare") as station:
+        name = winch if winch is not None or len(station.names()) > 1 else station.names()[0]
+        tension = station.tare(name)
+    if as_json:
+        echo_json({"schema": 1, "winch": name, "tension": tension})
+    else:
+        click.echo(f"tared: the cell reads {tension:.2f} N")
+        click.echo(
+            f"  `winchkit cell tare {name} --clear -b {bench}` takes a tare of the host away, with "
+            "--device the device's own"
+        )

@@ -1,0 +1,1 @@
+"""``winchkit cell``: load cells and other slow instruments; no drive is touched."""

@@ -1,0 +1,213 @@
+"""``winchkit cell calibrate``: known weights up and down, a fit, a report, accept or abort."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from winchkit.cli.core.options import bench_option, complete_winch
+from winchkit.cli.core.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.bench.cells.tasks import Cells
+    from winchkit.calibration.cell.fit import CellFit
+    from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
+
+__all__ = ["command"]
+
+_AT_REST = 4.0
+"""The spread of a mean over what white noise would make of it; more is a load that moves."""
+
+
+@click.command()
+@click.argument("cell", required=False, shell_complete=complete_winch)
+@bench_option
+@click.option("--weights", help='Weights in rising order, e.g. "0 2 5 10 15 20 kg"; or N.')
+@click.option("--series", default=3, show_default=True, help="Times up and down.")
+@click.option("--points", metavar="CSV", help="Fit these points instead of measuring.")
+@click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
+@click.option("--for", "duration", default="3 s", show_default=True, help="Averaged per weight.")
+@click.option("--settle", default="2 s", show_default=True, help="Waited after a weight is hung.")
+@click.option("--serial", help="Serial number of the cell; else what the device says.")
+@click.option("--temperature", help='At the cell, e.g. "21 degC".')
+@click.option(
+    "--direction",
+    type=click.Choice(["tension", "compression"]),
+    default="tension",
+    show_default=True,
+)
+@click.option(
+    "-o", "--output", metavar="FILE", help="The calibration's file; CELL.toml by default."
+)
+@click.option("--html", metavar="FILE", help="Also write the report as one page.")
+@click.option("--yes", is_flag=True, help="Accept the fit without asking.")
+@click.option("--json", "as_json", is_flag=True, help="Print the fit as JSON.")
+def command(
+    cell: str | None,
+    bench: str,
+    points: str | None,
+    order: Literal["linear", "quadratic"],
+    serial: str | None,
+    temperature: str | None,
+    direction: LoadDirection,
+    output: str | None,
+    html: str | None,
+    *,
+    yes: bool,
+    as_json: bool,
+    **guided: Any,
+) -> None:
+    """Calibrate the load cell CELL with known weights, and write the calibration beside the bench.
+
+    The device is not changed. Name the file in the wiring: cell = { …, calibration = "FILE" }.
+    """
+    from winchkit.calibration.cell.files import calibration_toml, write_text
+    from winchkit.calibration.cell.fit import fit_cell
+    from winchkit.cli.core.quantities import optional
+    from winchkit.report.pages.cell_calibration import report_lines
+
+    degrees = optional(temperature, "temperature")
+    found = _found(_force_cell(cell, bench), bench, points, serial, guided)
+    fit = fit_cell(found.points, order)
+    target = Path(output or Path(bench).parent / f"{found.name.replace('.', '-')}.toml")
+    calibration = _calibration(target.stem, fit, found, degrees, direction)
+    for line in report_lines(fit, found.points):
+        click.echo(line, err=as_json)
+    if html is not None:
+        _write_page(html, calibration, fit)
+    if not yes:
+        click.confirm(f"Accept, and write {target}?", abort=True, err=True)
+    write_text(target, calibration_toml(calibration))
+    click.echo(f"written: {target}", err=True)
+    if as_json:
+        echo_json({"schema": 1, "file": str(target), "fit": fit, "points": found.points})
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Points, and the cell that they are of."""
+
+    name: str
+    device: str
+    serial: str
+    points: tuple[CalibrationPoint, ...]
+
+
+def _found(
+    name: str, bench: str, points: str | None, serial: str | None, guided: dict[str, Any]
+) -> _Measured:
+    """Points from a file or from the bench."""
+    if points and guided["weights"]:
+        raise click.UsageError("'--points' measures nothing, so '--weights' has no place there.")
+    found = _from_file(name, bench, points) if points else _measure(name, bench, **guided)
+    return found if serial is None else replace(found, serial=serial)
+
+
+def _write_page(path: str, calibration: CellCalibration, fit: CellFit) -> None:
+    from winchkit.cli.model.options import write_page
+    from winchkit.report.pages.cell_calibration import report_page
+
+    write_page(path, report_page(calibration, fit))
+
+
+def _calibration(
+    name: str,
+    fit: CellFit,
+    found: _Measured,
+    temperature: float | None,
+    direction: LoadDirection,
+) -> CellCalibration:
+    from winchkit.schema.calibration import CellCalibration
+
+    loads = [point.load for point in found.points]
+    return CellCalibration(
+        name=name,
+        date=date.today(),
+        coefficients=fit.coefficients,
+        device=found.device,
+        serial_number=found.serial,
+        temperature=temperature,
+        direction=direction,
+        low=min(loads),
+        high=max(loads),
+        residual_std=fit.residual_std,
+        nonlinearity=fit.nonlinearity.value,
+        hysteresis=fit.hysteresis.value,
+        repeatability=fit.repeatability.value,
+        point=found.points,
+    )
+
+
+def _force_cell(cell: str | None, bench: str) -> str:
+    """Full name of what is to be calibrated; raises UsageError for what measures no force."""
+    from winchkit.bench.cells.desk import full_name
+    from winchkit.cli.cell.options import unit_of
+    from winchkit.schema.read import read_bench
+
+    name = full_name(read_bench(bench), cell)
+    if unit_of(name) != "N":
+        raise click.UsageError(f"{name} measures no force; weights calibrate a load cell.")
+    return name
+
+
+def _from_file(name: str, bench: str, points: str) -> _Measured:
+    """Points of a CSV file for a cell of the wiring file; nothing is opened."""
+    from winchkit.bench.cells.instruments import device_of, refs_of
+    from winchkit.calibration.cell.files import read_points
+    from winchkit.schema.read import read_bench
+
+    spec = read_bench(bench)
+    winch, _, role = name.rpartition(".")
+    device = device_of(spec, refs_of(spec)[winch, role]).name
+    return _Measured(name, device, "", read_points(points))
+
+
+def _measure(
+    cell: str, bench: str, *, weights: str | None, series: int, duration: str, settle: str
+) -> _Measured:
+    """Lead through the weights."""
+    from winchkit.calibration.cell.weighing_order import plan
+    from winchkit.cli.cell.options import cells
+    from winchkit.cli.core.quantities import quantity
+
+    steps = plan(weights or click.prompt("Weights, rising (0 2 5 10 kg)", err=True), series)
+    average, wait = quantity(duration, "time"), quantity(settle, "time")
+    with cells(bench, cell) as (found, name):
+        known = found.do("identify", name)
+        identity = known["identity"]
+        serial = f"{identity['serial number']:.0f}" if "serial number" in identity else ""
+        points = tuple(
+            _hang(found, name, f"{number}/{len(steps)}", step, average, wait)
+            for number, step in enumerate(steps, start=1)
+        )
+        return _Measured(name, known["device"], serial, points)
+
+
+def _hang(
+    found: Cells, name: str, number: str, step: CalibrationPoint, average: float, wait: float
+) -> CalibrationPoint:
+    """Ask for one weight and measure it, again where the operator wants."""
+    from winchkit.calibration.cell.weighing_order import spoken
+
+    while True:
+        click.prompt(
+            f"[{number}] hang {spoken(step)}, let it come to rest, press Enter",
+            default="",
+            show_default=False,
+            err=True,
+        )
+        seen = found.do("indicated", name, wait, average)
+        click.echo(
+            f"    indicated {seen['mean']:.4f} ± {seen['std']:.4f} N (noise {seen['noise']:.3g} N, "
+            f"{seen['readings']} readings)",
+            err=True,
+        )
+        at_rest = seen["std"] <= _AT_REST * seen["noise"] / seen["readings"] ** 0.5
+        if at_rest or click.confirm(
+            "    it is not at rest; take it all the same?", default=False, err=True
+        ):
+            return replace(step, indicated=seen["mean"], std=seen["std"])

@@ -1,0 +1,143 @@
+"""``winchkit cell diagnose``: a few seconds of readings, and what they say about the cell."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import Counter
+from typing import TYPE_CHECKING, NoReturn
+
+import click
+
+from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
+from winchkit.cli.core.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.calibration.cell.health import Health, Samples
+    from winchkit.drivers.reading import Reading
+
+__all__ = ["command"]
+
+_MEANINGS = {
+    "mismatch": "status and value contradict each other; check order, type and scale of the "
+    "value in the device file",
+    "overload": "beyond the cell's or the converter's range; take the load off, check the wires",
+    "underload": "below the cell's or the converter's range; check the wires",
+    "fault": "the device reports a fault of its own; check cell and cable",
+    "stale": "the device says that it has no new value",
+    "ambiguous": "it may be the late reply to an earlier request; check the line and longest_reply",
+    "frozen": "the counts stand still while they should not; switch the amplifier off and on",
+}
+
+
+@click.command()
+@cell_options
+@click.option("--for", "duration", default="10 s", show_default=True, help="Watched for this.")
+def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
+    """Watch CELL and report rate, noise, drift, frozen or repeated counts, hum and creep.
+
+    Leave the load alone, or change it once: then creep is told as well. Exit 1 where something
+    is wrong with the readings themselves.
+    """
+    from winchkit.bench.cells.tasks import readings_of
+    from winchkit.calibration.cell.health import examine
+    from winchkit.cli.core.quantities import quantity
+
+    seconds = quantity(duration, "time")
+    with cells(bench, cell) as (found, name):
+        watched = found.do("watch", name, seconds)
+    readings, counters = readings_of(watched), watched["counters"]
+    unit = unit_of(name)
+    flags = _flags(readings)
+    if sum(item.quality.usable for item in readings) < len(readings) / 2:
+        _tell_unusable(name, len(readings), flags, counters, as_json)
+    health = examine(_samples(readings))
+    if as_json:
+        told = {"cell": name, "unit": unit, **dataclasses.asdict(health)}
+        told |= {"flags": flags, "counters": counters}
+        echo_json({"schema": 1, **told})
+    else:
+        click.echo(f"{name}, {seconds:g} s:")
+        for line in _lines(health, unit):
+            click.echo(f"  {line}")
+        click.echo("  counters: " + ", ".join(f"{k} {v}" for k, v in counters.items()))
+        for remark in health.remarks:
+            click.echo(f"  ! {remark}")
+    if health.saturated or health.usable < health.readings or health.unique == 1:
+        click.get_current_context().exit(1)
+
+
+def _flags(readings: list[Reading]) -> dict[str, int]:
+    """How many readings carry each flag."""
+    found: Counter[str] = Counter()
+    for reading in readings:
+        found.update(flag.name.lower() for flag in reading.quality if flag.name)
+    return dict(found.most_common())
+
+
+def _tell_unusable(
+    name: str, count: int, flags: dict[str, int], counters: dict[str, int], as_json: bool
+) -> NoReturn:
+    """Say why there is nothing to examine, and end with 1."""
+    if as_json:
+        told = {"cell": name, "readings": count, "flags": flags, "counters": counters}
+        echo_json({"schema": 1, **told})
+    else:
+        listed = ", ".join(f"{flag} {number}" for flag, number in flags.items())
+        click.echo(f"{name}: most of {count} readings are no measurements: {listed}")
+        for flag in flags:
+            if flag in _MEANINGS:
+                click.echo(f"  ! {flag}: {_MEANINGS[flag]}")
+    click.get_current_context().exit(1)
+
+
+def _samples(readings: list[Reading]) -> Samples:
+    from winchkit.calibration.cell.health import samples_of
+    from winchkit.drivers.reading import Quality
+
+    saturated = Quality.OVERLOAD | Quality.UNDERLOAD
+    return samples_of(
+        [
+            (
+                item.t_sample,
+                item.raw,
+                item.gross,
+                item.quality.usable,
+                bool(item.quality & saturated),
+            )
+            for item in readings
+        ]
+    )
+
+
+def _lines(health: Health, unit: str) -> list[str]:
+    """Klipper's order: how many, how fast, how good; then what is in them."""
+    lines = [
+        f"readings {health.readings} ({health.rate:.1f} /s, longest gap "
+        f"{health.longest_gap * 1e3:.0f} ms)",
+        f"usable {health.usable}, saturated {health.saturated}",
+        f"counts: {health.unique} different, {health.duplicates:.1%} repeat the one before, "
+        f"longest standstill {health.longest_still:.2f} s",
+        f"gross value: {shown(health.low, unit)} to {shown(health.high, unit)}, "
+        f"mean {shown(health.mean, unit)}",
+        f"noise: {shown(health.noise, unit, 3)} rms"
+        + (f" ({health.noise_counts:.2g} counts)" if math.isfinite(health.noise_counts) else ""),
+        f"drift: {health.drift * 60:+.3g} ± {health.drift_std * 60:.2g} {unit} a minute",
+    ]
+    for hum in health.hum:
+        told = (
+            "cannot be told at this rate"
+            if math.isnan(hum.amplitude)
+            else f"{hum.amplitude:.3g} ± {hum.std:.2g} {unit}"
+            + ("" if hum.there else " (within the noise)")
+        )
+        lines.append(f"hum at {hum.frequency:g} Hz: {told}")
+    if health.creep is None:
+        lines.append("creep: no change of load was seen")
+    else:
+        creep = health.creep
+        lines.append(
+            f"creep after a change of {shown(creep.step, unit)}: {creep.change:+.3g} ± "
+            f"{creep.std:.2g} {unit} between 1 and 30 minutes, from {creep.since:.0f} s"
+        )
+    return lines

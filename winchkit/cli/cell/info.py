@@ -1,0 +1,46 @@
+"""``winchkit cell info``: what an instrument is, and what it says now."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
+from winchkit.cli.core.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@cell_options
+def command(cell: str | None, bench: str, *, as_json: bool) -> None:
+    """Print device file, serial number, calibration, tare, a reading with its times, counters."""
+    with cells(bench, cell) as (found, name):
+        facts = found.do("about", name)
+    if as_json:
+        echo_json({"schema": 1, **facts})
+        return
+    for line in _lines(facts, unit_of(name)):
+        click.echo(line)
+
+
+def _lines(facts: dict[str, Any], unit: str) -> list[str]:
+    device, reading, times = facts["device"], facts["reading"], facts["timing"]
+    identity = ", ".join(f"{key} {value:g}" for key, value in facts["identity"].items())
+    tare = facts["tare"]
+    lines = [
+        f"{facts['cell']}: {device['maker']} {device['model']}",
+        f"  device file  {device['name']} (trust: {device['trust']}; {device['source']})",
+        f"  identity     {identity or 'the device file does not say how to ask'}",
+        f"  calibration  {facts['calibration'] or 'none; the device is believed as it is'}",
+        f"  tare         host {shown(tare['host'], unit)}, device "
+        + {True: "on", False: "off", None: "unknown"}[tare["device"]],
+        f"  reading      {shown(reading['value'], unit, 6)} net, "
+        f"{shown(reading['gross'], unit, 6)} gross, {reading['raw']:g} counts: "
+        f"{reading['quality']}",
+        f"  sampled      {times['age'] * 1e3:.1f} ± {times['uncertainty'] * 1e3:.1f} ms before "
+        f"it was received, of which filter {times['filter'] * 1e3:.1f} ms",
+        "  counters     " + ", ".join(f"{key} {value}" for key, value in facts["counters"].items()),
+    ]
+    return lines + [f"  ! {remark}" for remark in facts["remarks"]]

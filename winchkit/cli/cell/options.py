@@ -1,0 +1,62 @@
+"""What the commands of ``winchkit cell`` have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import isnan
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.core.options import bench_option, complete_winch
+
+if TYPE_CHECKING:
+    from winchkit.bench.cells.tasks import Cells
+
+__all__ = ["cell_options", "cells", "host_tare_note", "shown", "unit_of"]
+
+_UNITS = {"cell": "N", "load": "N", "length": "m", "temperature": "degC"}
+
+
+def cell_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the argument CELL, --bench and --json."""
+    options: list[Callable[..., Any]] = [
+        click.argument("cell", required=False, shell_complete=complete_winch),
+        bench_option,
+        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+    ]
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+@contextmanager
+def cells(bench: str, cell: str | None) -> Iterator[tuple[Cells, str]]:
+    """The instruments of a bench, and the full name of the one that is meant."""
+    from winchkit.bench.cells.desk import full_name
+    from winchkit.bench.remote.cell_session import at_cells
+
+    with at_cells(bench) as found:
+        yield found, full_name(found.spec, cell)
+
+
+def unit_of(name: str) -> str:
+    """SI unit of an instrument by its role."""
+    return _UNITS[name.rpartition(".")[2]]
+
+
+def shown(value: float, unit: str, digits: int = 5) -> str:
+    """A value for people; ``unknown`` for NaN."""
+    return "unknown" if isnan(value) else f"{value:.{digits}g} {unit}".rstrip()
+
+
+def host_tare_note(result: dict[str, Any], unit: str) -> list[str]:
+    """That the host's tare is still taken off, where a device has zeroed or tared itself."""
+    tare = result["host_tare"]
+    if not tare:
+        return []
+    return [
+        f"  the host's own tare of {shown(tare, unit)} is still taken off; "
+        "`winchkit cell tare --clear` takes it away"
+    ]

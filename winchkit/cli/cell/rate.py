@@ -1,0 +1,68 @@
+"""``winchkit cell rate``: how fast an instrument is read, and why not faster."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from winchkit.cli.cell.options import cell_options, cells
+from winchkit.cli.core.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@cell_options
+@click.option("--for", "duration", default="3 s", show_default=True, help="Measured for this.")
+def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
+    """Measure the rate of CELL and say what limits it: wire, turnaround, conversions, sharing."""
+    from winchkit.cli.core.quantities import quantity
+
+    seconds = quantity(duration, "time")
+    with cells(bench, cell) as (found, name):
+        report = found.do("rate", name, seconds)
+    if as_json:
+        echo_json({"schema": 1, **report})
+        return
+    for line in _lines(report):
+        click.echo(line)
+
+
+def _lines(report: dict[str, Any]) -> list[str]:
+    head = f"{report['cell']}: {report['rate']:.1f} readings a second "
+    if report["by_itself"]:
+        head += f"(its device file says {report['planned']:.1f}); the device sends them by itself"
+    else:
+        head += f"(planned {report['planned']:.1f}), limited by {report['limited_by']}"
+    lines = [head, *(f"  {rate:8.1f} /s  {what}" for what, rate in report["limits"].items())]
+    lines += _cost(report["exchange"])
+    latency = {key: value * 1e3 for key, value in report["latency"].items()}
+    asked = "from its first byte to its last" if report["by_itself"] else "from request to answer"
+    lines.append(
+        f"  {asked} p50 {latency['p50']:.2f}, p99 {latency['p99']:.2f}, "
+        f"worst {latency['worst']:.2f} ms; {report['duplicates']:.1%} repeat the count before"
+    )
+    lines.append(
+        "  " + ", ".join(f"{key} {value}" for key, value in report["counters"].items() if value)
+    )
+    return [*lines, f"  {report['advice']}"] if report["advice"] else lines
+
+
+def _cost(cost: dict[str, Any]) -> list[str]:
+    """What a reading keeps the line busy with; nothing for a device that sends by itself."""
+    if not cost:
+        return []
+    lines = [f"  a reading keeps the line busy for {cost['time'] * 1e3:.2f} ms"]
+    if "bytes" in cost:
+        queries = f"{cost['queries']} {'query' if cost['queries'] == 1 else 'queries'}"
+        lines[0] += f": {cost['bytes']} bytes in {queries}"
+    if cost["baudrate"]:
+        lines[0] += f" at {cost['baudrate']} Bd"
+    if cost["baudrate"] and "wire" in cost:
+        lines.append(
+            f"  by the standard {cost['wire'] * 1e3:.2f} ms on the wire, "
+            f"{cost['silence'] * 1e3:.2f} ms of silence between frames, "
+            f"about {cost['turnaround'] * 1e3:.2f} ms turnaround"
+        )
+    return lines

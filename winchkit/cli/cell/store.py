@@ -1,0 +1,32 @@
+"""``winchkit cell store``: the one command that lets a device write its EEPROM."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.cell.options import cell_options, cells
+from winchkit.cli.core.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@cell_options
+@click.option("--command", "name", default="store", show_default=True, help="Of the device file.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
+def command(cell: str | None, bench: str, name: str, *, yes: bool, as_json: bool) -> None:
+    """Send CELL a command that writes its EEPROM, such as its own store, or a lasting zero.
+
+    An EEPROM wears out (100,000 writes are usual). Nothing else in winchkit writes it.
+    """
+    from winchkit.bench.cells.desk import check_permanent
+
+    with cells(bench, cell) as (found, full):
+        check_permanent(found.spec, full, name)
+        if not yes:
+            click.confirm(f"Write the EEPROM of {full} with '{name}'?", abort=True, err=True)
+        found.do("store", full, name)
+    if as_json:
+        echo_json({"schema": 1, "cell": full, "command": name})
+    else:
+        click.echo(f"{full}: '{name}' sent and accepted")

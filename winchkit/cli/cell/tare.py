@@ -1,0 +1,71 @@
+"""``winchkit cell tare``: a tare of the host, kept beside the wiring file; no EEPROM is written."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
+from winchkit.cli.core.output import echo_json
+
+__all__ = ["command"]
+
+_TASKS = {
+    (False, False): "host tare",
+    (False, True): "device tare",
+    (True, False): "clear tare",
+    (True, True): "clear device tare",
+}
+"""By --clear and --device."""
+
+
+@click.command()
+@cell_options
+@click.option("--for", "duration", default="1 s", show_default=True, help="Averaged over this.")
+@click.option("--clear", is_flag=True, help="Take the tare away: the host's, or with --device its.")
+@click.option("--device", is_flag=True, help="Send the device its own volatile tare instead.")
+def command(
+    cell: str | None, bench: str, duration: str, *, clear: bool, device: bool, as_json: bool
+) -> None:
+    """Let CELL count from what hangs on it now.
+
+    The host subtracts the mean; the number stands in BENCH.tares.toml and holds for everything
+    that opens the bench from now on. The device knows nothing of it.
+
+    `winchkit tare` does this where the device has no volatile tare of its own, else what --device
+    does: --clear takes the first away, --device --clear the second.
+    """
+    from winchkit.cli.core.quantities import quantity
+
+    seconds = quantity(duration, "time")
+    with cells(bench, cell) as (found, name):
+        task = _TASKS[clear, device]
+        result = found.do(task, name, *() if task == "clear tare" else (seconds,))
+    unit = unit_of(name)
+    if as_json:
+        echo_json({"schema": 1, "cell": name, "unit": unit, **result})
+        return
+    click.echo(f"{name}: {_told(task, result, unit)}")
+    for line in host_tare_note(result, unit) if device else ():
+        click.echo(line)
+
+
+def _told(task: str, result: dict[str, Any], unit: str) -> str:
+    """What was done, for people."""
+    if task == "clear tare":
+        return (
+            f"the host's tare of {shown(result['removed'], unit)} is gone; "
+            "`winchkit tare` sets one again"
+        )
+    before, after = (shown(result[key], unit) for key in ("before", "after"))
+    if task == "clear device tare":
+        return (
+            f"the device's own tare is gone: it read {before}; it reads {after}; "
+            "`winchkit tare` sets one again"
+        )
+    by = "the device" if task == "device tare" else "the host"
+    return (
+        f"tared by {by}: {before} ± {shown(result['std'], unit, 2)} is zero now "
+        f"({result['readings']} readings); it reads {after}"
+    )

@@ -1,0 +1,36 @@
+"""``winchkit cell zero``: the device's own zero."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
+from winchkit.cli.core.output import echo_json
+
+__all__ = ["command"]
+
+
+@click.command()
+@cell_options
+@click.option("--for", "duration", default="1 s", show_default=True, help="Averaged over this.")
+def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
+    """Send the device of CELL its zero command: what hangs on it now becomes its gross zero.
+
+    Only a volatile zero is sent; a device that keeps it in its EEPROM needs
+    `winchkit cell store --command zero`.
+    """
+    from winchkit.cli.core.quantities import quantity
+
+    seconds = quantity(duration, "time")
+    with cells(bench, cell) as (found, name):
+        result = found.do("zero", name, seconds)
+    unit = unit_of(name)
+    if as_json:
+        echo_json({"schema": 1, "cell": name, "unit": unit, **result})
+        return
+    click.echo(
+        f"{name}: the device zeroed itself at {shown(result['before'], unit)}; "
+        f"it reads {shown(result['after'], unit)}"
+    )
+    for line in host_tare_note(result, unit):
+        click.echo(line)

@@ -1,0 +1,247 @@
+"""``--dry-run``: the frames that a command would send, in words; nothing reaches a real bus.
+
+Commands that move are rehearsed on simulated drives with the bench's own wiring, in this process;
+commands that only write name their frames without any drive.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
+
+import can
+import click
+
+from winchkit.cli.core.output import echo_json
+from winchkit.drivers.clock import Clock
+
+if TYPE_CHECKING:
+    from winchkit.bench.remote.station import Station
+    from winchkit.drivers.can.tools.decode import Decoded, KnownNode
+    from winchkit.schema.bench import BenchSpec, BusSpec
+    from winchkit.schema.simbench import SimBench
+
+__all__ = [
+    "Frame",
+    "FrameTap",
+    "nodes_of",
+    "show_frames",
+    "station_for",
+    "writes",
+]
+
+_CYCLIC = ("SYNC", "RPDO", "heartbeat")
+_CONTROL_WORD = "6040h"
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame that would be sent."""
+
+    time: float
+    """Since the first, s."""
+    bus: str
+    identifier: int
+    data: bytes
+
+
+@contextmanager
+def station_for(
+    bench: str,
+    *,
+    client: str,
+    dry_run: bool,
+    as_json: bool = False,
+    effects: Sequence[str] = (),
+) -> Iterator[Station]:
+    """A station at the bench or, for a dry run, at a rehearsal whose frames are then shown.
+
+    ``client`` is the command's name, as other clients of the bench see it.
+    """
+    from winchkit.bench.remote.session import at_station
+
+    if not dry_run:
+        with at_station(bench, effects, client=client) as station:
+            yield station
+        return
+    from winchkit.schema.read import read_bench
+
+    spec = read_bench(bench).with_effects(effects)
+    frames: list[Frame] = []
+    with _rehearsal(spec, frames) as station:
+        yield station
+    show_frames(frames, nodes_of(spec), as_json=as_json)
+
+
+def nodes_of(spec: BenchSpec) -> dict[str, dict[int, KnownNode]]:
+    """The drives of a bench as their device files declare them, by bus and node."""
+    from winchkit.bench.cells.instruments import device_of
+    from winchkit.drivers.can.tools.decode import KnownNode, known_node
+
+    nodes: dict[str, dict[int, KnownNode]] = {
+        name: {bus.node: KnownNode("host")} for name, bus in spec.bus.items() if bus.kind == "can"
+    }
+    for name, winch in spec.winch.items():
+        ref = winch.servo
+        node = ref.node or 1
+        nodes[ref.bus][node] = known_node(f"winch {name}", device_of(spec, ref), node)
+    return nodes
+
+
+def writes(bus: str, node: int, values: Iterable[tuple[int, int, bytes]]) -> list[Frame]:
+    """Frames that write objects (index, sub-index, bytes) by SDO, one after another."""
+    from winchkit.drivers.can.tools.decode import write_frames
+
+    return [
+        Frame(0.0, bus, identifier, data)
+        for index, sub, value in values
+        for identifier, data in write_frames(node, index, sub, value)
+    ]
+
+
+def show_frames(
+    frames: Sequence[Frame], nodes: Mapping[str, Mapping[int, KnownNode]], *, as_json: bool
+) -> None:
+    """Print frames in words; as JSON all of them, else cyclic ones where they change."""
+    from winchkit.drivers.can.tools.decode import decode
+
+    decoded = [
+        (frame, decode(frame.identifier, frame.data, nodes.get(frame.bus, {}))) for frame in frames
+    ]
+    if as_json:
+        listed = [
+            {
+                "time": frame.time,
+                "bus": frame.bus,
+                "id": frame.identifier,
+                "data": frame.data.hex(),
+                **vars(words),
+            }
+            for frame, words in decoded
+        ]
+        echo_json({"schema": 1, "dry_run": True, "frames": listed})
+        return
+    for line in _digest(decoded):
+        click.echo(line)
+    click.echo("dry run: nothing was sent", err=True)
+
+
+def _digest(decoded: Sequence[tuple[Frame, Decoded]]) -> Iterator[str]:
+    """A line for each frame; cyclic ones between changes of a control word are summed up."""
+    words: dict[tuple[str, int], int | None] = {}
+    quiet: list[Decoded] = []
+    for frame, item in decoded:
+        key = (frame.bus, frame.identifier)
+        control = item.values.get(_CONTROL_WORD)
+        if item.kind in _CYCLIC and key in words and words[key] == control:
+            quiet.append(item)
+            continue
+        words[key] = control
+        yield from _summed(quiet)
+        quiet.clear()
+        data = frame.data.hex(" ").upper()
+        yield f"{frame.time:9.3f} s  {frame.bus} {frame.identifier:03X} [{data}]  {item.text}"
+    yield from _summed(quiet)
+
+
+def _summed(items: Sequence[Decoded]) -> Iterator[str]:
+    """How many frames there were, and between which values their targets lay."""
+    if not items:
+        return
+    counts = {kind: sum(item.kind == kind for item in items) for kind in _CYCLIC}
+    parts = [f"{count} × {kind}" for kind, count in counts.items() if count]
+    ranges: dict[tuple[int, str], list[int]] = {}
+    for item in items:
+        for name, value in item.values.items():
+            ranges.setdefault((item.node, name), []).append(value)
+    parts += [
+        f"node {node} {name} {min(values)} … {max(values)}"
+        for (node, name), values in ranges.items()
+        if name != _CONTROL_WORD and min(values) != max(values)
+    ]
+    yield f"           …  {', '.join(parts)}"
+
+
+@contextmanager
+def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
+    """The bench with simulated drives; what the host sends is collected."""
+    from winchkit.bench.bench import open_bench
+    from winchkit.bench.remote.station import LocalStation
+    from winchkit.cli.core.dry_run import FrameTap
+    from winchkit.sim.live.bench import LiveBench
+    from winchkit.sim.live.paced_clock import PacedClock
+
+    clock = PacedClock()
+    click.echo(
+        "dry run on simulated drives, each rope at its reference length; nothing is sent", err=True
+    )
+    with ExitStack() as stack:
+        live = stack.enter_context(LiveBench(_simulated(spec), clock=clock.simulation))
+        for name, bus in live.bench_spec.bus.items():
+            stack.enter_context(FrameTap(name, bus, clock, frames))
+        bench = stack.enter_context(open_bench(live.bench_spec, clock))
+        bench.on_cycle(clock.control)
+        station = LocalStation(bench)
+        yield station
+        station.close()
+
+
+def _simulated(spec: BenchSpec) -> SimBench:
+    """The bench as it is wired, without instruments, its declarations being true."""
+    from winchkit.schema.simbench import NoiseSpec, SimBench, WinchTruth
+
+    winches = {
+        name: replace(winch, cell=None, load=None, length=None, temperature=None)
+        for name, winch in spec.winch.items()
+    }
+    buses = {name: bus for name, bus in spec.bus.items() if bus.kind == "can"}
+    hanging = {name: winch.load_mass for name, winch in winches.items()}
+    truth = {
+        name: WinchTruth() if mass is None else WinchTruth(load_mass=mass)
+        for name, mass in hanging.items()
+    }
+    return SimBench(spec.name, replace(spec, winch=winches, bus=buses), truth, NoiseSpec(), ())
+
+
+_WAIT = 0.02
+_FROM_HOST = (0x000, 0x200, 0x300, 0x400, 0x500, 0x600)
+"""Identifiers, less the node number, that a host sends; and its SYNC, heartbeat and LSS."""
+_SYNC, _HEARTBEAT, _LSS = 0x080, 0x700, 0x7E5
+
+
+class FrameTap:
+    """Collects what the host sends for as long as its ``with`` block lasts."""
+
+    def __init__(self, name: str, bus: BusSpec, clock: Clock, frames: list[Frame]) -> None:
+        """Append to ``frames``; times count from now."""
+        self._name, self._clock, self._begun = name, clock, clock.now()
+        self._host = (_SYNC, _HEARTBEAT + bus.node, _LSS)
+        self._frames = frames
+        self._bus = can.Bus(interface="virtual", channel=bus.channel)
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._listen, name=f"tap-{name}", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self._bus.shutdown()
+
+    def _listen(self) -> None:
+        """Take every frame that there is, also those that wait when it is to end."""
+        while True:
+            message = self._bus.recv(0.0 if self._stopping.is_set() else _WAIT)
+            if message is None:
+                if self._stopping.is_set():
+                    return
+                continue
+            identifier = message.arbitration_id
+            if identifier in self._host or identifier & ~0x7F in _FROM_HOST:
+                time = self._clock.now() - self._begun
+                self._frames.append(Frame(time, self._name, identifier, bytes(message.data)))

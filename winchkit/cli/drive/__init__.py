@@ -1,0 +1,1 @@
+"""Commands about CANopen nodes: scan, info, config, LSS and bus load."""

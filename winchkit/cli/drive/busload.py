@@ -1,0 +1,72 @@
+"""``winchkit busload``: what a wiring file puts on its CAN buses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.core.options import complete_bench
+from winchkit.cli.core.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.drivers.can.bus.load import Load
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.argument("bench", metavar="BENCH", shell_complete=complete_bench)
+@click.option("--json", "as_json", is_flag=True, help="Print the loads as JSON.")
+@click.pass_context
+def command(ctx: click.Context, bench: str, as_json: bool) -> None:
+    """Worst-case load of each CAN bus of BENCH, and the fastest SYNC that fits.
+
+    Counts every frame with all stuff bits that it may need. Cyclic traffic should take no more
+    than 70 % of a bus, the rest is for SDO, emergencies and repeats. Opens nothing. Ends with 1
+    when a bus carries more than that.
+    """
+    from winchkit.bench.drives.bus_load import loads
+    from winchkit.drivers.can.bus.load import ADVISED
+    from winchkit.schema.read import read_bench
+
+    found = loads(read_bench(bench))
+    if as_json:
+        echo_json({"schema": 1, "advised": ADVISED, "bus": _trees(found)})
+    else:
+        for name, load in found.items():
+            _show(name, load)
+    ctx.exit(0 if all(load.share <= ADVISED for load in found.values()) else 1)
+
+
+def _trees(found: dict[str, Load]) -> dict[str, Any]:
+    return {
+        name: {
+            "bitrate": load.bitrate,
+            "cycle": load.cycle,
+            "share": load.share,
+            "fastest_cycle": load.fastest(),
+            "frames": [{**vars(frame), "bits": frame.bits} for frame in load.frames],
+        }
+        for name, load in found.items()
+    }
+
+
+def _show(name: str, load: Load) -> None:
+    fastest = load.fastest()
+    click.echo(
+        f"bus {name}: {load.share:.1%} of {load.bitrate / 1000:g} kbit/s at a cycle of "
+        f"{load.cycle * 1e3:g} ms ({1 / load.cycle:.0f} Hz); fastest that fits: "
+        f"{fastest * 1e3:.1f} ms ({1 / fastest:.0f} Hz)"
+    )
+    for frame in load.frames:
+        when = f"every {_ordinal(frame.every)}" if frame.every else f"every {frame.period:g} s"
+        click.echo(f"  {frame.name}: {_bytes(frame.size)}, {frame.bits} bits, {when}")
+
+
+def _bytes(size: int) -> str:
+    return "1 byte" if size == 1 else f"{size} bytes"
+
+
+def _ordinal(every: int) -> str:
+    return "SYNC" if every == 1 else f"{every} SYNCs"

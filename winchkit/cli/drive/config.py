@@ -1,0 +1,207 @@
+"""``winchkit config``: the settings of a drive, in files and in its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.core.options import BusChoice, bus_options, complete_winch, dry_run_option
+from winchkit.cli.core.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.cli.core.dry_run import Frame
+    from winchkit.drivers.can.canopen.node import Objects
+    from winchkit.drivers.can.tools.config import Difference
+
+__all__ = ["command"]
+
+_FILE = click.Path(dir_okay=False, path_type=Path)
+_who = click.argument("who", required=True, metavar="WINCH|NODE", shell_complete=complete_winch)
+_file = click.argument("file", type=_FILE, metavar="FILE")
+_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_yes = click.option("-y", "--yes", is_flag=True, help="Do not ask.")
+
+
+@dataclass(frozen=True)
+class Asking:
+    """How something that cannot be undone is asked for and told."""
+
+    what: str
+    yes: bool
+    dry_run: bool
+    as_json: bool
+
+
+@click.group()
+def command() -> None:
+    """Settings of a drive: save and load a file (.dcf or .json), store and restore its memory.
+
+    Settings are what the drive keeps for you: gains, limits, ramps, option codes. What a bench
+    sets at each opening (PDOs, heartbeats) is none, nor are commands and targets.
+    """
+
+
+@command.command()
+@_who
+@bus_options
+@click.option("-o", "--output", type=_FILE, required=True, help="A .dcf or .json file.")
+@_json
+def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
+    """Read every setting of a drive into a file."""
+    from winchkit.bench.drives.node_access import drive_at
+    from winchkit.drivers.can.tools.config import read_config, write_config_file
+
+    with drive_at(BusChoice(**bus).spec(), who) as node:
+        config = read_config(node.objects)
+        write_config_file(output, config, node.eds, node.node, node.bitrate)
+    for reason in config.refused:
+        click.echo(f"left out: {reason}", err=True)
+    count = len(config.values)
+    if as_json:
+        echo_json({"schema": 1, "output": output, "settings": count, "refused": config.refused})
+    else:
+        click.echo(f"{output}: {count} settings of {node.name}")
+
+
+@command.command()
+@_who
+@_file
+@bus_options
+@_json
+def diff(who: str, file: Path, *, as_json: bool, **bus: Any) -> None:
+    """Compare a file with a drive; ends with 1 where they differ."""
+    from winchkit.bench.drives.node_access import drive_at
+    from winchkit.drivers.can.tools.config import check_fits, difference, read_config_file
+    from winchkit.drivers.can.tools.scan import identity_of
+
+    with drive_at(BusChoice(**bus).spec(), who) as node:
+        config = read_config_file(file, node.objects.dictionary)
+        check_fits(config, identity_of(node.objects.port), str(file))
+        found = difference(config, node.objects)
+    if as_json:
+        echo_json({"schema": 1, "differences": found})
+    else:
+        for item in found:
+            click.echo(_line(item))
+        click.echo(f"{len(found)} of {len(config.values)} settings differ", err=True)
+    click.get_current_context().exit(1 if found else 0)
+
+
+@command.command()
+@_who
+@_file
+@bus_options
+@dry_run_option
+@_json
+def load(who: str, file: Path, *, dry_run: bool, as_json: bool, **bus: Any) -> None:
+    """Write what differs from a file to a drive, and read it back.
+
+    The drive must be disabled. It forgets what was loaded when it is switched off, unless
+    `config store` follows. A dry run shows every setting of the file, differing or not.
+    """
+    from winchkit.bench.drives.node_access import drive_at
+    from winchkit.drivers.can.tools.config import check_fits, read_config_file, write_config
+    from winchkit.drivers.can.tools.scan import identity_of
+
+    choice = BusChoice(**bus)
+    if dry_run:
+        _show_load(choice, who, file, as_json=as_json)
+        return
+    with drive_at(choice.spec(), who, writes=True) as node:
+        config = read_config_file(file, node.objects.dictionary)
+        check_fits(config, identity_of(node.objects.port), str(file))
+        changed = write_config(config, node.objects)
+    if as_json:
+        echo_json({"schema": 1, "changed": changed, "same": len(config.values) - len(changed)})
+        return
+    for item in changed:
+        click.echo(_line(item))
+    same = len(config.values) - len(changed)
+    click.echo(f"{len(changed)} settings written and read back, {same} were so already", err=True)
+
+
+@command.command()
+@_who
+@bus_options
+@_yes
+@dry_run_option
+@_json
+def store(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> None:
+    """Let a drive keep its present settings in its memory (1010h)."""
+    from winchkit.drivers.can.tools.config import STORE
+    from winchkit.drivers.can.tools.config import store as write
+
+    asking = Asking("overwrite its memory", yes, dry_run, as_json)
+    _sign(BusChoice(**bus), who, STORE, write, asking)
+
+
+@command.command()
+@_who
+@bus_options
+@_yes
+@dry_run_option
+@_json
+def restore(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> None:
+    """Let a drive take the maker's settings at its next start (1011h)."""
+    from winchkit.drivers.can.tools.config import RESTORE
+    from winchkit.drivers.can.tools.config import restore as write
+
+    asking = Asking("forget its settings at its next start", yes, dry_run, as_json)
+    _sign(BusChoice(**bus), who, RESTORE, write, asking)
+
+
+def _sign(
+    choice: BusChoice,
+    who: str,
+    signed: tuple[int, bytes],
+    write: Callable[[Objects], None],
+    asking: Asking,
+) -> None:
+    """Ask, then let the drive act on its memory."""
+    from winchkit.bench.drives.node_access import drive_at
+
+    index, signature = signed
+    if asking.dry_run:
+        _show(choice, who, [(index, 1, signature)], as_json=asking.as_json)
+        return
+    with drive_at(choice.spec(), who, writes=True) as node:
+        if not asking.yes:
+            click.confirm(f"{node.name}: {asking.what}?", abort=True, err=True)
+        write(node.objects)
+    if asking.as_json:
+        echo_json({"schema": 1, "name": node.name, "done": asking.what})
+    else:
+        click.echo(f"{node.name}: done")
+
+
+def _show_load(choice: BusChoice, who: str, file: Path, *, as_json: bool) -> None:
+    from winchkit.bench.drives.node_access import declared_drive
+    from winchkit.drivers.can.tools.config import read_config_file, settings
+
+    dictionary = declared_drive(choice.spec(), who).dictionary
+    config = read_config_file(file, dictionary)
+    known = settings(dictionary)
+    values = [(*key, known[key].encode_raw(value)) for key, value in config.values.items()]
+    _show(choice, who, values, as_json=as_json)
+
+
+def _show(
+    choice: BusChoice, who: str, values: list[tuple[int, int, bytes]], *, as_json: bool
+) -> None:
+    """Print the frames that would write these objects."""
+    from winchkit.bench.drives.node_access import declared_drive
+    from winchkit.cli.core.dry_run import nodes_of, show_frames, writes
+
+    spec = choice.spec()
+    drive = declared_drive(spec, who)
+    frames: list[Frame] = writes(drive.bus, drive.node, values)
+    show_frames(frames, nodes_of(spec), as_json=as_json)
+
+
+def _line(item: Difference) -> str:
+    drive = "not there" if item.drive is None else item.drive
+    return f"{item.object} {item.name}: file {item.file}, drive {drive}"

@@ -1,0 +1,86 @@
+"""``winchkit info``: what a drive says of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.core.options import BusChoice, bus_options, complete_device, complete_winch
+from winchkit.cli.core.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.bench.drives.node_access import Node
+    from winchkit.drivers.can.tools.info import DriveInfo, Noted
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.argument("who", required=False, metavar="WINCH|NODE", shell_complete=complete_winch)
+@bus_options
+@click.option(
+    "--device",
+    metavar="NAME",
+    shell_complete=complete_device,
+    help="Device file of a node that the bench does not name.  [default: the one that fits]",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print all of it as JSON.")
+def command(who: str | None, *, device: str | None, as_json: bool, **bus: Any) -> None:
+    """Show identity, state, modes, errors, limits, option codes and units of a drive.
+
+    Reads by SDO, through the process that owns the bench where there is one; writes nothing.
+    """
+    from winchkit.bench.drives.node_access import drive_at
+    from winchkit.drivers.can.tools.info import read_info
+
+    with drive_at(BusChoice(**bus).spec(), who, device=device) as node:
+        info = read_info(node.objects)
+    if as_json:
+        echo_json(_tree(node, info))
+    else:
+        for line in _lines(node, info):
+            click.echo(line)
+
+
+def _lines(node: Node, info: DriveInfo) -> Iterator[str]:
+    yield f"{node.name}: {' '.join(filter(None, (info.name, info.hardware, info.software)))}"
+    yield f"  identity: {info.identity}"
+    fits = info.device or "none of the shipped ones"
+    yield f"  device file: {node.device.name} is used, {fits} fits the identity"
+    yield f"  state: {info.state}, mode {info.mode}"
+    yield f"  modes: {', '.join(info.modes) or 'none told (6502h)'}"
+    if node.wiring is not None:
+        yield f"  brake: {'declared' if node.wiring.brake else 'none declared'}"
+    register = "not told" if info.error_register is None else f"{info.error_register:02X}h"
+    yield f"  error register: {register}"
+    for code, words in info.errors:
+        yield f"  error history: {code:04X}h {words}"
+    for group, entries in info.noted.items():
+        yield f"  {group}:"
+        for entry in entries:
+            if entry.value is not None:
+                yield f"    {_place(entry)} {entry.what}: {_shown(entry)}"
+
+
+def _place(entry: Noted) -> str:
+    return f"{entry.index:04X}h" + (f":{entry.sub}" if entry.sub else "")
+
+
+def _shown(entry: Noted) -> str:
+    return f"{entry.value}, {entry.meaning}" if entry.meaning else str(entry.value)
+
+
+def _tree(node: Node, info: DriveInfo) -> dict[str, Any]:
+    brake = node.wiring.brake if node.wiring is not None else None
+    return {
+        "schema": 1,
+        **vars(info),
+        "drive": info.name,
+        "name": node.name,
+        "node": node.node,
+        "used_device": node.device.name,
+        "brake": brake,
+        "errors": [{"code": code, "meaning": words} for code, words in info.errors],
+    }

@@ -1,0 +1,225 @@
+"""``winchkit lss``: finds drives without a node number, and gives numbers and bit rates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import click
+from canopen.lss import LssMaster
+
+from winchkit.cli.core.dry_run import Frame, show_frames
+from winchkit.cli.core.options import BusChoice, bus_options, dry_run_option
+from winchkit.cli.core.output import echo_json
+from winchkit.drivers.can.canopen.lss import LssLine
+from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.drivers.can.canopen.identity import Identity
+    from winchkit.drivers.can.canopen.lss import LssLine
+
+__all__ = [
+    "command",
+    "rehearsed",
+]
+
+_BUS = "can"
+_SELECTED = {0x43: 0x44}
+"""Answers whose first byte is not that of the question."""
+_ANSWERED = (0x11, 0x13, 0x17, 0x43, 0x5A, 0x5B, 0x5C, 0x5D, 0x5E)
+
+
+@contextmanager
+def rehearsed(*, as_json: bool) -> Iterator[LssLine]:
+    """An LSS line to nowhere; its frames are shown at the end."""
+    network = _Network()
+    line = LssLine(network)
+    yield line
+    line.close()
+    show_frames(network.frames, {}, as_json=as_json)
+
+
+class _Network:
+    """Stands for a bus, its network and the device on it."""
+
+    def __init__(self) -> None:
+        self.name = _BUS
+        self.network: Any = self
+        self.frames: list[Frame] = []
+        master: Any = LssMaster()
+        master.network = self
+        self.lss = master
+
+    def on(self, identifier: int, handler: object) -> None:
+        """Nothing ever comes from outside."""
+
+    def send_message(self, identifier: int, data: bytes) -> None:
+        """Note a frame; say yes to what wants an answer."""
+        self.frames.append(Frame(0.0, _BUS, identifier, bytes(data)))
+        if data[0] in _ANSWERED:
+            answer = bytes((_SELECTED.get(data[0], data[0]),)).ljust(8, b"\0")
+            self.lss.on_message_received(0x7E4, answer, 0.0)
+
+
+_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_PARTS = ("vendor", "product", "revision", "serial")
+
+
+class _Number(click.ParamType):  # type: ignore[type-arg]
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Take 26, 0x1A or 1Ah."""
+        text = str(value)
+        try:
+            if text[-1:] in "hH" and text[:-1]:
+                return int(text[:-1], 16)
+            return int(text, 0)
+        except ValueError:
+            self.fail(f"'{text}' is no number; write 26, 0x1A or 1Ah", param, ctx)
+
+
+def _identity_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the four parts of an identity."""
+    for part in reversed(_PARTS):
+        function = click.option(f"--{part}", type=_Number(), help="Of object 1018h.")(function)
+    only = click.option("--only", is_flag=True, help="The only device on the bus, whichever it is.")
+    return only(function)
+
+
+@click.group()
+def command() -> None:
+    """Layer setting services (CiA 305), for drives that have no node number yet.
+
+    A device is named by its identity, object 1018h, as `scan` and `lss list` show it. Nobody may
+    own the bench meanwhile, and no drive may move.
+    """
+
+
+@command.command("list")
+@bus_options
+@_json
+def find(*, as_json: bool, **bus: Any) -> None:
+    """Find a device without a node number (fast scan); several are found one after another.
+
+    Those with a number are shown by `winchkit scan`.
+    """
+    with _line(BusChoice(**bus)) as line:
+        found = line.find_unconfigured()
+    if as_json:
+        echo_json({"schema": 1, "unconfigured": [] if found is None else [found]})
+    else:
+        click.echo("no device without a node number" if found is None else str(found))
+
+
+@command.command()
+@_identity_options
+@bus_options
+@_json
+def identify(*, only: bool, as_json: bool, **rest: Any) -> None:
+    """Ask a device of a known identity for its node number."""
+    from winchkit.drivers.can.canopen.lss import UNCONFIGURED
+
+    parts = {part: rest.pop(part) for part in _PARTS}
+    with _line(BusChoice(**rest)) as line:
+        identity = _select(line, parts, only=only)
+        node = line.node()
+    number = None if node == UNCONFIGURED else node
+    if as_json:
+        echo_json({"schema": 1, "identity": identity, "node": number})
+    else:
+        click.echo(f"{identity}: {'no node number' if number is None else f'node {number}'}")
+
+
+@command.command("set")
+@_identity_options
+@click.option("--node", type=int, help="Node number, 1 to 127.")
+@click.option("--new-bitrate", type=int, help="Bit rate to set, bit/s.")
+@click.option("--store", is_flag=True, help="Let the device keep it when switched off.")
+@bus_options
+@dry_run_option
+@_json
+def assign(
+    *,
+    only: bool,
+    node: int | None,
+    new_bitrate: int | None,
+    store: bool,
+    dry_run: bool,
+    as_json: bool,
+    **rest: Any,
+) -> None:
+    """Set node number and bit rate of a device.
+
+    The number counts from the next reset of communication, the bit rate from the next start, and
+    only if stored.
+    """
+    if node is None and new_bitrate is None and not store:
+        raise UsageError("nothing to set; give --node, --new-bitrate or --store")
+    parts = {part: rest.pop(part) for part in _PARTS}
+    choice = BusChoice(**rest)
+    if dry_run:
+        from winchkit.cli.drive.lss import rehearsed
+
+        with rehearsed(as_json=as_json) as line:
+            _assign(line, parts, only, node, new_bitrate, store)
+        return
+    with _line(choice) as line:
+        identity = _assign(line, parts, only, node, new_bitrate, store)
+    if as_json:
+        done = {"node": node, "bitrate": new_bitrate, "stored": store}
+        echo_json({"schema": 1, "identity": identity, **done})
+        return
+    settings = [f"node {node}"] if node is not None else []
+    settings += [f"{new_bitrate} bit/s"] if new_bitrate is not None else []
+    settings += ["stored"] if store else []
+    click.echo(f"{identity}: {', '.join(settings)}; switch it off and on")
+
+
+def _assign(
+    line: LssLine,
+    parts: dict[str, int | None],
+    only: bool,
+    node: int | None,
+    bitrate: int | None,
+    store: bool,
+) -> Identity:
+    identity = _select(line, parts, only=only)
+    if node is not None:
+        line.set_node(node)
+    if bitrate is not None:
+        line.set_bitrate(bitrate)
+    if store:
+        line.store()
+    return identity
+
+
+def _select(line: LssLine, parts: dict[str, int | None], *, only: bool) -> Identity:
+    from winchkit.drivers.can.canopen.identity import Identity
+
+    given = {part: value for part, value in parts.items() if value is not None}
+    if only and not given:
+        return line.select_only()
+    if only or len(given) < len(_PARTS):
+        missing = ", ".join(f"--{part}" for part in _PARTS if part not in given)
+        raise UsageError(
+            f"which device? give all of its identity ({missing or 'without --only'}), or --only "
+            "where there is one device on the bus"
+        )
+    identity = Identity(**given)
+    line.select(identity)
+    return identity
+
+
+@contextmanager
+def _line(choice: BusChoice) -> Iterator[LssLine]:
+    from winchkit.bench.drives.node_access import free_bus
+    from winchkit.drivers.can.canopen.lss import LssLine
+
+    with free_bus(choice.spec()) as bus:
+        line = LssLine(bus)
+        try:
+            yield line
+        finally:
+            line.close()

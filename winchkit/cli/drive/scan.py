@@ -1,0 +1,51 @@
+"""``winchkit scan``: who is on the CAN buses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.core.options import BusChoice, bus_options
+from winchkit.cli.core.output import echo_json
+from winchkit.errors import NoReply
+
+if TYPE_CHECKING:
+    from winchkit.drivers.can.tools.scan import Found
+
+__all__ = ["command"]
+
+
+@click.command()
+@bus_options
+@click.option("--json", "as_json", is_flag=True, help="Print the nodes as JSON.")
+def command(*, as_json: bool, **bus: Any) -> None:
+    """List every node of a CAN bus: identity, heartbeat, the device file that fits.
+
+    Asks each node number for its device type and listens for heartbeats; writes nothing. Every
+    node is listed, also one that refuses, falls silent or shares its number with another. Ends
+    with 4 when nobody answers.
+    """
+    from winchkit.bench.drives.node_access import nodes_on
+
+    spec = BusChoice(**bus).spec()
+    found = nodes_on(spec)
+    if as_json:
+        echo_json({"schema": 1, "nodes": found})
+    for item in () if as_json else found:
+        click.echo(_line(item))
+    if not found:
+        raise NoReply(f"{spec.name}: no node answers; check power, wiring, termination, bit rate")
+
+
+def _line(item: Found) -> str:
+    problem = f"; {item.problem}" if item.problem else ""
+    if item.device_type is None:
+        return f"{item.bus} node {item.node}: {item.heartbeat}{problem}"
+    fits = f"fits {item.device}" if item.device else "no device file fits"
+    name = f"'{item.name}'" if item.name else "no name"
+    winch = f", winch {item.winch}" if item.winch else ""
+    return (
+        f"{item.bus} node {item.node}: {name}, {item.identity}, {item.heartbeat}, {fits}{winch}"
+        + problem
+    )

@@ -1,0 +1,1 @@
+"""Commands about files: check, export and shell completion."""

@@ -1,0 +1,194 @@
+"""``winchkit check``: read files of any kind and say everything that is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.options import effects_option
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.files.check_computer import about_computer, refusals
+from winchkit.errors import Fault, FileError, one_line
+
+if TYPE_CHECKING:
+    from winchkit.schema.bench import BenchSpec
+
+__all__ = ["command"]
+
+RUNS = (".csv", ".mcap")
+EDS = (".eds", ".dcf")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a file turned out to be."""
+
+    path: str
+    kind: str
+    """Kind of declaration or ``run``; empty where the file does not get so far."""
+    name: str = ""
+    summary: str = ""
+    faults: tuple[Fault, ...] = ()
+    warnings: tuple[Fault, ...] = ()
+    details: tuple[str, ...] = ()
+    """What is worth knowing before the file is used."""
+    drive: object = None
+    """Of an EDS or DCF: what it says of the drive."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the file can be used."""
+        return not self.faults
+
+
+@click.command()
+@click.argument("files", nargs=-1, metavar="FILE...")
+@effects_option
+@click.option("--computer", is_flag=True, help="Check this computer: real-time settings.")
+@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
+@click.pass_context
+def command(
+    ctx: click.Context,
+    files: tuple[str, ...],
+    effects: Sequence[str],
+    *,
+    computer: bool,
+    as_json: bool,
+) -> None:
+    """Check files of any kind: profiles, benches, programmes, devices (.toml), runs (.csv, .mcap).
+
+    Of a drive's EDS or DCF it tells what matters for winchkit; of a device file and of a bench
+    whether the drives do it by their EDS, and how each notices a dead host. Every fault of
+    a file is told with its line. Exits with 3 when a file has one. ``--computer`` says what this
+    computer permits a control loop (docs/realtime.md).
+    """
+    if not files and not computer:
+        raise click.UsageError("Missing argument 'FILE...'; or --computer.", ctx)
+    verdicts = [_verdict(file, effects) for file in files]
+    lines = about_computer() if computer else ()
+    for verdict in verdicts:
+        for warning in verdict.warnings:
+            click.echo(f"{warning} (warning)", err=True)
+    if as_json:
+        told = {"computer": lines} if computer else {}
+        echo_json({"schema": 1, "files": [_entry(verdict) for verdict in verdicts], **told})
+    else:
+        for line in lines:
+            click.echo(line)
+        for verdict in verdicts:
+            _show(verdict)
+    ctx.exit(0 if all(verdict.ok for verdict in verdicts) else FileError.exit_code)
+
+
+def _verdict(file: str, effects: Sequence[str]) -> Verdict:
+    try:
+        suffix = Path(file).suffix.lower()
+        if suffix in RUNS:
+            return _run(file)
+        if suffix in EDS:
+            return _eds(file)
+        if suffix == ".toml" or not Path(file).is_file():
+            return _declaration(file, effects)
+        known = ", ".join((".toml", *EDS, *RUNS))
+        return Verdict(file, "", faults=(Fault(f"'{suffix}' is none of {known}", file),))
+    except FileError as error:
+        return Verdict(file, "", faults=error.faults)
+
+
+def _run(file: str) -> Verdict:
+    from winchkit.runs import read_run
+    from winchkit.runs.info import summary_of
+
+    run = read_run(file)
+    notes = tuple(Fault(note, file) for note in run.notes)
+    return Verdict(file, "run", run.name, summary_of(run).text, warnings=notes)
+
+
+def _eds(file: str) -> Verdict:
+    from winchkit.cli.files.check_eds import describe_eds, lines_of
+
+    drive, warnings = describe_eds(Path(file))
+    name = " ".join(filter(None, (drive.maker, drive.product)))
+    kind = Path(file).suffix.lower()[1:]
+    return Verdict(
+        file,
+        kind,
+        name,
+        str(drive.identity),
+        warnings=warnings,
+        details=tuple(lines_of(drive)),
+        drive=drive,
+    )
+
+
+def _declaration(file: str, effects: Sequence[str]) -> Verdict:
+    from winchkit.cli.files.check_drives import report_of
+    from winchkit.cli.files.check_drums import stroke_of, warnings_of_drums
+    from winchkit.cli.files.check_effects import bench_of
+    from winchkit.cli.files.check_effects import faults_and_warnings as of_effects
+    from winchkit.cli.files.check_robots import faults_and_warnings as of_robots
+    from winchkit.schema.read import load
+
+    declaration = load(file)
+    bench = bench_of(declaration.value)
+    drives = report_of(declaration.value)
+    robot_faults, robot_warnings = of_robots(file, declaration.value)
+    effect_faults, effect_warnings = of_effects(file, declaration.value, effects)
+    faults = (*effect_faults, *drives.faults, *robot_faults)
+    warnings = (
+        *declaration.warnings,
+        *effect_warnings,
+        *_doubts(file, bench),
+        *warnings_of_drums(file, declaration.value),
+        *drives.warnings,
+        *robot_warnings,
+    )
+    return Verdict(
+        file,
+        declaration.kind,
+        declaration.value.name,
+        stroke_of(declaration.value),
+        faults,
+        warnings,
+        details=(*drives.details, *(() if bench is None else refusals(bench))),
+    )
+
+
+def _doubts(file: str, bench: BenchSpec | None) -> list[Fault]:
+    """Limits of a bench that are possible and rarely meant."""
+    from winchkit.schema.plausible import doubts
+    from winchkit.schema.reading.source import open_source
+
+    if bench is None or not (found := list(doubts(bench))):
+        return []
+    source = open_source(file)
+    return [source.fault(key, message) for key, message in found]
+
+
+def _show(verdict: Verdict) -> None:
+    for fault in verdict.faults:
+        click.echo(str(fault), err=True)
+    if verdict.ok:
+        called = f"{verdict.kind} '{one_line(verdict.name)}'" + (
+            f", {verdict.summary}" if verdict.summary else ""
+        )
+        click.echo(f"{one_line(verdict.path)}: ok ({called})")
+        for line in verdict.details:
+            click.echo(f"  {line}")
+
+
+def _entry(verdict: Verdict) -> dict[str, object]:
+    return {
+        "path": verdict.path,
+        "ok": verdict.ok,
+        "kind": verdict.kind or None,
+        "name": verdict.name or None,
+        "faults": verdict.faults,
+        "warnings": verdict.warnings,
+        "details": verdict.details,
+        "drive": verdict.drive,
+    }

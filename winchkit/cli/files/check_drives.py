@@ -1,0 +1,95 @@
+"""What ``winchkit check`` says of drives: a device file against its EDS, and those of a bench."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.simbench import SimBench
+
+if TYPE_CHECKING:
+    from winchkit.errors import Fault
+
+__all__ = ["DriveReport", "report_of"]
+
+
+@dataclass(frozen=True)
+class DriveReport:
+    """What is found wrong, and what is worth knowing, of the drives of a declaration."""
+
+    faults: tuple[Fault, ...] = ()
+    warnings: tuple[Fault, ...] = ()
+    details: tuple[str, ...] = ()
+
+
+def report_of(value: object) -> DriveReport:
+    """Check a drive's device file, or all device files of a bench. Raises FileError."""
+    if isinstance(value, SimBench):
+        return _of_bench(value.bench)
+    if isinstance(value, BenchSpec):
+        found = _of_bench(value)
+        return replace(found, warnings=(*found.warnings, *_not_commissioned(value)))
+    if not isinstance(value, DeviceSpec) or value.servo is None:
+        return DriveReport()
+    from winchkit.drivers.can.canopen.device_check import check_drive
+
+    report = check_drive(value)
+    ways = ", ".join(f"{one.way} ({one.reaction})" for one in report.host_loss)
+    return DriveReport(
+        report.faults, report.warnings, (f"loss of the host, by the EDS: {ways or 'no way'}",)
+    )
+
+
+def _not_commissioned(spec: BenchSpec) -> list[Fault]:
+    """What of the commissioning record does not hold, of a bench with real drives."""
+    from winchkit.bench.commissioning.validity import is_simulated, stale_items
+    from winchkit.errors import Fault
+
+    if is_simulated(spec):
+        return []
+    return [
+        Fault(f"not commissioned: {item}; run `winchkit commission {spec.path}`", spec.path)
+        for item in stale_items(spec)
+    ]
+
+
+def _of_bench(spec: BenchSpec) -> DriveReport:
+    """All that a check of each device file says, and how each winch notices a dead host."""
+    from winchkit.catalog import find
+    from winchkit.drivers.can.bus.interface import sends_remote
+    from winchkit.drivers.can.canopen.device_check import (
+        check_drive,
+        host_loss_problem,
+    )
+    from winchkit.errors import Fault
+    from winchkit.schema.read import load
+
+    faults: dict[Fault, None] = {}
+    warnings: dict[Fault, None] = {}
+    details = []
+    for name, winch in spec.winch.items():
+        declaration = load(find("devices", winch.servo.device, spec.path or None))
+        device = declaration.value
+        if not isinstance(device, DeviceSpec) or device.servo is None:
+            continue
+        report = check_drive(device)
+        faults |= dict.fromkeys(report.faults)
+        way = winch.host_loss or device.servo.host_loss
+        doubt = host_loss_problem(report.host_loss, way)
+        if doubt and not report.host_loss:
+            faults[Fault(f"winch {name}, device '{device.name}': {doubt}", spec.path)] = None
+        else:
+            warnings |= dict.fromkeys(declaration.warnings + report.warnings)
+        if way == "guarding" and not sends_remote(spec.bus[winch.servo.bus]):
+            adapter = spec.bus[winch.servo.bus].interface
+            said = f"winch {name}: guarding needs remote frames, which '{adapter}' does not send"
+            faults[Fault(said, spec.path)] = None
+        found = next((one.reaction for one in report.host_loss if one.way == way), "")
+        details.append(f"winch {name}: loss of the host by {way}{f': {found}' if found else ''}")
+        for ref in (winch.cell, winch.load, winch.length, winch.temperature):
+            if ref is not None:
+                instrument = load(find("devices", ref.device, spec.path or None))
+                warnings |= dict.fromkeys(instrument.warnings)
+    return DriveReport(tuple(faults), tuple(warnings), tuple(details))

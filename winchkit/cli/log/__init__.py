@@ -1,0 +1,1 @@
+"""``winchkit log``: records benches; shows, recovers and replays what was recorded."""

@@ -1,0 +1,72 @@
+"""``winchkit log info``: what a log holds."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.output import echo_json
+from winchkit.errors import one_line
+
+if TYPE_CHECKING:
+    from winchkit.runs.info import LogInfo, SourceInfo
+
+__all__ = ["command"]
+
+_SHOWN = 100
+
+
+@click.command()
+@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+def command(files: tuple[str, ...], as_json: bool) -> None:
+    """Say what FILE holds: channels, rates, gaps, duration, counters, and whether it was closed.
+
+    Several files are the parts of one log; so is FILE itself where only its parts exist.
+    """
+    from winchkit.runs.info import info_of
+    from winchkit.runs.read import read_log
+
+    info = info_of(read_log(files))
+    if as_json:
+        echo_json({"schema": 1, **vars(info)})
+        return
+    for line in _lines(info):
+        click.echo(one_line(line))
+
+
+def _lines(info: LogInfo) -> list[str]:
+    from winchkit.cli.core.terminal import HEADS, counter_rows
+
+    closed = {True: "closed", False: "not closed", None: "CSV, which has no end mark"}[info.closed]
+    begun = f"begun {info.begun}, " if info.begun else ""
+    lines = [f"{info.path}: {begun}{info.duration:.6g} s, {closed}"]
+    lines += [f"  {note}" for note in info.notes]
+    lines += [f"  {_source(item)}" for item in info.sources]
+    lines += [f"  trip: {text}" for text in info.events]
+    lines += [f"  tare of {text}" for text in info.tares]
+    lines += [f"  commander of {text}" for text in info.commanders]
+    for name, *cells in counter_rows(info.counters):
+        counted = zip(HEADS.values(), cells, strict=True)
+        lines.append(f"  {name}: " + ", ".join(f"{words} {cell}" for (_, words), cell in counted))
+    lines += [f"  {key}: {_short(value)}" for key, value in info.metadata.items()]
+    return lines
+
+
+def _source(item: SourceInfo) -> str:
+    parts = [f"{item.samples} samples"]
+    if not math.isnan(item.rate):
+        parts.append(f"{item.rate:.4g} Hz")
+    parts.append(f"{item.gaps} gaps" + (f" up to {item.longest_gap:.3g} s" if item.gaps else ""))
+    if item.missing:
+        parts.append("NaN: " + ", ".join(f"{name} {n}" for name, n in item.missing.items()))
+    if item.flagged:
+        parts.append(f"{item.flagged} flagged")
+    return f"{item.topic}: {', '.join(item.channels)}: {', '.join(parts)}"
+
+
+def _short(text: str) -> str:
+    shown = one_line(text)
+    return shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"

@@ -1,0 +1,241 @@
+"""``winchkit log``: records a bench, and looks after what was recorded."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.options import complete_bench, effects_option
+from winchkit.cli.core.output import echo_json
+from winchkit.errors import WinchkitError
+
+if TYPE_CHECKING:
+    from winchkit.bench.recording.live_sinks import LiveSink
+    from winchkit.bench.remote.station import Station
+
+__all__ = ["command"]
+
+COMMANDS = {
+    "info": At("winchkit.cli.log.info", "What a log holds: channels, rates, gaps, counters."),
+    "recover": At("winchkit.cli.log.recover", "Save what is whole of a log that was cut off."),
+    "export": At("winchkit.cli.files.export", "Convert a log to CSV, MCAP, Parquet or MF4."),
+    "replay": At("winchkit.cli.log.replay", "Play a log as if it came from the bench."),
+}
+_CHECK_PERIOD = 0.1
+_SHOW_PERIOD = 0.5
+
+
+@click.group(cls=LazyGroup, table=COMMANDS, invoke_without_command=True)
+@click.option(
+    "-b",
+    "--bench",
+    metavar="FILE",
+    shell_complete=complete_bench,
+    help="Wiring file of the bench.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Where to: a .csv or .mcap file.")
+@click.option("--rotate", metavar="LIMIT", help="Go on in a new file, e.g. after 100MB or 10min.")
+@click.option("--replace", is_flag=True, help="Write over an earlier log of that name.")
+@click.option("--for", "duration", metavar="TIME", help="End after this time, e.g. 10s or '2 min'.")
+@click.option("--jsonl", is_flag=True, help="Print live pictures to stdout, one JSON a line.")
+@click.option("--udp", metavar="HOST:PORT", help="Send live pictures as JSON, e.g. to PlotJuggler.")
+@click.option("--period", default="0.02 s", show_default=True, help="Between two live pictures.")
+@effects_option
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.pass_context
+def command(
+    context: click.Context,
+    *,
+    bench: str | None,
+    output: str | None,
+    rotate: str | None,
+    replace: bool,
+    duration: str | None,
+    jsonl: bool,
+    udp: str | None,
+    period: str,
+    effects: Sequence[str],
+    as_json: bool,
+) -> None:
+    """Log every winch of a bench until Ctrl-C, or for a time.
+
+    MCAP holds every channel with its own time stamps. In CSV a row stands for each reading of the
+    load cell (else of the length instrument). Moves nothing, and keeps no program from owning the
+    bench; when the owner ends, the log goes on in a file of its own, FILE-2 and so on.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    if bench is None:
+        raise click.UsageError("Missing option '-b' / '--bench'.")
+    _refuse(output, rotate, jsonl=jsonl, udp=udp, as_json=as_json)
+    _refuse_to_lose(None if replace else output)
+    from winchkit.bench.remote.reconnection import watch
+    from winchkit.cli.core.quantities import quantity, seconds
+    from winchkit.cli.core.terminal import live_sinks
+
+    limit, pause = seconds(duration), quantity(period, "time")
+    with live_sinks(jsonl=jsonl, udp=udp) as sinks:
+        log = _Log(output, rotate, replace, limit, pause if sinks else _CHECK_PERIOD, sinks)
+        try:
+            watch(bench, "log", log.follow, log.lose, effects)
+        except KeyboardInterrupt:
+            click.echo("ending the log", err=True)
+        except WinchkitError as error:
+            if as_json:
+                echo_json(log.result | {"problem": str(error)})
+            raise
+    if as_json:
+        echo_json(log.result)
+    elif output and not jsonl:
+        for file, rows in log.files.items():
+            click.echo(f"{file}: {rows} rows")
+
+
+class _Log:
+    """A log over the life of one or several owners of the bench, each of which writes a file."""
+
+    def __init__(
+        self,
+        output: str | None,
+        rotate: str | None,
+        replace: bool,
+        limit: float | None,
+        pause: float,
+        sinks: list[LiveSink],
+    ) -> None:
+        self.files: dict[str, int] = {}
+        """Rows by file."""
+        self._output, self._rotate, self._replace = output, rotate, replace
+        self._limit, self._pause, self._sinks = limit, pause, sinks
+        self._counted: dict[str, dict[str, Any]] = {}
+        self._start = 0.0
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What was logged, as JSON has it."""
+        return {
+            "schema": 1,
+            "output": self._output,
+            "files": self.files,
+            "counters": self._counted,
+            "rows": sum(self.files.values()),
+        }
+
+    def lose(self, words: str) -> None:
+        """Tell that an owner has gone."""
+        goes_on = f"; the log goes on in {self._next()}" if self._output else ""
+        click.echo(f"winchkit: {words}{goes_on}", err=True)
+
+    def follow(self, station: Station) -> None:
+        """Log at an owner until the time is over, or Ctrl-C."""
+        file = self._next()
+        self._start = self._start or time.monotonic()
+        if file:
+            station.start_log(str(Path(file).absolute()), self._rotate, self._replace)
+            self.files[file], self._replace = 0, False
+        try:
+            with _counter_row(station) as show:
+                self._watch(station, file, show)
+        except KeyboardInterrupt:
+            click.echo("ending the log", err=True)
+        except WinchkitError:
+            self._note_rows(station, file)
+            raise
+        self._counted = station.counters()
+        if file:
+            self.files[file] = station.end_log()
+
+    def _note_rows(self, station: Station, file: str) -> None:
+        """Counters and rows of a log that has failed, where its owner still answers."""
+        with suppress(WinchkitError):
+            self._counted = station.counters()
+            if file:
+                self.files[file] = int(self._counted.get("log", {}).get("rows") or 0)
+
+    def _watch(self, station: Station, file: str, show: Callable[[], None]) -> None:
+        """Look after the log, and show every new picture, until the time is over."""
+        seen = -1
+        while self._limit is None or time.monotonic() - self._start < self._limit:
+            time.sleep(min(self._pause, self._limit or self._pause))
+            rows = station.log_rows()
+            if file:
+                self.files[file] = rows
+            status = station.status() if self._sinks else {"cycle": seen}
+            if status["cycle"] != seen:
+                seen = status["cycle"]
+                for sink in self._sinks:
+                    sink(status)
+            show()
+
+    def _next(self) -> str:
+        """The file for the next owner: ``lift.csv``, then ``lift-2.csv`` and so on."""
+        if not self._output or not self.files:
+            return self._output or ""
+        path, number = Path(self._output), len(self.files) + 1
+        while True:
+            following = path.with_stem(f"{path.stem}-{number}")
+            if not _earlier(str(following)):
+                return str(following)
+            number += 1
+
+
+def _earlier(output: str) -> list[Path]:
+    """What is there of an earlier log of that name, its parts included."""
+    from winchkit.runs.recording.rotation import parts_beside
+
+    path = Path(output)
+    return [item for item in (path, *parts_beside(path)) if item.is_file()]
+
+
+def _refuse_to_lose(output: str | None) -> None:
+    """Raise UsageError where an earlier log would be written over."""
+    held = [item for item in _earlier(output) if item.stat().st_size] if output else []
+    if held:
+        raise click.UsageError(f"{held[0]} holds a log already; name another file, or --replace.")
+
+
+def _refuse(
+    output: str | None, rotate: str | None, *, jsonl: bool, udp: str | None, as_json: bool
+) -> None:
+    """Raise UsageError for options that cannot be meant together, before anything is opened."""
+    if not (output or jsonl or udp):
+        raise click.UsageError("Missing option '-o' / '--output' (or '--jsonl', '--udp').")
+    if jsonl and as_json:
+        raise click.UsageError("'--jsonl' and '--json' both print to stdout; choose one.")
+    if rotate is not None:
+        from winchkit.runs.recording.rotation import Rotation
+
+        Rotation.parse(rotate)
+
+
+@contextmanager
+def _counter_row(station: Station) -> Iterator[Callable[[], None]]:
+    """A live table of what is counted, where somebody sees it."""
+    if not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.console import Console
+    from rich.live import Live
+
+    from winchkit.cli.core.terminal import counter_table
+
+    shown = 0.0
+
+    with Live(console=Console(stderr=True), auto_refresh=False) as live:
+
+        def show() -> None:
+            nonlocal shown
+            now = time.monotonic()
+            if now - shown >= _SHOW_PERIOD:
+                shown = now
+                counted: dict[str, dict[str, Any]] = station.counters()
+                live.update(counter_table(counted), refresh=True)
+
+        yield show

@@ -1,0 +1,1 @@
+"""Commands that compare a model with runs: compare, diagnose, add, plan, calibrate, size."""

@@ -1,0 +1,108 @@
+"""``winchkit add``: fit an effect and write it into a copy of a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.model.options import (
+    Asked,
+    ManyValues,
+    html_option,
+    json_option,
+    model_options,
+    page_title,
+    read_all,
+    write_page,
+)
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.add import Addition
+    from winchkit.schema.profiles.robot import RobotProfile
+
+__all__ = ["command", "write_addition"]
+
+
+@click.command(cls=ManyValues)
+@click.argument("effect")
+@click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs to fit.")
+@click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
+@model_options
+@json_option
+@html_option
+def command(
+    effect: str, runs: Sequence[str], output: str, asked: Asked, as_json: bool, html: str | None
+) -> None:
+    """Fit EFFECT beside the effects of a profile on runs, and write the better profile.
+
+    Values that the profile has already are refitted with it; every value gets its standard
+    deviation, the runs and the date.
+    """
+    from winchkit.cli.model.options import read_profile, refuse_options
+    from winchkit.diagnosis.add import grow
+    from winchkit.schema.profiles.robot import RobotProfile
+
+    declared, catalogue = read_profile(asked.source), asked.catalogue
+    names = [Path(run).name for run in runs]
+    if isinstance(declared, RobotProfile):
+        refuse_options(asked.band)
+        _to_robot(effect, runs, declared, asked, output, as_json, html)
+        return
+    grown = grow(effect, asked.runs(runs), declared, catalogue, asked.band)
+    write_addition(asked.source, grown.addition, names, Path(output))
+    _tell(grown.addition, output, as_json)
+    if html:
+        from winchkit.report.pages.pages import addition_html
+
+        title = page_title(declared.name, runs, effect)
+        page = addition_html(grown, title, asked.profile, output, options=asked.options)
+        write_page(html, page)
+
+
+def _to_robot(
+    effect: str,
+    runs: Sequence[str],
+    declared: RobotProfile,
+    asked: Asked,
+    output: str,
+    as_json: bool,
+    html: str | None,
+) -> None:
+    """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
+    from winchkit.diagnosis.robot.add import grow_robot
+
+    name, _, place = effect.partition("/")
+    line = asked.winch or place or None
+    grown = grow_robot(name, read_all(runs), declared, line, asked.catalogue)
+    write_addition(asked.source, grown.addition, [Path(r).name for r in runs], Path(output))
+    _tell(grown.addition, output, as_json)
+    if html:
+        from winchkit.report.pages.robot import robot_addition_html
+
+        title = page_title(declared.name, runs, effect)
+        options = asked.options
+        page = robot_addition_html(grown, title, asked.profile, output, options=options)
+        write_page(html, page)
+
+
+def _tell(addition: Addition, output: str, as_json: bool) -> None:
+    click.echo(f"written: {output}", err=True)
+    if as_json:
+        echo_json(addition.to_json())
+        return
+    from winchkit.report.text import addition_text
+
+    click.echo(addition_text(addition))
+
+
+def write_addition(source: Path, addition: Addition, runs: Sequence[str], out: Path) -> None:
+    """Write a fitted addition into a copy of a profile, with its provenance."""
+    from winchkit.cli.model.options import provenance
+    from winchkit.profile_edit.fitted import write_fitted
+
+    fitted, judged = provenance(addition.terms, addition.outputs, runs)
+    write_fitted(source, fitted, out, judged)

@@ -1,0 +1,156 @@
+"""``winchkit calibrate``: a robot's geometry and winches from poses of which anything was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.model.options import ManyValues, html_option, page_title, read_all, write_page
+from winchkit.errors import UsageError, suggest
+
+if TYPE_CHECKING:
+    from winchkit.calibration.robot.calibrate import Calibrated, Options
+    from winchkit.calibration.robot.pose_design import NextPose
+
+__all__ = ["command"]
+
+Loss = Literal["least-squares", "huber", "cauchy"]
+
+_LOSSES: tuple[Loss, ...] = ("least-squares", "huber", "cauchy")
+_NOISE_DIMENSIONS = {
+    "rope": "length",
+    "position": "length",
+    "rotation": "angle",
+    "swivel": "angle",
+    "cable_length": "length",
+    "balance": "force",
+}
+
+
+@click.command(cls=ManyValues)
+@click.argument("robot")
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@click.option(
+    "--validate", "validate", multiple=True, metavar="RUN...", help="Held out; else every tenth."
+)
+@click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
+@click.option("--effect", "effects", multiple=True, metavar="NAME", help="Fit this effect too.")
+@click.option(
+    "--noise", "noise", multiple=True, metavar="KIND=VALUE",
+    help="A known standard deviation, e.g. position='0.02 mm'; else estimated.",
+)  # fmt: skip
+@click.option("--loss", type=click.Choice(_LOSSES), default="least-squares", show_default=True)
+@click.option("--middle-force", metavar="FORCE", help="Rope force kept near, where not measured.")
+@click.option("--next", "following", type=click.IntRange(0), default=0, help="Poses to propose.")
+@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+@html_option
+def command(
+    robot: str,
+    runs: Sequence[str],
+    validate: Sequence[str],
+    output: str,
+    effects: Sequence[str],
+    noise: Sequence[str],
+    loss: str,
+    middle_force: str | None,
+    following: int,
+    as_json: bool,
+    html: str | None,
+) -> None:
+    """Calibrate the robot of profile ROBOT on the poses of RUNs and write the better profile.
+
+    A row of a run is a pose: motor angles of all lines, and whatever else was measured there, in
+    any mix: position, rotation or some of its angles, swivel angles, rope lengths. The poses
+    themselves are always found beside the parameters.
+    """
+    from winchkit.calibration.robot.pose_design import next_poses
+    from winchkit.catalog import find
+
+    source = find("profiles", robot)
+    found = _calibrated(source, runs, validate, _options(effects, noise, loss, middle_force))
+    ahead = next_poses(found, following) if following else []
+    if len(ahead) < following:
+        click.echo(f"only {len(ahead)} of {following} poses can be held by the ropes", err=True)
+    _write(source, found, Path(output), runs)
+    _tell(found, ahead, as_json)
+    if html:
+        from winchkit.report.pages.robot_calibration import calibration_html
+
+        title = page_title(found.equations.robot.profile.name, runs)
+        write_page(html, calibration_html(found, ahead, title))
+
+
+def _options(
+    effects: Sequence[str], noise: Sequence[str], loss: str, middle_force: str | None
+) -> Options:
+    from winchkit.calibration.robot.calibrate import Options
+    from winchkit.units import parse
+
+    middle = None if middle_force is None else parse(middle_force, "force")
+    return Options(tuple(effects), _loss(loss), _noise(noise), middle)
+
+
+def _calibrated(
+    source: Path, runs: Sequence[str], validate: Sequence[str], options: Options
+) -> Calibrated:
+    """Fit all rows where others validate, else nine of ten."""
+    from winchkit.calibration.robot.calibrate import calibrate, split
+    from winchkit.model.robot import robot_of
+    from winchkit.runs.poses import read_poses
+    from winchkit.schema.read import read_robot
+
+    profile = read_robot(source)
+    measured = read_poses(read_all(runs), profile)
+    fit, held = split(measured)
+    if validate:
+        fit, held = measured, read_poses(read_all(validate), profile)
+    return calibrate(robot_of(profile), fit, held, options, lambda t: click.echo(t, err=True))
+
+
+def _tell(found: Calibrated, ahead: Sequence[NextPose], as_json: bool) -> None:
+    from winchkit.calibration.robot.results import calibration_json, calibration_text
+
+    if not as_json:
+        click.echo(calibration_text(found, ahead))
+        return
+    for warning in found.warnings:
+        click.echo(f"{warning} (warning)", err=True)
+    echo_json(calibration_json(found, ahead))
+
+
+def _loss(name: str) -> Loss:
+    return next(loss for loss in _LOSSES if loss == name)
+
+
+def _noise(given: Sequence[str]) -> Mapping[str, float]:
+    """``position=0.02 mm`` as SI by kind."""
+    from winchkit.units import parse
+
+    out = {}
+    for text in given:
+        kind, equals, value = text.partition("=")
+        kind = kind.strip()
+        if not equals or kind not in _NOISE_DIMENSIONS:
+            known = list(_NOISE_DIMENSIONS)
+            raise UsageError(
+                f"--noise '{text}': write KIND=VALUE with one of {', '.join(known)}"
+                + ("" if kind in known else suggest(kind, known))
+            )
+        out[kind] = parse(value.strip(), _NOISE_DIMENSIONS[kind])
+        if not out[kind] > 0:
+            raise UsageError(f"--noise '{text}': a standard deviation is above zero")
+    return out
+
+
+def _write(source: Path, found: Calibrated, out: Path, runs: Sequence[str]) -> None:
+    from datetime import UTC, datetime
+
+    from winchkit.calibration.robot.profile import Provenance, write_calibrated
+
+    today = datetime.now(UTC).date()
+    write_calibrated(source, found, out, Provenance([Path(run).name for run in runs], today))
+    click.echo(f"written: {out}", err=True)

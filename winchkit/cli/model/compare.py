@@ -1,0 +1,121 @@
+"""``winchkit compare``: how far a profile is from measured runs, and what the error follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.output import echo_each, echo_json
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import (
+    Asked,
+    html_option,
+    json_option,
+    model_options,
+    page_title,
+    pages_beside,
+    read_all,
+    read_each,
+    save_page,
+    write_page,
+)
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.results import Comparison
+    from winchkit.schema.profiles.robot import RobotProfile
+    from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@model_options
+@json_option
+@html_option
+def command(runs: Sequence[str], asked: Asked, as_json: bool, html: str | None) -> None:
+    """Compare runs with a profile at its file values; only the length offset is fitted."""
+    from winchkit.cli.model.options import read_profile, refuse_options
+    from winchkit.diagnosis.compare import compared
+    from winchkit.report.pages.pages import comparison_html
+    from winchkit.schema.profiles.robot import RobotProfile
+
+    declared = read_profile(asked.source)
+    if isinstance(declared, RobotProfile):
+        refuse_options(asked.band, asked.winch)
+        _tell_robot(runs, declared, asked, as_json, html)
+        return
+    if asked.each:
+        _tell_each(runs, declared, asked, as_json, html)
+        return
+    answer = compared(asked.runs(runs), declared, asked.catalogue, asked.band)
+    _tell(answer.comparison, as_json)
+    if html:
+        title = page_title(declared.name, runs)
+        write_page(html, comparison_html(answer, title, asked.profile, options=asked.options))
+
+
+def _tell_each(
+    runs: Sequence[str], declared: WinchProfile, asked: Asked, as_json: bool, html: str | None
+) -> None:
+    """Every winch of the runs by itself, and what their errors follow alike or not."""
+    from winchkit.diagnosis.compare import compared
+    from winchkit.diagnosis.fleet.anova import errors_of, shared_errors
+    from winchkit.report.pages.fleet import shared_errors_text
+    from winchkit.report.pages.pages import comparison_html
+    from winchkit.report.text import compare_text
+
+    found, errors = {}, {}
+    title, catalogue = page_title(declared.name, runs), asked.catalogue
+    with progress_bar() as told:
+        winches = read_each(runs)
+        pages = pages_beside(html, list(winches)) if html else {}
+        for index, (name, own) in enumerate(winches.items()):
+            told(f"winch {name}", index / len(winches))
+            answer = compared(own, declared, catalogue, asked.band)
+            found[name], errors[name] = answer.comparison, errors_of(answer)
+            if html:
+                options = replace(asked, winch=name).options
+                page = comparison_html(answer, f"{title}, {name}", asked.profile, options=options)
+                save_page(str(Path(html).with_name(pages[name])), page)
+            del answer  # gigabytes after long runs
+    shared = shared_errors(errors)
+    if as_json:
+        said = {name: one.to_json() for name, one in found.items()}
+        outputs = {name: one.to_json() for name, one in shared.items()}
+        echo_json({"schema": 1, "winches": said, "shared": {"outputs": outputs}})
+    else:
+        texts = {name: compare_text(one) for name, one in found.items()}
+        echo_each(texts, shared_errors_text(found, shared))
+    if html:
+        from winchkit.report.pages.fleet import shared_errors_html
+
+        write_page(html, shared_errors_html(found, shared, title, pages))
+
+
+def _tell_robot(
+    runs: Sequence[str], declared: RobotProfile, asked: Asked, as_json: bool, html: str | None
+) -> None:
+    """Poses with a robot's profile."""
+    from winchkit.diagnosis.robot.compare import compared_robot
+
+    answer = compared_robot(read_all(runs), declared, asked.catalogue)
+    _tell(answer.comparison, as_json)
+    if html:
+        from winchkit.report.pages.robot import robot_comparison_html
+
+        title = page_title(declared.name, runs)
+        write_page(html, robot_comparison_html(answer, title, asked.profile, options=asked.options))
+
+
+def _tell(comparison: Comparison, as_json: bool) -> None:
+    if as_json:
+        echo_json(comparison.to_json())
+        return
+    from winchkit.report.text import compare_text
+
+    click.echo(compare_text(comparison))

@@ -1,0 +1,155 @@
+"""``winchkit diagnose``: which physical effect the profile lacks, or that it lacks none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.core.outcome import threads_abandoned
+from winchkit.cli.core.output import echo_each, echo_json
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import (
+    Asked,
+    html_option,
+    json_option,
+    model_options,
+    page_title,
+    pages_beside,
+    read_all,
+    read_each,
+    save_page,
+    write_page,
+)
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.diagnose import Answer
+    from winchkit.diagnosis.results import Diagnosis
+    from winchkit.schema.profiles.robot import RobotProfile
+    from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@model_options
+@click.option("--every-sample", is_flag=True, help="Do not thin long runs out.")
+@json_option
+@html_option
+def command(
+    runs: Sequence[str], asked: Asked, every_sample: bool, as_json: bool, html: str | None
+) -> None:
+    """Name the physical effect that the model lacks, with its size and what it would buy.
+
+    Two runs of one programme and load are the measure of the noise: record everything twice.
+    Long runs are thinned out as far as their signals allow; --winch all takes each by itself
+    and tells what they have in common.
+    """
+    from winchkit.cli.model.options import read_profile, refuse_options
+    from winchkit.schema.profiles.robot import RobotProfile
+
+    declared, thin = read_profile(asked.source), not every_sample
+    if isinstance(declared, RobotProfile):
+        refuse_options(asked.band, asked.winch)
+        _tell_robot(runs, declared, asked, as_json, html)
+    elif asked.each:
+        _tell_each(runs, declared, asked, thin, as_json, html)
+    else:
+        _tell_one(runs, declared, asked, thin, as_json, html)
+
+
+def _tell_one(
+    runs: Sequence[str],
+    declared: WinchProfile,
+    asked: Asked,
+    thin: bool,
+    as_json: bool,
+    html: str | None,
+) -> None:
+    """What one winch lacks, on a page besides where that is asked."""
+    from winchkit.diagnosis.diagnose import diagnose
+
+    with progress_bar() as told:
+        own, catalogue = asked.runs(runs), asked.catalogue
+        answer = diagnose(own, declared, catalogue, asked.band, thin=thin, told=told)
+    (echo_json if as_json else click.echo)(_said(answer, as_json))
+    if html:
+        write_page(html, _page(answer, page_title(declared.name, runs), asked))
+
+
+def _tell_each(
+    runs: Sequence[str],
+    declared: WinchProfile,
+    asked: Asked,
+    thin: bool,
+    as_json: bool,
+    html: str | None,
+) -> None:
+    """What every winch of the runs lacks, each by itself, and what they have in common."""
+    from winchkit.diagnosis.fleet.diagnose import diagnose_each
+    from winchkit.diagnosis.fleet.meta_analysis import alarms, shared_effects
+    from winchkit.report.pages.fleet import shared_effects_text
+
+    said: dict[str, Any] = {}
+    found: dict[str, Diagnosis] = {}
+    present: dict[str, float] = {}
+    title, catalogue = page_title(declared.name, runs), asked.catalogue
+    with threads_abandoned(), progress_bar() as told:
+        winches = read_each(runs)
+        pages = pages_beside(html, list(winches)) if html else {}
+        each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, told=told)
+        for name, answer in each:
+            found[name], said[name] = answer.diagnosis, _said(answer, as_json)
+            present[name] = answer.found.presence.p_value
+            if html:
+                own = _page(answer, f"{title}, {name}", replace(asked, winch=name))
+                save_page(str(Path(html).with_name(pages[name])), own)
+            del answer  # hundreds of megabytes after long runs
+    shared, chances = shared_effects(found, catalogue), alarms(found, present)
+    if as_json:
+        together = {"effects": [one.to_json() for one in shared], "alarms": chances}
+        echo_json({"schema": 1, "winches": said, "shared": together})
+    else:
+        echo_each(said, shared_effects_text(found, shared, chances))
+    if html:
+        from winchkit.report.pages.fleet import shared_effects_html
+
+        write_page(html, shared_effects_html(found, shared, chances, title, pages))
+
+
+def _tell_robot(
+    runs: Sequence[str], declared: RobotProfile, asked: Asked, as_json: bool, html: str | None
+) -> None:
+    """What a robot's model lacks, from poses."""
+    from winchkit.diagnosis.robot.diagnose import diagnose_robot
+
+    with progress_bar() as told:
+        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, told)
+    (echo_json if as_json else click.echo)(_said(answer, as_json))
+    if html:
+        from winchkit.report.pages.robot import robot_report_html
+
+        title = page_title(declared.name, runs)
+        write_page(html, robot_report_html(answer, title, asked.profile, options=asked.options))
+
+
+def _page(answer: Answer, title: str, asked: Asked) -> str:
+    """An answer as a page, with the commands that repeat it."""
+    from winchkit.report.pages.pages import report_html
+
+    return report_html(answer, title, profile=asked.profile, options=asked.options)
+
+
+def _said(answer: Answer, as_json: bool) -> Any:
+    """An answer as JSON data or as text: what is printed, without all that is behind it."""
+    if as_json:
+        from winchkit.report.as_json import report_json
+
+        return report_json(answer)
+    from winchkit.report.text import report_text
+
+    return report_text(answer)

@@ -1,0 +1,176 @@
+"""``winchkit effects``: the catalogue of effects, the card of one, a file for one of your own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.model.options import Asked, ManyValues, html_option, model_options, write_page
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.results import Diagnosis
+    from winchkit.effects.catalogue import Catalogue
+    from winchkit.runs.run import Run
+    from winchkit.schema.profiles.winch import WinchProfile
+
+    _Data = tuple[Sequence[Run], WinchProfile, Catalogue, float | None]
+    """Runs, profile, effects and band, as a diagnosis takes them."""
+
+__all__ = [
+    "command",
+    "new",
+    "show",
+]
+
+_OUTPUTS = ("cable_length", "tension", "motor_torque")
+
+
+class _Effects(LazyGroup):
+    """``effects new …`` is a command; anything else is an effect to show, or all of them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Send whatever is no command to ``show``."""
+        if not args or (args[0] not in self.table and args[0] not in ctx.help_option_names):
+            args = ["show", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group(
+    "effects",
+    cls=_Effects,
+    table={
+        "show": At(
+            "winchkit.cli.model.effects", "List the effects, or show the card of one.", "show"
+        ),
+        "new": At("winchkit.cli.model.effects", "Write a file for an effect of your own.", "new"),
+    },
+)
+def command() -> None:
+    """List the effects that a model may lack, show the card of one, or begin one of your own.
+
+    'winchkit effects' and 'winchkit effects ID' are short for 'winchkit effects show [ID]'.
+    """
+
+
+@click.command("show")
+@click.argument("effect_id", metavar="[ID]", required=False)
+@click.option(
+    "--effects",
+    "files",
+    multiple=True,
+    metavar="FILE",
+    help="Python file with effects of your own; may be given several times.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, complete, in SI units.")
+@html_option
+def show(effect_id: str | None, files: Sequence[str], as_json: bool, html: str | None) -> None:
+    """List the effects that a model may lack, or show the card of one.
+
+    The page of --html holds the card, or all cards, with the signatures drawn.
+    """
+    from winchkit.effects.card import card, card_data
+    from winchkit.effects.catalogue import load_catalogue
+
+    catalogue = load_catalogue(files)
+    if effect_id is not None and as_json:
+        echo_json({"schema": 1, **card_data(catalogue[effect_id])})
+    elif effect_id is not None:
+        click.echo(card(catalogue[effect_id]))
+    elif as_json:
+        echo_json({"schema": 1, "effects": [card_data(effect) for effect in catalogue]})
+    else:
+        click.echo(_listing(catalogue))
+    if html:
+        from winchkit.report.pages.effects import effects_html
+
+        shown = list(catalogue) if effect_id is None else [catalogue[effect_id]]
+        write_page(html, effects_html(shown, effect_id or "The catalogue of effects"))
+
+
+def _listing(catalogue: Catalogue) -> str:
+    """Effects by the first output that they change; those that only a robot has by themselves."""
+    from winchkit.report.words.columns import hanging
+
+    lines: list[str] = []
+    for place in (*_OUTPUTS, ""):
+        own = [
+            [effect.id, effect.what]
+            for effect in catalogue
+            if ("" if effect.of_robots else effect.outputs[0]) == place
+        ]
+        lines += [f"On the way to {place}" if place else "On a robot", *hanging(own), ""]
+    return "\n".join([*lines, f"{len(catalogue)} effects; 'winchkit effects ID' shows one."])
+
+
+@click.command(cls=ManyValues)
+@click.argument("file", metavar="FILE.py")
+@click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs.")
+@click.option("--curve", metavar="ID", help="Empirical effect to begin from; else the strongest.")
+@click.option("--id", "effect_id", metavar="ID", help="Of the new effect; else the file's name.")
+@model_options
+def new(
+    file: str, runs: Sequence[str], curve: str | None, effect_id: str | None, asked: Asked
+) -> None:
+    """Write FILE.py with the variable and the curve that the runs show and no effect explains.
+
+    It is ready for --effects: diagnose with it, then put in the physics that you recognise.
+    """
+    from winchkit.cli.model.options import read_profile, refuse_curves
+    from winchkit.effects.effect_template import check_own, write_wave_on_drum
+
+    refuse_curves(read_profile(asked.source))
+    name = effect_id or Path(file).stem.replace("_", "-")
+    check_own(name, Path(file), asked.catalogue)
+    data = (asked.runs(runs), asked.declared, asked.catalogue, asked.band)
+    if curve is None:
+        found = _unexplained(data)
+        order = _order_of_drum(found)
+        if order is not None:
+            write_wave_on_drum(order, name, Path(file))
+            _tell(file, name, f"a wave of {order} periods per drum turn")
+            return
+        curve = found.empirical[0]
+    _write_curve(curve, name, Path(file), data)
+    _tell(file, name, curve)
+
+
+def _tell(file: str, name: str, start: str) -> None:
+    click.echo(f"written: {file}; it holds the effect '{name}', begun from {start}", err=True)
+
+
+def _write_curve(curve: str, name: str, file: Path, data: _Data) -> None:
+    from winchkit.diagnosis.add import add
+    from winchkit.effects.effect_template import write_own
+    from winchkit.effects.empirical import EMPIRICAL
+    from winchkit.errors import UsageError
+    from winchkit.units import suggest
+
+    if curve not in EMPIRICAL:
+        raise UsageError(f"'{curve}' is no empirical effect{suggest(curve, list(EMPIRICAL))}")
+    term, _ = add(curve, *data).added
+    write_own(term, name, file)
+
+
+def _unexplained(data: _Data) -> Diagnosis:
+    """A diagnosis that leaves something, and says where."""
+    from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.errors import UsageError
+
+    found = diagnose(*data).diagnosis
+    if not found.empirical:
+        raise UsageError(
+            f"the verdict is '{found.verdict}' and nothing unexplained was located; name the "
+            "curve to begin from with --curve, e.g. empirical-motor-torque-speed"
+        )
+    return found
+
+
+def _order_of_drum(found: Diagnosis) -> int | None:
+    """Order per drum turn that several outputs share: then the drum's own path has it."""
+    orders = [w.order for w in found.where if w.variable == "drum_angle" and w.order is not None]
+    return next((order for order in orders if orders.count(order) > 1), None)

@@ -1,0 +1,35 @@
+"""``winchkit ledger``: how a profile grew, as a ladder of held-out errors."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.model.options import html_option, write_page
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file.")
+@click.option("--json", "as_json", is_flag=True, help="Print the ledger as JSON.")
+@html_option
+def command(profile: str, as_json: bool, html: str | None) -> None:
+    """Show every effect that was added to or removed from a profile and what that did."""
+    from winchkit.catalog import find
+    from winchkit.cli.model.options import read_profile
+    from winchkit.profile_edit.history import ladder
+
+    declared = read_profile(find("profiles", profile))
+    rungs = ladder(declared)
+    if as_json:
+        steps = [rung.to_json() for rung in rungs]
+        echo_json({"schema": 1, "profile": declared.name, "steps": steps})
+    else:
+        from winchkit.report.pages.history import ladder_text
+
+        click.echo(ladder_text(declared.name, rungs))
+    if html:
+        from winchkit.report.pages.history import ladder_html
+
+        write_page(html, ladder_html(declared.name, rungs))

@@ -1,0 +1,304 @@
+"""What commands that hold a model against runs are asked: runs, a profile, effects of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from re import compile as pattern
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.errors import Fault, FileError, UsageError
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.results import Estimate, OutputFit
+    from winchkit.effects.bind import Term
+    from winchkit.effects.catalogue import Catalogue
+    from winchkit.profile_edit.fitted import Fitted
+    from winchkit.profile_edit.ledger import Judged
+    from winchkit.runs.run import Run
+    from winchkit.schema.profiles.robot import RobotProfile
+    from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = [
+    "ALL",
+    "Asked",
+    "ManyValues",
+    "html_option",
+    "json_option",
+    "model_options",
+    "page_title",
+    "pages_beside",
+    "provenance",
+    "read_all",
+    "read_each",
+    "read_profile",
+    "read_runs",
+    "refuse_curves",
+    "refuse_options",
+    "save_page",
+    "write_page",
+]
+
+ALL = "all"
+"""Said to ``--winch``: every winch of the runs by itself."""
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+_MODEL_OPTIONS = (
+    click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
+    click.option("--winch", help="Which winch of runs with several; 'all' where each is told."),
+    click.option(
+        "--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects."
+    ),
+    click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file."),
+)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A profile as the user named it, and how to hold it against runs."""
+
+    profile: str
+    effect_files: Sequence[str]
+    winch: str | None
+    band: float | None
+
+    @property
+    def source(self) -> Path:
+        """The profile's file."""
+        from winchkit.catalog import find
+
+        return find("profiles", self.profile)
+
+    @property
+    def declared(self) -> WinchProfile:
+        """The profile. Raises FileError with its faults."""
+        from winchkit.schema.read import read_winch
+
+        return read_winch(self.source)
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """All effects, a user's own included."""
+        from winchkit.effects import load_catalogue
+
+        return load_catalogue(self.effect_files)
+
+    def runs(self, paths: Sequence[str]) -> list[Run]:
+        """Runs of the one winch. Raises FileError with the faults of all files."""
+        return read_runs(paths, self.winch)
+
+    @property
+    def each(self) -> bool:
+        """Whether every winch of the runs is asked for by itself."""
+        return self.winch == ALL
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """What was given beside runs and profile, as words to repeat it with."""
+        out = [word for path in self.effect_files for word in ("--effects", path)]
+        out += [] if self.winch is None else ["--winch", self.winch]
+        out += [] if self.band is None else ["--band", f"{self.band:g}"]
+        return tuple(out)
+
+
+class ManyValues(click.Command):
+    """A command whose options shown as ``RUN...`` take several values: ``--fit a.csv b.csv``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Spell ``--fit a b`` as ``--fit a --fit b`` before click reads it."""
+        several = [p for p in self.params if str(p.metavar or "").endswith("...")]
+        many = {name for p in several if isinstance(p, click.Option) for name in p.opts}
+        out: list[str] = []
+        current: str | None = None
+        for arg in args:
+            if arg.startswith("-") and arg != "-":
+                current = arg if arg in many else None
+                out.append(arg)
+            elif current is not None and out[-1] != current:
+                out += [current, arg]
+            else:
+                out.append(arg)
+        return super().parse_args(ctx, out)
+
+
+def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every command that holds a model against runs; it gets them as ``asked``."""
+
+    @wraps(function)
+    def bundled(
+        profile: str,
+        effect_files: Sequence[str],
+        winch: str | None,
+        band: float | None,
+        **others: Any,
+    ) -> Any:
+        return function(asked=Asked(profile, effect_files, winch, band), **others)
+
+    for option in _MODEL_OPTIONS:
+        bundled = option(bundled)
+    return bundled
+
+
+def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:
+    """Runs of one winch. Raises FileError with the faults of all files."""
+    return [_of_winch(run, winch) for run in read_all(paths)]
+
+
+def read_each(paths: Sequence[str]) -> dict[str, list[Run]]:
+    """Runs of every winch that is in all of them, each file read once. Raises FileError."""
+    runs = read_all(paths)
+    names = [name for name in runs[0].winches() if all(name in run.winches() for run in runs)]
+    if not names:
+        listed = "; ".join(f"{run.path}: {', '.join(run.winches())}" for run in runs)
+        raise UsageError(f"no winch is in all of the runs: {listed}")
+    return {name: [run.of_winch(name) for run in runs] for name in names}
+
+
+def read_all(paths: Sequence[str]) -> list[Run]:
+    """Runs with all that they hold. Raises FileError with the faults of all files."""
+    from winchkit.runs import read_run
+
+    runs: list[Run] = []
+    faults: list[Fault] = []
+    for path in paths:
+        try:
+            runs.append(read_run(path))
+        except FileError as error:
+            faults += error.faults
+    if faults:
+        raise FileError(faults)
+    return runs
+
+
+def _of_winch(run: Run, winch: str | None) -> Run:
+    known = run.winches()
+    if winch is None:
+        if len(known) > 1:
+            raise UsageError(
+                f"{run.path}: has the winches {', '.join(known)}; choose one with --winch, "
+                "or have each told by compare and diagnose with --winch all"
+            )
+        return run.of_winch(known[0])
+    if known != [""] and winch not in known:
+        raise UsageError(f"{run.path}: no winch '{winch}'; it has {', '.join(known)}")
+    return run.of_winch(winch if known != [""] else "")
+
+
+html_option = click.option("--html", metavar="FILE", help="Also write the answer as one page.")
+_RUNS_NAMED = 3
+_NO_FILE = pattern(r"[^\w.-]")
+_PAGE_BEGINS = b"<!DOCTYPE html>"
+
+
+def write_page(path: str, page: str) -> None:
+    """Write a page as :func:`save_page` does and say so on stderr."""
+    save_page(path, page)
+    click.echo(f"report: {path}", err=True)
+
+
+def save_page(path: str, page: str) -> None:
+    """Write a page; the folder is made where its parent exists.
+
+    Raises FileError where it cannot be written, and for a file there that is no page: a run
+    named after ``--html`` by mistake stays what it is.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(exist_ok=True)
+        if target.is_file() and not _may_be_replaced(target):
+            raise FileError(
+                Fault("holds something else than a page and was left alone; name another", path)
+            )
+        target.write_text(page, encoding="utf-8")
+    except OSError as error:
+        reason = error.strerror or error
+        raise FileError(
+            Fault(f"the page cannot be written: {reason}; name another file for --html", path)
+        ) from error
+
+
+def pages_beside(path: str, winches: Sequence[str]) -> dict[str, str]:
+    """Names of the winches' own pages beside the page of all: ``report-A.html``.
+
+    Raises UsageError where two winches would get one page.
+    """
+    page = Path(path)
+    names = {w: f"{page.stem}-{_NO_FILE.sub('-', w) or 'winch'}{page.suffix}" for w in winches}
+    if len(set(names.values())) < len(names):
+        raise UsageError(f"--html: no page for each of the winches {', '.join(winches)}")
+    return names
+
+
+def page_title(profile: str, runs: Sequence[str], effect: str = "") -> str:
+    """``bench-spiral: a.csv, b.csv``, or ``bench-spiral: 12 runs, a.csv to l.csv``."""
+    added = f" with {effect}" if effect else ""
+    names = [Path(run).name for run in runs]
+    told = ", ".join(names)
+    if len(names) > _RUNS_NAMED:
+        told = f"{len(names)} runs, {names[0]} to {names[-1]}"
+    return f"{profile}{added}: {told}"
+
+
+def _may_be_replaced(target: Path) -> bool:
+    """Whether a file is empty or an earlier page."""
+    with target.open("rb") as there:
+        return there.read(len(_PAGE_BEGINS)) in {b"", _PAGE_BEGINS}
+
+
+def read_profile(path: Path) -> WinchProfile | RobotProfile:
+    """The profile of a winch or of a robot. Raises FileError."""
+    from winchkit.schema.profiles.robot import RobotProfile
+    from winchkit.schema.profiles.winch import WinchProfile
+    from winchkit.schema.read import read_any, read_winch
+
+    value = read_any(path)
+    # The reader of winches refuses every other kind in its own words.
+    return value if isinstance(value, (WinchProfile, RobotProfile)) else read_winch(path)
+
+
+def refuse_options(band: float | None, winch: str | None = None) -> None:
+    """Raise UsageError for options that mean nothing for a robot's poses."""
+    if band is not None:
+        raise UsageError("--band: a robot's poses stand still and have no torque to filter")
+    if winch is not None:
+        raise UsageError("--winch: a robot's lines are judged together; leave it out")
+
+
+def refuse_curves(declared: WinchProfile | RobotProfile) -> None:
+    """Raise UsageError for a robot's profile where a curve along a winch's run is asked for."""
+    from winchkit.schema.profiles.robot import RobotProfile
+
+    if isinstance(declared, RobotProfile):
+        raise UsageError(
+            f"'{declared.name}' is a robot: there is no curve to begin from along its poses. "
+            "'winchkit diagnose' says over what the rest lives; write the effect by hand, as "
+            "examples/my_effect.py, with on_robot, and give it with --effects"
+        )
+
+
+def provenance(
+    terms: Sequence[tuple[Term, Mapping[str, Estimate]]],
+    outputs: Mapping[str, OutputFit],
+    runs: Sequence[str],
+) -> tuple[list[Fitted], Judged]:
+    """Fitted terms and the ledger's figures, dated today."""
+    from datetime import UTC, datetime
+
+    from winchkit.profile_edit.fitted import Fitted
+    from winchkit.profile_edit.ledger import Judged
+
+    today = datetime.now(UTC).date()
+    fitted = [Fitted(t, {n: e.std for n, e in v.items()}, runs, today) for t, v in terms]
+    judged = Judged(
+        today,
+        runs,
+        {name: o.unit for name, o in outputs.items()},
+        {name: o.heldout_rms_before for name, o in outputs.items()},
+        {name: o.heldout_rms_after for name, o in outputs.items()},
+        {name: o.noise_rms for name, o in outputs.items() if o.noise_rms is not None},
+    )
+    return fitted, judged

@@ -1,0 +1,276 @@
+"""``winchkit plan``: the next motion programme, as a file that ``winchkit run`` executes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from string import ascii_uppercase
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.options import complete_bench
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.model.options import Asked, json_option, model_options, read_all, refuse_options
+from winchkit.errors import UsageError
+from winchkit.units import suggest
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.design.plan import Offer
+    from winchkit.diagnosis.design.programmes import Room
+    from winchkit.diagnosis.robot.plan import PosePlan
+    from winchkit.effects.bind import Term
+    from winchkit.schema.bench import LimitSpec
+    from winchkit.schema.profiles.robot import RobotProfile
+    from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = [
+    "command",
+    "tell_poses",
+]
+
+
+def tell_poses(
+    runs: Sequence[str],
+    declared: RobotProfile,
+    asked: Asked,
+    output: str | None,
+    bench: str | None,
+    as_json: bool,
+) -> None:
+    """Diagnose, then propose poses; raises UsageError for options that mean nothing here."""
+    from winchkit.diagnosis.robot.diagnose import diagnose_robot
+    from winchkit.diagnosis.robot.plan import plan_poses
+
+    refuse_options(asked.band, asked.winch)
+    if bench is not None:
+        raise UsageError(
+            "--bench: a robot's plan keeps to the poses that pulling ropes can hold inside its "
+            "frame; leave it out"
+        )
+    if output is not None and Path(output).suffix == ".toml":
+        raise UsageError(
+            f"-o {output}: a robot's plan is a list of poses and no programme; name a .csv file"
+        )
+    plan = plan_poses(diagnose_robot(read_all(runs), declared, asked.catalogue))
+    best = plan.best
+    if output and best is not None:
+        from winchkit.runs import write_run
+
+        write_run(plan.run(best), output)
+        click.echo(f"written: {output}", err=True)
+    elif output:
+        click.echo(f"nothing written to {output}: no such poses tell more", err=True)
+    if as_json:
+        echo_json({**plan.to_json(), "written": output if best is not None else None})
+    else:
+        click.echo(_poses_text(plan))
+
+
+def _poses_text(plan: PosePlan) -> str:
+    """A line a kind, the best first, then its poses."""
+    from math import degrees
+
+    from winchkit.diagnosis.robot.pose_design import reach
+    from winchkit.report.words.columns import hanging
+    from winchkit.report.words.numbers import percent
+
+    if not plan.offers:
+        return "nothing to tell apart, and these poses would have shown every effect of usual size"
+    letters = ascii_uppercase[: len(plan.pairs)]
+    head = ["what poses to take next (nothing to tell apart: what they would show besides)"]
+    if plan.pairs:
+        head = ["what poses to take next, with the chance (power) that they tell apart"]
+        head += [
+            f"  {letter}: {a.effect.id} / {b.effect.id}"
+            for letter, (a, b) in zip(letters, plan.pairs, strict=False)
+        ]
+    rows = [["poses", "reach", "turn", *letters, "shows besides"]]
+    for offer in plan.offers:
+        away, turned = reach(offer)
+        powers = [percent(power) for power in plan.of_pairs(offer)]
+        shown = plan.shows(offer)
+        told = ", ".join(shown[:_FEW]) or "—"
+        told += f" and {len(shown) - _FEW} more" if len(shown) > _FEW else ""
+        far = [f"{away * 1e3:.0f} mm", f"{degrees(turned):.0f}°"]
+        rows.append([f"{len(offer.pose.position)} {offer.kind.name}", *far, *powers, told])
+    return "\n".join([*head, *hanging(rows), *_indistinguishable(plan), *_listed(plan)])
+
+
+def _indistinguishable(plan: PosePlan) -> list[str]:
+    """What no poses tell apart, and what does."""
+    from winchkit.diagnosis.robot.pose_design import WORTHWHILE
+    from winchkit.effects.effect import told_apart
+    from winchkit.report.words.columns import paragraph
+
+    lines = []
+    for index, (first, second) in enumerate(plan.pairs):
+        if max(offer.powers[index] for offer in plan.offers) < WORTHWHILE:
+            names = f"{first.effect.id} / {second.effect.id}"
+            what = told_apart(first.effect, second.effect)
+            lines += paragraph(f"{names}: no such poses tell them apart. What does: {what}")
+    if plan.best is None and not plan.pairs:
+        hidden = ", ".join(term.effect.id for term in plan.hidden)
+        lines += paragraph(f"No such poses would show what these did not: {hidden}.")
+    return lines
+
+
+def _listed(plan: PosePlan) -> list[str]:
+    """The poses of the best offer."""
+    from math import degrees
+
+    from winchkit.model.robot import angles_of
+    from winchkit.report.words.columns import aligned
+
+    offer = plan.best
+    if offer is None:
+        return []
+    rows = [["", "x [mm]", "y [mm]", "z [mm]", "roll [°]", "pitch [°]", "yaw [°]"]]
+    turned = angles_of(offer.pose.rotation).tolist()
+    for number, (place, angles) in enumerate(
+        zip(offer.pose.position.tolist(), turned, strict=True), start=1
+    ):
+        cells = [f"{v * 1e3:.0f}" for v in place]
+        cells += [f"{round(degrees(v), 1) + 0.0:.1f}" for v in angles]
+        rows.append([str(number), *cells])
+    told = f"the poses '{offer.kind.name}', in this order; -o FILE.csv writes them"
+    return ["", told, *aligned(rows)]
+
+
+_FEW = 2
+"""Effects named in a row; --json has them all."""
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@click.option("-o", "--output", metavar="NEXT", help="Programme or poses to write.")
+@click.option(
+    "-b",
+    "--bench",
+    metavar="FILE",
+    shell_complete=complete_bench,
+    help="Wiring file whose limits say how far, how fast and how heavy; else as the RUNs were.",
+)
+@model_options
+@json_option
+def command(
+    runs: Sequence[str], output: str | None, bench: str | None, asked: Asked, as_json: bool
+) -> None:
+    """Propose what to run next, by what it tells apart and shows per minute.
+
+    Kinds of programmes are tried on the model with the noise of the RUNs: those that separate
+    the effects that these runs cannot tell apart come first, else those that show what these
+    could not. Run the file with 'winchkit run NEXT.toml --bench B' and diagnose again.
+    For a robot's profile the plan is a list of poses, and NEXT.csv a run of them to measure at.
+    """
+    from winchkit.cli.model.options import read_profile
+    from winchkit.schema.profiles.robot import RobotProfile
+
+    declared = read_profile(asked.source)
+    if isinstance(declared, RobotProfile):
+        from winchkit.cli.model.plan import tell_poses
+
+        tell_poses(runs, declared, asked, output, bench, as_json)
+    else:
+        _plan_winch(runs, declared, asked, output, bench, as_json)
+
+
+def _plan_winch(
+    runs: Sequence[str],
+    declared: WinchProfile,
+    asked: Asked,
+    output: str | None,
+    bench: str | None,
+    as_json: bool,
+) -> None:
+    """The next programme of one winch."""
+    from winchkit.diagnosis.design.plan import offers, programme_of
+    from winchkit.diagnosis.design.programmes import allowed, seen
+    from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.schema.programme import write_programme
+
+    limits = None if bench is None else _limits(bench, asked.winch)
+    catalogue = asked.catalogue
+    answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
+    problem, pairs = answer.inquiry.problem, answer.pairs
+    room = seen(problem.dataset) if limits is None else allowed(problem.dataset, limits)
+    noise = answer.found.noise.rms
+    found = offers(problem, pairs, noise, list(catalogue), bar=answer.bar, room=room)
+    if output:
+        path = Path(output)
+        write_programme(programme_of(problem.dataset, found[0].kind, path.stem, room), path)
+        click.echo(f"written: {output}", err=True)
+    if as_json:
+        listed = [offer.to_json(pairs) for offer in found]
+        echo_json({"schema": 1, "offers": listed, "programme": output})
+    else:
+        click.echo(_text(found, pairs, named=bool(answer.sets)))
+        for line in _silent(found, pairs, room, widened=limits is not None):
+            click.echo(line)
+
+
+def _limits(bench: str, winch: str | None) -> LimitSpec:
+    """How far, how fast and how heavy the next programme may go on a bench."""
+    from winchkit.schema.read import read_bench
+
+    wired = read_bench(bench).winch
+    if winch is None and len(wired) > 1:
+        raise UsageError(f"which winch? {bench} has {', '.join(wired)}; give --winch")
+    name = winch or next(iter(wired))
+    if name not in wired:
+        known = list(wired)
+        raise UsageError(
+            f"{bench} has no winch '{name}'; it has {', '.join(known)}{suggest(name, known)}"
+        )
+    return wired[name].limits
+
+
+def _silent(
+    found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], room: Room, *, widened: bool
+) -> list[str]:
+    """What none of these programmes tells apart, and what does."""
+    from winchkit.diagnosis.design.plan import hopeless
+    from winchkit.effects.effect import told_apart
+
+    lines = []
+    for first, second in hopeless(found, pairs):
+        names = f"{first.effect.id} / {second.effect.id}"
+        lines.append(
+            f"{names}: no such motion within {room.low:.2f} m to {room.high:.2f} m tells them "
+            f"apart. What does: {told_apart(first.effect, second.effect)}"
+        )
+    if lines and not widened:
+        lines.append("With --bench BENCH.toml the plan goes as far as that bench may.")
+    return lines
+
+
+def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], *, named: bool) -> str:
+    """A line a kind, the best first; pairs of effects by letters."""
+    from winchkit.report.words.columns import aligned, hanging, paragraph
+    from winchkit.report.words.numbers import percent
+
+    if not pairs:
+        rows = [["programme", "minutes", "shows besides"]]
+        rows += [[o.kind.name, f"{o.minutes:.1f}", _shown(o, _FEW)] for o in found]
+        said = "what to run next (nothing to tell apart: what it would show besides)"
+        return "\n".join([said, *hanging(rows)])
+    letters = ascii_uppercase[: len(pairs)]
+    table = [["programme", "minutes", *letters]]
+    for offer in found:
+        powers = [percent(power) for power in offer.powers[: len(letters)]]
+        table.append([offer.kind.name, f"{offer.minutes:.1f}", *powers])
+    what = "" if named else " what came closest (none is named yet)"
+    head = [f"what to run next, with the chance (power) that it tells apart{what}"]
+    head += [
+        f"  {letter}: {a.effect.id} / {b.effect.id}"
+        for letter, (a, b) in zip(letters, pairs, strict=False)
+    ]
+    besides = paragraph(f"the first shows besides: {_shown(found[0])}", "  ", "    ")
+    return "\n".join([*head, *aligned(table), *besides])
+
+
+def _shown(offer: Offer, most: int | None = None) -> str:
+    """Effects that a programme would show and the runs so far do not."""
+    told = ", ".join(offer.shows[:most]) or "—"
+    left = len(offer.shows) - len(offer.shows[:most])
+    return f"{told} and {left} more" if left else told

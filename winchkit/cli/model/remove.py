@@ -1,0 +1,69 @@
+"""``winchkit remove``: take an effect out of a copy of a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.model.options import Asked, ManyValues, json_option, model_options, read_all
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.add import Removal
+
+__all__ = ["command"]
+
+
+@click.command(cls=ManyValues)
+@click.argument("effect")
+@click.option("--fit", "runs", multiple=True, metavar="RUN...", help="Runs to refit the others on.")
+@click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
+@model_options
+@json_option
+def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json: bool) -> None:
+    """Write a profile without EFFECT; with --fit the effects that stay are refitted.
+
+    A robot's effect on one line is EFFECT/LINE, or EFFECT with --winch LINE. The ledger notes the
+    step, and 'winchkit undo' takes it back.
+    """
+    from winchkit.cli.model.options import read_profile, refuse_options
+    from winchkit.diagnosis.add import remove
+    from winchkit.schema.profiles.robot import RobotProfile
+
+    declared, removal = read_profile(asked.source), None
+    if isinstance(declared, RobotProfile):
+        from winchkit.diagnosis.robot.add import remove_from_robot
+
+        refuse_options(asked.band)
+        effect = f"{effect}/{asked.winch}" if asked.winch else effect
+        if runs:
+            removal = remove_from_robot(effect, read_all(runs), declared, asked.catalogue)
+    elif runs:
+        removal = remove(effect, asked.runs(runs), declared, asked.catalogue, asked.band)
+    _write(asked.source, effect, removal, runs, Path(output))
+    click.echo(f"written: {output}", err=True)
+    _tell(effect, removal, as_json)
+
+
+def _write(
+    source: Path, effect: str, removal: Removal | None, runs: Sequence[str], out: Path
+) -> None:
+    from winchkit.cli.model.options import provenance
+    from winchkit.profile_edit.fitted import write_without
+
+    terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
+    fitted, judged = provenance(terms, outputs, [Path(run).name for run in runs])
+    write_without(source, effect, fitted, out, judged)
+
+
+def _tell(effect: str, removal: Removal | None, as_json: bool) -> None:
+    if as_json:
+        nothing = {"schema": 1, "effect": effect, "outputs": {}, "parameters": {}, "notes": []}
+        echo_json(nothing if removal is None else removal.to_json())
+    elif removal is not None:
+        from winchkit.report.text import addition_text
+
+        click.echo(addition_text(removal))

@@ -1,0 +1,1 @@
+"""``winchkit sim`` and ``winchkit demo``: simulated benches and the whole procedure on one."""

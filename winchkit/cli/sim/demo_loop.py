@@ -1,0 +1,142 @@
+"""The stations of the demonstration: record on a simulated bench, diagnose, add, compare."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from winchkit.catalog import find
+
+if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench
+    from winchkit.diagnosis.add import Addition
+    from winchkit.diagnosis.diagnose import Answer
+    from winchkit.runs.run import Run
+    from winchkit.schema.programme import Programme, Step
+    from winchkit.schema.simbench import SimBench
+
+__all__ = ["Findings", "Told", "learn", "programmes", "record", "truth_of"]
+
+Told = Callable[[str, float], None]
+"""Told what is being done, and the recorded time so far, s."""
+
+PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
+_AT_NOISE = 1.3
+_APPROACH = 0.5
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the loop found, the truth still unknown to it."""
+
+    answer: Answer
+    addition: Addition | None
+    """The effect named first, added to the profile."""
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Effects of the first step, as the data leave them; empty where nothing is missing."""
+        steps = self.answer.diagnosis.steps
+        return steps[0].effects if steps else ()
+
+    @property
+    def worst_held_out(self) -> float:
+        """Largest held-out error of any output, in units of its noise."""
+        outputs = self.addition.outputs if self.addition else self.answer.diagnosis.outputs
+        return max(
+            fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else float("inf")
+            for fitted in outputs.values()
+        )
+
+    def right(self, truth: tuple[str, ...]) -> bool:
+        """Whether the hidden effect, and nothing else, was found, and the error is noise now."""
+        steps = self.answer.diagnosis.steps
+        if not truth:
+            return not steps and self.answer.diagnosis.verdict == "adequate"
+        return len(steps) == 1 and truth[0] in self.named and self.worst_held_out <= _AT_NOISE
+
+
+def programmes() -> list[Programme]:
+    """The motion programmes of the demonstration."""
+    from winchkit.schema.read import read_programme
+
+    return [read_programme(find("sim", name)) for name in PROGRAMMES]
+
+
+def truth_of(bench: SimBench) -> tuple[str, ...]:
+    """Catalogue ids of what is hidden; looked at when everything else is done."""
+    return tuple(a for t in bench.truth.values() for spec in t.hidden for a in spec.answers)
+
+
+def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
+    """Run the programmes on a simulated bench, with CAN frames and Modbus transactions.
+
+    Time is simulated: it advances as fast as this computer can. Raises MotionError where the
+    control loop was late nevertheless: such runs are not valid.
+    """
+    from winchkit.bench.bench import open_bench
+    from winchkit.bench.programme import run_programme
+    from winchkit.errors import MotionError
+    from winchkit.sim.clock.simulated_clock import SimulatedClock
+    from winchkit.sim.live.bench import LiveBench
+
+    written: list[Path] = []
+    clock = SimulatedClock()
+    start = clock.now()
+
+    def progress(repeat: int, _number: int, step: Step) -> None:
+        told(f"repeat {repeat}: {_words(step)}", clock.now() - start)
+
+    with LiveBench(bench, seed=seed, simulated_time=clock) as live:
+        told("commissioning the drive", 0.0)
+        with open_bench(live.bench_spec, clock) as opened:
+            for programme in programmes():
+                _go_to_start(opened, programme)
+                written += run_programme(
+                    opened, programme, folder, live.answer, progress=progress, replace=True
+                )
+            late = opened.loop.overruns
+    if late:
+        raise MotionError(
+            f"this computer could not keep the cycle: {late} late, result not valid; "
+            "run the demo again while less else is running"
+        )
+    return written
+
+
+def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
+    """Diagnose recorded runs, add what was found to a copy of the profile, and fit it."""
+    from winchkit.cli.model.add import write_addition
+    from winchkit.diagnosis.add import add
+    from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.schema.read import read_winch
+
+    source = find("profiles", profile_name)
+    nominal = out / "nominal.toml"
+    shutil.copyfile(source, nominal)
+    profile = read_winch(nominal)
+    answer = diagnose(runs, profile)
+    if not answer.diagnosis.steps:
+        return Findings(answer, None)
+    addition = add(answer.diagnosis.steps[0].effects[0], runs, profile)
+    write_addition(nominal, addition, [run.name for run in runs], out / "improved.toml")
+    return Findings(answer, addition)
+
+
+def _go_to_start(opened: Bench, programme: Programme) -> None:
+    """Begin where the programme ends, so that its repeats are equal from the first one on."""
+    last = next(step for step in reversed(programme.step) if step.to is not None)
+    for winch in opened.winch.values():
+        if last.to is not None:
+            winch.move_to(last.to, speed=_APPROACH)
+
+
+def _words(step: Step) -> str:
+    if step.ask is not None:
+        return step.ask
+    if step.hold is not None:
+        return f"hold {step.hold:g} s"
+    return f"to {step.to:g} m" if step.to is not None else f"by {step.by:g} m"

@@ -1,0 +1,136 @@
+"""``winchkit sim serve``: a simulated bench in real time, for other terminals to connect to."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from winchkit.cli.core.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.sim.live.bench import LiveBench
+    from winchkit.sim.live.buses import Interface
+
+__all__ = ["command"]
+
+_CHECK_EVERY = 0.1
+_TURN = 5e-4
+
+
+@click.command("serve")
+@click.argument("bench")
+@click.option("--seed", default=0, show_default=True, help="Of the noise.")
+@click.option(
+    "--bench-file",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Wiring file to write.  [default: BENCH-bench.toml]",
+)
+@click.option(
+    "--interface",
+    default="udp_multicast",
+    show_default=True,
+    type=click.Choice(["udp_multicast", "virtual"]),
+    help="CAN of the drives: between processes, or within this one only.",
+)
+@click.option(
+    "--hidden",
+    multiple=True,
+    metavar="PHYSICS",
+    help="Hide this instead of what the bench hides, as in 'sim record'.",
+)
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print a line of JSON when it is ready, and per reply."
+)
+def command(
+    *,
+    bench: str,
+    seed: int,
+    bench_file: Path | None,
+    interface: Interface,
+    hidden: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Run a simulated BENCH live until Ctrl-C: drives on CAN, instruments on Modbus or serial.
+
+    Prints the wiring file to connect to. Takes lines on its input: load A 32 kg, fault A.cell
+    silence, recover A.cell, status, quit. While it runs, 'winchkit run --yes' with that wiring
+    file lets it hang the loads that a programme asks for; it finds the simulation by the file
+    BENCH-bench.toml.sim beside it. With --json the first line on stdout says that others can
+    connect now: {"schema": 1, "bench": FILE, "ready": true}.
+    """
+    from winchkit.catalog import find
+    from winchkit.schema.read import read_simbench
+    from winchkit.sim.live.bench import LiveBench
+    from winchkit.sim.live.control import ControlServer
+
+    # Bus and instruments share this interpreter; 5 ms, its default turn, is a whole cycle.
+    sys.setswitchinterval(_TURN)
+    declared = read_simbench(find("sim", bench))
+    path = bench_file or Path(f"{declared.name}-bench.toml")
+    ended = threading.Event()
+    with LiveBench(declared, seed=seed, hidden=hidden, interface=interface) as live:
+        live.write_bench_file(path)
+        with ControlServer(live, path, ended.set), _ended_by_signals(ended):
+            _introduce(live, path, as_json=as_json)
+            _listen(live, ended, as_json=as_json)
+            while not ended.wait(_CHECK_EVERY):
+                live.check()
+    click.echo(f"ended; {path} leads nowhere any more", err=True)
+
+
+@contextmanager
+def _ended_by_signals(ended: threading.Event) -> Iterator[None]:
+    """Take Ctrl-C and SIGTERM as the way to end, even where a shell had them ignored."""
+    signals = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: ended.set()) for number in signals]
+    try:
+        yield
+    finally:
+        for number, handler in zip(signals, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _introduce(live: LiveBench, path: Path, *, as_json: bool) -> None:
+    winch = next(iter(live.winches))
+    if as_json:
+        echo_json({"schema": 1, "bench": path, "ready": True})
+    else:
+        click.echo(path)
+    click.echo(f"{live.sim_bench.name} runs. From another terminal:", err=True)
+    click.echo(f"  winchkit monitor --bench {path}", err=True)
+    click.echo(f"  winchkit jog {winch} --bench {path}", err=True)
+    click.echo("Lines here: load, fault, recover, status, quit, help. Ctrl-C ends it.", err=True)
+
+
+def _listen(live: LiveBench, ended: threading.Event, *, as_json: bool) -> None:
+    """Obey what is typed, on a thread; the end of the input ends nothing."""
+    arguments = (live, ended, as_json)
+    threading.Thread(target=_obey_input, args=arguments, name="sim-input", daemon=True).start()
+
+
+def _obey_input(live: LiveBench, ended: threading.Event, as_json: bool) -> None:
+    from winchkit.errors import WinchkitError
+    from winchkit.sim.live.control import HELP, obey
+
+    for raw in sys.stdin:
+        line = raw.strip()
+        if line == "quit":
+            ended.set()
+            return
+        if not line:
+            continue
+        try:
+            reply = HELP if line == "help" else obey(live, line)
+            if as_json:
+                echo_json({"schema": 1, "line": line, "reply": reply})
+            else:
+                click.echo(reply)
+        except WinchkitError as error:
+            click.echo(f"{error}", err=True)

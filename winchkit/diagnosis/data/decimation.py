@@ -1,0 +1,179 @@
+"""Long runs thinned out for a diagnosis: low-passed, then every k-th sample.
+
+An hour at 1 kHz holds millions of samples of motions that take seconds. The model's own signals
+(speeds, directions, accelerations) are taken at the full rate and thinned like the measured ones:
+a friction that changes its sign within a millisecond is then low-passed on both sides alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.signal import firwin, upfirdn, welch
+
+from winchkit.arrays import Array
+from winchkit.model.derivatives import Clock
+from winchkit.model.line import Motion
+from winchkit.model.stages import At
+from winchkit.runs.run import Run
+
+__all__ = ["Thinning", "thinning_for"]
+
+_MANY = 200_000
+"""Samples of all runs from which thinning begins."""
+_WANTED = 90_000
+"""Samples to which it thins, where the signals allow."""
+_PASSED = 0.25
+"""Cut-off over the new sampling rate: what folds back below it comes from three times as high."""
+_SLOWEST = 20.0
+"""Least sampling rate that is left, Hz: reversals and lags live within a tenth of a second."""
+_LOST = 0.01
+"""Of what a channel does beyond its noise, the share that may lie above the cut-off."""
+_BLOCK = 16.0
+"""Length of the blocks whose spectra are averaged, s, at most."""
+_BLOCKS = 8
+"""How many there are at least, overlapping by half."""
+_CLEAR = 2.0
+"""Times the noise's power that a band must hold to be more than noise."""
+_GAP = 2.5
+_TAPS = 10
+_BETA = 7.857
+"""Kaiser window, 80 dB."""
+_CHANNELS = ("motor_angle", "motor_torque", "tension", "load", "cable_length")
+
+
+@dataclass(frozen=True)
+class Thinning:
+    """Every ``factor``-th sample of a low-passed run, whole below a cut-off."""
+
+    factor: int
+    cut_off: float
+    """Hz; below it all stays, at twice it half of the amplitude is left, at three times nothing."""
+
+    @property
+    def words(self) -> str:
+        """For the notes of a diagnosis."""
+        return (
+            f"every {_ordinal(self.factor)} sample of the runs, whole up to {self.cut_off:.3g} Hz "
+            f"and low-passed beyond, is compared: beyond lies less than {_LOST:.0%} of what any "
+            "channel does"
+        )
+
+    def run(self, run: Run) -> Run:
+        """A thinned run; a sample is NaN where most of what it stands for is."""
+        pieces = _pieces(run.time)
+        channels = {
+            name: replace(channel, values=self._measured(channel.values, pieces))
+            for name, channel in run.channels.items()
+            if name.rpartition(".")[2] in (*_CHANNELS, "motor_velocity", "temperature")
+        }
+        return replace(run, time=self._every(run.time, pieces), channels=channels)
+
+    def motion(self, motion: Motion) -> Motion:
+        """A motion along the thinned run, each of its signals low-passed by itself."""
+        pieces = _pieces(motion.at.time)
+        at: dict[str, Any] = {
+            field.name: self._passed(value, pieces)
+            for field in fields(At)
+            if isinstance(value := getattr(motion.at, field.name), np.ndarray)
+        }
+        at["time"] = self._every(motion.at.time, pieces)
+
+        def thinned(values: Array | None) -> Array | None:
+            return None if values is None else self._passed(values, pieces)
+
+        return replace(
+            motion,
+            at=replace(motion.at, **at),
+            clock=Clock(at["time"]),
+            load=thinned(motion.load),
+            drum_tension=thinned(motion.drum_tension),
+            rounding=thinned(motion.rounding),
+        )
+
+    def _every(self, time: Array, pieces: Sequence[slice]) -> Array:
+        return np.concatenate([time[piece][:: self.factor] for piece in pieces])
+
+    def _measured(self, values: Array, pieces: Sequence[slice]) -> Array:
+        known = np.isfinite(values)
+        if known.all():
+            return self._passed(values, pieces)
+        if not known.any():
+            return self._every(values, pieces)
+        index = np.arange(len(values))
+        bridged = np.interp(index, index[known], values[known])
+        share = self._passed(known.astype(float), pieces)
+        return np.where(share > 0.5, self._passed(bridged, pieces), np.nan)
+
+    def _passed(self, values: Array, pieces: Sequence[slice]) -> Array:
+        """Low-passed without delay and thinned, each piece by itself."""
+        reach = _TAPS // 2 * self.factor
+        taps = firwin(2 * reach + 1, 1.0 / self.factor, window=("kaiser", _BETA))
+        out = []
+        for piece in pieces:
+            own = values[piece]
+            count = -(-len(own) // self.factor)
+            if len(own) < 2:
+                out.append(own)
+                continue
+            # Turned about its ends, so that a ramp goes on as a ramp.
+            padded = np.pad(own, reach, mode="reflect", reflect_type="odd")
+            whole = upfirdn(taps, padded, down=self.factor)
+            out.append(whole[_TAPS : _TAPS + count])
+        return np.concatenate(out)
+
+
+def _ordinal(number: int) -> str:
+    ends = {1: "st", 2: "nd", 3: "rd"}
+    return f"{number}{'th' if number % 100 in (11, 12, 13) else ends.get(number % 10, 'th')}"
+
+
+def thinning_for(runs: Sequence[Run]) -> Thinning | None:
+    """How far runs may be thinned, all by one factor; None where they are short enough."""
+    total, rate = sum(map(len, runs)), 1 / max(run.interval for run in runs)
+    if total < _MANY:
+        return None
+    wanted = -(-total // _WANTED)
+    quickest = max(
+        (_quickest(run[name], rate) for run in runs for name in _CHANNELS if name in run),
+        default=0.0,
+    )
+    allowed = rate * _PASSED / quickest if quickest else np.inf
+    factor = int(min(wanted, allowed, rate / _SLOWEST))
+    return Thinning(factor, _PASSED * rate / factor) if factor > 1 else None
+
+
+def _quickest(values: Array, rate: float) -> float:
+    """Frequency above which nearly nothing of a signal lies beyond its white noise, Hz."""
+    known = np.isfinite(values)
+    length = min(len(values) // _BLOCKS, round(_BLOCK * rate))
+    if not known.any() or length < 2:
+        return 0.0
+    index = np.arange(len(values))
+    bridged = values if known.all() else np.interp(index, index[known], values[known])
+    # A ramp of many turns would leak over all frequencies through a common window.
+    window = ("general_cosine", (3 / 8, 1 / 2, 1 / 8))
+    frequency, power = welch(bridged, fs=rate, window=window, nperseg=length, detrend=_levelled)
+    noise = float(np.median(power[frequency > rate / 4]))
+    clear = np.where(power > _CLEAR * noise, power - noise, 0.0)
+    beyond = np.cumsum(clear[::-1])[::-1]
+    return float(frequency[np.flatnonzero(beyond >= _LOST * beyond[0])[-1]]) if beyond[0] else 0.0
+
+
+def _levelled(values: Array) -> Array:
+    """Without mean and slope along the last axis."""
+    x = np.arange(values.shape[-1]) - (values.shape[-1] - 1) / 2
+    slope = (values @ x / (x @ x))[..., None]
+    return np.asarray(values - values.mean(axis=-1, keepdims=True) - slope * x)
+
+
+def _pieces(time: Array) -> list[slice]:
+    """Stretches between gaps in time."""
+    steps = np.diff(time)
+    ends = np.flatnonzero(steps > _GAP * np.median(steps)) + 1
+    edges = [0, *ends.tolist(), len(time)]
+    return [slice(low, high) for low, high in pairwise(edges)]

@@ -1,0 +1,177 @@
+"""Motions with the noise of their inputs taken out, to evaluate effects' changes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct, idct
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.repeats import Repeats
+from winchkit.diagnosis.data.spectrum import band_edges
+from winchkit.model.line import Line, Motion
+from winchkit.model.stages import Signals
+
+__all__ = [
+    "agreed",
+    "calm_motions",
+    "contrasts",
+    "quiet",
+]
+
+_FLOOR_SHARE = 1 / 3
+
+
+def contrasts(aligned: Array) -> tuple[Array, Array]:
+    """Mean part and differences of repeats, each with the variance of one run's noise.
+
+    ``aligned`` (m, n) → (n,) the sum over √m, and (m − 1, n) Helmert contrasts, orthogonal to it
+    and to each other.
+    """
+    m = len(aligned)
+    mean = aligned.sum(axis=0) / np.sqrt(m)
+    differences = [
+        (aligned[:j].sum(axis=0) - j * aligned[j]) / np.sqrt(j * (j + 1)) for j in range(1, m)
+    ]
+    return mean, np.array(differences).reshape(m - 1, aligned.shape[1])
+
+
+def quiet(signal: Array) -> Array:
+    """A signal without white noise: Wiener gain per band over the floor of its top third."""
+    full = np.asarray(dct(signal, type=2, norm="ortho"))
+    power = full**2
+    top = power[int(len(power) * (1 - _FLOOR_SHARE)) :]
+    floor = float(np.mean(top)) if len(top) else 0.0
+    return _gained(full, power, np.full_like(power, floor))
+
+
+def agreed(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
+    """What its repeats know of each signal, on its own samples; zero where they do not overlap.
+
+    A signal's own noise takes no part: it is in what the signal predicts as well, and what is
+    left of it would be taken for a lag or a loop that denoises it.
+    """
+    if len(signals) < 2:
+        return [quiet(signal) for signal in signals]
+    aligned = np.array([signal[index] for signal, index in zip(signals, rows, strict=True)])
+    _, differences = contrasts(aligned)
+    noise = np.mean(np.asarray(dct(differences, type=2, norm="ortho", axis=1)) ** 2, axis=0)
+    out = []
+    for own, (signal, index) in enumerate(zip(signals, rows, strict=True)):
+        others, _ = contrasts(np.delete(aligned, own, axis=0))
+        full = np.asarray(dct(others, type=2, norm="ortho"))
+        shared = np.zeros_like(signal)
+        shared[index] = _gained(full, full**2, noise) / np.sqrt(len(signals) - 1)
+        out.append(shared)
+    return out
+
+
+def _gained(full: Array, power: Array, noise: Array) -> Array:
+    """Inverse transform with each band scaled by the share of its power that is not noise."""
+    edges = band_edges(np.arange(len(full), dtype=float), 1)
+    gain = np.ones_like(full)
+    for low, high in pairwise(edges):
+        inside = slice(
+            0 if low == -np.inf else int(np.ceil(low)),
+            len(full) if high == np.inf else int(np.ceil(high)),
+        )
+        total = float(np.sum(power[inside]))
+        share = 1 - float(np.sum(noise[inside])) / total if total > 0 else 0.0
+        # A ratio of two sums of n squares varies by 2/√n: below two of that, nothing is there.
+        deviation = 2 / np.sqrt(inside.stop - inside.start)
+        gain[inside] = share if share > min(2 * deviation, 0.9) else 0.0
+    gain[0] = 1.0
+    return np.asarray(idct(full * gain, type=2, norm="ortho"))
+
+
+def calm_motions(
+    line: Line, signals: Sequence[Signals], motions: Sequence[Motion], repeats: Sequence[Repeats]
+) -> list[Motion]:
+    """Motions whose rope force and temperature carry no noise, one per run.
+
+    The acceleration of the rope is what repeats agree on; a measured force is what follows it
+    and, of the rest, what repeats agree on; a known weight's force follows it alone. How far
+    differences have rounded the acceleration a measured force tells as well; for a known weight
+    it is an unknown of the fit.
+    """
+    out = list(motions)
+    for group in repeats:
+        own = [signals[index] for index in group.runs]
+        units = [_unit_weight(line, s) for s in own]
+        follow = _shared([load for load, _ in units], group)
+        rounding = _shared([rounding for _, rounding in units], group)
+        moved = [np.column_stack(pair) for pair in zip(follow, rounding, strict=True)]
+        for index, force, r in zip(group.runs, _forces(own, moved, group), rounding, strict=True):
+            out[index] = _with(out[index], force, r, signals[index].temperature)
+    return out
+
+
+def _unit_weight(line: Line, signals: Signals) -> tuple[Array, Array]:
+    """What one kilogram would pull, m/s², and how far differences may have rounded that."""
+    motion = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
+    assert motion.load is not None
+    assert motion.rounding is not None
+    return motion.load, motion.rounding
+
+
+def _shared(values: Sequence[Array], group: Repeats) -> list[Array]:
+    """What repeats agree on, and the mean; where a run has no repeat, its own without noise."""
+    about = [value - value.mean() for value in values]
+    out = []
+    for value, own, shared, rows in zip(
+        values, about, agreed(about, group.rows), group.rows, strict=True
+    ):
+        alone = np.ones(len(own), dtype=bool)
+        alone[rows] = False
+        if alone.any():
+            shared[alone] = quiet(own)[alone]
+        out.append(shared + value.mean())
+    return out
+
+
+def _forces(
+    signals: Sequence[Signals], moved: Sequence[Array], group: Repeats
+) -> list[Array | None]:
+    """Rope force of every run of a group; None where none is known.
+
+    ``moved`` (n, 2) of each run is what a unit weight pulls, and its rounding.
+    """
+    measured = [s.load if s.load is not None else s.tension for s in signals]
+    known = [s.load_mass if s.load is None else None for s in signals]
+    if all(mass is not None for mass in known):
+        pairs = zip(known, moved, strict=True)
+        return [mass * pulled[:, 0] for mass, pulled in pairs if mass is not None]
+    values = [value for value in measured if value is not None]
+    if len(values) < len(signals):
+        return [None] * len(signals)
+    followed = [_followed(v, f) for v, f in zip(values, moved, strict=True)]
+    rest = agreed([v - f for v, f in zip(values, followed, strict=True)], group.rows)
+    return [f + r for f, r in zip(followed, rest, strict=True)]
+
+
+def _followed(force: Array, moved: Array) -> Array:
+    """The part of a force that is constant or follows the rope's acceleration."""
+    columns = np.column_stack([np.ones_like(force), moved - moved.mean(axis=0)])
+    return np.asarray(columns @ np.linalg.lstsq(columns, force, rcond=None)[0])
+
+
+def _with(
+    motion: Motion, force: Array | None, rounding: Array, temperature: Array | None
+) -> Motion:
+    """A motion with a calm rope force and temperature; ``rounding`` is that of a unit weight."""
+    at = motion.at
+    if temperature is not None:
+        at = replace(at, temperature=quiet(temperature))
+    if force is None:
+        return replace(motion, at=at)
+    return replace(
+        motion,
+        at=replace(at, tension=force),
+        load=None if motion.load is None else force,
+        drum_tension=None if motion.drum_tension is None else force,
+        rounding=None if motion.load_mass is None else motion.load_mass * rounding,
+    )

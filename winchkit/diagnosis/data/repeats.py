@@ -1,0 +1,124 @@
+"""Recognises runs that repeat each other, and lines up their clocks.
+
+Two runs are repeats when their aligned motor angles agree and their mean loads agree within 2 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import correlate
+
+from winchkit.arrays import Array
+from winchkit.model.line import GRAVITY
+from winchkit.model.stages import Signals
+
+__all__ = ["Repeats", "find_repeats"]
+
+_ANGLE_AGREES = 0.02
+_LOAD_AGREES = 0.02
+_OVERLAP = 0.8
+_AS_GOOD = 1e-6
+_SAME_RATE = 0.05
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """Runs of one programme and load: their indices and the samples that belong together."""
+
+    runs: tuple[int, ...]
+    rows: tuple[NDArray[np.intp], ...]
+    """Per run the sample indices that line up, all of equal length."""
+
+
+def find_repeats(signals: list[Signals]) -> list[Repeats]:
+    """Partition of all runs into sets of repeats; a run without any is a set of its own."""
+    sets: list[tuple[list[int], list[float]]] = []
+    for index, run in enumerate(signals):
+        for members, shifts in sets:
+            shift = _shift(signals[members[0]], run)
+            if shift is not None:
+                members.append(index)
+                shifts.append(shift)
+                break
+        else:
+            sets.append(([index], [0.0]))
+    return [_lined_up(members, shifts, signals) for members, shifts in sets]
+
+
+def mean_load(run: Signals) -> float | None:
+    """Mean tension at the platform, else at the cell, N; None where neither is known."""
+    if run.load is not None:
+        return float(np.mean(run.load))
+    if run.load_mass is not None:
+        return GRAVITY * run.load_mass
+    return None if run.tension is None else float(np.mean(run.tension))
+
+
+def _shift(first: Signals, other: Signals) -> float | None:
+    """Seconds by which ``other``'s clock is ahead of ``first``'s, or None where it is no repeat."""
+    if not _equally_loaded(first, other):
+        return None
+    step = float(np.median(np.diff(first.time)))
+    if abs(float(np.median(np.diff(other.time))) - step) > _SAME_RATE * step:
+        return None
+    begun = first.time[0], other.time[0]
+    a, b = (_evenly(run, step) for run in (first, other))
+    if not np.ptp(a) or not np.ptp(b):
+        return None
+    lag = _best_lag(a, b)
+    start, stop = max(0, -lag), min(len(a), len(b) - lag)
+    apart = a[start:stop] - b[start + lag : stop + lag]
+    spread = float(np.std(a[start:stop]))
+    if float(np.sqrt(np.mean(apart**2))) > _ANGLE_AGREES * spread:
+        return None
+    return lag * step + float(begun[1] - begun[0])
+
+
+def _best_lag(a: Array, b: Array) -> int:
+    """Samples by which b is behind a where their mean square difference is least.
+
+    Not where they correlate most: that is another lag where a log begins or ends in motion.
+    """
+    lags = np.arange(1 - len(a), len(b))
+    start, stop = np.maximum(0, -lags), np.minimum(len(a), len(b) - lags)
+    mean = a.mean()
+    a, b = a - mean, b - mean
+    within_a, within_b = (np.concatenate([[0.0], np.cumsum(x**2)]) for x in (a, b))
+    squares = within_a[stop] - within_a[start] + within_b[stop + lags] - within_b[start + lags]
+    apart = (squares - 2 * correlate(b, a, mode="full")) / (stop - start)
+    enough = stop - start >= _OVERLAP * min(len(a), len(b))
+    apart = np.where(enough, apart, np.inf)
+    # A motion that repeats within itself fits at several lags: then the one with most in common.
+    fits = apart <= apart.min() + _AS_GOOD * float(np.mean(a**2))
+    return int(lags[fits][np.argmax((stop - start)[fits])])
+
+
+def _equally_loaded(first: Signals, other: Signals) -> bool:
+    loads = mean_load(first), mean_load(other)
+    if loads[0] is None or loads[1] is None:
+        return loads[0] is loads[1]
+    return abs(loads[0] - loads[1]) <= _LOAD_AGREES * max(abs(loads[0]), abs(loads[1]))
+
+
+def _evenly(run: Signals, step: float) -> Array:
+    """Motor angle on an even grid: logs of a live bench have gaps and jitter."""
+    grid = np.arange(run.time[0], run.time[-1], step)
+    return np.interp(grid, run.time, run.motor_angle)
+
+
+def _lined_up(members: list[int], shifts: list[float], signals: list[Signals]) -> Repeats:
+    """Samples of all members that stand nearest to the first one's, where all of them run."""
+    clocks = [signals[m].time - shift for m, shift in zip(members, shifts, strict=True)]
+    low, high = max(c[0] for c in clocks), min(c[-1] for c in clocks)
+    half = float(np.median(np.diff(clocks[0]))) / 2
+    common = clocks[0][(clocks[0] >= low - half) & (clocks[0] <= high + half)]
+    return Repeats(tuple(members), tuple(_nearest(clock, common) for clock in clocks))
+
+
+def _nearest(clock: Array, times: Array) -> NDArray[np.intp]:
+    """Index of the sample of ``clock`` nearest to each time."""
+    after = np.clip(np.searchsorted(clock, times), 1, len(clock) - 1)
+    return np.where(times - clock[after - 1] <= clock[after] - times, after - 1, after)

@@ -1,0 +1,123 @@
+"""Whether runs can be compared with a profile at all; every fault with its file and column."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from winchkit.errors import Fault, RunError
+from winchkit.model.line import Line
+from winchkit.model.stages import OUTPUTS, Signals
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["admit"]
+
+_FEWEST = 50
+_SLOPE = 0.75, 1.3333
+_PARTIAL = 0.5
+_ENOUGH = 20_000
+"""Samples that tell another winch."""
+
+
+def admit(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
+    """Notes on what is missing but no fault; raises RunError with every fault of every run."""
+    if not runs:
+        raise RunError("no run given")
+    faults = [fault for run in runs for fault in _faults(run)] + _twice(runs)
+    if not faults:
+        faults = [fault for run in runs for fault in _other_winch(run, profile)]
+    if faults:
+        raise RunError(faults)
+    return [note for run in runs for note in _notes(run, profile)]
+
+
+def _faults(run: Run) -> list[Fault]:
+    where = run.path or run.name
+    faults = []
+    if "motor_angle" not in run:
+        known = ", ".join(["time", *run])
+        return [Fault(f"no column 'motor_angle [rad]'; it has {known}", where)]
+    if len(run) < _FEWEST:
+        faults.append(Fault(f"only {len(run)} samples; at least {_FEWEST} are needed", where))
+        return faults
+    if not any(output in run for output in OUTPUTS):
+        message = f"no column to compare; it needs at least one of {', '.join(OUTPUTS)}"
+        faults.append(Fault(message, where))
+    for name in ("motor_angle", "load", *OUTPUTS):
+        if name not in run:
+            continue
+        values = run[name]
+        finite = values[np.isfinite(values)]
+        key = f"column '{name}'"
+        if len(finite) < _PARTIAL * len(values):
+            message = f"{len(values) - len(finite)} of {len(values)} samples are NaN; remove it"
+            faults.append(Fault(message, where, key=key))
+        elif np.ptp(finite) == 0:
+            if name == "motor_angle":
+                message = f"constant at {finite[0]:g} rad: nothing moves in this run"
+            elif name == "load":
+                continue
+            else:
+                message = (
+                    f"constant at {finite[0]:g} in all {len(values)} samples: the instrument "
+                    "did not measure; remove the column"
+                )
+            faults.append(Fault(message, where, key=key))
+    return faults
+
+
+def _twice(runs: Sequence[Run]) -> list[Fault]:
+    """Runs given twice: as repeats of themselves they would show no noise at all."""
+    faults = []
+    for index, run in enumerate(runs):
+        for other in runs[:index]:
+            if len(run) != len(other) or set(run) != set(other):
+                continue
+            if all(np.array_equal(run[c], other[c], equal_nan=True) for c in run):
+                message = f"holds the same samples as {other.path or other.name}; give it once"
+                faults.append(Fault(message, run.path or run.name))
+    return faults
+
+
+def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
+    """Whether the run was plainly recorded on another winch than the profile's."""
+    where = run.path or run.name
+    if "cable_length" not in run:
+        named = run.metadata.get("profile", profile.name)
+        if named == profile.name:
+            return []
+        message = f"recorded with profile '{named}', compared with '{profile.name}'"
+        return [Fault(message + "; give the profile of this winch", where, key="metadata profile")]
+    good = np.isfinite(run["motor_angle"]) & np.isfinite(run["cable_length"])
+    few = np.flatnonzero(good)[:: max(1, len(run) // _ENOUGH)]
+    line = Line(profile)
+    signals = Signals(run.time[few], run["motor_angle"][few])
+    predicted = line.predict(line.motion(signals))["cable_length"]
+    measured = run["cable_length"][few]
+    if np.ptp(predicted) < 0.01 * max(profile.drum.winding_radius, np.ptp(measured)):
+        return []
+    slope = float(np.polyfit(predicted - predicted.mean(), measured, 1)[0])
+    if _SLOPE[0] < slope < _SLOPE[1]:
+        return []
+    message = (
+        f"changes by {slope:.3g} times what profile '{profile.name}' predicts; this is another "
+        "winch, another ratio or another direction: check gearbox.ratio, gearbox.direction and "
+        "drum.winding_radius"
+    )
+    return [Fault(message, where, key="column 'cable_length'")]
+
+
+def _notes(run: Run, profile: WinchProfile) -> list[str]:
+    notes = []
+    missing = {name: channel.missing for name, channel in run.channels.items() if channel.missing}
+    if missing:
+        listed = ", ".join(f"{name} {count}" for name, count in missing.items())
+        notes.append(f"{run.name}: NaN samples not compared: {listed}")
+    named = run.metadata.get("profile", profile.name)
+    if named != profile.name:
+        notes.append(f"{run.name}: recorded with profile '{named}', compared with '{profile.name}'")
+    if run.gaps:
+        notes.append(f"{run.name}: {run.gaps} gaps in time")
+    return notes

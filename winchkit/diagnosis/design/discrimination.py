@@ -1,0 +1,142 @@
+"""Which run would tell two effects apart: programmes tried on the model before they are run.
+
+For each of a few kinds of programme the line is predicted with one effect; what no size of the
+other can imitate there and in the runs so far, in units of the noise, is the noncentrality λ
+(Hunter and Reiner, 1965).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import ncx2
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.design.programmes import KINDS, imagined
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.results import NextRun
+from winchkit.effects.bind import Term
+from winchkit.effects.effect import told_apart
+
+__all__ = ["APART", "SoFar", "next_runs", "power_of", "separation", "so_far"]
+
+APART = 3.841
+"""Squares that a difference of two effects must bring: the 5 % level of chance."""
+_OFFERED = 2
+_WORTHWHILE = 0.2
+
+
+@dataclass(frozen=True)
+class SoFar:
+    """What the runs so far know of two effects, in as few rows as say the same."""
+
+    shared: Array
+    """Columns of what runs to come share with them: offset and the second effect's numbers."""
+    shown: Array
+    """The first effect there."""
+    left: float
+    """λ of the runs so far alone."""
+
+
+def next_runs(
+    problem: Problem, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
+) -> tuple[NextRun, ...]:
+    """The programmes that separate each pair best per minute, with the power they would have."""
+    if not pairs:
+        return ()
+    out: list[NextRun] = []
+    tried = [(kind, imagined(problem.dataset, kind)) for kind in KINDS]
+    for first, second in pairs:
+        offers, known = [], so_far(problem, first, second, noise)
+        for kind, programme in tried:
+            minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
+            strength = separation(programme, first, second, noise, known=known)
+            offers.append((strength / minutes, power_of(strength), kind.name))
+        # Any programme sure to separate them will do: of those the quickest per minute.
+        offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
+        names = (first.effect.id, second.effect.id)
+        useful = [offer for offer in offers if offer[1] >= _WORTHWHILE][:_OFFERED]
+        out += [NextRun(names, name, power) for _, power, name in useful]
+        if not useful:
+            # No motion separates them: what does is on the card, and its power is not known.
+            out.append(NextRun(names, told_apart(first.effect, second.effect), float("nan")))
+    return tuple(out)
+
+
+def power_of(strength: float, needed: float = APART) -> float:
+    """Chance that a difference of noncentrality λ brings the squares that are needed."""
+    return float(ncx2.sf(needed, 1, max(strength, 0.0)))
+
+
+def separation(
+    problem: Problem,
+    first: Term,
+    second: Term | None,
+    noise: Mapping[str, float],
+    *,
+    known: SoFar | None = None,
+    repeats: int = 1,
+) -> float:
+    """Noncentrality λ of the first effect where the second may take any size.
+
+    Without a second one, of the first beside the nuisances alone. Where it is ``known`` what runs
+    so far say, by how much λ grows: the second must be one size there and here, so that a run
+    which shows nothing of it tells as much as one that does.
+    """
+    rows = _rows(problem, first, second, noise)
+    if rows is None:
+        return 0.0
+    own, shared, shown = (np.asarray(np.sqrt(repeats) * part) for part in rows)
+    if known is None:
+        return _left(np.column_stack([own, shared]), shown)
+    above = np.zeros((len(known.shown), own.shape[1]))
+    columns = np.block([[above, known.shared], [own, shared]])
+    return max(0.0, _left(columns, np.concatenate([known.shown, shown])) - known.left)
+
+
+def so_far(
+    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+) -> SoFar | None:
+    """What the runs of a problem know of two effects; None where that is no number."""
+    rows = _rows(problem, first, second, noise)
+    if rows is None:
+        return None
+    own, shared, shown = rows
+    triangle = np.asarray(np.linalg.qr(np.column_stack([own, shared, shown]), mode="r"))
+    kept = triangle[own.shape[1] :, own.shape[1] :]
+    return SoFar(kept[:, :-1], kept[:, -1], _left(kept[:, :-1], kept[:, -1]))
+
+
+def _rows(
+    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+) -> tuple[Array, Array, Array] | None:
+    """Columns that are a run's own (states), those that all runs share, and the first effect.
+
+    All in units of the noise; None where an effect is no number somewhere.
+    """
+    weight = np.empty(problem.rows)
+    for segment in problem.segments:
+        weight[segment.rows] = 1 / max(noise.get(segment.output, np.inf), 1e-300)
+    shown = problem.change(Hypothesis().with_term(first, problem.runs)) * weight
+    rival = Hypothesis()
+    if second is not None:
+        rival = rival.with_term(second, problem.runs)
+    imitation = problem.jacobian(problem.vector(rival), rival) * weight[:, None]
+    if not (np.isfinite(imitation).all() and np.isfinite(shown).all()):
+        return None
+    states = sum(len(start) for start in rival.starts)
+    nuisances, offset = problem.nuisance_columns.shape[1], int(problem.fits_offset)
+    own = [*range(offset, nuisances), *range(imitation.shape[1] - states, imitation.shape[1])]
+    numbers = imitation[:, nuisances : imitation.shape[1] - states]
+    level = imitation[:, :1] if offset else np.zeros((problem.rows, 1))
+    shared = np.column_stack([level, numbers, problem.change(rival) * weight])
+    return imitation[:, own], shared, shown
+
+
+def _left(columns: Array, shown: Array) -> float:
+    """Squares that columns leave of what is shown."""
+    left = shown - columns @ np.linalg.lstsq(columns, shown, rcond=1e-10)[0]
+    return float(left @ left)

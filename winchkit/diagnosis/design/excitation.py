@@ -1,0 +1,79 @@
+"""What a set of runs cannot show, said before anything is concluded from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.repeats import mean_load
+from winchkit.diagnosis.regression.time_series import Problem
+
+__all__ = ["what_runs_cannot_show"]
+
+_DIFFERENT_LOADS = 0.05
+_ONE_WAY = 0.02
+_WARMED = 1.0
+_MOVES = 1e-3
+_ONE_SPEED = 0.1
+_PLATEAU = 0.75
+
+
+def what_runs_cannot_show(problem: Problem) -> list[str]:
+    """Sentences on missing repeats, loads, directions, reversals, speeds and temperatures."""
+    dataset = problem.dataset
+    notes = []
+    if not dataset.repeated:
+        notes.append(
+            "no run repeats another: the noise is what no known effect explains, so an effect "
+            "outside the catalogue cannot be excluded; record one programme twice"
+        )
+    loads = [m for m in (mean_load(r.signals) for r in dataset.recordings) if m is not None]
+    if not loads:
+        notes.append("no load and no tension: what depends on the rope's force cannot be seen")
+    elif max(loads) - min(loads) < _DIFFERENT_LOADS * max(abs(x) for x in loads):
+        notes.append(
+            "one load only: rope elasticity and frame compliance, cell gain and offset are hard "
+            "to tell apart; repeat a run under another load"
+        )
+    if loads and all(r.raw.load is None for r in dataset.recordings):
+        notes.append(
+            "no load known: pulley friction and cell errors cannot be seen; give load_mass or "
+            "a second cell"
+        )
+    notes += _motions([r.raw.at.speed for r in dataset.recordings])
+    warmth = [r.signals.temperature for r in dataset.recordings]
+    if any(t is None for t in warmth):
+        notes.append("no temperature measured: thermal effects cannot be seen")
+    elif np.ptp(np.concatenate([t for t in warmth if t is not None])) < _WARMED:
+        notes.append(
+            "temperature nearly constant: a thermal effect looks like an offset or a wrong radius, "
+            "if it shows at all; record one run cold and one warm"
+        )
+    return notes
+
+
+def _motions(speeds: Sequence[Array]) -> list[str]:
+    """Sentences on directions, reversals and speeds; ``speeds`` in m/s, one array per run."""
+    moving = [speed[np.abs(speed) > _MOVES] for speed in speeds]
+    every = np.concatenate(moving)
+    notes = []
+    inwards = float(np.mean(every > 0)) if len(every) else 0.0
+    if not _ONE_WAY < inwards < 1 - _ONE_WAY:
+        notes.append(
+            "one direction only: friction and backlash cannot be told from gains and offsets; "
+            "run back as well"
+        )
+    elif not any(np.any(np.diff(np.sign(run))) for run in moving):
+        notes.append(
+            "no reversals: each run goes one way, so that play, Dahl friction and hysteresis show "
+            "at most in how a run begins; turn back within a run"
+        )
+    pace = np.abs(every)
+    if len(pace) and np.mean(np.abs(pace / np.median(pace) - 1) < _ONE_SPEED) > _PLATEAU:
+        notes.append(
+            "one speed only: dry and viscous friction, play and a late instrument differ in the "
+            "ramps alone; run at several speeds"
+        )
+    return notes

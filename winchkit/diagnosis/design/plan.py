@@ -1,0 +1,191 @@
+"""What to run next, as a programme: what it separates and what it would show for the first time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.design.detectability import Bar
+from winchkit.diagnosis.design.discrimination import power_of, separation, so_far
+from winchkit.diagnosis.design.programmes import (
+    KINDS,
+    Kind,
+    Room,
+    imagined,
+    seen,
+    usual_temperature,
+)
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.selection.candidates import missing_needs
+from winchkit.effects.bind import Term
+from winchkit.effects.effect import Effect
+from winchkit.effects.parametrization import Coordinates
+from winchkit.schema.programme import Programme, Step
+
+__all__ = ["Offer", "hopeless", "offers", "programme_of"]
+
+_SURE = 0.9
+_FAINT = 0.2
+"""A power that is not worth a run."""
+_HANGING, _WARMING = 1 / 3, 20.0
+"""What an operator needs to hang a load and to warm a machine through, minutes."""
+_REPEATS = 2
+_HANGS = 0.5
+
+
+@dataclass(frozen=True)
+class Offer:
+    """One kind of programme and what it would bring."""
+
+    kind: Kind
+    minutes: float
+    """Of motion and of the operator's work, both repeats."""
+    powers: tuple[float, ...]
+    """Chance of telling each pair apart."""
+    shows: tuple[str, ...]
+    """Effects of a usual size that it shows and the runs so far do not."""
+
+    @property
+    def worth(self) -> tuple[float, ...]:
+        """To be compared in this order: more is better.
+
+        First what it tells apart for sure, then with a fair chance, then a minute's worth of it;
+        where there is nothing to tell apart, what it shows a minute.
+        """
+        sure = sum(power >= _SURE for power in self.powers)
+        told = round(sum(power for power in self.powers if power >= _FAINT), 1)
+        quick, shown = 1 / self.minutes, len(self.shows) / self.minutes
+        return (sure, told, quick, shown) if told else (0.0, 0.0, shown, quick)
+
+    def to_json(self, pairs: Sequence[tuple[Term, Term]]) -> dict[str, Any]:
+        """As ``winchkit plan --json`` prints it."""
+        separates = [
+            {"effects": [a.effect.id, b.effect.id], "power": power}
+            for (a, b), power in zip(pairs, self.powers, strict=True)
+        ]
+        return {
+            "kind": self.kind.name,
+            "minutes": self.minutes,
+            "separates": separates,
+            "shows": list(self.shows),
+        }
+
+
+def offers(
+    problem: Problem,
+    pairs: Sequence[tuple[Term, Term]],
+    noise: Mapping[str, float],
+    effects: Sequence[Effect],
+    *,
+    bar: Bar,
+    room: Room | None = None,
+) -> list[Offer]:
+    """Every kind of programme within a room, else within what was seen; the most telling first.
+
+    An effect shows where it takes what a diagnosis wants for its name, the ``bar``.
+    """
+    dataset = problem.dataset
+    room = room or seen(dataset)
+    usual = [(term, so_far(problem, term, None, noise)) for term in _usual(effects, problem)]
+    hidden = [(t, known) for t, known in usual if known and not _sees(bar, t, known.left)]
+    known_pairs = [(a, b, so_far(problem, a, b, noise)) for a, b in pairs]
+    out = []
+    for kind in KINDS:
+        tried = imagined(dataset, kind, room)
+        motion = sum(r.signals.time[-1] for r in tried.dataset.recordings) / 60
+        minutes = _REPEATS * (motion + _work(kind, dataset))
+        powers = tuple(
+            power_of(separation(tried, a, b, noise, known=known, repeats=_REPEATS))
+            for a, b, known in known_pairs
+        )
+        shows = tuple(
+            term.effect.id
+            for term, known in hidden
+            if _sees(
+                bar,
+                term,
+                known.left + separation(tried, term, None, noise, known=known, repeats=_REPEATS),
+            )
+        )
+        out.append(Offer(kind, minutes, powers, shows))
+    return sorted(out, key=lambda offer: offer.worth, reverse=True)
+
+
+def _sees(bar: Bar, term: Term, strength: float) -> bool:
+    """Whether an effect of noncentrality λ would most probably be named."""
+    return bar.power(strength, Coordinates(term.effect).freedom) >= _SURE
+
+
+def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list[tuple[Term, Term]]:
+    """Pairs that none of these programmes tells apart."""
+    return [
+        pair
+        for index, pair in enumerate(pairs)
+        if max(offer.powers[index] for offer in found) < _FAINT
+    ]
+
+
+def programme_of(dataset: Dataset, kind: Kind, name: str, room: Room | None = None) -> Programme:
+    """A kind as a programme for ``winchkit run``: within a room, else what was seen; twice.
+
+    It begins and ends at the shortest length, so that its repeats are equal.
+    """
+    room = room or seen(dataset)
+    steps: list[Step] = []
+    for warmed in kind.warmed if _warm(dataset) else (0.0,):
+        if len(kind.warmed) > 1:
+            steps += _bring(dataset, warmed)
+        for load in kind.loads:
+            steps += _hang(room.load(load))
+            steps.append(_move(room.low, room.fastest))
+            for share, speed in kind.moves:
+                steps += [_move(room.at(share), speed * room.fastest), Step(hold=kind.hold)]
+    about = f"{kind.name}; proposed from {len(dataset.recordings)} runs of {dataset.profile.name}"
+    return Programme(name, tuple(steps), repeat=_REPEATS, description=about)
+
+
+def _bring(dataset: Dataset, warmed: float) -> list[Step]:
+    """Ask for a temperature, in whole degrees."""
+    usual = usual_temperature(dataset)
+    if usual is None:
+        return []
+    wanted = float(round(usual + warmed))
+    ask = f"bring rope and machine to {wanted:g} degC"
+    return [Step(ask=ask, temperature=wanted)]
+
+
+def _hang(mass: float | None) -> list[Step]:
+    """Ask for a load, rounded to what a bench has at hand."""
+    if mass is None:
+        return []
+    wanted = max(_HANGS, round(mass / _HANGS) * _HANGS)
+    return [Step(ask=f"hang the {wanted:g} kg load", load_mass=wanted)]
+
+
+def _work(kind: Kind, dataset: Dataset) -> float:
+    """What the operator has to do in one repeat, minutes."""
+    warmings = len(kind.warmed) - 1 if _warm(dataset) else 0
+    hangs = len(kind.loads) if len(kind.loads) > 1 else 0
+    return warmings * _WARMING + hangs * _HANGING
+
+
+def _move(length: float, speed: float) -> Step:
+    return Step(to=round(length, 3), speed=float(f"{max(speed, 1e-3):.2g}"))
+
+
+def _warm(dataset: Dataset) -> bool:
+    return usual_temperature(dataset) is not None
+
+
+def _usual(effects: Sequence[Effect], problem: Problem) -> list[Term]:
+    """Every effect that could be seen here, in a usual size."""
+    out = []
+    for effect in effects:
+        if missing_needs(effect, problem):
+            continue
+        shape = next(iter(Coordinates(effect).grid()))
+        secant = next(iter(Coordinates(effect).secants()))
+        out.append(Term(effect, {**effect.null, **shape, **secant}))
+    return out

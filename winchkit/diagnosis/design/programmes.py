@@ -1,0 +1,164 @@
+"""Kinds of programmes, tried on the model before anyone runs them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Dataset, assemble
+from winchkit.diagnosis.data.repeats import mean_load
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.model.line import GRAVITY, Line
+from winchkit.model.stages import Signals
+from winchkit.model.trajectory import plan
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.bench import LimitSpec
+
+__all__ = ["KINDS", "Kind", "Room", "allowed", "imagined", "seen", "usual_temperature"]
+
+_RATE = 20.0
+_MARGIN = 0.05
+"""Share of a bench's stroke that is kept off each end."""
+_RESERVE = 1.5
+"""Between a bench's limits of speed and tension and what is proposed."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of programme: moves within the stroke seen so far, loads, temperatures."""
+
+    name: str
+    moves: tuple[tuple[float, float], ...]
+    """Where to (share of the stroke) and how fast (share of the highest speed)."""
+    loads: tuple[float, ...] = (1.0,)
+    """In units of the mean load so far; one run each."""
+    warmed: tuple[float, ...] = (0.0,)
+    """Kelvin above the temperature so far; one run each."""
+    hold: float = 0.5
+    """After each move, s."""
+
+
+_THERE_AND_BACK = ((1.0, 1.0), (0.0, 1.0))
+KINDS = (
+    Kind("full stroke, one load", _THERE_AND_BACK),
+    Kind("full stroke, three loads", _THERE_AND_BACK, loads=(0.5, 1.0, 2.0)),
+    Kind(
+        "one load at five lengths, with holds",
+        tuple((x, 0.5) for x in (1, 0.75, 0.5, 0.25, 0)),
+        hold=5.0,
+    ),
+    Kind(
+        "speed ladder, both directions",
+        tuple((x, s) for s in (0.05, 0.2, 0.5, 1.0) for x in (0.6, 0.4)),
+    ),
+    Kind(
+        "short reversals, slow and fast",
+        tuple((0.5 + 0.01 * k * (-1) ** k, s) for s in (0.02, 0.3) for k in range(1, 6)),
+    ),
+    Kind("full stroke, warmed up by 15 K", _THERE_AND_BACK, warmed=(0.0, 15.0)),
+)
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a programme stays within."""
+
+    low: float
+    """Shortest free length, m."""
+    high: float
+    fastest: float
+    """Highest speed of the rope, m/s."""
+    mass: float | None
+    """Mean load so far as a mass, kg; None where none is known."""
+    lightest: float = 0.0
+    """Load that keeps the rope from going slack, kg."""
+    heaviest: float = np.inf
+    """Load that the bench's tension limit leaves room for, kg."""
+
+    def at(self, share: float) -> float:
+        """Length at a share of the stroke, m."""
+        return self.low + (self.high - self.low) * share
+
+    def load(self, share: float) -> float | None:
+        """A share of the mean load, kg."""
+        if self.mass is None:
+            return None
+        return max(self.lightest, min(self.heaviest, self.mass * share))
+
+
+def seen(dataset: Dataset) -> Room:
+    """Stroke, speed and load of a dataset: the room that runs have shown to be there."""
+    recordings = dataset.recordings
+    lengths = np.concatenate([r.raw.at.free_length for r in recordings])
+    fastest = max(float(np.max(np.abs(r.raw.at.speed))) for r in recordings)
+    usual = [m for m in (mean_load(r.signals) for r in recordings) if m is not None]
+    mass = float(np.mean(usual)) / GRAVITY if usual else None
+    return Room(float(lengths.min()), float(lengths.max()), fastest, mass)
+
+
+def allowed(dataset: Dataset, limits: LimitSpec) -> Room:
+    """The room that a bench's limits leave, with a margin; what they do not say, as it was seen."""
+    room = seen(dataset)
+    if limits.length is not None:
+        margin = _MARGIN * (limits.length[1] - limits.length[0])
+        room = replace(room, low=limits.length[0] + margin, high=limits.length[1] - margin)
+    if limits.tension_slack is not None:
+        room = replace(room, lightest=limits.tension_slack * _RESERVE / GRAVITY)
+    if limits.tension_high is not None:
+        room = replace(room, heaviest=limits.tension_high / _RESERVE / GRAVITY)
+    return replace(room, fastest=limits.speed / _RESERVE)
+
+
+def usual_temperature(dataset: Dataset) -> float | None:
+    """Mean temperature of the runs, degC; None where one of them does not know it."""
+    known = [r.signals.temperature for r in dataset.recordings]
+    if any(t is None for t in known):
+        return None
+    return float(np.mean([np.mean(t) for t in known if t is not None]))
+
+
+def imagined(dataset: Dataset, kind: Kind, room: Room | None = None) -> Problem:
+    """A problem whose runs follow a kind of programme and measure what the nominal line says."""
+    usual = usual_temperature(dataset)
+    room = room or seen(dataset)
+    runs = []
+    for load in kind.loads:
+        for warmed in kind.warmed if usual is not None else (0.0,):
+            warm = None if usual is None else usual + warmed
+            runs.append(_run(dataset, kind, room, room.load(load), warm))
+    return Problem(assemble(runs, dataset.profile))
+
+
+def _run(dataset: Dataset, kind: Kind, room: Room, mass: float | None, warm: float | None) -> Run:
+    at = room.low
+    pieces = [np.full(round(kind.hold * _RATE), at)]
+    for share, speed in kind.moves:
+        target, fastest = room.at(share), room.fastest
+        move = plan(target - at, max(speed * fastest, 1e-4), 4 * fastest, 40 * fastest)
+        time = np.arange(0.0, move.duration, 1 / _RATE)
+        pieces += [at + np.asarray(move.at(time)[0]), np.full(round(kind.hold * _RATE), target)]
+        at = target
+    length = np.concatenate(pieces)
+    time = np.arange(len(length)) / _RATE
+    line = Line(dataset.profile)
+    angle = np.array([line.motor_angle(float(x)) for x in length])
+    temperature = None if warm is None else warm * np.ones_like(time)
+    return _as_run(dataset, time, angle, mass, temperature)
+
+
+def _as_run(
+    dataset: Dataset, time: Array, angle: Array, mass: float | None, temperature: Array | None
+) -> Run:
+    """A run on which every output that the dataset measures shows what the nominal line says."""
+    line = Line(dataset.profile)
+    predicted = line.predict(line.motion(Signals(time, angle, load_mass=mass)))
+    channels = {"motor_angle": Channel(angle, "rad")}
+    if temperature is not None:
+        channels["temperature"] = Channel(temperature, "degC")
+    for output in dataset.outputs:
+        if output in predicted:
+            channels[output] = Channel(predicted[output], "")
+    metadata = {} if mass is None else {"load_mass": f"{mass!r} kg"}
+    return Run("imagined", time, channels, metadata)

@@ -1,0 +1,76 @@
+"""A diagnosis of every winch of a recording by itself."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from threading import Thread
+
+from winchkit.diagnosis.diagnose import Answer, Told, diagnose, silent
+from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["diagnose_each"]
+
+_AT_A_TIME = 2
+
+
+def diagnose_each(
+    winches: Mapping[str, Sequence[Run]],
+    profile: WinchProfile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+    *,
+    thin: bool = True,
+    told: Told = silent,
+) -> Iterator[tuple[str, Answer]]:
+    """Name and answer of every winch, in order, all against one profile.
+
+    Two are worked on at a time: on long arrays numpy leaves a second core to the other. An answer
+    holds hundreds of megabytes after long runs, so let go of one before taking the next.
+    """
+    catalogue = catalogue or load_catalogue()
+    shares = dict.fromkeys(winches, 0.0)
+
+    def one(name: str) -> Answer:
+        def heard(what: str, share: float) -> None:
+            shares[name] = share
+            told(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
+
+        answer = diagnose(winches[name], profile, catalogue, band, thin=thin, told=heard)
+        heard("done", 1.0)
+        return answer
+
+    begun: deque[tuple[str, Future[Answer]]] = deque()
+    for name in winches:
+        begun.append((name, _begun(one, name)))
+        if len(begun) == _AT_A_TIME:
+            yield _taken(begun)
+    while begun:
+        yield _taken(begun)
+
+
+def _taken(begun: deque[tuple[str, Future[Answer]]]) -> tuple[str, Answer]:
+    """The oldest, waited for; nothing here keeps its answer."""
+    name, future = begun.popleft()
+    return name, future.result()
+
+
+def _begun(work: Callable[[str], Answer], name: str) -> Future[Answer]:
+    """An answer being worked on.
+
+    Whoever is interrupted while waiting gets away at once; a pool would first wait for its
+    threads, for seconds.
+    """
+    future: Future[Answer] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(work(name))
+        except BaseException as error:  # noqa: BLE001 - handed to whoever waits for the answer
+            future.set_exception(error)
+
+    Thread(target=run, name=f"diagnose {name}").start()
+    return future

@@ -1,0 +1,128 @@
+"""What the sampling of a run may have rounded: effects on a finer motion, less on the samples.
+
+Speeds, accelerations and loops are worked out from samples of the motor angle. Between samples a
+fast move is smoother than its differences say, so that the same effect, computed on the motion
+interpolated between the samples, changes the outputs by a little more or less. How much of that
+is right nobody knows: a real winch moves between samples, a simulation may not. So the whole
+difference is what an effect's values, and what it leaves, may be wrong by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.data.spectrum import to_frequency
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.effects.bind import modifiers_of
+from winchkit.model.derivatives import is_calmer
+from winchkit.model.line import Line, Motion
+from winchkit.model.stages import Signals
+
+__all__ = ["rounded", "without_rounding"]
+
+_FINER = 4
+_DEGREE = 3
+
+
+def rounded(problem: Problem, hypothesis: Hypothesis) -> Array:
+    """What the terms add on a motion of finer steps, less what they add on the samples, rows."""
+    out = np.zeros(problem.rows)
+    dataset = problem.dataset
+    if not hypothesis.terms or not dataset.recordings:
+        return out
+    moved = [
+        _moved(Line(dataset.profile, modifiers_of(started(hypothesis, run))), recording)
+        for run, recording in enumerate(dataset.recordings)
+    ]
+    for segment in problem.segments:
+        recording = dataset.recordings[segment.run]
+        valid = recording.valid[segment.output]
+        signal = moved[segment.run].get(segment.output)
+        if signal is not None:
+            out[segment.rows] = to_frequency(np.where(valid, signal, 0.0), segment.band)
+    return out
+
+
+def without_rounding(problem: Problem, fit: Fit, weight: Array) -> Array:
+    """A fit's residual without the part, between none and all, that rounding explains, rows."""
+    column = rounded(problem, fit.hypothesis)
+    across = _beside(fit.jacobian * weight[:, None], column * weight)
+    size = float(across @ across)
+    if not size:
+        return fit.residual
+    share = float(np.clip(across @ (fit.residual * weight) / size, 0.0, 1.0))
+    return fit.residual - share * across / weight
+
+
+def _beside(present: Array, column: Array) -> Array:
+    """A column with the present ones projected out; zero where rounding is all that is left."""
+    left = column - present @ np.linalg.lstsq(present, column, rcond=None)[0]
+    return np.zeros_like(left) if left @ left <= 1e-12 * float(column @ column) else left
+
+
+def _moved(line: Line, recording: Recording) -> dict[str, Array]:
+    """By how much each output changes with a finer motion, at the samples of one run."""
+    fine = _finer(recording, line)
+    if fine is None:
+        return {}
+    nominal = Line(line.profile).predict(fine)
+    after, before = line.predict(fine), line.predict(recording.smooth)
+    return {
+        output: (after[output] - nominal[output])[::_FINER]
+        - (before[output] - recording.nominal_smooth[output])
+        for output in recording.measured
+    }
+
+
+def _finer(recording: Recording, line: Line) -> Motion | None:
+    """A run's calm motion interpolated between its samples.
+
+    None where derivatives are not differences of these samples: they were taken before a long run
+    was thinned out, or the drive's own velocity is calmer than the jitter of its time stamps.
+    """
+    signals, smooth = recording.signals, recording.smooth
+    if recording.thinned:
+        return None
+    velocity = signals.motor_velocity
+    if velocity is not None and is_calmer(velocity, np.gradient(signals.motor_angle, signals.time)):
+        return None
+    count = len(signals.time)
+    here = np.arange(count, dtype=float)
+    there = np.arange(_FINER * (count - 1) + 1) / _FINER
+
+    def between(values: Array) -> Array:
+        return np.asarray(make_interp_spline(here, values, k=_DEGREE)(there))
+
+    time, angle = np.interp(there, here, signals.time), between(signals.motor_angle)
+    finer = line.motion(Signals(time, angle, fastest=signals.fastest))
+    at = replace(
+        finer.at,
+        tension=between(smooth.at.tension + _sharper(recording, line)),
+        temperature=np.interp(there, here, smooth.at.temperature),
+    )
+    load = None if smooth.load is None else at.tension
+    drum_side = None if smooth.drum_tension is None else between(smooth.drum_tension)
+    return replace(finer, at=at, load=load, drum_tension=drum_side, load_mass=smooth.load_mass)
+
+
+def _sharper(recording: Recording, line: Line) -> Array:
+    """What differences over a span h have rounded off the rope force, (n,).
+
+    A second difference of x is its second derivative and h²/12 of the fourth. Only that part of a
+    force counts which follows the rope's acceleration, as a hanging weight does.
+    """
+    signals, tension = recording.signals, recording.smooth.at.tension
+    hanging = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
+    assert hanging.load is not None
+    assert hanging.rounding is not None
+    weight = hanging.load - hanging.load.mean()
+    size = float(weight @ weight)
+    mass = float(weight @ tension) / size if size else 0.0
+    return -mass * hanging.rounding / 12

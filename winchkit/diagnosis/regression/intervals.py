@@ -1,0 +1,251 @@
+"""How sure fitted values are: profile likelihood, widened by what a likelihood does not know.
+
+A likelihood believes the model and the noise. So its 95 % interval is widened
+
+- to the block jackknife's, where blocks of time vary by more than the noise says;
+- by half of what parts of the data (outputs, groups of runs) contradict each other, where they do;
+- by what the sampling of the runs may have rounded.
+
+Never the covariance of independent residuals: they are correlated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.cross_validation import Folds, left_out_steps
+from winchkit.diagnosis.regression.discretization import rounded
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.results import Estimate
+from winchkit.effects.bind import Term
+from winchkit.effects.effect import Parameter
+from winchkit.effects.parametrization import Coordinates
+
+__all__ = [
+    "Spread",
+    "estimates",
+    "profile_ends",
+    "spread_of",
+]
+
+_LINEAR = 0.15
+_SEARCHES = 4
+_FARTHEST = 4.0
+
+
+def profile_ends(
+    problem: Problem, fit: Fit, weight: Array, covariance: Array, reach: Array
+) -> tuple[Array, Array]:
+    """Where the whitened squares have risen by ``reach``² with all else refitted; two (unknowns,).
+
+    ``weight`` is 1/σ per row, ``covariance`` (unknowns, unknowns) that of the linearised fit,
+    ``reach`` (unknowns,) in its standard deviations. Only the coordinates of terms are moved:
+    nuisances are linear, and nobody asks for the state in which a run began.
+    """
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    low, high = fit.vector - reach * deviation, fit.vector + reach * deviation
+    bounds = problem.bounds(fit.hypothesis)
+    first = problem.nuisance_columns.shape[1]
+    states = sum(len(start) for start in fit.hypothesis.starts)
+    for index in range(first, len(fit.vector) - states):
+        if deviation[index] > 0.0:
+            walk = _Walk(problem, fit, weight, covariance, index)
+            low[index] = fit.vector[index] - walk.length(-1.0, reach[index])
+            high[index] = fit.vector[index] + walk.length(1.0, reach[index])
+    return np.clip(low, *bounds), np.clip(high, *bounds)
+
+
+class _Walk:
+    """Away from a fit along one unknown, the others following."""
+
+    def __init__(
+        self, problem: Problem, fit: Fit, weight: Array, covariance: Array, index: int
+    ) -> None:
+        self._problem, self._fit, self._weight, self._index = problem, fit, weight, index
+        self._deviation = float(np.sqrt(covariance[index, index]))
+        self._along = covariance[:, index] / covariance[index, index]
+        others = np.arange(len(covariance)) != index
+        whitened = fit.jacobian[:, others] * weight[:, None]
+        normal = np.linalg.pinv(whitened.T @ whitened, rcond=1e-12, hermitian=True)
+        self._others, self._whitened, self._normal = others, whitened, normal
+        self._bounds = problem.bounds(fit.hypothesis)
+
+    def length(self, side: float, reach: float) -> float:
+        """How far one may go, in the unknown's coordinate."""
+        usual = reach * self._deviation
+        wanted, far = reach**2, usual
+        for _ in range(_SEARCHES):
+            risen = self._risen(side * far, wanted)
+            if abs(risen / wanted - 1) < _LINEAR:
+                break
+            # Squares rise with the square of the way, or nearly so.
+            far *= float(np.clip(np.sqrt(wanted / max(risen, 1e-9)), 0.3, 2.0))
+            if far > _FARTHEST * usual:
+                return _FARTHEST * usual
+        return far
+
+    def _risen(self, moved: float, wanted: float) -> float:
+        """By how much the whitened squares rise, the others corrected once where it matters."""
+        low, high = self._bounds
+        vector = np.clip(self._fit.vector + moved * self._along, low, high)
+        residual = self._residual(vector)
+        risen = float(residual @ residual) - self._fit.cost
+        if risen < (1 + _LINEAR) * wanted:
+            return risen
+        step = np.zeros_like(vector)
+        step[self._others] = self._normal @ (self._whitened.T @ residual)
+        corrected = self._residual(np.clip(vector + step, low, high))
+        return min(risen, float(corrected @ corrected) - self._fit.cost)
+
+    def _residual(self, vector: Array) -> Array:
+        like = self._fit.hypothesis
+        return self._problem.residual(self._problem.hypothesis(vector, like)) * self._weight
+
+
+_95 = 1.959964
+_CONTRADICTS = 3.5
+_LEAST_SAY = 1e-3
+_NOTHING = 1e6
+"""Of its usual size: an unknown that may be off by as much is not known at all."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How far every unknown of a fit may be off, in the coordinates of the fit."""
+
+    std: Array
+    """(unknowns,)."""
+    low: Array
+    """Lower ends of 95 % intervals, (unknowns,)."""
+    high: Array
+
+
+def spread_of(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
+    """Standard deviations and 95 % intervals of every unknown."""
+    weight = noise.weight(problem)
+    whitened = fit.jacobian * weight[:, None]
+    normal = whitened.T @ whitened
+    covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
+    likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    statistical = np.maximum(likelihood, _jackknife(problem, fit, noise, blocks))
+    unknown = (statistical > _NOTHING) | (np.diag(normal) == 0.0)
+    covariance[unknown] = covariance[:, unknown] = likelihood[unknown] = 0.0
+    statistical[unknown] = _NOTHING
+    shift = covariance @ (whitened.T @ (rounded(problem, fit.hypothesis) * weight))
+    contradiction = _contradiction(problem, whitened, fit.residual * weight, covariance)
+    systematic = np.hypot(shift, contradiction)
+    wider = np.divide(
+        statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
+    )
+    low, high = profile_ends(problem, fit, weight, covariance, _95 * wider)
+    below, above = (
+        np.where(unknown, _NOTHING, way) for way in (fit.vector - low, high - fit.vector)
+    )
+    return Spread(
+        np.hypot(statistical, systematic),
+        fit.vector - np.hypot(below, _95 * systematic),
+        fit.vector + np.hypot(above, _95 * systematic),
+    )
+
+
+def _jackknife(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Array:
+    """Standard deviation of every unknown from leaving out each block of time."""
+    steps = left_out_steps(problem, fit, noise, blocks)
+    n = blocks.count
+    return np.asarray(np.sqrt((n - 1) / n * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
+
+
+def _contradiction(problem: Problem, whitened: Array, residual: Array, covariance: Array) -> Array:
+    """Half of the largest difference between what a part and the rest of the data say.
+
+    Zero where noise alone may have made it. A part's pull on an unknown u = C Jᵀr, of say
+    w = (C N C)/C, is w (1 − w) times the difference of what it and the rest would have found.
+    """
+    out = np.zeros(len(covariance))
+    variance = np.maximum(np.diag(covariance), 1e-300)
+    for part in _parts(problem):
+        own = whitened[part]
+        normal = own.T @ own
+        pull = covariance @ (own.T @ residual[part])
+        through = covariance @ normal @ covariance
+        say = np.clip(np.diag(through) / variance, 0.0, 1.0)
+        left = np.diag(through - through @ normal @ covariance)
+        both = (say > _LEAST_SAY) & (say < 1 - _LEAST_SAY) & (left > 0)
+        sure = both & (pull**2 > _CONTRADICTS**2 * np.where(both, left, 1.0))
+        apart = np.abs(pull) / np.where(sure, say * (1 - say), 1.0) / 2
+        out = np.maximum(out, np.where(sure, apart, 0.0))
+    return out
+
+
+def _parts(problem: Problem) -> Iterator[NDArray[np.intp]]:
+    """Rows of each output, and of each group of programme and load, where there are several."""
+    groups = {run: i for i, group in enumerate(problem.dataset.repeats) for run in group.runs}
+    for key in (lambda s: s.output, lambda s: groups[s.run]):
+        kinds = dict.fromkeys(key(s) for s in problem.segments)
+        for kind in kinds if len(kinds) > 1 else ():
+            rows = [
+                np.arange(s.rows.start, s.rows.stop) for s in problem.segments if key(s) == kind
+            ]
+            yield np.concatenate(rows)
+
+
+def estimates(problem: Problem, fit: Fit, spread: Spread) -> list[tuple[Term, dict[str, Estimate]]]:
+    """Every term of a fit with its values, standard deviations, 95 % intervals and units."""
+    at = problem.nuisance_columns.shape[1]
+    out = []
+    for term in fit.hypothesis.terms:
+        coordinates = Coordinates(term.effect)
+        part = slice(at, at + len(coordinates))
+        at += len(coordinates)
+        vector = fit.vector[part]
+        deviation = coordinates.deviations(vector, spread.std[part], term.values)
+        ends = _ends(coordinates, vector, (spread.low[part], spread.high[part]), term.values)
+        out.append(
+            (
+                term,
+                {
+                    p.name: _estimate(p, term.values[p.name], deviation, ends.get(p.name))
+                    for p in term.effect.parameters
+                    if p.name in deviation or p.whole
+                },
+            )
+        )
+    return out
+
+
+def _ends(
+    coordinates: Coordinates, vector: Array, ends: tuple[Array, Array], base: Mapping[str, float]
+) -> dict[str, tuple[float, float]]:
+    """Intervals of values with a coordinate of their own; an amplitude with a phase has none."""
+    out: dict[str, tuple[float, float]] = {}
+    for index, name in enumerate(coordinates.names):
+        if name in (coordinates.effect.polar or ()):
+            continue
+        told = []
+        for end in ends:
+            moved = vector.copy()
+            moved[index] = end[index]
+            told.append(coordinates.values(moved, base)[name])
+        out[name] = min(told), max(told)
+    return out
+
+
+def _estimate(
+    parameter: Parameter,
+    value: float,
+    deviation: Mapping[str, float],
+    ends: tuple[float, float] | None,
+) -> Estimate:
+    """A value; how sure is NaN where the data leave it anywhere within its bounds."""
+    std = deviation.get(parameter.name, 0.0)
+    if std >= parameter.high - parameter.low:
+        return Estimate(value, float("nan"), parameter.unit)
+    low, high = ends or (value - _95 * std, value + _95 * std)
+    return Estimate(value, std, parameter.unit, (low, high))

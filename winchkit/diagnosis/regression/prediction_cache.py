@@ -1,0 +1,146 @@
+"""Predicts one run for many hypotheses: what one shares with the last few is not computed again.
+
+A candidate on the motor's torque leaves the rope's way as it is, and a derivative by one unknown
+moves one part of the line only. So every part is kept with the terms that it came from.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.data.spectrum import to_frequency
+from winchkit.effects.bind import Term, modifiers_of
+from winchkit.model.line import Line, Motion
+from winchkit.model.stages import Stage, Way
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["Predictor", "masked"]
+
+Part = TypeVar("Part")
+Sharper = float | None
+"""The share of its rounding that a known weight's force is given back; None leaves it as it is."""
+_KEPT = 3
+"""The hypothesis at hand, the one moved from it, and the one it came from."""
+_WAY = (Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND)
+_FORCE = (Stage.ROPE_WEIGHT, Stage.PULLEY)
+_SHOWN = {
+    "cable_length": (Stage.ROPE, Stage.FRAME, Stage.LENGTH_INSTRUMENT),
+    "tension": (Stage.CELL,),
+    "motor_torque": (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL),
+}
+
+
+class Predictor:
+    """What hypotheses change in the outputs of one recording."""
+
+    def __init__(self, profile: WinchProfile, recording: Recording) -> None:
+        self._profile = profile
+        self._recording = recording
+        self._kept: dict[str, OrderedDict[Hashable, Any]] = {}
+        # A measured load does not care how the rope is paid out; a known weight does.
+        force = _FORCE if recording.smooth.load_mass is None else _WAY + _FORCE
+        self._stages: dict[str, tuple[Stage, ...]] = {
+            "motion": (),
+            "nominal": (),
+            "way": _WAY,
+            "force": force,
+            "cable_length": _WAY + _SHOWN["cable_length"],
+            "tension": force + _SHOWN["tension"],
+            "motor_torque": _WAY + force + _SHOWN["motor_torque"],
+        }
+
+    def outputs_of(self, stage: Stage) -> set[str]:
+        """Outputs on whose way a stage lies."""
+        return {output for output in _SHOWN if stage in self._stages[output]}
+
+    def change(self, output: str, terms: Sequence[Term], sharper: Sharper = None) -> Array:
+        """Coefficients of what the terms change in an output, (kept,); zero where not compared."""
+
+        def compute() -> Array:
+            moved = self._shown(output, terms, sharper) - self._nominal(sharper)[output]
+            return masked(self._recording, output, moved)
+
+        return self._remembered(output, terms, sharper, compute)
+
+    def _motion(self, sharper: Sharper) -> Motion:
+        smooth = self._recording.smooth
+        if sharper is None:
+            return smooth
+        return self._remembered("motion", (), sharper, lambda: _sharpened(smooth, sharper))
+
+    def _nominal(self, sharper: Sharper) -> Mapping[str, Array]:
+        if sharper is None:
+            return self._recording.nominal_smooth
+
+        def compute() -> Mapping[str, Array]:
+            return self._line(()).predict(self._motion(sharper))
+
+        return self._remembered("nominal", (), sharper, compute)
+
+    def _shown(self, output: str, terms: Sequence[Term], sharper: Sharper) -> Array:
+        line, at, way = self._line(terms), self._motion(sharper).at, self._way(terms)
+        if output == "cable_length":
+            return line.shown_length(at, way)
+        if output == "tension":
+            return line.shown_tension(at, self._force(terms, sharper))
+        return line.shown_torque(at, way, self._force(terms, sharper))
+
+    def _way(self, terms: Sequence[Term]) -> Way:
+        def compute() -> Way:
+            return self._line(terms).way(self._recording.smooth.at)
+
+        return self._remembered("way", terms, None, compute)
+
+    def _force(self, terms: Sequence[Term], sharper: Sharper) -> Array:
+        def compute() -> Array:
+            return self._line(terms).drum_side(self._motion(sharper), self._way(terms))
+
+        return self._remembered("force", terms, sharper, compute)
+
+    def _line(self, terms: Sequence[Term]) -> Line:
+        return Line(self._profile, modifiers_of(terms))
+
+    def _remembered(
+        self, part: str, terms: Sequence[Term], sharper: Sharper, compute: Callable[[], Part]
+    ) -> Part:
+        """A part of the prediction from the terms that act on it, computed or kept."""
+        stages = self._stages[part]
+        own = (
+            (term.effect.id, *term.values.items()) for term in terms if term.effect.stage in stages
+        )
+        key = (sharper, *own)
+        kept = self._kept.setdefault(part, OrderedDict())
+        if key not in kept:
+            kept[key] = compute()
+            if len(kept) > _KEPT:
+                kept.popitem(last=False)
+        kept.move_to_end(key)
+        found: Part = kept[key]
+        return found
+
+
+def masked(recording: Recording, output: str, signal: Array) -> Array:
+    """Coefficients of a signal within its band, zero where the output is not compared, (kept,)."""
+    return to_frequency(np.where(recording.valid[output], signal, 0.0), recording.bands[output])
+
+
+def _sharpened(motion: Motion, sharper: float) -> Motion:
+    """A motion with a known weight's force given back what differences rounded off.
+
+    Loops depend on it: they turn around where the rope is quickest to speed up.
+    """
+    if motion.load is None or motion.rounding is None:
+        return motion
+    load = motion.load + sharper * motion.rounding
+    # Over a span the second difference is off by span²/12 of the fourth derivative; that of a
+    # simulation that differentiates twice over steps h by h²/3: as far is what the line adds.
+    twice = 1 / (3 * motion.clock.reach**2)
+    rounded = float(np.clip((sharper + 1 / 12) / twice, 0.0, 1.0))
+    return replace(motion, at=replace(motion.at, tension=load), load=load, rounded=rounded)

@@ -1,0 +1,1 @@
+"""Residual analysis: error statistics, attribution to variables (correlation ratio), maps."""

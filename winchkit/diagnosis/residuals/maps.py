@@ -1,0 +1,184 @@
+"""Residual maps: the mean of a residual over two variables at once.
+
+One variable shows what an error follows, two show how: an elastic rope's error grows with the load
+times the length, a frame's with the load alone. The pairs are those in which the effects of the
+catalogue differ; an angle stands for where in its turn it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.residuals.attribution import by_chance, kept_rows, variables_of
+from winchkit.model.variables import ANGLES, VARIABLE_UNITS
+
+__all__ = ["PAIRS", "ResidualMap", "residual_maps", "same_cells"]
+
+PAIRS = (
+    ("cable_length", "load"),
+    ("cable_length", "drum_angle"),
+    ("cable_length", "temperature"),
+    ("speed", "load"),
+    ("reversal_distance", "load"),
+    ("motor_angle", "load"),
+)
+"""Across and up; ``load`` is the tension where no load is known."""
+_ACROSS, _UP = 16, 10
+_FEWEST = 3
+_TAILS = 0.002
+_DIGITS = 5
+_LEAST_CHANGE = {"temperature": 1.0}
+"""What less is noise of the instrument rather than a change, K."""
+
+
+@dataclass(frozen=True)
+class ResidualMap:
+    """The mean residual of one output over two variables, SI."""
+
+    output: str
+    over: tuple[str, str]
+    """Variables across and up; an angle within its turn, a reversal distance as log10 of m."""
+    edges: tuple[Array, Array]
+    """Of the cells, (across + 1,) and (up + 1,); the outermost hold what lies beyond."""
+    mean: Array
+    """Measured less predicted, (across, up); NaN where fewer than three samples lie."""
+    count: NDArray[np.intp]
+    """Samples of every cell, (across, up)."""
+    share: float
+    """Of the residual's power that the means take, less what chance gives."""
+
+    @property
+    def largest(self) -> tuple[int, int]:
+        """The cell of the largest mean."""
+        across, up = np.unravel_index(int(np.nanargmax(np.abs(self.mean))), self.mean.shape)
+        return int(across), int(up)
+
+    def to_json(self) -> dict[str, Any]:
+        """As the commands print it; null where hardly a sample lies."""
+        return {
+            "output": self.output,
+            "over": list(self.over),
+            "units": [VARIABLE_UNITS.get(name, "1") for name in self.over],
+            "edges": [_rounded(edges) for edges in self.edges],
+            "mean": [_rounded(row) for row in self.mean],
+            "share": self.share,
+        }
+
+
+def residual_maps(problem: Problem, residual: Array) -> list[ResidualMap]:
+    """Maps that take a share of a residual, (rows,), worth telling; per output the best first."""
+    known = [variables_of(recording) for recording in problem.dataset.recordings]
+    out: list[ResidualMap] = []
+    for output in problem.dataset.outputs:
+        error, kept = _errors(problem, residual, output), kept_rows(problem, output)
+        found = [
+            drawn
+            for pair in PAIRS
+            if (places := _places(problem, known, output, pair)) is not None
+            and (drawn := _map_of(output, places, error, kept)) is not None
+            and drawn.share > by_chance(int(np.isfinite(drawn.mean).sum()), kept)
+        ]
+        out += sorted(found, key=lambda m: -m.share)
+    return out
+
+
+def same_cells(problem: Problem, residual: Array, like: ResidualMap) -> ResidualMap | None:
+    """The map of another residual of the same problem in the cells of one that is drawn."""
+    known = [variables_of(recording) for recording in problem.dataset.recordings]
+    places = _places(problem, known, like.output, like.over)
+    error = _errors(problem, residual, like.output)
+    kept = kept_rows(problem, like.output)
+    return None if places is None else _map_of(like.output, places, error, kept)
+
+
+_Places = tuple[tuple[str, str], tuple[Array, Array]]
+
+
+def _places(
+    problem: Problem, known: list[dict[str, Array]], output: str, pair: tuple[str, str]
+) -> _Places | None:
+    """Names and values of a pair at every compared sample; None where a run lacks one."""
+    own = [s for s in problem.segments if s.output == output]
+    names = [_name(name, known[own[0].run]) for name in pair]
+    if any(name not in known[s.run] for s in own for name in names):
+        return None
+    values = [
+        np.concatenate(
+            [
+                _within_turn(name, known[s.run][name])[
+                    problem.dataset.recordings[s.run].valid[output]
+                ]
+                for s in own
+            ]
+        )
+        for name in names
+    ]
+    return (names[0], names[1]), (values[0], values[1])
+
+
+def _name(name: str, known: Mapping[str, Array]) -> str:
+    return "tension" if name == "load" and "load" not in known else name
+
+
+def _within_turn(name: str, values: Array) -> Array:
+    return np.mod(values, 2 * np.pi) if name in ANGLES else values
+
+
+def _errors(problem: Problem, residual: Array, output: str) -> Array:
+    """Residual of an output at its compared samples, all runs one after another."""
+    times = problem.in_time(residual)
+    recordings = problem.dataset.recordings
+    return np.concatenate(
+        [
+            time[recordings[s.run].valid[output]]
+            for s, time in zip(problem.segments, times, strict=True)
+            if s.output == output
+        ]
+    )
+
+
+def _map_of(output: str, places: _Places, error: Array, kept: int) -> ResidualMap | None:
+    """The map, or None where a variable hardly changes or nothing is left."""
+    names, (x, y) = places
+    edges = (_edges(names[0], x, _ACROSS), _edges(names[1], y, _UP))
+    total = float(error @ error)
+    still = (np.ptp(e) <= _LEAST_CHANGE.get(n, 0.0) for n, e in zip(names, edges, strict=True))
+    if total == 0.0 or any(still):
+        return None
+    cell = _index(x, edges[0]) * _UP + _index(y, edges[1])
+    count = np.bincount(cell, minlength=_ACROSS * _UP)
+    sums = np.bincount(cell, weights=error, minlength=_ACROSS * _UP)
+    used = count >= _FEWEST
+    if not used.any():
+        return None
+    mean = np.full(len(count), np.nan)
+    mean[used] = sums[used] / count[used]
+    taken = float(np.sum(sums[used] ** 2 / count[used]))
+    chance = total * np.count_nonzero(used) / kept
+    share = max(0.0, float((taken - chance) / total))
+    shape = (_ACROSS, _UP)
+    return ResidualMap(output, names, edges, mean.reshape(shape), count.reshape(shape), share)
+
+
+def _edges(name: str, values: Array, cells: int) -> Array:
+    """Even cells over all but the tails, or over the turn of an angle."""
+    if name in ANGLES:
+        return np.linspace(0.0, 2 * np.pi, cells + 1)
+    low, high = np.quantile(values, [_TAILS, 1 - _TAILS])
+    return np.linspace(low, high, cells + 1)
+
+
+def _index(values: Array, edges: Array) -> NDArray[np.intp]:
+    return np.searchsorted(edges[1:-1], values, side="right")
+
+
+def _rounded(values: Array) -> list[float | None]:
+    """Numbers of a drawing, to five digits."""
+    return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in values]

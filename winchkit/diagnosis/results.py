@@ -1,0 +1,303 @@
+"""What a comparison and a diagnosis say, as frozen dataclasses and as JSON (DESIGN's promises)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import isnan
+from typing import Any, ClassVar, Literal
+
+from winchkit.diagnosis.residuals.maps import ResidualMap
+from winchkit.effects.empirical import empirical_id
+from winchkit.effects.placement import HOME
+
+__all__ = [
+    "Candidate",
+    "Comparison",
+    "Detectable",
+    "Diagnosis",
+    "Estimate",
+    "NextRun",
+    "OutputError",
+    "OutputFit",
+    "RobotDiagnosis",
+    "Step",
+    "Where",
+    "apart",
+    "plain_step",
+]
+
+Verdict = Literal["adequate", "explained", "partly", "unknown"]
+
+
+@dataclass(frozen=True)
+class OutputError:
+    """How far one output is from its prediction, SI."""
+
+    unit: str
+    samples: int
+    band: float | None
+    signal_rms: float
+    rms: float
+    max: float
+    bias: float
+    noise_rms: float | None
+    """From differences of repeats; None without any."""
+    follows: tuple[tuple[str, float], ...]
+    """Variables and the share of the error that each explains."""
+    orders: tuple[tuple[str, int, float], ...] = ()
+    """Angles, how often per turn the error repeats over them, and the share of that sine."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As the command prints it."""
+        plain = {k: v for k, v in vars(self).items() if k not in {"follows", "orders"}}
+        follows = [{"variable": name, "share": share} for name, share in self.follows]
+        orders = [{"variable": v, "order": order, "share": s} for v, order, s in self.orders]
+        return {**plain, "follows": follows, "orders": orders}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A profile against measured runs, only the length offset fitted."""
+
+    outputs: Mapping[str, OutputError]
+    offset: float | None
+    """Fitted offset of the length instrument, m."""
+    notes: tuple[str, ...] = ()
+    maps: tuple[ResidualMap, ...] = field(default=(), compare=False)
+    """What the errors do over two variables; per output the most telling first."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``winchkit compare --json`` prints it."""
+        outputs = {name: error.to_json() for name, error in self.outputs.items()}
+        return {
+            "schema": 1,
+            "outputs": outputs,
+            "length_offset": self.offset,
+            "maps": [drawn.to_json() for drawn in self.maps],
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter's value with its standard deviation, SI."""
+
+    value: float
+    std: float
+    unit: str
+    interval: tuple[float, float] | None = None
+    """That holds the truth in 95 of 100 cases; None where it was not worked out."""
+
+
+@dataclass(frozen=True)
+class OutputFit:
+    """One output before and after, SI."""
+
+    unit: str
+    band: float | None
+    signal_rms: float
+    rms_before: float
+    rms_after: float
+    heldout_rms_before: float
+    heldout_rms_after: float
+    noise_rms: float | None
+    noise_source: str = "repeats"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One addition to the model: the effects that the data cannot tell apart there."""
+
+    effects: tuple[str, ...]
+    parameters: Mapping[str, Mapping[str, Estimate]]
+    heldout_gain: float
+    angles: Mapping[str, float] = field(default_factory=dict)
+    """Between the first effect's signature and the others', rad."""
+    whole: bool = False
+    """All of the effects at once, as a robot's whole geometry; not one of them."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As the command prints it."""
+        parameters = {
+            effect: {name: vars(estimate) for name, estimate in values.items()}
+            for effect, values in self.parameters.items()
+        }
+        return {
+            "effects": list(self.effects),
+            "parameters": parameters,
+            "heldout_gain": self.heldout_gain,
+            "angles": dict(self.angles),
+        }
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect of the catalogue, scored beside the model that the runs were compared with."""
+
+    effect: str
+    score: float
+    heldout_rms: Mapping[str, float]
+    """With it added; empty where its score did not earn a fit."""
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """The smallest size of an effect that these runs could have shown."""
+
+    effect: str
+    parameter: str
+    smallest: float
+    """NaN where no size within the parameter's bounds would have been seen."""
+    unit: str
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where an unexplained rest lives."""
+
+    output: str
+    variable: str
+    share: float
+    order: int | None = None
+    frequency: float | None = None
+    line: str | None = None
+    """Of a robot, or axis of its platform's position, where one alone has most of it."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As the command prints it: order, frequency or line only where it has one."""
+        return {key: value for key, value in vars(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
+class NextRun:
+    """A motion programme that would tell two effects apart."""
+
+    separates: tuple[str, str]
+    programme: str
+    power: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer: what is missing, how sure that is, and what these runs cannot show."""
+
+    data: ClassVar[str] = "runs"
+    """What it was made from, in a word."""
+
+    verdict: Verdict
+    outputs: Mapping[str, OutputFit]
+    steps: tuple[Step, ...]
+    candidates: tuple[Candidate, ...]
+    detectable: tuple[Detectable, ...]
+    unexplained_share: float
+    where: tuple[Where, ...]
+    next_runs: tuple[NextRun, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def empirical(self) -> tuple[str, ...]:
+        """Empirical effects that would take up the rest where it lives, most of it first."""
+        seen = [empirical_id(w.output, w.variable) for w in self.where if w.frequency is None]
+        return tuple(dict.fromkeys(seen))
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``winchkit diagnose --json`` prints it."""
+        return {
+            "schema": 1,
+            "verdict": self.verdict,
+            "outputs": {name: vars(output) for name, output in self.outputs.items()},
+            "steps": [step.to_json() for step in self.steps],
+            "candidates": [vars(c) | {"heldout_rms": dict(c.heldout_rms)} for c in self.candidates],
+            "detectable": [vars(d) for d in self.detectable],
+            "unexplained": {
+                "share": self.unexplained_share,
+                "where": [where.to_json() for where in self.where],
+                "empirical": list(self.empirical),
+            },
+            "next_runs": [
+                {**vars(run), "separates": list(run.separates)} for run in self.next_runs
+            ],
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class RobotDiagnosis(Diagnosis):
+    """As a winch's; ids of effects at a place are ``EFFECT/LINE`` inside."""
+
+    data: ClassVar[str] = "poses"
+    geometry: str = "file"
+    """``file`` where the numbers of the profile were taken as they are, ``refitted`` where the
+    geometry was let go."""
+
+    @property
+    def empirical(self) -> tuple[str, ...]:
+        """None: a curve over a pose has no effect of its own."""
+        return ()
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``winchkit diagnose --json`` prints it for a robot."""
+        out = super().to_json()
+        out["geometry"] = self.geometry
+        out["steps"] = [_step(step) for step in self.steps]
+        out["candidates"] = [_placed(candidate) for candidate in out["candidates"]]
+        out["detectable"] = _detectable(out["detectable"])
+        for run in out["next_runs"]:
+            run["separates"] = [apart(name)[0] for name in run["separates"]]
+        return out
+
+
+def apart(placed: str) -> tuple[str, str | None]:
+    """An effect's id and the line it was placed on, None for all lines or the platform."""
+    effect, _, line = placed.partition("/")
+    return effect, line or None
+
+
+def plain_step(step: Step) -> Step:
+    """A step without the home lengths that a rope's law brings along."""
+    parameters = {
+        effect: {n: e for n, e in values.items() if not n.startswith(HOME)}
+        for effect, values in step.parameters.items()
+    }
+    return replace(step, parameters=parameters)
+
+
+def _step(step: Step) -> dict[str, Any]:
+    """One step; ``lines`` has, for each name of ``effects``, the lines that it may be on."""
+    lines: dict[str, list[str | None]] = {}
+    for placed in step.effects:
+        effect, line = apart(placed)
+        lines.setdefault(effect, []).append(line)
+    parameters: dict[str, Any] = {}
+    for placed, values in step.parameters.items():
+        effect, line = apart(placed)
+        several = len(lines.get(effect, ())) > 1 and effect in parameters
+        key = placed if several else effect
+        parameters[key] = {name: vars(estimate) for name, estimate in values.items()}
+    return {
+        "effects": list(lines),
+        "lines": lines,
+        "parameters": parameters,
+        "heldout_gain": step.heldout_gain,
+        "angles": dict(step.angles),
+        "whole": step.whole,
+    }
+
+
+def _placed(candidate: Mapping[str, Any]) -> dict[str, Any]:
+    effect, line = apart(candidate["effect"])
+    return {**candidate, "effect": effect, "line": line}
+
+
+def _detectable(items: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Per effect and parameter the line on which it would have to be largest to be seen."""
+    out: dict[tuple[str, str], dict[str, Any]] = {}
+    for item in items:
+        effect, line = apart(item["effect"])
+        key = effect, item["parameter"]
+        worst = out.get(key)
+        size = item["smallest"]
+        if worst is None or isnan(size) or size > worst["smallest"]:
+            out[key] = {**item, "effect": effect, "line": line}
+    return list(out.values())

@@ -1,0 +1,162 @@
+"""What a robot's errors follow: lines, the platform's place and turn, lengths, tensions, warmth.
+
+An effect on one line shows there alone, and a shifted point turns its sign with the pose. So a
+share is that of means over bins of a variable, line by line (axis by axis of a position).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.robot.errors import Errors
+from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.model.robot import angles_of
+
+__all__ = ["AXES", "ON_PLATFORM", "follows_of", "most_telling", "on_ropes", "variables_of_poses"]
+
+AXES = ("x", "y", "z")
+"""Columns of a position's error."""
+ON_PLATFORM = tuple(f"platform_{name}" for name in (*AXES, "roll", "pitch", "yaw"))
+"""Variables of the pose itself."""
+_BINS = 8
+_WORTH = 0.02
+_SURE = 3.0
+_MOSTLY = 0.5
+_FEWEST = 20
+
+
+@dataclass(frozen=True)
+class _Share:
+    """What the means over a variable's bins take of an error's power."""
+
+    share: float
+    """Less what chance gives."""
+    by_chance: float
+    """What chance hardly reaches."""
+    column: int
+    """Which line or axis has most of it."""
+    alone: bool
+    """Whether that one has over half of it."""
+
+
+def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
+    """Per output the variables that its error follows, largest share first.
+
+    ``winch`` is the share of the lines' own constants, ``pose`` that of what the lines of one pose
+    have in common.
+    """
+    variables, out = variables_of_poses(problem), []
+    for output, error in on_ropes(problem, errors).items():
+        lines = AXES if output == "platform_position" else problem.dataset.names
+        found = []
+        for name, values in variables.items():
+            if values.shape[1] not in (1, error.shape[1]):
+                continue
+            taken = _taken(np.broadcast_to(values, error.shape), error)
+            if taken.share > max(_WORTH, taken.by_chance):
+                line = lines[taken.column] if taken.alone else None
+                found.append(Followed(output, name, taken.share, line=line))
+        if output != "platform_position":
+            found += _constants(problem, output, error)
+        out += sorted(found, key=lambda f: -f.share)
+    return out
+
+
+def most_telling(values: Array, error: Array) -> int:
+    """Which line or axis, a column, follows a variable with most of its error."""
+    return _taken(np.broadcast_to(values, error.shape), error).column
+
+
+def on_ropes(problem: RobotProblem, errors: Errors) -> Errors:
+    """Errors as they are drawn: a tension's as the least forces that would balance it, by line."""
+    out = dict(errors)
+    if "tension" in out:
+        known = np.isfinite(out["tension"])
+        inside = np.where(known, out["tension"], 0.0)
+        spread = (problem.equations.to_ropes @ inside[..., None])[..., 0]
+        out["tension"] = np.where(known.all(axis=1, keepdims=True), spread, np.nan)
+    return out
+
+
+def variables_of_poses(problem: RobotProblem) -> dict[str, Array]:
+    """By name, (p, 1) of the platform, (p, n) of the lines, SI."""
+    dataset, measured = problem.dataset, problem.dataset.measured
+    angle = measured.motor_angle
+    drum = np.empty_like(angle)
+    for i, winch in enumerate(problem.robot.winches):
+        turned = angle[:, i] - winch.reference.motor_angle
+        drum[:, i] = turned * winch.gearbox.direction / winch.gearbox.ratio
+    pose = problem.equations.pose
+    place = np.concatenate([pose.position, angles_of(pose.rotation)], axis=1)
+    out = {name: place[:, [k]] for k, name in enumerate(ON_PLATFORM)}
+    out |= {
+        "cable_length": problem.robot.lengths_at(angle),
+        "motor_angle": angle,
+        "drum_angle": drum,
+    }
+    if dataset.has_tension:
+        out["tension"] = measured.tension
+    if np.isfinite(measured.temperature).any():
+        out["temperature"] = measured.temperature
+    return out
+
+
+def _taken(values: Array, error: Array) -> _Share:
+    """Share of the error's power in its means over bins, column by column, constants left out."""
+    known = np.isfinite(error) & np.isfinite(values)
+    total, count, between, bins = 0.0, 0, np.zeros(error.shape[1]), 0
+    for k in range(error.shape[1]):
+        there = known[:, k]
+        x, e = values[there, k], error[there, k]
+        total, count = total + float(e @ e), count + len(e)
+        if len(e) < _FEWEST or np.ptp(x) <= 1e-9 * max(1.0, float(np.abs(x).max())):
+            continue
+        edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)[1:-1]))
+        number = np.searchsorted(edges, x, side="right")
+        many = np.bincount(number)
+        used = many > 0
+        sums = np.bincount(number, weights=e - e.mean())
+        between[k] = float(np.sum(sums[used] ** 2 / many[used]))
+        bins += int(np.count_nonzero(used)) - 1
+    if not total or not bins:
+        return _Share(0.0, 1.0, 0, alone=False)
+    most = int(np.argmax(between))
+    share = float(between.sum()) / total - bins / count
+    alone = bool(between[most] > _MOSTLY * between.sum())
+    return _Share(max(0.0, share), _SURE * float(np.sqrt(2 * bins)) / count, most, alone)
+
+
+def _constants(problem: RobotProblem, output: str, error: Array) -> list[Followed]:
+    """Shares of what is constant on a line, and common to the lines of one pose."""
+    known, out = np.isfinite(error), []
+    winch = np.broadcast_to(np.arange(error.shape[1]), error.shape)
+    pose = np.broadcast_to(problem.dataset.pose[:, None], error.shape)
+    for name, values in (("winch", winch), ("pose", pose)):
+        taken = _category_share(values[known], error[known])
+        if taken.share > max(_WORTH, taken.by_chance):
+            own = name == "winch" and taken.alone
+            line = problem.dataset.names[taken.column] if own else None
+            out.append(Followed(output, name, taken.share, line=line))
+    return out
+
+
+def _category_share(category: NDArray[np.intp], error: Array) -> _Share:
+    """Share of the error's power in the means of its categories, less what chance gives."""
+    total = float(error @ error)
+    if total == 0.0:
+        return _Share(0.0, 1.0, 0, alone=False)
+    count = np.bincount(category)
+    used = count > 0
+    means = np.zeros(len(count))
+    means[used] = np.bincount(category, weights=error)[used] ** 2 / count[used]
+    many = int(np.count_nonzero(used))
+    share = float(means.sum()) / total - many / len(error)
+    chance = _SURE * float(np.sqrt(2 * many)) / len(error)
+    most = int(np.argmax(means))
+    alone = bool(means[most] > _MOSTLY * means.sum())
+    return _Share(max(0.0, share), chance, most, alone)

@@ -1,0 +1,130 @@
+"""Which effects a robot's poses could show, each at each of its places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.diagnosis.robot.prior import Believed
+from winchkit.effects.bind import Term
+from winchkit.effects.bind_robot import lines_with_home_length
+from winchkit.effects.catalogue import Catalogue
+from winchkit.effects.effect import Effect
+from winchkit.effects.placement import (
+    at_line,
+    base_of,
+    line_of_effect,
+    placements,
+    with_home_lengths,
+)
+from winchkit.schema.profiles.winch import LAYERED, WinchProfile
+
+__all__ = ["GEOMETRY", "candidates_at", "geometry_believed", "lacking", "lacking_parts", "needless"]
+
+GEOMETRY = ("exit-point", "anchor-point", "swivel-radius", "drum-radius", "layer-thickness")
+"""Effects that are the geometry which a calibration fits."""
+_PRIORS = {
+    "exit-point": ("exit_point", 5e-3),
+    "anchor-point": ("anchor_point", 5e-3),
+    "swivel-radius": ("swivel_radius", 0.4e-3),
+    "drum-radius": ("winding_radius", 0.5e-3),
+    "layer-thickness": ("layer_growth", 0.04e-3),
+}
+"""Their names in ``[prior]`` with the standard deviation where a file has none, m: CABTIVE paper,
+Table 4, its bounds read as two standard deviations."""
+_PARTS = {
+    "swivel-radius": "a line with a swivel_radius",
+    "layer-thickness": "a drum that winds in layers",
+    "guide-offset": "a [guide] in a line's winch",
+}
+_OUTSIDE_LINES = {"tension": "LINE.tension [N] of the load cells", "temperature": "a temperature"}
+
+
+def candidates_at(dataset: RobotDataset, catalogue: Catalogue) -> Iterator[Effect]:
+    """Effects at their places, as far as the poses could show them at all."""
+    for effect in catalogue:
+        if not effect.on_robot or lacking(effect, dataset):
+            continue
+        for placed in placements(effect, dataset.names):
+            if _has_part(placed, dataset):
+                yield needless(placed, dataset)
+
+
+def lacking(effect: Effect, dataset: RobotDataset) -> list[str]:
+    """Channels that an effect needs on a robot and that are not there, in words."""
+    out = []
+    if "rope_force" in effect.needs and not dataset.has_tension:
+        out.append(_OUTSIDE_LINES["tension"])
+    if "tension" in effect.outputs and not dataset.has_balance:
+        out.append("tensions that carry the platform's weight")
+    if "temperature" in effect.needs and not np.isfinite(dataset.measured.temperature).all():
+        out.append(_OUTSIDE_LINES["temperature"])
+    return out
+
+
+def lacking_parts(effect: Effect, dataset: RobotDataset) -> list[str]:
+    """Parts that no line has and that an effect is about, in words."""
+    return [] if _has_part(effect, dataset) else [_PARTS[base_of(effect)]]
+
+
+def needless(effect: Effect, dataset: RobotDataset) -> Effect:
+    """An effect as the search takes it: its needs are met; a rope's law brings home lengths."""
+    if "rope_force" in effect.needs and effect.outputs == ("cable_length",):
+        known = lines_with_home_length(dataset.robot)
+        effect = with_home_lengths(effect, [n for n in dataset.names if n not in known])
+    return replace(effect, needs=())
+
+
+def geometry_believed(dataset: RobotDataset, catalogue: Catalogue, fitted: bool) -> list[Believed]:
+    """The geometry as nuisances: with the priors of a calibration, or with what one left.
+
+    ``fitted`` takes the standard deviations that a calibration wrote; without them there is none.
+    """
+    out = []
+    for name in GEOMETRY:
+        effect = catalogue[name]
+        for placed in [effect] if name == "layer-thickness" else _each(effect, dataset):
+            if not _has_part(placed, dataset):
+                continue
+            for parameter in placed.parameters:
+                std = _std(dataset, placed, parameter.name, fitted)
+                if std > 0:
+                    out.append(Believed(Term(placed, placed.null), parameter.name, std))
+    return out
+
+
+def _each(effect: Effect, dataset: RobotDataset) -> Iterable[Effect]:
+    return (at_line(effect, line) for line in dataset.names)
+
+
+def _std(dataset: RobotDataset, effect: Effect, parameter: str, fitted: bool) -> float:
+    """Of one number of the geometry, m."""
+    key, default = _PRIORS[base_of(effect)]
+    profile = dataset.robot
+    if not fitted:
+        prior = {str(name): spec.std for name, spec in profile.prior.items()}
+        return prior.get(key, default)
+    from winchkit.units import parse
+
+    line = line_of_effect(effect)
+    axis = f".{parameter}" if parameter in ("x", "y", "z") else ""
+    name = f"{line}.{key}{axis}" if line else key
+    stated = profile.fitted.std.get(name) if profile.fitted else None
+    return parse(stated, "length") if stated else 0.0
+
+
+def _has_part(effect: Effect, dataset: RobotDataset) -> bool:
+    """Whether a line, or any where the effect acts on all, has the part that it is about."""
+    place = line_of_effect(effect)
+    lines = [line for line in dataset.robot.line if not place or line.name == place]
+    winches = [line.winch for line in lines if isinstance(line.winch, WinchProfile)]
+    if base_of(effect) == "swivel-radius":
+        return any(line.swivel_radius > 0 for line in lines)
+    if base_of(effect) == "layer-thickness":
+        return any(winch.drum.kind in LAYERED for winch in winches)
+    if base_of(effect) == "guide-offset":
+        return any(winch.guide is not None for winch in winches)
+    return True

@@ -1,0 +1,168 @@
+"""What users read of a robot's model: errors in SI, in sample and on poses held out.
+
+``cable_length`` is the rope by the drum against the rope by geometry at the pose measured,
+``platform_position`` the pose that the motor angles stand for against the one measured, and
+``tension`` what measured rope forces and the weight leave unbalanced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.cross_validation import Folds, left_out_steps
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.results import OutputFit
+from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.variance_components import PoseNoise
+
+__all__ = ["UNITS", "Errors", "Shown", "errors_of", "figures", "held_out_rms", "noise_rms", "rms"]
+
+Errors = dict[str, Array]
+UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
+_HELD = 6
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A fitted model with all that is needed to judge it."""
+
+    problem: RobotProblem
+    fit: Fit
+    noise: Noise
+    folds: Folds
+
+
+def errors_of(problem: RobotProblem, residuals: Mapping[str, Array]) -> Errors:
+    """By output, (p, k), SI, NaN where unknown."""
+    at_pose, to_place = _maps(problem)
+    known = _seen(residuals)
+    moved = np.where(known, np.concatenate([residuals["position"], residuals["rotation"]], 1), 0.0)
+    by = problem.slope()["rope"]
+    closure = residuals["rope"] - (by @ moved[..., None])[..., 0]
+    rows = np.where(np.isfinite(closure), closure, 0.0)
+    length = (at_pose @ rows[..., None])[..., 0]
+    out = {"cable_length": np.where(np.isfinite(closure), -length, np.nan)}
+    if problem.dataset.measured.motor_angle.shape[1] >= _HELD:
+        whole = np.isfinite(residuals["rope"]).all(axis=1, keepdims=True)
+        stray = np.where(whole, np.nan_to_num(residuals["rope"]), np.nan)
+        found = residuals["position"] - (to_place @ stray[..., None])[..., 0]
+        if np.isfinite(found).any():
+            out["platform_position"] = found
+    if "tension" in residuals:
+        out["tension"] = -residuals["tension"]
+    return out
+
+
+def noise_rms(problem: RobotProblem, noise: PoseNoise) -> dict[str, float]:
+    """What the instruments alone would leave, by output, SI."""
+    at_pose, to_place = _maps(problem)
+    sigma, by = noise.sigma, problem.slope()["rope"]
+    here = problem.residuals(())
+    pose = np.repeat([sigma["position"] ** 2, sigma["rotation"] ** 2], 3) * _seen(here)
+    spread = by * np.sqrt(pose)[:, None, :]
+    whole = spread @ np.swapaxes(spread, 1, 2) + sigma["rope"] ** 2 * np.eye(by.shape[1])
+    length = np.trace(at_pose @ whole @ np.swapaxes(at_pose, 1, 2), axis1=1, axis2=2)
+    out = {"cable_length": float(np.sqrt(np.mean(length) / by.shape[1]))}
+    place = np.sum(to_place**2, axis=(1, 2)) * sigma["rope"] ** 2 + 3 * sigma["position"] ** 2
+    out["platform_position"] = float(np.sqrt(np.mean(place)))
+    out["tension"] = sigma["tension"]
+    return out
+
+
+def figures(begin: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit]:
+    """Every output before and after; a position's rms is of its distance."""
+    before, after = (errors_of(s.problem, s.problem.at(s.fit.hypothesis)) for s in (begin, final))
+    held_before, held_after = held_out_rms(begin), held_out_rms(final)
+    least = noise_rms(final.problem, noise)
+    signal = signals(final.problem)
+    source = "repeats" if noise.from_repeats else "saturated fit"
+    return {
+        name: OutputFit(
+            unit=UNITS[name],
+            band=None,
+            signal_rms=signal[name],
+            rms_before=rms(name, before[name]),
+            rms_after=rms(name, after[name]),
+            heldout_rms_before=held_before[name],
+            heldout_rms_after=held_after[name],
+            noise_rms=least[name],
+            noise_source=source,
+        )
+        for name in after
+        if name in before
+    }
+
+
+def rms(name: str, error: Array) -> float:
+    """Of all values; of a position of its distance."""
+    known = error[np.isfinite(error).all(axis=1)] if name == "platform_position" else error
+    squares = np.nansum(known**2, axis=1) if name == "platform_position" else known**2
+    squares = squares[np.isfinite(squares)]
+    return float(np.sqrt(np.mean(squares))) if squares.size else float("nan")
+
+
+def signals(problem: RobotProblem) -> dict[str, float]:
+    """How much each output varies, rms about its mean, SI."""
+    measured = problem.dataset.measured
+    length = problem.equations.residuals(problem.robot)["rope"] + problem.robot.lengths_at(
+        measured.motor_angle, problem.equations.forces(problem.robot), problem.equations.warm
+    )
+    values = {
+        "cable_length": length,
+        "platform_position": measured.position,
+        "tension": measured.tension,
+    }
+    out = {}
+    for name, array in values.items():
+        known = np.isfinite(array).all(axis=1)
+        apart = array[known] - array[known].mean(axis=0) if known.any() else array[known]
+        out[name] = rms(name, apart) if known.any() else float("nan")
+    return out
+
+
+def held_out_rms(shown: Shown) -> dict[str, float]:
+    """Error of every output on poses held out, rms in SI."""
+    return {name: rms(name, error) for name, error in _held_out(shown).items()}
+
+
+def _held_out(shown: Shown) -> Errors:
+    """Errors of every pose with the unknowns fitted without its fold, linearised."""
+    problem, found = shown.problem, shown.fit
+    here = problem.at(found.hypothesis)
+    steps = left_out_steps(problem, found, shown.noise, shown.folds)
+    row, fold = problem.pose_of_row, np.concatenate(shown.folds.of)
+    of_pose = np.zeros(len(problem.dataset.measured), dtype=np.intp)
+    of_pose[row[row >= 0]] = fold[row >= 0]
+    out = {kind: values.copy() for kind, values in here.items()}
+    for index in range(len(found.vector)):
+        step = 1e-3 * max(1.0, abs(found.vector[index]))
+        vector = found.vector.copy()
+        vector[index] += step
+        there = problem.at(problem.hypothesis(vector, found.hypothesis))
+        by = steps[of_pose, index][:, None] / step
+        for kind, values in there.items():
+            out[kind] += (values - here[kind]) * by
+    return errors_of(problem, out)
+
+
+def _seen(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Which of the six coordinates of each pose were measured, (p, 6)."""
+    both = np.concatenate([residuals["position"], residuals["rotation"]], axis=1)
+    return np.asarray(np.isfinite(both))
+
+
+def _maps(problem: RobotProblem) -> tuple[Array, Array]:
+    """Per pose: what takes what unmeasured coordinates can undo out of closures (p, n, n), and
+    closures to the place where the ropes put the platform (p, 3, n)."""
+    by = problem.slope()["rope"]
+    by = np.where(np.isfinite(by), by, 0.0)
+    free = by * ~_seen(problem.residuals(()))[:, None, :]
+    undone = free @ np.linalg.pinv(free, rcond=1e-9)
+    back = np.asarray(np.linalg.pinv(by, rcond=1e-9), dtype=float)
+    return np.eye(by.shape[1]) - undone, back[:, :3]

@@ -1,0 +1,55 @@
+"""What a set of poses cannot show, said before anything is concluded from it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from winchkit.model.robot.rotation import rotation_of, rotation_vector
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.robot.preparation import Study
+
+__all__ = ["what_poses_cannot_show"]
+
+_TURNED = np.radians(1.0)
+_FEW = 40
+
+
+def what_poses_cannot_show(study: Study) -> list[str]:
+    """Sentences on missing repeats, tensions, temperatures, rotations, and on few poses."""
+    dataset, measured = study.dataset, study.dataset.measured
+    notes = []
+    if not study.noise.from_repeats:
+        notes.append(
+            "too few poses repeat another: the noise is what neither geometry nor any known effect "
+            "explains, so an effect outside the catalogue cannot be excluded; drive to some ten "
+            "poses twice"
+        )
+    if not dataset.has_tension:
+        notes.append(
+            "no tensions measured: what depends on the ropes' force (elasticity, payload, cells) "
+            "cannot be seen; record LINE.tension [N]"
+        )
+    elif not dataset.has_balance:
+        notes.append(
+            "the tensions measured do not carry the platform's weight, whatever it is: payload and "
+            "cells cannot be judged; does something else pull at the platform?"
+        )
+    if not np.isfinite(measured.temperature).all():
+        notes.append("no temperature measured: thermal effects cannot be seen")
+    if not np.isfinite(measured.position).any():
+        notes.append("no position measured: where the platform frame lies cannot be seen")
+    whole = measured.angles[np.isfinite(measured.angles).all(axis=1)]
+    if len(whole):
+        turned = rotation_vector(rotation_of(*whole.T) @ rotation_of(*whole[0]).T)
+        if float(np.max(np.linalg.norm(turned, axis=1))) < _TURNED:
+            notes.append(
+                "the platform never turned: exit and anchor points cannot be told apart; turn it "
+                "between poses"
+            )
+    distinct = int(dataset.pose.max()) + 1
+    if distinct < _FEW:
+        notes.append(f"{distinct} distinct poses only; ninety, widely spread, tell much more")
+    return notes

@@ -1,0 +1,74 @@
+"""Numbers of a robot's geometry that are believed only so well, and the profile that has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from winchkit.effects.bind import Term
+from winchkit.effects.placement import base_of, line_of_effect
+from winchkit.schema.profiles.robot import LineSpec, RobotProfile
+from winchkit.schema.profiles.winch import LAYERED, WinchProfile
+
+__all__ = ["Believed", "believed_profile"]
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Believed:
+    """A number of the geometry that is a nuisance: one parameter of a term, and its prior."""
+
+    term: Term
+    """Its values are where the fit has them now."""
+    parameter: str
+    std: float
+    """Of the prior, SI."""
+    at: float = 0.0
+    """Where the prior has it."""
+
+    @property
+    def value(self) -> float:
+        """Where it is now."""
+        return self.term.values[self.parameter]
+
+    def moved(self, by: float) -> Believed:
+        """With another value, ``by`` standard deviations from where it is."""
+        values = {**self.term.values, self.parameter: self.value + by * self.std}
+        return replace(self, term=Term(self.term.effect, values))
+
+
+def believed_profile(profile: RobotProfile, believed: Iterable[Believed]) -> RobotProfile:
+    """A robot's profile with every number of its geometry where it is now."""
+    lines = {line.name: line for line in profile.line}
+    for belief in believed:
+        if not belief.value:
+            continue
+        place = line_of_effect(belief.term.effect)
+        for name in [place] if place else lines:
+            lines[name] = _with(lines[name], base_of(belief.term.effect), belief)
+    return replace(profile, line=tuple(lines.values()))
+
+
+def _with(line: LineSpec, effect: str, belief: Believed) -> LineSpec:
+    """A line with one number moved."""
+    by, winch = belief.value, line.winch
+    if effect == "exit-point":
+        return replace(line, exit_point=_shifted(line.exit_point, belief.parameter, by))
+    if effect == "anchor-point":
+        return replace(line, anchor_point=_shifted(line.anchor_point, belief.parameter, by))
+    if effect == "swivel-radius":
+        return replace(line, swivel_radius=line.swivel_radius + by)
+    assert isinstance(winch, WinchProfile)
+    drum = winch.drum
+    if effect == "drum-radius":
+        drum = replace(drum, winding_radius=drum.winding_radius + by)
+    elif drum.kind in LAYERED:
+        growth = winch.cable.diameter if drum.layer_growth is None else drum.layer_growth
+        drum = replace(drum, layer_growth=(growth or 0.0) + by)
+    return replace(line, winch=replace(winch, drum=drum))
+
+
+def _shifted(point: Point, axis: str, by: float) -> Point:
+    x, y, z = (value + by * (name == axis) for name, value in zip("xyz", point, strict=True))
+    return x, y, z

@@ -1,0 +1,251 @@
+"""A robot's poses as one regression: equations that no pose can undo, each with unit noise.
+
+The equations of a pose are whitened, and what its six freedoms can take up is projected out: the
+pose itself is never known exactly. Numbers that are believed only so well (a calibrated geometry)
+are nuisances with a prior: rows that hold them where they were, spread over the folds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.spectrum import Band
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.time_series import Problem, Segment
+from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.diagnosis.robot.equations import POSED, Equations
+from winchkit.diagnosis.robot.prior import Believed, believed_profile
+from winchkit.effects.bind import Term
+from winchkit.effects.bind_robot import robot_with_terms
+from winchkit.effects.placement import base_of, line_of_effect
+from winchkit.model.robot import Pose, Robot
+from winchkit.model.stages import Stage
+from winchkit.schema.profiles.robot import RobotProfile
+
+__all__ = ["RobotProblem", "Standing"]
+
+_COPIES = 5
+_SEEN = 1e-9
+_ZERO, _OFFSET = 0.2, 0.05
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a problem stands: what is taken for granted while effects are fitted."""
+
+    dataset: RobotDataset
+    pose: Pose
+    sigma: Mapping[str, float]
+    believed: tuple[Believed, ...] = ()
+
+    @cached_property
+    def profile(self) -> RobotProfile:
+        """The profile with the geometry where it is now."""
+        return believed_profile(self.dataset.robot, self.believed)
+
+    def robot(self, terms: Sequence[Term] = ()) -> Robot:
+        """With terms beside the geometry."""
+        return robot_with_terms(self.profile, terms)
+
+
+class RobotProblem(Problem):
+    """Residuals of hypotheses on a robot's poses."""
+
+    def __init__(self, standing: Standing) -> None:
+        self.standing = standing
+        self.dataset: RobotDataset = standing.dataset
+        self.runs = 1
+        self.robot = standing.robot()
+        self.equations = Equations(standing.dataset, standing.pose, self.robot)
+        self._start = self.equations.residuals(self.robot)
+        self._zeros = _zeros(self._start, self.dataset)
+        self._posed = [k for k in POSED if np.isfinite(self._start[k]).any()]
+        self._project()
+        here = self._rows_of(self._start)
+        prior = [-(b.value - b.at) / b.std for b in standing.believed]
+        self._prior = np.tile(np.array(prior) / np.sqrt(_COPIES), _COPIES)
+        counts = [int(np.count_nonzero(keep)) for keep in self._keep.values()]
+        self.rows_of_poses = sum(counts)
+        self.segments = self._segments(counts)
+        self.rows = self.segments[-1].rows.stop
+        self.base = self._beside(here, self._prior)
+        self._here = here
+        self.fits_offset = self.rounds = False
+        self.nuisance_columns = self._nuisances()
+
+    @cached_property
+    def band_of_row(self) -> NDArray[np.intp]:
+        """One band per kind of output."""
+        out = np.zeros(self.rows, dtype=np.intp)
+        for index, segment in enumerate(self.segments):
+            out[segment.rows] = index
+        return out
+
+    @property
+    def bands(self) -> list[tuple[str, float, float]]:
+        """One per output: poses have no frequency."""
+        return [(s.output, 0.0, float("inf")) for s in self.segments]
+
+    @property
+    def floor(self) -> Array:
+        """Rows are whitened."""
+        return np.full(len(self.segments), 1e-12)
+
+    @cached_property
+    def pose_of_row(self) -> NDArray[np.intp]:
+        """Row of the run behind each row; −1 − copy for those of the prior, (rows,)."""
+        own = [np.nonzero(keep)[0] for keep in self._keep.values()]
+        copies = -1 - np.repeat(np.arange(_COPIES), len(self.standing.believed))
+        return np.concatenate([own[0], copies, *own[1:]])
+
+    def samples(self, output: str) -> int:
+        """Rows of an output, the prior's left out."""
+        return max(1, int(np.count_nonzero(self._keep[output])))
+
+    def outputs_of(self, stage: Stage) -> set[str]:
+        """All: a rope that is longer moves the platform, and with it every force."""
+        return set(self.dataset.outputs)
+
+    def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
+        """What the terms add to the prediction, rows; one output is not had without the others."""
+        if not hypothesis.terms:
+            return np.zeros(self.rows)
+        moved = self._rows_of(self.residuals(hypothesis.terms))
+        return self._beside(self._here - moved, np.zeros_like(self._prior))
+
+    def residuals(self, terms: Sequence[Term]) -> dict[str, Array]:
+        """Model less measurement by kind, zeros of instruments taken out, SI."""
+        return self.residuals_at(self.standing, terms)
+
+    def residuals_at(self, standing: Standing, terms: Sequence[Term]) -> dict[str, Array]:
+        """As :meth:`residuals`, with the geometry elsewhere."""
+        found = self.equations.residuals(standing.robot(terms))
+        return {kind: self._zeroed(kind, values) for kind, values in found.items()}
+
+    def at(self, hypothesis: Hypothesis) -> dict[str, Array]:
+        """Residuals of a hypothesis with the geometry where its nuisances move it."""
+        believed = self.standing.believed
+        first = self.nuisance_columns.shape[1] - len(believed)
+        by = hypothesis.nuisances[first:] or (0.0,) * len(believed)
+        moved = tuple(b.moved(x) for b, x in zip(believed, by, strict=True))
+        return self.residuals_at(replace(self.standing, believed=moved), hypothesis.terms)
+
+    def in_time(self, rows: Array) -> list[Array]:
+        """Rows of each segment: there is no time."""
+        return [rows[s.rows] for s in self.segments]
+
+    def slope(self) -> dict[str, Array]:
+        """Derivatives of the residuals by the pose."""
+        return self.equations.by_pose(self.robot)
+
+    def _zeroed(self, kind: str, values: Array) -> Array:
+        return values + self._zeros[kind] if kind in self._zeros else values
+
+    def _project(self) -> None:
+        """Per pose an orthonormal basis of what no move of it can undo."""
+        sigma, by = self.standing.sigma, self.slope()
+        known = np.concatenate([np.isfinite(self._start[k]) for k in self._posed], axis=1)
+        slope = np.concatenate([by[k] / sigma[k] for k in self._posed], axis=1)
+        slope = np.where(known[..., None], slope, 0.0)
+        # What is unknown gets a direction of its own, which is then left out.
+        left, size, _ = np.linalg.svd(slope, full_matrices=True)
+        rank = np.sum(size > _SEEN * np.maximum(size[:, :1], 1e-300), axis=1)
+        index = np.arange(slope.shape[1])
+        self._basis = left
+        keep = index >= rank[:, None]
+        self._keep = {"cable_length": keep}
+        for p in np.flatnonzero(~known.all(axis=1)):
+            free = left[p][known[p]][:, keep[p]]
+            own, strength, _ = np.linalg.svd(free, full_matrices=False)
+            count = int(np.sum(strength > 0.5))
+            self._basis[p] = 0.0
+            place = np.ix_(np.flatnonzero(known[p]), np.arange(count))
+            self._basis[p][place] = own[:, :count]
+            keep[p] = index < count
+        if self.dataset.has_balance:
+            self._keep["tension"] = np.isfinite(self._start["tension"])
+
+    def _rows_of(self, residuals: Mapping[str, Array]) -> Array:
+        """Measured less predicted, whitened and freed of the pose: closures, then tensions."""
+        sigma = self.standing.sigma
+        white = np.concatenate([residuals[k] / sigma[k] for k in self._posed], axis=1)
+        white = np.where(np.isfinite(white), white, 0.0)
+        free = (np.swapaxes(self._basis, 1, 2) @ white[..., None])[..., 0]
+        parts = [-free[self._keep["cable_length"]]]
+        if "tension" in self._keep:
+            parts.append(-residuals["tension"][self._keep["tension"]] / sigma["tension"])
+        return np.concatenate(parts)
+
+    def _beside(self, rows: Array, prior: Array) -> Array:
+        first = int(np.count_nonzero(self._keep["cable_length"]))
+        return np.concatenate([rows[:first], prior, rows[first:]])
+
+    def _segments(self, counts: Sequence[int]) -> list[Segment]:
+        counts = [counts[0] + len(self._prior), *counts[1:]]
+        ends = np.cumsum(counts).tolist()
+        return [
+            Segment(0, output, slice(end - count, end), Band(count, 1.0))
+            for output, count, end in zip(self._keep, counts, ends, strict=True)
+        ]
+
+    def _nuisances(self) -> Array:
+        """Zeros of instruments, then what is believed, in standard deviations; (rows, count)."""
+        columns = []
+        for kind, std in (("swivel", _ZERO), ("gauge", _OFFSET)):
+            if kind not in self._zeros or (kind == "gauge" and self.dataset.measured.length_zeroed):
+                continue
+            for i in range(len(self.dataset.names)):
+                moved = {k: np.zeros_like(v) for k, v in self._start.items()}
+                moved[kind][:, i] = std
+                column = -self._rows_of(moved)
+                if np.any(column):
+                    columns.append(self._beside(column, np.zeros_like(self._prior)))
+        for index, moved in enumerate(self.moved_by_belief()):
+            column = self._here - self._rows_of(moved)
+            held = np.zeros((_COPIES, len(self.standing.believed)))
+            held[:, index] = 1 / np.sqrt(_COPIES)
+            columns.append(self._beside(column, held.ravel()))
+        return np.array(columns).reshape(len(columns), self.rows).T
+
+    def moved_by_belief(self) -> list[dict[str, Array]]:
+        """Residuals with each number of the geometry moved by a standard deviation.
+
+        A line's equations hold no other line's numbers: those of one kind are moved together. How
+        they turn forces is left out, since it is looked at anew wherever the geometry settles.
+        """
+        believed = self.standing.believed
+        here = self.residuals(())
+        out = [dict(here) for _ in believed]
+        kinds = {(base_of(b.term.effect), b.parameter) for b in believed}
+        for kind in sorted(kinds):
+            own = [(base_of(b.term.effect), b.parameter) == kind for b in believed]
+            moved = [b.moved(1.0) if mine else b for b, mine in zip(believed, own, strict=True)]
+            there = self.residuals_at(replace(self.standing, believed=tuple(moved)), ())
+            for index in np.flatnonzero(own).tolist():
+                line = line_of_effect(believed[index].term.effect)
+                place = [self.dataset.names.index(line)] if line else slice(None)
+                for name in ("rope", "swivel", "gauge"):
+                    out[index][name] = here[name].copy()
+                    out[index][name][:, place] = there[name][:, place]
+        return out
+
+
+def _zeros(start: Mapping[str, Array], dataset: RobotDataset) -> dict[str, Array]:
+    """First guess of the zeros of swivel angles and length instruments, per line."""
+    out: dict[str, Array] = {}
+    for kind in ("swivel", "gauge"):
+        known = np.isfinite(start[kind])
+        if not known.any() or (kind == "gauge" and dataset.measured.length_zeroed):
+            continue
+        values = np.where(known, start[kind], 0.0)
+        if kind == "swivel":
+            out[kind] = -np.angle(np.where(known, np.exp(1j * values), 0.0).sum(axis=0))
+        else:
+            out[kind] = -values.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return out

@@ -1,0 +1,64 @@
+"""Whether a grown model holds where it was not fitted: the gate of the search."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from winchkit.diagnosis.regression.cross_validation import confidence, held_out, held_out_rms
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.selection.engine import Inquiry, Trial
+from winchkit.effects.parametrization import Coordinates
+
+__all__ = ["BETTER", "MATTERS", "best_that_holds", "holds"]
+
+_GATE_LEVEL = 0.02
+BETTER = 2.0
+"""By how much a criterion must fall for a change to be worth it."""
+_NO_WORSE = 1.02
+MATTERS = 0.98
+"""Of some held-out error, what may be left for a change to matter to anyone."""
+
+
+def best_that_holds(
+    inquiry: Inquiry, present: Fit, noise: Noise, trials: list[Trial]
+) -> Fit | None:
+    """The best of the short list that passes the gate, all refitted; None where none does."""
+    before = inquiry.criterion(present)
+    for trial in sorted(trials, key=lambda t: t.criterion):
+        if trial.criterion < before - BETTER and holds(inquiry, present, trial.fit, noise):
+            return trial.fit
+    return None
+
+
+def holds(
+    inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise, matters: float = MATTERS
+) -> bool:
+    """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
+
+    An effect that shows in few blocks, such as those of one kind of move, cannot be certain by
+    rank; that it pays for itself in every single group, none of which it was fitted on, can.
+    """
+    problem = inquiry.problem
+    blocks = inquiry.blocks
+    before = held_out(problem, present, noise, blocks)
+    after = held_out(problem, grown, noise, blocks)
+    groups = inquiry.folds(grown, noise)
+    gain = held_out(problem, present, noise, groups) - held_out(problem, grown, noise, groups)
+    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _added(present, grown))
+    if np.sum(before - after) <= 0 or (confidence(before, after) > _GATE_LEVEL and not pays):
+        return False
+    was = held_out_rms(problem, present, noise, groups)
+    now = held_out_rms(problem, grown, noise, groups)
+    ratios = [now[output] / was[output] for output in problem.dataset.outputs]
+    # What is certain and changes nothing, such as a clock a millisecond off, is not worth a name.
+    return bool(np.sum(gain) > 0 and min(ratios) < matters and max(ratios) < _NO_WORSE)
+
+
+def _added(present: Fit, grown: Fit) -> int:
+    """Degrees of freedom that a grown model has more than the present model, one at least."""
+    after, before = (
+        sum(Coordinates(term.effect).freedom for term in fitted.hypothesis.terms)
+        for fitted in (grown, present)
+    )
+    return max(1, after - before)

@@ -1,0 +1,155 @@
+"""How well the residual fits every candidate's signature, and how well noise alone would.
+
+Only inner products are needed, so that scoring again with another noise, or simulating what noise
+alone would score, costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.selection.signatures import Atom, Signatures, pieces
+
+__all__ = ["Projected", "Score", "chance_level", "score", "worthless"]
+
+_NOTHING = 1e-300
+_SIMULATIONS = 400
+_UNIDENTIFIABLE = 1e-7
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Score:
+    """How much of the residual's whitened squares an atom would take, and its chance level."""
+
+    atom: Atom
+    gain: float
+    value: float
+    """Gain less the price of its degrees of freedom."""
+    amplitudes: Array
+    """In units of the secants."""
+    strength: float
+    """λ for one usual size: noncentrality of its whitened, projected signature."""
+
+
+class Projected:
+    """Signatures with the present model's unknowns projected out, under one noise."""
+
+    def __init__(self, problem: Problem, found: Signatures, jacobian: Array, noise: Noise) -> None:
+        self.found = found
+        self._jacobian = jacobian
+        self._weight2 = noise.weight(problem) ** 2
+        self._freedom = noise.freedom
+        self._cross, self._normal = _cross(problem, jacobian, found.columns)
+        self._share = share = 1 / noise.power
+        cross, normal, gram = (
+            np.tensordot(share, part, axes=1) for part in (self._cross, self._normal, found.gram)
+        )
+        self._through = -np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ cross
+        self.inner = _projected(gram, cross, normal, self._through)
+        """Inner products of the whitened, projected columns, (p, p)."""
+        plain = np.einsum("b,bii->i", share, found.gram)
+        self._roots = [self._root(atom, plain) for atom in found.atoms]
+
+    def products(self, residual: Array) -> Array:
+        """Inner products of the whitened residual with the projected columns, (p,)."""
+        weighted = residual * self._weight2
+        own = self.found.columns.T @ weighted
+        return np.asarray(own + self._through.T @ (self._jacobian.T @ weighted))
+
+    def gains(self, products: Array) -> Array:
+        """Whitened squares that each atom takes; products (p,) or (p, samples)."""
+        return np.array(
+            [
+                np.sum((root.T @ products[atom.columns]) ** 2, axis=0)
+                for atom, root in zip(self.found.atoms, self._roots, strict=True)
+            ]
+        )
+
+    def amplitudes(self, index: int, products: Array) -> Array:
+        """Amplitudes of one atom in units of its secants."""
+        root = self._roots[index]
+        atom = self.found.atoms[index]
+        return np.asarray(root @ (root.T @ products[atom.columns]))
+
+    def strength(self, index: int) -> float:
+        """λ for one usual size of an atom; zero where it cannot be identified."""
+        first = self.found.atoms[index].columns.start
+        return float(self.inner[first, first]) if self._roots[index].shape[1] else 0.0
+
+    def simulated(self, samples: int = _SIMULATIONS) -> Array:
+        """Products that noise alone would give, its power known only so well; (p, samples)."""
+        random = np.random.default_rng(0)
+        out = np.zeros((len(self.inner), samples))
+        bands = zip(
+            self._share, self.found.gram, self._cross, self._normal, self._freedom, strict=True
+        )
+        for share, gram, cross, normal, freedom in bands:
+            part = share * _projected(gram, cross, normal, self._through)
+            # No Cholesky factor: what the present model explains whole is left with rounding only.
+            values, vectors = np.linalg.eigh(part)
+            factor = np.sqrt(freedom / random.chisquare(freedom, samples))
+            noise = random.standard_normal((len(part), samples)) * factor
+            # The symmetric root: the same draws whichever way rounding turns the vectors.
+            out += (vectors * np.sqrt(np.maximum(values, 0.0))) @ (vectors.T @ noise)
+        return out
+
+    def _root(self, atom: Atom, plain: Array) -> Array:
+        """R with R Rᵀ the inverse of an atom's inner products, where they can be identified."""
+        inner = self.inner[atom.columns, atom.columns]
+        if np.max(plain[atom.columns]) < _ROUNDING:
+            # What a usual size moves by less than rounding would let chance reach any level.
+            return np.zeros((len(inner), 0))
+        size = np.sqrt(np.maximum(plain[atom.columns], _NOTHING))
+        values, vectors = np.linalg.eigh(inner / np.outer(size, size))
+        kept = values > _UNIDENTIFIABLE
+        return np.asarray((vectors[:, kept] / np.sqrt(values[kept])) / size[:, None])
+
+
+def _projected(gram: Array, cross: Array, normal: Array, through: Array) -> Array:
+    """Inner products of columns from which unknowns were taken out by ``through``, (p, p)."""
+    mixed = cross.T @ through
+    return np.asarray(gram + mixed + mixed.T + through.T @ normal @ through)
+
+
+def _cross(problem: Problem, jacobian: Array, columns: Array) -> tuple[Array, Array]:
+    """Per band: inner products of unknowns with columns, and among unknowns."""
+    count, q = len(problem.bands), jacobian.shape[1]
+    cross, normal = np.zeros((count, q, columns.shape[1])), np.zeros((count, q, q))
+    for band, rows in pieces(problem):
+        cross[band] += jacobian[rows].T @ columns[rows]
+        normal[band] += jacobian[rows].T @ jacobian[rows]
+    return cross, normal
+
+
+def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
+    """Scores of all atoms, best first: gain less (degrees of freedom) · ln(rows)."""
+    products = projected.products(residual)
+    out = []
+    for index, gain in enumerate(projected.gains(products).tolist()):
+        atom = projected.found.atoms[index]
+        value = gain - atom.freedom * float(np.log(rows))
+        strength = projected.strength(index)
+        out.append(Score(atom, gain, value, projected.amplitudes(index, products), strength))
+    return sorted(out, key=lambda s: -s.value)
+
+
+def worthless(item: Score, rows: int) -> Score:
+    """The score of an atom that takes nothing of the residual."""
+    value = -item.atom.freedom * float(np.log(rows))
+    return replace(item, gain=0.0, value=value, amplitudes=np.zeros_like(item.amplitudes))
+
+
+def chance_level(projected: Projected, rows: int) -> Array:
+    """Largest score over all atoms that noise alone gives, simulated, sorted; (samples,)."""
+    atoms = projected.found.atoms
+    if not atoms:
+        return np.zeros(1)
+    price = np.array([atom.freedom * np.log(rows) for atom in atoms])
+    gains = projected.gains(projected.simulated())
+    return np.asarray(np.sort((gains - price[:, None]).max(axis=0)))

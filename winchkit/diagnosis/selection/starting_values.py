@@ -1,0 +1,127 @@
+"""Where fits of a candidate begin, and what becomes of shapes that a fit drives to their ends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.selection.scores import Score
+from winchkit.effects.bind import Term
+from winchkit.effects.effect import Effect
+from winchkit.effects.parametrization import Coordinates
+
+__all__ = [
+    "by_coefficients",
+    "elsewhere",
+    "gap",
+    "in_disguise",
+    "placed",
+    "starting_values",
+]
+
+
+def in_disguise(term: Term) -> bool:
+    """Whether a term has become another effect: a shape at its bound, values that cannot be."""
+    effect = term.effect
+    if effect.possible is not None and not effect.possible(term.values):
+        return True
+    coordinates = Coordinates(effect)
+    at = coordinates.vector(term.values)
+    low, high = coordinates.bounds()
+    shapes = slice(len(coordinates.amplitudes), None)
+    ends = (at <= low + 1e-6) | (at >= high - 1e-6)
+    return bool(np.any(ends[shapes]))
+
+
+def by_coefficients(effect: Effect) -> list[Effect]:
+    """The effect with one coefficient of its series, with two, …, with all of them.
+
+    A few loads show a law's first curvature, not its third: coefficients beyond what the data
+    can show run to their bounds, and the law without them is still that law. What has no series
+    is itself alone.
+    """
+    series = [p for p in effect.parameters if p.role == "shape" and p.low < p.null == 0.0 < p.high]
+    out = [effect]
+    while len(series) > 1:
+        last, longer = series.pop(), out[0]
+        held = replace(last, role="fixed")
+        parameters = tuple(held if p is last else p for p in longer.parameters)
+        probes = tuple(probe for probe in longer.probes if last.name not in probe)
+        out.insert(0, replace(longer, parameters=parameters, probes=probes))
+    return out
+
+
+def gap(grid: tuple[float, ...], at: float) -> float:
+    """Distance from a point of a grid to its farther neighbour."""
+    index = grid.index(at)
+    return max(abs(grid[i] - at) for i in (index - 1, index + 1) if 0 <= i < len(grid))
+
+
+def elsewhere(term: Term, shape: Mapping[str, float]) -> bool:
+    """Whether a point of a grid is another place to rest than where a fit has left a term.
+
+    An order has as many places as the grid has points; a moment has one in every hold, and the
+    best of them may be another once more is explained.
+    """
+    grids = [p for p in term.effect.parameters if p.name in shape and p.grid]
+    return any(shape[p.name] != term.values[p.name] for p in grids if p.whole or p.low == 0.0)
+
+
+def starting_values(item: Score) -> list[dict[str, float]]:
+    """Values at which fits of an atom begin: its linear amplitudes within bounds, or its probes."""
+    atom = item.atom
+    coordinates = Coordinates(atom.effect)
+    base = {**atom.effect.null, **atom.shape}
+    usual = [{**base, **secant} for secant in atom.secants]
+    if atom.effect.probes:
+        return usual
+    null = coordinates.vector(base)
+    vector = null + sum(
+        amplitude * (coordinates.vector(values) - null)
+        for amplitude, values in zip(item.amplitudes, usual, strict=True)
+    )
+    low, high = coordinates.bounds()
+    return [coordinates.values(np.clip(vector, low, high), base)]
+
+
+_HALVINGS = 7
+
+
+def placed(
+    problem: Problem, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array
+) -> list[dict[str, float]]:
+    """Where fits begin; a moment is first sought between the points of its grid.
+
+    A step far from its moment has no gradient towards it, but its gain rises all the way.
+    """
+    begun = starting_values(item)
+    places = [p for p in Coordinates(item.atom.effect).shapes if p.grid and p.low == 0.0]
+    if not places or len(begun) > 1:
+        return begun
+    place, values = places[0], begun[0]
+    here = problem.change(hypothesis)
+    residual, jacobian = present.residual * weight, present.jacobian * weight[:, None]
+
+    def gain(at: float) -> float:
+        term = Term(item.atom.effect, {**values, place.name: at})
+        column = problem.change(hypothesis.with_term(term, problem.runs)) - here
+        column = column * weight
+        column = column - jacobian @ np.linalg.lstsq(jacobian, column)[0]
+        size = float(column @ column)
+        return float((column @ residual) ** 2) / size if size else 0.0
+
+    at, step = values[place.name], gap(place.grid, values[place.name])
+    best = gain(at)
+    for _ in range(_HALVINGS):
+        step /= 2
+        tried = {gain(x): x for x in (at - step, at + step) if place.low <= x <= place.high}
+        if tried and max(tried) > best:
+            best = max(tried)
+            at = tried[best]
+    return [{**values, place.name: at}]

@@ -1,0 +1,221 @@
+"""Doubt in what was found: names that a curve without any name beats are not given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.discretization import rounded
+from winchkit.diagnosis.regression.noise import orthonormal
+from winchkit.diagnosis.regression.projection import gain
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.stepwise import Found, with_a_pair, without_term
+from winchkit.diagnosis.verdict.decision import Judgement, judge, withheld
+from winchkit.diagnosis.verdict.spline_alternatives import Columns, curves
+from winchkit.effects.bind import Term
+from winchkit.effects.parametrization import Coordinates
+
+__all__ = [
+    "Beside",
+    "Curve",
+    "Doubt",
+    "best_curve",
+    "judge_and_doubt",
+]
+
+_UNIDENTIFIABLE = 1e-7
+_NOTHING = 1e-300
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve over one variable, and what it would save."""
+
+    place: str
+    """Output that it is added to, or ``rope force`` or ``winding``, which show in several."""
+    variable: str
+    pays: float
+    """Whitened squares that it takes, less the price of its numbers."""
+
+
+class Beside:
+    """A whitened residual beside which curves are tried, and what explains a part of it."""
+
+    def __init__(self, residual: Array, jacobian: Array, weight: Array) -> None:
+        """``residual`` (rows,) with unknowns of derivative ``jacobian`` (rows, k) still free."""
+        self.weight = weight
+        self.explained = orthonormal(jacobian * weight[:, None])
+        whitened = residual * weight
+        self.residual = whitened - self.explained @ (self.explained.T @ whitened)
+
+    @property
+    def cost(self) -> float:
+        """Whitened squares that are left."""
+        return float(self.residual @ self.residual)
+
+
+def best_curve(
+    problem: Problem, beside: Beside, outputs: Sequence[str], price: float
+) -> Curve | None:
+    """The curve that pays best, among those that show in one of ``outputs``.
+
+    ``price`` is what each of its numbers must save.
+    """
+    best: Curve | None = None
+    for place, variable, laws, columns in curves(problem, outputs):
+        hats = _inner_products(beside, columns, len(laws[0][0]))
+        pays = max(hats.gain(law) - price * freedom for law, freedom in laws)
+        if best is None or pays > best.pays:
+            best = Curve(place, variable, pays)
+    return best
+
+
+@dataclass(frozen=True)
+class _Hats:
+    """Inner products of whitened hats, and of what is left of them beside a fit."""
+
+    plain: Array
+    """(hats, hats)."""
+    inner: Array
+    """(hats, hats), without what the fit's unknowns explain."""
+    products: Array
+    """With the residual, (hats,)."""
+
+    def gain(self, law: Array) -> float:
+        """Whitened squares that a law of hats, (hats, k), takes."""
+        size = np.sqrt(np.maximum(np.diag(law.T @ self.plain @ law), _NOTHING))
+        inner = law.T @ self.inner @ law / np.outer(size, size)
+        # Measured by what they were: of what a fit explains whole only rounding is left.
+        return gain(inner, (law.T @ self.products) / size, _UNIDENTIFIABLE)
+
+
+def _inner_products(beside: Beside, columns: Columns, count: int) -> _Hats:
+    """Of so many hats, piece by piece."""
+    plain, products = np.zeros((count, count)), np.zeros(count)
+    through = np.zeros((count, beside.explained.shape[1]))
+    for rows, signal in columns:
+        whitened = signal * beside.weight[rows]
+        plain += whitened @ whitened.T
+        through += whitened @ beside.explained[rows]
+        products += whitened @ beside.residual[rows]
+    return _Hats(plain, plain - through @ through.T, products)
+
+
+_SLIGHT = 1e-3
+"""Share of what a name explains by which the physics of a real part may differ from its formula."""
+_SLIGHT_OF_MORE = 2e-4
+"""The same where more is certainly missing."""
+
+
+def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
+    """The judgement of what was found, less the names that a nameless curve beats.
+
+    All additions are doubted together, then each beside the others. One that is beaten is
+    dropped, or gives way to a pair; where too much is then left, nothing is named. Without
+    repeats something unknown is always left, and a doubt of one addition is told only.
+    """
+    judgement = judge(inquiry, found)
+    doubt = Doubt(inquiry, found)
+    if judgement.shown is not found or not doubt.added:
+        return judgement
+    terms = doubt.terms
+    if curve := doubt.beaten(doubt.added):
+        pair = with_a_pair(inquiry, found)
+        if pair is not None:
+            return judge_and_doubt(inquiry, pair)
+        return withheld(inquiry, found, 1.0, _words(terms, terms, curve))
+    for index in reversed(doubt.added) if len(terms) > 1 else ():
+        curve = doubt.beaten([index])
+        if curve and found.noise.from_repeats:
+            return _less(doubt, index, curve)
+        if curve:
+            note = f"{_over(curve)} would explain more than {terms[index - inquiry.given].label}"
+            judgement = replace(judgement, notes=(*judgement.notes, note))
+    return judgement
+
+
+def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
+    """The judgement without a beaten addition, or without any name where it is needed."""
+    inquiry, found = doubt.inquiry, doubt.found
+    doubted = found.final.hypothesis.terms[index : index + 1]
+    without = judge_and_doubt(inquiry, without_term(inquiry, found, index))
+    if without.shown.final.labels[inquiry.given :]:
+        return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
+    share = doubt.taken([index]) / doubt.taken(doubt.added)
+    return withheld(inquiry, found, min(1.0, share), _words(doubt.terms, doubted, curve))
+
+
+class Doubt:
+    """What a search found, and what is left of the data without some of it."""
+
+    def __init__(self, inquiry: Inquiry, found: Found) -> None:
+        self.inquiry = inquiry
+        self.found = found
+        self.added = range(inquiry.given, len(found.final.hypothesis.terms))
+        self.terms = found.final.hypothesis.terms[inquiry.given :]
+
+    @cached_property
+    def _rounding(self) -> Array:
+        return rounded(self.inquiry.problem, self.found.final.hypothesis)[:, None]
+
+    def beside(self, indices: Sequence[int], *, rounding: bool = True) -> Beside:
+        """What is left without some terms, the others free about where they are.
+
+        Not fitted anew: a lag that stands in for a lost friction is far from where both are right.
+        With ``rounding`` what sampling may have rounded is free as well.
+        """
+        problem, final = self.inquiry.problem, self.found.final
+        hypothesis = final.hypothesis
+        others, own = hypothesis, np.zeros(len(final.vector), dtype=bool)
+        for index in sorted(indices, reverse=True):
+            own |= problem.unknowns_of(index, hypothesis)
+            others = others.without(index)
+        lost = problem.change(hypothesis) - problem.change(others) if indices else 0.0
+        free = final.jacobian[:, ~own]
+        free = np.hstack([free, self._rounding]) if rounding else free
+        return Beside(final.residual + lost, free, self.found.noise.weight(problem))
+
+    def taken(self, indices: Sequence[int]) -> float:
+        """Whitened squares that terms take beside the others."""
+        return self.beside(indices).cost - self.beside(()).cost
+
+    def beaten(self, indices: Sequence[int]) -> Curve | None:
+        """A curve that pays better than terms do, if there is one."""
+        if not self._beaten(indices, rounding=False):
+            return None
+        # What sampling may have rounded is not held against a name; it takes a while to know.
+        return self._beaten(indices, rounding=True)
+
+    def _beaten(self, indices: Sequence[int], *, rounding: bool) -> Curve | None:
+        inquiry, hypothesis = self.inquiry, self.found.final.hypothesis
+        effects = [hypothesis.terms[index].effect for index in indices]
+        beside = self.beside(indices, rounding=rounding)
+        taken = beside.cost - self.beside((), rounding=rounding).cost
+        # The states in which runs begin are no numbers of a law, and cost it nothing here.
+        pays = taken - inquiry.price * sum(Coordinates(effect).freedom for effect in effects)
+        outputs = sorted({output for effect in effects for output in effect.outputs})
+        curve = best_curve(inquiry.problem, beside, outputs, inquiry.price)
+        # What is certainly there is no chance deviation of the right formula.
+        slight = _SLIGHT_OF_MORE if self.found.still else _SLIGHT
+        margin = inquiry.price + slight * taken
+        return curve if curve and curve.pays > pays + margin else None
+
+
+def _words(terms: Sequence[Term], doubted: Sequence[Term], curve: Curve) -> str:
+    """Why names are not given."""
+    than = "" if len(doubted) == len(terms) else f" than {_names(doubted)}"
+    return f"closest, but not named: {_names(terms)}; {_over(curve)} explains more{than}"
+
+
+def _over(curve: Curve) -> str:
+    place, variable = curve.place.replace("_", " "), curve.variable.replace("_", " ")
+    return f"an unknown curve of the {place} over the {variable}"
+
+
+def _names(terms: Sequence[Term]) -> str:
+    return ", ".join(term.label for term in terms)

@@ -1,0 +1,158 @@
+"""Curves over one variable, drawn with hats, and what they change in the outputs.
+
+A hat is one at its knot and falls to zero at its neighbours: every curve is a sum of them, so that
+their inner products serve all laws over one variable at one place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.regression.prediction_cache import masked
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.residuals.attribution import variables_of
+from winchkit.model.variables import ANGLES, COMPOUND
+
+__all__ = ["PLACES", "Columns", "Law", "columns_of", "curves", "hats_over", "laws_over"]
+
+_HATS = 20
+_TAILS = 0.001
+_DEGREES = (1, 2, 3, 4)
+_COARSE = (6, 12)
+_POWERS = (1.5, 2.0, 3.0)
+_TAKEN = (*ANGLES, *COMPOUND, "direction")
+"""Variables of which any curve has a name already, or is tried as a product."""
+_WARMER = 1.0
+"""Less is noise of the thermometer rather than a change, K."""
+Law = tuple[Array, int]
+"""Values of a curve at the knots, (hats, k) for k numbers, and what choosing it costs."""
+Columns = Iterable[tuple[slice, Array]]
+"""Some rows, and what the hats change in them, (hats, rows)."""
+
+
+def curves(
+    problem: Problem, outputs: Sequence[str]
+) -> Iterator[tuple[str, str, list[Law], Columns]]:
+    """Place, variable, laws, and what their hats change, where that shows in ``outputs``."""
+    recordings = problem.dataset.recordings
+    known = [
+        variables_of(recording) | {"direction": recording.smooth.at.direction}
+        for recording in recordings
+    ]
+    names = [n for n in known[0] if n not in _TAKEN and all(n in other for other in known)]
+    for factor, name in (*((None, n) for n in names), *_products(names)):
+        ends = _ends(name, [k[name] for k in known])
+        if ends is None:
+            continue
+        knots = np.linspace(*ends, _HATS)
+        hats = [hats_over(k[name], knots) for k in known]
+        if factor is not None:
+            hats = [h * k[factor] for h, k in zip(hats, known, strict=True)]
+        laws = laws_over(knots, name, level=factor is not None)
+        for place, shown in PLACES.items():
+            seen = set(shown) & set(outputs) & set(problem.dataset.outputs)
+            if seen and (place != "winding" or (name, factor) == ("cable_length", None)):
+                variable = name if factor is None else f"{factor} times {name}"
+                yield place, variable, laws, columns_of(problem, shown, hats, knots)
+
+
+def _products(names: Sequence[str]) -> list[tuple[str, str]]:
+    """What is worth trying times a curve over what: frictions by place and load, soft ropes.
+
+    The direction is the model's own: how sharply a friction turns is nobody's name.
+    """
+    force = "load" if "load" in names else "tension"
+    pairs = (
+        ("direction", "cable_length"),
+        ("direction", force),
+        (force, "cable_length"),
+        ("cable_length", force),
+        (force, "temperature"),
+    )
+    return [pair for pair in pairs if set(pair) <= {"direction", *names}]
+
+
+def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
+    low, high = np.quantile(np.concatenate(values), [_TAILS, 1 - _TAILS])
+    least = _WARMER if name == "temperature" else 1e-9 * max(abs(low), abs(high))
+    return (float(low), float(high)) if high - low > least else None
+
+
+def hats_over(values: Array, knots: Array) -> Array:
+    """Triangles over the knots that add up to one, (knots, n)."""
+    at = np.clip((values - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
+    cell = np.minimum(at.astype(np.intp), len(knots) - 2)
+    out, sample = np.zeros((len(knots), len(values))), np.arange(len(values))
+    out[cell, sample] = 1.0 - (at - cell)
+    out[cell + 1, sample] = at - cell
+    return out
+
+
+def laws_over(knots: Array, name: str, *, level: bool) -> list[Law]:
+    """What a curve may be, in values at the knots, with what each costs to choose.
+
+    With its ``level`` where it is a factor; else that is an offset, and there are effects for it.
+    """
+    z = np.linspace(-1.0, 1.0, len(knots))
+    out: list[Law] = []
+    for degree in _DEGREES:
+        powers = np.asarray(np.polynomial.legendre.legvander(z, degree), dtype=np.float64)
+        out.append((powers, degree + 1) if level else (powers[:, 1:], degree))
+    for count in _COARSE:
+        out.append((hats_over(z, np.linspace(-1.0, 1.0, count)).T, count))
+    for at in z[1:-1]:
+        sides = [np.maximum(z - at, 0.0), np.maximum(at - z, 0.0), np.ones_like(z)]
+        out.append((np.column_stack(sides[: 2 + level]), 3 + level))
+    if name == "speed":
+        out += [((np.sign(knots) * np.abs(knots) ** n)[:, None], 2) for n in _POWERS]
+    return out
+
+
+_Shown = Callable[[Recording, Array, Array], Array]
+
+
+def columns_of(
+    problem: Problem, shown: Mapping[str, _Shown], hats: Sequence[Array], knots: Array
+) -> Columns:
+    """What the hats change in every output of every run."""
+    for segment in problem.segments:
+        if segment.output in shown:
+            recording = problem.dataset.recordings[segment.run]
+            signal = shown[segment.output](recording, hats[segment.run], knots)
+            yield segment.rows, masked(recording, segment.output, signal)
+
+
+def _plainly(recording: Recording, hats: Array, knots: Array) -> Array:
+    """An instrument's own curve."""
+    return hats
+
+
+def _by_the_arm(recording: Recording, hats: Array, knots: Array) -> Array:
+    """Motor torque of a curve of the rope's force."""
+    force = recording.smooth.at.tension
+    heavy = np.maximum(np.abs(force), 1e-9)
+    return np.asarray(hats * recording.nominal_smooth["motor_torque"] * np.sign(force) / heavy)
+
+
+def _by_virtual_work(recording: Recording, hats: Array, knots: Array) -> Array:
+    """Motor torque of a curve of the winding: what the rope moves per turn more, it pulls more."""
+    step = knots[1] - knots[0]
+    cell = np.floor((recording.smooth.at.free_length - knots[0]) / step)
+    cell = np.clip(cell, 0, len(knots) - 2)
+    index = np.arange(len(knots))[:, None]
+    slopes = ((index == cell + 1) * 1.0 - (index == cell) * 1.0) / step
+    return np.asarray(recording.nominal_smooth["motor_torque"] * slopes)
+
+
+PLACES: Mapping[str, Mapping[str, _Shown]] = {
+    "cable_length": {"cable_length": _plainly},
+    "tension": {"tension": _plainly},
+    "motor_torque": {"motor_torque": _plainly},
+    "rope force": {"tension": _plainly, "motor_torque": _by_the_arm},
+    "winding": {"cable_length": _plainly, "motor_torque": _by_virtual_work},
+}
+"""Where a curve may act, and how each output shows it."""

@@ -1,0 +1,340 @@
+"""A CAN bus: one receive thread, handlers by identifier, and counts of what goes wrong."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import threading
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+
+import can
+import canopen
+
+from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
+from winchkit.drivers.can.bus.interface import (
+    Frame,
+    Interface,
+    open_interface,
+    queue_full,
+    sends_remote,
+    simulated_interface,
+)
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.scheduling import event_of, thread_of
+from winchkit.errors import ConnectionLost
+from winchkit.schema.bench import BusSpec
+
+__all__ = [
+    "CanBus",
+    "FrameTime",
+    "Handler",
+]
+
+_DRIFT = 2e-4
+"""At most by how much two clocks run apart."""
+_LATE = 0.02
+"""A frame that was read later than this tells nothing of the offset, s."""
+_SET = 0.25
+"""When all frames of so long come late, one of the clocks was set, s."""
+_OLDEST = 0.1
+"""No frame is taken to be older, s."""
+
+
+class FrameTime:
+    """Finds the offset between two steady clocks from the frames themselves.
+
+    A frame is handed over some time after its stamp, and sometimes at once: the least difference
+    seen is the offset, which may grow only as slowly as clocks drift. What comes out is never
+    later than the reception.
+    """
+
+    def __init__(self) -> None:
+        self._offset: float | None = None
+        self._last = 0.0
+        self._late_since: float | None = None
+
+    def map(self, stamp: float, now: float) -> float:
+        """Moment of a frame on the bench's clock, given its stamp and when it was received, s."""
+        if stamp <= 0.0:
+            return now
+        offset = self._offset = self._learn(stamp, now)
+        self._last = now
+        return max(stamp + offset, now - _OLDEST)
+
+    def _learn(self, stamp: float, now: float) -> float:
+        seen = now - stamp
+        if self._offset is None or seen < self._offset:
+            self._late_since = None
+            return seen
+        late = seen - self._offset
+        if late <= _LATE:
+            self._late_since = None
+            return self._offset + min(late, _DRIFT * max(0.0, now - self._last))
+        if self._late_since is None:
+            self._late_since = stamp
+        if stamp - self._late_since < _SET:
+            return self._offset
+        self._late_since = None
+        return seen
+
+
+Handler = Callable[[bytes, float], None]
+"""Takes a frame's data and its time on the bench's clock; runs on the receive thread."""
+
+_SYNC = 0x080
+_NMT = 0x000
+_HEARTBEAT = 0x700
+_SDO_REPLY = range(0x581, 0x600)
+_WAIT = 0.05
+_MAX_FAILURES = 5
+_FAILURE_PAUSE = 0.01
+_FULL_TIME = 0.1
+"""For which the queue of the interface may be full before the bus counts as dead, s."""
+_GONE = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO)
+_SDO_SIZE = 8
+_LAST_NODE = 127
+
+for _library in ("canopen", "can"):
+    logging.getLogger(_library).addHandler(logging.NullHandler())
+
+
+class CanBus:
+    """An open bus. ``fault`` says why it died, once it has; :meth:`reopen` gives it new life.
+
+    Handlers check what they are given and raise nothing: they run on the receive thread.
+    """
+
+    def __init__(self, spec: BusSpec, name: str, clock: Clock) -> None:
+        """Open the bus and start receiving; raises ConnectionLost."""
+        self.name = name
+        self.clock = clock
+        self.received = self.sent = self.unsent = self.reopened = 0
+        self.thread_id = 0
+        """Native id of the receive thread, once it runs."""
+        self.fault: str | None = None
+        self.beats: Counter[int] = Counter()
+        """Heartbeats sent, by the node that they were sent for."""
+        self.sends_remote = sends_remote(spec)
+        """Whether the interface sends remote frames, as far as that is known."""
+        self.sync_held = self.heartbeat_held = False
+        """Whether :meth:`sync` or :meth:`heartbeat` send nothing, while a drive is to miss them."""
+        self.network = canopen.Network()
+        self._spec = spec
+        self._handlers: dict[int, Handler] = {}
+        self._errors = ErrorTally()
+        self._heard: set[int] = set()
+        self._dropped = self._syncs_heard = 0
+        self._syncs_sent = 0
+        self._full_since: float | None = None
+        self.on_foreign_sync: Callable[[str], None] = lambda _words: None
+        """Called on the receive thread with each SYNC that was not sent here."""
+        self.on(_SYNC, self._hear_sync)
+        self._open()
+
+    def close(self) -> None:
+        """Stop receiving and let the interface go."""
+        self._stopping.set()
+        self._thread.join(timeout=2.0)
+        self._dropped += self._port.dropped
+        self._port.close()
+
+    def reopen(self) -> None:
+        """Open the interface anew after it went down; raises ConnectionLost.
+
+        Nodes, handlers and counts stay. Nothing is sent: drives keep the state that they are in,
+        and whoever wants to move them has to set them up again.
+        """
+        self.close()
+        try:
+            self._open()
+        except ConnectionLost as error:
+            self.fault = str(error)
+            raise
+        self.reopened += 1
+        self._errors.enter(BusState.ACTIVE)
+        self.fault = None
+
+    @property
+    def error_frames(self) -> int:
+        """Error frames received."""
+        return self._errors.frames
+
+    @property
+    def health(self) -> BusHealth:
+        """What happened since it was opened first."""
+        tally, down = self._errors, self.fault is not None and not self._thread.is_alive()
+        return BusHealth(
+            state=BusState.DOWN if down else tally.state,
+            received=self.received,
+            sent=self.sent,
+            error_frames=tally.frames,
+            bus_off=tally.bus_off,
+            error_passive=tally.error_passive,
+            overruns=tally.overruns,
+            dropped=self._dropped + self._port.dropped,
+            unsent=self.unsent,
+            reopened=self.reopened,
+            foreign_syncs=self.foreign_syncs,
+            fault=self.fault or "",
+        )
+
+    @property
+    def nodes(self) -> frozenset[int]:
+        """Nodes that are known here, or whose heartbeat was heard."""
+        known = (identifier - _HEARTBEAT for identifier in tuple(self._handlers))
+        return frozenset(self._heard.union(node for node in known if 0 < node <= _LAST_NODE))
+
+    @property
+    def foreign_syncs(self) -> int:
+        """SYNC frames on the bus that were not sent here."""
+        # Over UDP multicast what is sent comes back.
+        own = self._syncs_sent if self._spec.interface == "udp_multicast" else 0
+        return max(0, self._syncs_heard - own)
+
+    @property
+    def foreign_sync(self) -> str:
+        """That somebody else sends SYNC, in words; empty where nobody does."""
+        count = self.foreign_syncs
+        if not count:
+            return ""
+        return (
+            f"bus '{self.name}': {count} SYNC frames that were not sent here; a second master, or "
+            "a drive whose 1005h has bit 30 set, sends SYNC too: cyclic modes need one producer"
+        )
+
+    def _hear_sync(self, _data: bytes, _now: float) -> None:
+        self._syncs_heard += 1
+        if words := self.foreign_sync:
+            self.on_foreign_sync(words)
+
+    def on(self, identifier: int, handler: Handler) -> None:
+        """Call ``handler`` for every frame with this identifier."""
+        self._handlers[identifier] = handler
+
+    def off(self, identifier: int) -> None:
+        """Let frames with this identifier pass again."""
+        self._handlers.pop(identifier, None)
+
+    def pass_on(self, identifier: int, data: bytes, now: float) -> None:
+        """Hand an SDO reply that a handler does not want to the confirmed SDO client."""
+        self.network.notify(identifier, bytearray(data), now)
+
+    def send(self, identifier: int, data: bytes) -> bool:
+        """Send one frame; raises ConnectionLost.
+
+        A full queue of the interface is no dead bus: the frame is left out and counted (False is
+        returned), and only a queue that stays full is a fault.
+        """
+        port = self._port
+        try:
+            with self.network.send_lock:
+                port.send(identifier, data)
+        except (can.CanError, OSError, ValueError) as error:
+            if self._queue_full(error):
+                return False
+            raise self._unsendable(port, error) from error
+        self.sent += 1
+        if self._full_since is not None:
+            self._full_since = None
+        return True
+
+    def remote(self, identifier: int) -> None:
+        """Send a remote frame, to which a node answers with one byte; raises ConnectionLost."""
+        port = self._port
+        try:
+            with self.network.send_lock:
+                port.send_remote(identifier)
+        except (can.CanError, OSError, ValueError) as error:
+            raise self._unsendable(port, error) from error
+        self.sent += 1
+
+    def sync(self) -> None:
+        """Send SYNC."""
+        if not self.sync_held:
+            self._syncs_sent += 1
+            self.send(_SYNC, b"")
+
+    def nmt(self, command: int, node: int) -> None:
+        """Send an NMT command: 1 start, 2 stop, 80h pre-operational, 81h reset."""
+        self.send(_NMT, bytes((command, node)))
+
+    def heartbeat(self, node: int, state: int) -> None:
+        """Send the host's heartbeat."""
+        if self.heartbeat_held:
+            return
+        if self.send(_HEARTBEAT + node, bytes((state,))):
+            self.beats[node] += 1
+
+    def _queue_full(self, error: Exception) -> bool:
+        """Whether a frame may be left out: the queue is full, and has not been for long."""
+        if not queue_full(error):
+            return False
+        now = self.clock.now()
+        if self._full_since is None:
+            self._full_since = now
+        lasting = now - self._full_since > _FULL_TIME
+        self.unsent += not lasting
+        return not lasting
+
+    def _unsendable(self, port: Interface, error: Exception) -> ConnectionLost:
+        self.unsent += 1
+        reason = f"cannot send: {error}"
+        if port is self._port:
+            self.fault = reason
+        return ConnectionLost(f"bus '{self.name}': {reason}; check the adapter")
+
+    def _open(self) -> None:
+        simulated = simulated_interface(self._spec, self.clock)
+        self._port: Interface = simulated or open_interface(self._spec, self.name)
+        self.network.bus = self._port.library
+        self._times = FrameTime()
+        self._stopping = event_of(self.clock)
+        receive = partial(self._receive, self._port)
+        self._thread = thread_of(self.clock, receive, f"can-{self.name}")
+        self._thread.start()
+
+    def _receive(self, port: Interface) -> None:
+        """Receive until closed; one unreadable frame is counted, many in a row end the bus."""
+        self.thread_id = threading.get_native_id()
+        failures, stopping = 0, self._stopping
+        while not stopping.is_set():
+            try:
+                frame = port.receive(_WAIT)
+            except (can.CanError, OSError, ValueError) as error:
+                self._errors.frames += 1
+                failures += 1
+                # An interface that goes down says so once and is silent from then on.
+                if failures >= _MAX_FAILURES or getattr(error, "errno", None) in _GONE:
+                    self.fault = f"cannot receive: {error}"
+                    return
+                stopping.wait(_FAILURE_PAUSE)
+                continue
+            failures = 0
+            if frame is not None:
+                self._dispatch(frame)
+            elif (state := port.state()) is not None:
+                self._errors.enter(state)
+
+    def _dispatch(self, frame: Frame) -> None:
+        if frame.error:
+            self._take_error(frame)
+            return
+        self.received += 1
+        now = self.clock.now()
+        if frame.identifier > _HEARTBEAT:
+            self._heard.add(frame.identifier - _HEARTBEAT)
+        handler = self._handlers.get(frame.identifier)
+        if handler is not None:
+            handler(frame.data, self._times.map(frame.stamp, now) if frame.stamp else now)
+        elif frame.identifier in _SDO_REPLY and len(frame.data) == _SDO_SIZE:
+            self.network.notify(frame.identifier, bytearray(frame.data), now)
+
+    def _take_error(self, frame: Frame) -> None:
+        """A bus-off is a fault: until the controller restarts nobody hears what is sent."""
+        before = self._errors.state
+        self._errors.take(frame.identifier, frame.data)
+        state = self._errors.state
+        if state is BusState.OFF and before is not BusState.OFF:
+            self.fault = "the controller is bus off; check termination, bit rate and wiring"

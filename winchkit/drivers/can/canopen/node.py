@@ -1,0 +1,254 @@
+"""One CANopen node by SDO: typed reads and writes, one at a time, with every answer checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+import can
+import canopen
+from canopen.objectdictionary import ODVariable, datatypes
+
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.bus.interface import queue_full
+from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.drivers.can.canopen.pdo import MappedObject
+from winchkit.drivers.can.canopen.sdo_client import sdo_client
+from winchkit.drivers.scheduling import lock_of
+from winchkit.errors import DeviceRefused, FileError, NoReply, NotPermitted
+
+__all__ = [
+    "ObjectPort",
+    "Objects",
+    "SdoNode",
+    "Value",
+    "is_signed",
+    "object_name",
+    "read_dictionary",
+    "variables",
+]
+
+Value = int | float | str
+"""Of an object: numbers, and texts."""
+
+_SIGNED = {
+    *(0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x6007, 0x6060, 0x6061, 0x6062, 0x6064, 0x606B),
+    *(0x606C, 0x6071, 0x6074, 0x6077, 0x6078, 0x607A, 0x607C, 0x607D, 0x6098, 0x60B0, 0x60B1),
+    *(0x60B2, 0x60F4, 0x60FA, 0x60FF),
+}
+"""Objects that CiA 402-2 makes signed; some makers declare them unsigned in their EDS."""
+
+
+class ObjectPort(Protocol):
+    """Moves the bytes of objects; ``SdoNode`` is one."""
+
+    def upload_if_there(self, index: int, sub: int = 0) -> bytes | None:
+        """Bytes of an object; None where the device has none. Raises NoReply, DeviceRefused."""
+
+    def download(self, index: int, sub: int, data: bytes) -> None:
+        """Write the bytes of an object; raises NoReply, DeviceRefused."""
+
+
+class Objects:
+    """A port and the object dictionary by which its bytes are read."""
+
+    def __init__(self, port: ObjectPort, dictionary: Any) -> None:
+        """Take canopen's dictionary of an EDS."""
+        self.port = port
+        self.dictionary = dictionary
+
+    def number(self, index: int, sub: int = 0) -> int | None:
+        """An integer, signed as the dictionary says; None where the device has no such object."""
+        data = self.port.upload_if_there(index, sub)
+        if data is None:
+            return None
+        signed = is_signed(self.dictionary.get_variable(index, sub))
+        return int.from_bytes(data, "little", signed=signed)
+
+    def text(self, index: int, sub: int = 0) -> str:
+        """A text; empty where the device has no such object."""
+        data = self.port.upload_if_there(index, sub) or b""
+        return data.split(b"\0")[0].decode("ascii", errors="replace").strip()
+
+    def value(self, variable: ODVariable) -> Value | None:
+        """Value of a declared object; None where the device has none, or of another size."""
+        data = self.port.upload_if_there(variable.index, variable.subindex)
+        if data is None or (variable.fixed_size and 8 * len(data) < len(variable)):
+            return None
+        raw = variable.decode_raw(data[: len(variable) // 8] if variable.fixed_size else data)
+        return raw if isinstance(raw, int | float | str) else None
+
+    def write(self, variable: ODVariable, value: Value) -> None:
+        """Write a declared object; raises ValueError where the value does not fit its type."""
+        self.port.download(variable.index, variable.subindex, variable.encode_raw(value))
+
+
+def is_signed(variable: ODVariable | None) -> bool:
+    """Whether the bits of an object are two's complement: by its type, or by CiA 402-2.
+
+    Five of Roboteq's EDS files declare 60FFh UNSIGNED32; a negative speed is written to it as the
+    two's complement of its size all the same.
+    """
+    if variable is None:
+        return False
+    if variable.data_type in datatypes.SIGNED_TYPES:
+        return True
+    return (
+        variable.index in _SIGNED
+        and variable.data_type in datatypes.UNSIGNED_TYPES
+        and (variable.index != 0x607D or variable.subindex > 0)
+    )
+
+
+def variables(dictionary: Any) -> Iterator[ODVariable]:
+    """Every object and sub-object of a dictionary, in order."""
+    for index in sorted(dictionary):
+        item = dictionary[index]
+        if isinstance(item, ODVariable):
+            yield item
+        else:
+            yield from (item[sub] for sub in sorted(item))
+
+
+def object_name(index: int, sub: int = 0) -> str:
+    """``6064h``, or ``607Dh:1``."""
+    return f"{index:04X}h:{sub}" if sub else f"{index:04X}h"
+
+
+_ABSENT = {0x06020000, 0x06090011}
+_TIMEOUT = 0.5
+_FULL_TRIES, _FULL_PAUSE = 20, 0.005
+"""How often, and after which pause (s), a full queue of the interface is tried again."""
+
+
+def read_dictionary(path: Path, node: int) -> Any:
+    """Object dictionary of an EDS or DCF; raises FileError. Its warnings are for ``check``."""
+    return read_eds(path, node)[0]
+
+
+class SdoNode:
+    """A node's object dictionary over SDO. Safe to use from several threads."""
+
+    def __init__(self, bus: CanBus, node: int, eds: Path) -> None:
+        """Attach to ``node`` of an open bus; nothing is sent yet."""
+        self.bus = bus
+        self.node = node
+        self.dictionary = read_dictionary(eds, node)
+        remote = canopen.RemoteNode(node, self.dictionary)
+        bus.network.add_node(remote)
+        self._sdo = sdo_client(remote, bus.clock)
+        self._sdo.RESPONSE_TIMEOUT = _TIMEOUT
+        self._lock = lock_of(bus.clock)
+
+    def place(self, index: int, sub: int = 0) -> str:
+        """How messages name an object."""
+        variable = self.dictionary.get_variable(index, sub)
+        number = f"{index:04X}h:{sub}" if sub else f"{index:04X}h"
+        name = f" ({variable.name})" if variable is not None else ""
+        return f"bus '{self.bus.name}' node {self.node} {number}{name}"
+
+    def read(self, index: int, sub: int = 0) -> int:
+        """Value of an integer object; raises NoReply, DeviceRefused."""
+        return self._number(index, sub, self.upload(index, sub))
+
+    def upload(self, index: int, sub: int = 0) -> bytes:
+        """Bytes of any object as the device sends them; raises NoReply, DeviceRefused."""
+        with self._lock:
+            try:
+                return bytes(self._insist(lambda: self._sdo.upload(index, sub)))
+            except canopen.SdoAbortedError as error:
+                raise self._refused("read", index, sub, error) from error
+            except (canopen.SdoCommunicationError, can.CanError, OSError) as error:
+                raise self._silent(index, sub, error) from error
+
+    def read_if_there(self, index: int, sub: int = 0) -> int | None:
+        """Value of an object that the device may lack; None where it does."""
+        data = self.upload_if_there(index, sub)
+        return None if data is None else self._number(index, sub, data)
+
+    def upload_if_there(self, index: int, sub: int = 0) -> bytes | None:
+        """Bytes of an object that the device may lack; None where it does."""
+        try:
+            return self.upload(index, sub)
+        except DeviceRefused as error:
+            cause = error.__cause__
+            if isinstance(cause, canopen.SdoAbortedError) and cause.code in _ABSENT:
+                return None
+            raise
+
+    def write(self, index: int, sub: int, value: int) -> None:
+        """Write an integer object; raises NoReply, DeviceRefused, NotPermitted for its range.
+
+        A negative value goes as the two's complement of the object's size.
+        """
+        item = self._variable(index, sub, 4)
+        try:
+            data = value.to_bytes(item.bits // 8, "little", signed=value < 0 or item.signed)
+        except OverflowError as error:
+            raise NotPermitted(
+                f"{self.place(index, sub)}: {value} does not fit into its {item.bits} bits"
+            ) from error
+        self.download(index, sub, data)
+
+    def download(self, index: int, sub: int, data: bytes) -> None:
+        """Write the bytes of any object; raises NoReply, DeviceRefused."""
+        with self._lock:
+            try:
+                self._insist(lambda: self._sdo.download(index, sub, data))
+            except canopen.SdoAbortedError as error:
+                value = int.from_bytes(data, "little")
+                raise self._refused(f"write {value} to", index, sub, error) from error
+            except (canopen.SdoCommunicationError, can.CanError, OSError) as error:
+                raise self._silent(index, sub, error) from error
+
+    def write_verified(self, index: int, sub: int, value: int) -> None:
+        """Write, read back and compare; raises DeviceRefused when the device kept another value."""
+        self.write(index, sub, value)
+        kept = self.read(index, sub)
+        if kept != value:
+            raise DeviceRefused(
+                f"{self.place(index, sub)}: wrote {value}, reads back {kept}; "
+                "the device does not take this value"
+            )
+
+    def writes(self, index: int, sub: int) -> bool:
+        """Whether the EDS lets the object be written; True where it does not know it."""
+        variable = self.dictionary.get_variable(index, sub)
+        return variable is None or bool(variable.writable)
+
+    def mapped(self, index: int, sub: int) -> MappedObject:
+        """The object as a PDO carries it; raises FileError when the EDS does not know it."""
+        if self.dictionary.get_variable(index, sub) is None:
+            raise FileError(f"{self.place(index, sub)}: not in the EDS, so it cannot be mapped")
+        return self._variable(index, sub, 4)
+
+    def _insist(self, transfer: Callable[[], Any]) -> Any:
+        """Run a transfer; while the interface's queue is full, again after a pause."""
+        for _ in range(_FULL_TRIES):
+            try:
+                return transfer()
+            except (can.CanError, OSError) as error:
+                if not queue_full(error):
+                    raise
+                self.bus.clock.sleep(_FULL_PAUSE)
+        return transfer()
+
+    def _number(self, index: int, sub: int, data: bytes) -> int:
+        signed = self._variable(index, sub, len(data)).signed
+        return int.from_bytes(data, "little", signed=signed)
+
+    def _variable(self, index: int, sub: int, size: int) -> MappedObject:
+        variable = self.dictionary.get_variable(index, sub)
+        if variable is None:
+            return MappedObject(index, sub, 8 * size, False)
+        return MappedObject(index, sub, len(variable), is_signed(variable))
+
+    def _refused(self, what: str, index: int, sub: int, error: Exception) -> DeviceRefused:
+        return DeviceRefused(f"{self.place(index, sub)}: the device refused to {what} it: {error}")
+
+    def _silent(self, index: int, sub: int, error: Exception) -> NoReply:
+        return NoReply(
+            f"{self.place(index, sub)}: no answer within {_TIMEOUT:g} s ({error}); "
+            "check power, wiring, bit rate and node id"
+        )

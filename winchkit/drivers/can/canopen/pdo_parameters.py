@@ -1,0 +1,114 @@
+"""Writes PDO parameters in the order that the standard asks for, and reads them back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo import PdoCodec, parse_object
+from winchkit.errors import NotPermitted
+from winchkit.schema.devices.servo import PdoSpec
+
+__all__ = ["Direction", "cob_id", "codecs", "set_up"]
+
+Direction = Literal["tpdo", "rpdo"]
+
+_INVALID = 1 << 31
+_NO_RTR = 1 << 30
+_COMMUNICATION = {"tpdo": 0x1800, "rpdo": 0x1400}
+_MAPPING = {"tpdo": 0x1A00, "rpdo": 0x1600}
+_FIRST_COB = {"tpdo": 0x180, "rpdo": 0x200}
+_PREDEFINED = range(1, 5)
+_MOST = 512
+_INHIBIT_UNIT, _MS = 1e-4, 1e-3
+
+
+def cob_id(direction: Direction, number: int, node: int) -> int:
+    """Identifier of the predefined connection set."""
+    return _FIRST_COB[direction] + 0x100 * (number - 1) + node
+
+
+def codecs(node: SdoNode, specs: Iterable[PdoSpec]) -> tuple[PdoCodec, ...]:
+    """Codecs of the PDOs of a device file, typed by the EDS."""
+    return tuple(
+        PdoCodec(spec, [node.mapped(*parse_object(text)) for text in spec.objects])
+        for spec in specs
+    )
+
+
+def set_up(node: SdoNode, direction: Direction, wanted: tuple[PdoCodec, ...]) -> None:
+    """Map ``wanted`` and switch every other PDO of this direction off, those beyond four too.
+
+    The node must be pre-operational. Raises NoReply, DeviceRefused.
+    """
+    by_number = {codec.spec.number: codec for codec in wanted}
+    for number in (*_PREDEFINED, *_beyond(node, direction)):
+        record = _COMMUNICATION[direction] + number - 1
+        codec = by_number.get(number)
+        if codec is not None:
+            _map(node, direction, codec)
+            continue
+        identifier = node.read_if_there(record, 1)
+        if identifier is not None and not identifier & _INVALID and node.writes(record, 1):
+            node.write(record, 1, identifier | _INVALID)
+
+
+def _beyond(node: SdoNode, direction: Direction) -> list[int]:
+    """Numbers of the PDOs above four that the EDS declares."""
+    first = _COMMUNICATION[direction]
+    return [
+        number
+        for number in range(_PREDEFINED.stop, _MOST + 1)
+        if first + number - 1 in node.dictionary
+    ]
+
+
+def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
+    number = codec.spec.number
+    record = _COMMUNICATION[direction] + number - 1
+    mapping = _MAPPING[direction] + number - 1
+    identifier = cob_id(direction, number, node.node)
+    if direction == "tpdo":
+        identifier |= _NO_RTR
+    node.write(record, 1, identifier | _INVALID)
+    node.write_verified(record, 2, codec.spec.transmission)
+    _set_timers(node, record, codec.spec)
+    if node.writes(mapping, 0):
+        node.write(mapping, 0, 0)
+        for position, item in enumerate(codec.objects, start=1):
+            node.write_verified(mapping, position, item.entry)
+        node.write_verified(mapping, 0, len(codec.objects))
+    else:
+        _check_fixed(node, direction, codec)
+    node.write(record, 1, identifier)
+    _verify_identifier(node, record, identifier)
+
+
+def _check_fixed(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
+    """A mapping that the EDS does not let change has to be the one that is wanted."""
+    mapping = _MAPPING[direction] + codec.spec.number - 1
+    count = node.read(mapping, 0)
+    held = [node.read(mapping, position) for position in range(1, count + 1)]
+    if held != [item.entry for item in codec.objects]:
+        entries = ", ".join(f"{entry:08X}h" for entry in held) or "nothing"
+        raise NotPermitted(
+            f"{node.place(mapping)} is fixed and holds {entries}, not the objects of {direction} "
+            f"{codec.spec.number} in the device file; write there what the drive holds"
+        )
+
+
+def _set_timers(node: SdoNode, record: int, spec: PdoSpec) -> None:
+    """Inhibit time and event timer; a drive may lack those that are not asked for."""
+    if not spec.by_event:
+        return
+    for sub, time, unit in ((3, spec.inhibit_time, _INHIBIT_UNIT), (5, spec.event_timer, _MS)):
+        if time or node.read_if_there(record, sub) is not None:
+            node.write_verified(record, sub, round(time / unit))
+
+
+def _verify_identifier(node: SdoNode, record: int, identifier: int) -> None:
+    """Compare the COB-ID, letting a device keep its own mind about the RTR bit."""
+    kept = node.read(record, 1)
+    if (kept ^ identifier) & ~_NO_RTR:
+        node.write_verified(record, 1, identifier)

@@ -1,0 +1,394 @@
+"""A CiA 402 axis: newest feedback in SI, and one command a cycle."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
+from winchkit.drivers.can.canopen.nmt import NmtState
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+from winchkit.drivers.can.cia402.command import Command, Commander
+from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec, await_booted, commission
+from winchkit.drivers.can.cia402.feedback import (
+    AxisFeedback,
+    FeedbackHealth,
+    Gathering,
+    check_feedback,
+)
+from winchkit.drivers.can.cia402.mode_change import change_mode
+from winchkit.drivers.can.cia402.modes import MODES, Homing, Target, homing_state, status_words
+from winchkit.drivers.can.cia402.motor_position import MotorPosition
+from winchkit.drivers.can.cia402.profile_parameters import HomingSpec, set_homing, set_profile
+from winchkit.drivers.can.cia402.sdo_stop import SdoStop
+from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, Wish, control_word
+from winchkit.drivers.can.host_loss.mechanism import Silence, Terms
+from winchkit.drivers.can.host_loss.watch import HostWatch
+from winchkit.drivers.clock import Clock
+from winchkit.errors import Fault, FileError, NotPermitted, WinchkitError
+from winchkit.schema.devices.device import DeviceSpec
+
+__all__ = ["AxisFeedback", "Cia402Axis"]
+
+_STALE_SYNCS, _STALE_BEATS = 5, 2
+"""Feedback that is older than both of these tells nothing of the drive's state any more."""
+_NMT_STOP = 0x02
+_POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
+
+
+class Cia402Axis:
+    """One drive on a CAN bus.
+
+    ``commission``, ``switch_mode``, ``prepare_homing`` and ``set_profile`` talk SDO and may take
+    a second; ``send`` and ``feedback`` are for the control loop. ``begin_cycle`` tells it the
+    number and time of each SYNC. The axis outlives its bus: after ``CanBus.reopen`` it is
+    commissioned again.
+    """
+
+    def __init__(
+        self, bus: CanBus, node: int, device: DeviceSpec, watch: WatchSpec, clock: Clock
+    ) -> None:
+        """Attach to a node; nothing is sent yet. Raises FileError for an unusable device file."""
+        if device.servo is None:
+            raise FileError(Fault("is no servo drive; name one as `servo`", device.path))
+        self.name = f"bus '{bus.name}' node {node}"
+        self.servo = device.servo
+        self.emergencies = EmergencyLog()
+        self.drive: Commissioned | None = None
+        """What it agreed to; None before it is commissioned."""
+        self.mode: str = device.servo.motion_mode
+        self._bus, self._clock, self._watch = bus, clock, watch
+        self._node = SdoNode(bus, node, Path(device.path).parent / device.servo.eds)
+        terms = Terms(watch.host, watch.timeout, watch.heartbeat, watch.cycle)
+        self.host = HostWatch(self._node, device.servo, terms, clock, watch.hardware)
+        """How the drive watches the host; its ``silent`` ends the life signs, to stop it."""
+        self.heartbeat = self.host.heartbeat
+        self._position = MotorPosition(device.servo, watch.speed)
+        self._gathering: Gathering | None = None
+        self._commander: Commander | None = None
+        self._cycle = (0, -math.inf)
+        self._boot_ups = self._beats = 0
+        self._previous = 0
+        self._sdo_stop = SdoStop(bus, node)
+        self._stop_frames: list[tuple[int, bytes]] = []
+        bus.on(0x700 + node, self.heartbeat.receive)
+        bus.on(0x080 + node, self.emergencies.receive)
+
+    def commission(self) -> Commissioned:
+        """Set the drive up, checked and disabled; raises NoReply, DeviceRefused, NotPermitted."""
+        self._gathering = self._commander = None
+        self._previous = 0
+        self._sdo_stop.hold(True)
+        try:
+            return self._commission()
+        finally:
+            self._sdo_stop.hold(False)
+
+    def _commission(self) -> Commissioned:
+        self.heartbeat.forget()
+        await_booted(self._node, self.servo.boot_time, self._clock, self.heartbeat)
+        # Only a boot-up after this one takes away what is set up now.
+        self._boot_ups = self.heartbeat.boot_ups
+        self._beats = self._bus.beats[self._watch.host]
+        drive = commission(self._node, self.servo, self._watch, self._clock, self.host)
+        self.host.await_operational()
+        if self._watch.prove:
+            proof = self.host.prove(self.emergencies)
+            self.emergencies.clear()
+            loss = self.host.reaction(proof, drive.options, seen=self._watch.seen_stopping)
+            drive = dataclasses.replace(drive, proof=proof, host_loss=loss)
+        self.host.arm()
+        counter = self._position.begin(drive, self._boot_ups)
+        commander = Commander(self.name, drive, self._node.node, drive.mode, counter)
+        gathering = self._listen(drive)
+        self.drive, self.mode = drive, drive.mode
+        self._commander, self._gathering = commander, gathering
+        self._stop_frames = commander.stop_frames()
+        self.emergencies.in_force.clear()
+        return drive
+
+    def take_commissioning(self, *, seen_stopping: bool, stops_on_nmt: bool) -> None:
+        """Take what the commissioning record says of this very drive, while it is enabled."""
+        self._watch = dataclasses.replace(
+            self._watch, seen_stopping=seen_stopping, stops_on_nmt=stops_on_nmt
+        )
+        if self.drive is not None:
+            loss = self.host.reaction(self.drive.proof, self.drive.options, seen=seen_stopping)
+            self.drive = dataclasses.replace(self.drive, host_loss=loss, stops_on_nmt=stops_on_nmt)
+
+    def emergency_stop(self, *, sdo: bool) -> None:
+        """Send the quick stop that was prepared at commissioning: RPDOs with 02h, SDO where asked.
+
+        Nothing is computed and nothing is read: it works whatever else has failed. The RPDOs take
+        effect at the next SYNC. Raises ConnectionLost.
+        """
+        self._previous = QUICK_STOP
+        for identifier, data in () if self.host.withholds_rpdos else self._stop_frames:
+            self._bus.send(identifier, data)
+        if sdo:
+            self._sdo_stop.send()
+
+    def stop_by_sdo(self) -> None:
+        """Quick stop by SDO, and its state asked for, without waiting; raises ConnectionLost."""
+        self._sdo_stop.send()
+
+    def stop_by_nmt(self) -> None:
+        """NMT stop; raises ConnectionLost."""
+        self._bus.nmt(_NMT_STOP, self._node.node)
+
+    def end_stop(self) -> None:
+        """The stop by SDO is over: its replies are the confirmed client's again."""
+        self._sdo_stop.end()
+
+    @property
+    def sdo_state(self) -> State | None:
+        """Power state that it told by SDO since the stop by SDO began."""
+        return self._sdo_stop.state
+
+    @property
+    def sdo_refused(self) -> bool:
+        """Whether it aborted the stop by SDO that is under way."""
+        return self._sdo_stop.refused
+
+    @property
+    def stops_on_nmt(self) -> bool:
+        """Whether commissioning saw it leave operation enabled on NMT stop."""
+        return False if self.drive is None else self.drive.stops_on_nmt
+
+    @property
+    def moves_alone(self) -> bool:
+        """Whether it makes the motion of its mode by itself (HM, PP)."""
+        return MODES[self.mode].moves_alone
+
+    @property
+    def nmt_text(self) -> str:
+        """NMT state of its heartbeat in words."""
+        return "unknown" if self.heartbeat.state is None else str(NmtState(self.heartbeat.state))
+
+    @property
+    def alarms(self) -> tuple[int, ...]:
+        """Emergency codes that it sent and has not taken back."""
+        return tuple(self.emergencies.in_force)
+
+    @property
+    def alarm_text(self) -> str:
+        """The emergency codes in force, in words."""
+        return self.emergencies.standing
+
+    def forget_alarms(self) -> None:
+        """A reset has dealt with them; those that still hold are sent again."""
+        self.emergencies.in_force.clear()
+
+    def disarm(self) -> None:
+        """Let the drive, at rest, stop watching the host; raises ConnectionLost."""
+        self.host.disarm()
+
+    def fall_silent(self) -> bool:
+        """End the life signs that the drive watches, until it is commissioned again.
+
+        Returns whether SYNC is one of them, which the control loop has to end.
+        """
+        self.host.silent = True
+        return self.host.mechanism.silence in (Silence.SYNC, Silence.ALL)
+
+    @property
+    def objects(self) -> SdoNode:
+        """Its object dictionary over SDO."""
+        return self._node
+
+    @property
+    def feedback(self) -> AxisFeedback | None:
+        """What its newest complete answer to a SYNC said."""
+        return None if self._gathering is None else self._gathering.feedback
+
+    @property
+    def health(self) -> FeedbackHealth:
+        """Counts of its TPDOs since it was commissioned."""
+        return FeedbackHealth() if self._gathering is None else self._gathering.health
+
+    @property
+    def short_frames(self) -> int:
+        """Frames with fewer bytes than they should have."""
+        return self.health.short + self.emergencies.short
+
+    @property
+    def position_mode(self) -> bool:
+        """Whether it is moved by target positions (CSP, IP) and not by speeds."""
+        return MODES[self.mode].kind is Target.ANGLE
+
+    @property
+    def mode_kept(self) -> bool:
+        """Whether the drive still shows the mode that it was given."""
+        shown = self.feedback.mode if self.feedback else None
+        return shown is None or shown == MODES[self.mode].number
+
+    @property
+    def operational(self) -> bool:
+        """Whether its heartbeat says that its PDOs run."""
+        return self.heartbeat.state in (None, NmtState.OPERATIONAL)
+
+    @property
+    def mapping_lost(self) -> bool:
+        """Whether it has booted since it was commissioned, and forgotten its PDOs."""
+        return self.heartbeat.boot_ups != self._boot_ups
+
+    @property
+    def lost_set_up(self) -> bool:
+        """Whether it has to be commissioned again: it booted, or does not run its PDOs."""
+        return self.mapping_lost or not self.operational or self.state is State.UNKNOWN
+
+    @property
+    def state(self) -> State:
+        """Its power state as far as it is certain: UNKNOWN once what it said is stale."""
+        feedback = self.feedback
+        if feedback is None or self.mapping_lost:
+            return State.UNKNOWN
+        sync, now = self._cycle
+        old = sync - feedback.sync > _STALE_SYNCS
+        if old and now - feedback.time > _STALE_BEATS * self._watch.heartbeat:
+            return State.UNKNOWN
+        return feedback.state
+
+    @property
+    def homing(self) -> Homing:
+        """How far a homing is, by the newest feedback; for the mode HM, once it was started."""
+        return Homing.INTERRUPTED if self.feedback is None else homing_state(self.feedback.status)
+
+    @property
+    def status_words(self) -> tuple[str, ...]:
+        """The bits of its status word in words, as its mode gives them meaning."""
+        return () if self.feedback is None else status_words(self.mode, self.feedback.status)
+
+    @property
+    def fault_text(self) -> str:
+        """Its error code and last emergency in words."""
+        code = self.feedback.error_code if self.feedback else 0
+        words = f"error {code:04X}h {error_text(code)}" if code else "no error code"
+        last = self.emergencies[-1] if self.emergencies else None
+        return f"{words}; {last}" if last is not None and last.code != code else words
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the newest feedback says that the motor stands still."""
+        return self._position.at_rest(self.feedback)
+
+    def begin_cycle(self, sync: int, now: float) -> None:
+        """Note the SYNC that is about to be sent: TPDOs that follow were sampled at it."""
+        self._cycle = (sync, now)
+        self.host.begin_cycle(now)
+        if self._gathering is not None:
+            self._gathering.begin(sync, now)
+
+    def send(
+        self,
+        wish: Wish,
+        *,
+        velocity: float = 0.0,
+        angle: float | None = None,
+        torque: float = 0.0,
+        start: bool = False,
+    ) -> int:
+        """Send the next control word towards ``wish`` with targets (rad/s, rad, N m).
+
+        Returns the word. The mode says which target counts; beside it, velocity and torque are
+        fed forward where 60B1h and 60B2h are mapped. Without a target angle a
+        position-controlled axis holds where it is; a drive that is not enabled gets zero and its
+        actual position, so that it starts from rest. To run down is to halt where the drive makes
+        the motion itself (PP, HM), and to quick-stop under a torque. ``start`` starts a homing
+        (HM). Nothing is enabled before the host's heartbeat has begun. Raises NotPermitted for
+        targets beyond the drive's range, ConnectionLost.
+        """
+        commander, feedback = self._commander, self.feedback
+        if commander is None or feedback is None:
+            return self._previous
+        if wish in (Wish.RUN_DOWN, Wish.HALT) and not MODES[self.mode].can_run_down:
+            wish = Wish.STOP
+        if wish is Wish.ENABLE and not self._watched:
+            # The drive's watchdog arms on the first life sign that it hears.
+            wish = Wish.DISABLE
+        word = control_word(
+            self.state,
+            wish,
+            previous=self._previous,
+            fresh=feedback.sync >= self._cycle[0] - 1,
+            at_rest=self.at_rest,
+        )
+        command = Command(wish, velocity, angle, torque, start)
+        word, frames = commander.frames(word, command, feedback)
+        for identifier, data in () if self.host.withholds_rpdos else frames:
+            self._bus.send(identifier, data)
+        self._previous = word
+        return word
+
+    def switch_mode(self, mode: str) -> None:
+        """Give the drive another mode, verified, while it is disabled.
+
+        Raises NotPermitted when it is not or when it lacks the mode, FileError when the device
+        file maps no target for it, NoReply, DeviceRefused; it then keeps the mode that it had.
+        """
+        drive = self._disabled_drive(f"change to {mode}")
+        if mode not in drive.modes:
+            raise NotPermitted(
+                f"{self.name}: the drive has no mode {mode}; it has {', '.join(drive.modes)}"
+            )
+        homed = self.homing is Homing.DONE
+        commander = Commander(self.name, drive, self._node.node, mode, self._position.counter)
+        before = self._commander, self.mode
+        # From here on cyclic PDOs must carry the new mode, lest they set the old one again.
+        self._commander, self.mode = commander, mode
+        self._stop_frames = commander.stop_frames()
+        try:
+            change_mode(self._node, mode, self._clock)
+        except WinchkitError:
+            self._commander, self.mode = before
+            if self._commander is not None:
+                self._stop_frames = self._commander.stop_frames()
+            raise
+        self._position.changed_mode(before[1], mode, homed=homed)
+
+    def prepare_homing(self, homing: HomingSpec) -> None:
+        """Set a homing up and change to HM, disabled; ``send(Wish.ENABLE, start=True)`` runs it.
+
+        Afterwards ``switch_mode(servo.motion_mode)`` leads back. Raises NotPermitted, NoReply,
+        DeviceRefused.
+        """
+        drive = self._disabled_drive("prepare a homing")
+        set_homing(self._node, self.servo, drive.scale, homing)
+        self.switch_mode("HM")
+
+    def permit_angle(self, angle: float) -> None:
+        """Raise NotPermitted where a position mode cannot go to a motor angle (rad)."""
+        if self.position_mode and self._commander is not None:
+            self._commander.counts(angle)
+
+    def set_profile(self, *, speed: float | None = None, acceleration: float | None = None) -> None:
+        """Set speed (rad/s) and ramps (rad/s^2) of the profile modes; raises NotPermitted."""
+        drive = self._disabled_drive("set its profile")
+        set_profile(self._node, self.servo, drive.scale, speed=speed, acceleration=acceleration)
+
+    @property
+    def _watched(self) -> bool:
+        """Whether the drive has had a life sign of the host since it was commissioned."""
+        return self.host.begun(self._bus.beats[self._watch.host] - self._beats)
+
+    def _disabled_drive(self, what: str) -> Commissioned:
+        if self.drive is None:
+            raise NotPermitted(f"{self.name}: commission the drive before you {what}")
+        if self.state in _POWERED or not self.at_rest:
+            raise NotPermitted(
+                f"{self.name}: cannot {what} while the drive is {self.state} and "
+                f"{'at rest' if self.at_rest else 'moving'}; stop it first"
+            )
+        return self.drive
+
+    def _listen(self, drive: Commissioned) -> Gathering:
+        """Hear the drive's TPDOs, put together anew."""
+        check_feedback(self.name, drive.tpdo)
+        gathering = Gathering(drive.tpdo, drive.scale, self._watch.cycle, self._position.counter)
+        for codec in drive.tpdo:
+            identifier = cob_id("tpdo", codec.spec.number, self._node.node)
+            self._bus.on(identifier, gathering.receiver(codec))
+        return gathering

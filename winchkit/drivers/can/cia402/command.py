@@ -1,0 +1,211 @@
+"""One cycle's command to a drive: targets in its own counts, packed into its RPDOs."""
+
+from __future__ import annotations
+
+import struct
+from enum import Enum
+from typing import NamedTuple
+
+from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+from winchkit.drivers.can.cia402.commission import Commissioned
+from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
+from winchkit.drivers.can.cia402.modes import AT_ONCE, MODES, START, TARGETS, Target
+from winchkit.drivers.can.cia402.position_counter import PositionCounter
+from winchkit.drivers.can.cia402.state_machine import (
+    ENABLE_OPERATION,
+    HALT,
+    QUICK_STOP,
+    State,
+    Wish,
+)
+from winchkit.errors import Fault, FileError, NotPermitted
+
+__all__ = [
+    "Command",
+    "Commander",
+    "SetPoint",
+]
+
+_ACKNOWLEDGED = 1 << 12
+
+
+class _Step(Enum):
+    IDLE = 0
+    PLACED = 1
+    RAISED = 2
+
+
+class SetPoint:
+    """Hands targets over one at a time, each by a rising edge that the drive acknowledges.
+
+    The target stands on the bus a cycle before bit 4 rises, and until that is acknowledged: the
+    two may travel in different PDOs, and no drive may take an edge with the target before.
+    """
+
+    def __init__(self) -> None:
+        self._offered = 0
+        self._step = _Step.IDLE
+
+    def reset(self, actual: int) -> None:
+        """The axis is not enabled: it holds its place until a target differs from it."""
+        self._offered, self._step = actual, _Step.IDLE
+
+    def step(self, target: int | None, status: int) -> tuple[int, int]:
+        """Bits for the control word and the target to send (counts); None asks for no move."""
+        acknowledged = bool(status & _ACKNOWLEDGED)
+        if self._step is _Step.PLACED:
+            self._step = _Step.RAISED
+        elif self._step is _Step.RAISED:
+            self._step = _Step.IDLE if acknowledged else _Step.RAISED
+        elif target is not None and target != self._offered and not acknowledged:
+            self._offered, self._step = target, _Step.PLACED
+        return (START | AT_ONCE if self._step is _Step.RAISED else 0), self._offered
+
+
+Key = tuple[int, int]
+
+_CONTROL, _MODE = (0x6040, 0), (0x6060, 0)
+_VELOCITY_OFFSET, _TORQUE_OFFSET = (0x60B1, 0), (0x60B2, 0)
+_ALWAYS = {_CONTROL, _MODE, _VELOCITY_OFFSET, _TORQUE_OFFSET}
+_MOVES = (Wish.ENABLE, Wish.RUN_DOWN)
+
+
+class Command(NamedTuple):
+    """What is asked of the drive in a cycle; SI at the motor shaft."""
+
+    wish: Wish
+    velocity: float = 0.0
+    """rad/s."""
+    angle: float | None = None
+    """rad; None holds the axis where it is."""
+    torque: float = 0.0
+    """N m."""
+    start: bool = False
+    """Start a homing."""
+
+
+class Commander:
+    """Makes frames of commands, for one drive in one mode."""
+
+    def __init__(
+        self,
+        name: str,
+        drive: Commissioned,
+        node: int,
+        mode: str,
+        counter: PositionCounter | None = None,
+    ) -> None:
+        """Raise FileError where the device file maps too little, or what nobody fills."""
+        self._name, self._drive, self._mode = name, drive, MODES[mode]
+        self.counter = counter or PositionCounter(*counter_range(drive.tpdo))
+        self._set_point = SetPoint()
+        target = self._mode.target
+        _check(name, drive, mode, target)
+        live = _ALWAYS if target is None else _ALWAYS | {target}
+        self._codecs = tuple(
+            (cob_id("rpdo", codec.spec.number, node), codec)
+            for codec in drive.rpdo
+            if live & codec.position.keys()
+        )
+        self._objects = [key for _, codec in self._codecs for key in codec.position]
+        """Of all RPDOs in their order; the values of a cycle stand in the same order."""
+        self._zeros = [self._mode.number if key == _MODE else 0 for key in self._objects]
+        kind, feeds = self._mode.kind, (_VELOCITY_OFFSET,)
+        self._controls = self._places(_CONTROL)
+        self._angles = self._places((0x607A, 0), (0x60C1, 1))
+        self._speeds = self._places((0x60FF, 0), *(feeds if kind is Target.ANGLE else ()))
+        self._torques = self._places((0x6071, 0) if kind is Target.TORQUE else _TORQUE_OFFSET)
+
+    def frames(
+        self, word: int, command: Command, feedback: AxisFeedback
+    ) -> tuple[int, list[tuple[int, bytes]]]:
+        """The control word with the bits of the mode, and the frames to send.
+
+        ``word`` is what the state machine asks for; only one that keeps the drive enabled gets
+        bits and targets, any other goes with zero and the actual position. Raises NotPermitted
+        for targets beyond the drive's range.
+        """
+        enabled = feedback.state is State.OPERATION_ENABLED
+        moves = enabled and word == ENABLE_OPERATION and command.wish in _MOVES
+        bits, angle = self._aim(command, feedback, moves)
+        if moves and command.wish is Wish.RUN_DOWN and self._mode.moves_alone:
+            bits = HALT
+        values = self._zeros.copy()
+        for place in self._controls:
+            values[place] = word | bits
+        for place in self._angles:
+            values[place] = angle
+        if moves:
+            scale = self._drive.scale
+            for place in self._speeds:
+                values[place] = scale.velocity_counts(command.velocity)
+            for place in self._torques:
+                values[place] = scale.torque_counts(command.torque)
+        return word | bits, self._packed(values)
+
+    def stop_frames(self) -> list[tuple[int, bytes]]:
+        """Frames of a quick stop that need no feedback: 02h, the mode, and zero targets.
+
+        In quick stop the drive makes its own ramp, and no target counts (CiA 402-2).
+        """
+        values = self._zeros.copy()
+        for place in self._controls:
+            values[place] = QUICK_STOP
+        frames = zip(self._packed(values), self._codecs, strict=True)
+        return [frame for frame, (_, codec) in frames if _CONTROL in codec.position]
+
+    def _places(self, *keys: Key) -> tuple[int, ...]:
+        """Where the values of these objects stand, as far as an RPDO carries them."""
+        return tuple(place for place, key in enumerate(self._objects) if key in keys)
+
+    def _packed(self, values: list[int]) -> list[tuple[int, bytes]]:
+        """The RPDOs with these values."""
+        frames, end = [], 0
+        for identifier, codec in self._codecs:
+            start, end = end, end + len(codec.objects)
+            try:
+                frames.append((identifier, codec.encode(values[start:end])))
+            except struct.error:
+                said = zip(codec.position, values[start:end], strict=True)
+                words = ", ".join(f"{_text(key)} = {value}" for key, value in said)
+                raise NotPermitted(
+                    f"{self._name}: a target does not fit into RPDO {codec.spec.number} ({words}); "
+                    "it is beyond the drive's range"
+                ) from None
+        return frames
+
+    def _aim(self, command: Command, feedback: AxisFeedback, moves: bool) -> tuple[int, int]:
+        """The bits of the mode and the target position: the actual one where nothing is asked."""
+        actual = feedback.shown
+        if actual is None:
+            actual = self._drive.scale.angle_counts(feedback.angle)
+        if not moves or self._mode.kind is not Target.ANGLE:
+            self._set_point.reset(actual)
+            return self._start_bit(command) if moves else 0, actual
+        wanted = None if command.angle is None else self.counts(command.angle)
+        if self._mode.name == "PP":
+            return self._set_point.step(wanted, feedback.status)
+        return self._start_bit(command), actual if wanted is None else wanted
+
+    def counts(self, angle: float) -> int:
+        """Target position (607Ah) for an angle; raises NotPermitted beyond the counter's end."""
+        return self.counter.target(self._drive.scale.unwrapped_counts(angle), self._name)
+
+    def _start_bit(self, command: Command) -> int:
+        """Bit 4 in modes without a handshake: follow (IP), start a homing (HM)."""
+        name = self._mode.name
+        return START if name == "IP" or (name == "HM" and command.start) else 0
+
+
+def _check(name: str, drive: Commissioned, mode: str, target: Key | None) -> None:
+    mapped = {key for codec in drive.rpdo for key in codec.position}
+    needed = {_CONTROL} if target is None else {_CONTROL, target}
+    faults = [f"lacks {_text(key)}, which {mode} needs" for key in sorted(needed - mapped)]
+    known = _ALWAYS.union(TARGETS)
+    faults += [f"maps {_text(key)}, which nothing fills" for key in sorted(mapped - known)]
+    if faults:
+        raise FileError([Fault(f"{name}: its RPDO mapping {fault}") for fault in faults])
+
+
+def _text(key: Key) -> str:
+    return f"{key[0]:04X}h:{key[1]}" if key[1] else f"{key[0]:04X}h"

@@ -1,0 +1,194 @@
+"""Brings a CiA 402 drive from power-on to operational, disabled, checked and watched over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from winchkit.drivers.can.canopen.communication import set_communication
+from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo import PdoCodec
+from winchkit.drivers.can.canopen.pdo_parameters import codecs, set_up
+from winchkit.drivers.can.cia402.cycle import set_cycle
+from winchkit.drivers.can.cia402.limits import DriveLimits, LimitsAtShaft, set_limits
+from winchkit.drivers.can.cia402.mode_change import change_mode, supported_modes
+from winchkit.drivers.can.cia402.modes import MODES
+from winchkit.drivers.can.cia402.option_codes import OptionCode, merged, set_options
+from winchkit.drivers.can.cia402.profile_parameters import set_profile
+from winchkit.drivers.can.cia402.standstill import PolledStandstill
+from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, state_of
+from winchkit.drivers.can.cia402.units import Scale, read_scale
+from winchkit.drivers.can.host_loss.proof import HostLoss, Proof
+from winchkit.drivers.can.host_loss.watch import HostWatch
+from winchkit.drivers.clock import Clock
+from winchkit.errors import NoReply, NotPermitted
+from winchkit.schema.devices.servo import OptionSpec, ServoSpec
+
+__all__ = ["Commissioned", "WatchSpec", "await_booted", "commission"]
+
+_START, _PRE_OPERATIONAL = 0x01, 0x80
+_STOP_TIME = 3.0
+_POLL = 0.01
+_MISSED_BEATS = 2.5
+
+
+@dataclass(frozen=True)
+class WatchSpec:
+    """Who watches whom, how often, and what the drive itself has to keep to."""
+
+    host: int
+    """Node id of the host."""
+    heartbeat: float
+    """Period of the host's heartbeat and the drive's, s."""
+    cycle: float
+    """SYNC period, s."""
+    brake: bool
+    """Whether a holding brake lets the drive lose torque without dropping the load."""
+
+    acceleration: float = 0.0
+    """Of the motor, that a profile mode may use, rad/s^2; 0 leaves the drive's own."""
+    prove: bool = True
+    """Whether every commissioning proves that the drive notices a withheld heartbeat."""
+    limits: LimitsAtShaft = field(default_factory=LimitsAtShaft)
+    """Written to the drive and read back."""
+    speed: float = 0.0
+    """Greatest of the motor, rad/s: how far it can turn while it is not heard; 0: not known."""
+    options: OptionSpec = field(default_factory=OptionSpec)
+    """Option codes that count before those of the device file."""
+    hardware: str = ""
+    """What stops the winch when the host dies, where no object of the drive does; else empty."""
+    seen_stopping: bool = False
+    """Whether the commissioning record says that the enabled drive stopped on a silent host."""
+    stops_on_nmt: bool = False
+    """Whether the commissioning record says that it leaves operation enabled on NMT stopped."""
+
+    @property
+    def timeout(self) -> float:
+        """After this long without a life sign the other side counts as lost, s: 2.5 beats."""
+        return _MISSED_BEATS * self.heartbeat
+
+
+@dataclass(frozen=True)
+class Commissioned:
+    """What the drive said and agreed to."""
+
+    mode: str
+    modes: tuple[str, ...]
+    """All that it has."""
+    scale: Scale
+    tpdo: tuple[PdoCodec, ...]
+    rpdo: tuple[PdoCodec, ...]
+    options: Mapping[str, OptionCode]
+    """605Ah to 605Eh and 6007h as they are now, by the keys of a device file."""
+    limits: DriveLimits
+    """As read back."""
+    cycle: float | None
+    """60C2h, s; None where the drive has none."""
+    on_error: int | None
+    """1029h:1, what it does with its network state when the host is gone: 0 pre-operational,
+    1 nothing, 2 stopped; None where it has no such object."""
+    proof: Proof | None = None
+    """How it noticed a silent host; None where that was not asked for."""
+    host_loss: HostLoss = field(default_factory=HostLoss)
+    """How it notices a dead host, and what is known of its reaction while it is enabled."""
+    stops_on_nmt: bool = False
+    """Whether it was seen to leave operation enabled on NMT stopped; False where unknown."""
+    notes: tuple[str, ...] = ()
+    """What was found and changed, for whoever opens the bench to read."""
+
+
+def commission(
+    node: SdoNode, servo: ServoSpec, watch: WatchSpec, clock: Clock, host: HostWatch
+) -> Commissioned:
+    """Set a drive that has booted up for cyclic motion and start it, disabled.
+
+    Raises NoReply, DeviceRefused, and NotPermitted where the drive could not be moved safely.
+    """
+    _bring_to_rest(node, servo, clock)
+    node.bus.nmt(_PRE_OPERATIONAL, node.node)
+    notes = set_communication(node)
+    mode = servo.motion_mode
+    modes = supported_modes(node, servo, mode)
+    watches = None if watch.hardware else servo.host_loss
+    options = set_options(node, merged(servo.options, watch.options), watch.brake, watches)
+    scale = read_scale(node, servo)
+    tpdo, rpdo = codecs(node, servo.tpdo), codecs(node, servo.rpdo)
+    set_up(node, "tpdo", tpdo)
+    set_up(node, "rpdo", rpdo)
+    cycle = set_cycle(node, watch.cycle)
+    host.set_up()
+    on_error = _set_error_behaviour(node)
+    limits = set_limits(node, scale, watch.limits)
+    change_mode(node, mode, clock)
+    if watch.acceleration and not MODES[mode].cyclic:
+        # The drive's own ramps must not come in the way of those that the host makes.
+        set_profile(node, servo, scale, acceleration=watch.acceleration)
+    node.bus.nmt(_START, node.node)
+    loss = host.reaction(None, options, seen=watch.seen_stopping)
+    stops = watch.stops_on_nmt
+    return Commissioned(
+        *(mode, modes, scale, tpdo, rpdo, options, limits, cycle, on_error),
+        host_loss=loss,
+        stops_on_nmt=stops,
+        notes=notes,
+    )
+
+
+def await_booted(
+    node: SdoNode, boot_time: float, clock: Clock, heartbeat: HeartbeatWatch | None = None
+) -> None:
+    """Ask for the device type until the drive has booted; raises NoReply.
+
+    A drive that somebody else has stopped by NMT answers no SDO: it is made pre-operational, which
+    enables nothing.
+    """
+    deadline = clock.now() + boot_time
+    while True:
+        try:
+            node.read(0x1000)
+        except NoReply as error:
+            if clock.now() >= deadline:
+                if heartbeat is not None and heartbeat.state == NmtState.STOPPED:
+                    raise NoReply(
+                        f"{node.place(0x1000)}: the drive is NMT stopped and does not leave this "
+                        "state on the command pre-operational; look for another NMT master, or "
+                        "switch the drive off and on"
+                    ) from error
+                raise
+            node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        else:
+            return
+
+
+def _set_error_behaviour(node: SdoNode) -> int | None:
+    """Have the drive leave operational when the host is gone (1029h:1 = 0).
+
+    Returns what it keeps: 0 pre-operational, 2 stopped, 1 no change where it takes nothing else,
+    None without such an object. Raises NoReply, DeviceRefused.
+    """
+    kept = node.read_if_there(0x1029, 1)
+    if kept == 1 and node.writes(0x1029, 1):
+        node.write(0x1029, 1, 0)
+        kept = node.read(0x1029, 1)
+    return kept
+
+
+def _bring_to_rest(node: SdoNode, servo: ServoSpec, clock: Clock) -> None:
+    """Stop a drive that another master has left enabled."""
+    deadline = clock.now() + _STOP_TIME
+    standstill: PolledStandstill | None = None
+    while True:
+        state = state_of(node.read(0x6041))
+        if state not in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+            return
+        node.write(0x6040, 0, QUICK_STOP)
+        standstill = standstill or PolledStandstill(node, servo, clock)
+        if standstill.poll() and state is State.QUICK_STOP_ACTIVE:
+            return
+        if clock.now() > deadline:
+            raise NotPermitted(
+                f"{node.place(0x6041)}: still {state} {_STOP_TIME:g} s after a quick stop; "
+                "use the emergency stop and look at the drive"
+            )
+        clock.sleep(_POLL)

@@ -1,0 +1,106 @@
+"""Limits that the drive itself keeps, the second barrier behind the bench's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite, nan
+
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.cia402.units import Scale
+from winchkit.errors import NotPermitted
+
+__all__ = ["DriveLimits", "LimitsAtShaft", "read_limits", "set_limits"]
+
+_U32_OFF = 0xFFFFFFFF
+_MS = 1e-3
+
+
+@dataclass(frozen=True)
+class LimitsAtShaft:
+    """Limits at the motor shaft; what is None leaves the drive's own alone."""
+
+    angle: tuple[float, float] | None = None
+    """Lowest and highest motor angle (607Dh), rad."""
+    following_error: float | None = None
+    """6065h, rad."""
+    following_time: float | None = None
+    """6066h, s."""
+    torque: float | None = None
+    """Greatest of either sign (6072h), N m."""
+    torque_positive: float | None = None
+    """60E0h, N m."""
+    torque_negative: float | None = None
+    """60E1h, as a positive number, N m."""
+    speed: float | None = None
+    """Of profile modes (607Fh), rad/s."""
+
+
+@dataclass(frozen=True)
+class DriveLimits:
+    """What a drive keeps, SI at the motor shaft; NaN where it has no such object or no limit."""
+
+    angle: tuple[float, float] = (nan, nan)
+    following_error: float = nan
+    following_time: float = nan
+    torque: float = nan
+    torque_positive: float = nan
+    torque_negative: float = nan
+    speed: float = nan
+
+
+def set_limits(node: SdoNode, scale: Scale, wanted: LimitsAtShaft) -> DriveLimits:
+    """Write the limits that are given and read all of them back.
+
+    Raises NotPermitted for a limit that the drive has no object for, DeviceRefused for one that
+    it does not keep, NoReply.
+    """
+    for index, sub, counts in _counts(scale, wanted):
+        if node.read_if_there(index, sub) is None:
+            raise NotPermitted(
+                f"{node.place(index, sub)}: the drive has no such limit; leave it to the bench's"
+            )
+        node.write_verified(index, sub, counts)
+    return read_limits(node, scale)
+
+
+def read_limits(node: SdoNode, scale: Scale) -> DriveLimits:
+    """The limits as the drive has them; raises NoReply, DeviceRefused."""
+
+    def value(index: int, sub: int, unit: float, none: int | None = None) -> float:
+        counts = node.read_if_there(index, sub)
+        return nan if counts is None or counts == none else counts * unit
+
+    low, high = value(0x607D, 1, scale.angle), value(0x607D, 2, scale.angle)
+    return DriveLimits(
+        angle=(low, high) if low < high else (nan, nan),
+        following_error=value(0x6065, 0, scale.angle, _U32_OFF),
+        following_time=value(0x6066, 0, _MS),
+        torque=value(0x6072, 0, scale.torque),
+        torque_positive=value(0x60E0, 0, scale.torque),
+        torque_negative=value(0x60E1, 0, scale.torque),
+        speed=value(0x607F, 0, scale.velocity, _U32_OFF),
+    )
+
+
+def _counts(scale: Scale, wanted: LimitsAtShaft) -> Iterator[tuple[int, int, int]]:
+    """Index, sub-index and counts of everything that is to be written."""
+    if wanted.angle is not None:
+        low, high = sorted(wanted.angle)
+        if not (isfinite(low) and isfinite(high) and low < high):
+            raise NotPermitted(f"motor angles {low:g} to {high:g} rad are no limits")
+        yield 0x607D, 1, scale.angle_counts(low)
+        yield 0x607D, 2, scale.angle_counts(high)
+    if wanted.following_error is not None:
+        yield 0x6065, 0, scale.angle_counts(wanted.following_error)
+    if wanted.following_time is not None:
+        yield 0x6066, 0, round(wanted.following_time / _MS)
+    for index, torque in (
+        (0x6072, wanted.torque),
+        (0x60E0, wanted.torque_positive),
+        (0x60E1, wanted.torque_negative),
+    ):
+        if torque is not None:
+            yield index, 0, scale.torque_counts(torque)
+    if wanted.speed is not None:
+        yield 0x607F, 0, scale.velocity_counts(wanted.speed)

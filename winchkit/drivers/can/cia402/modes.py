@@ -1,0 +1,149 @@
+"""Modes of operation of CiA 402-2 as a table: numbers, targets, and what their own bits mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from winchkit.drivers.can.cia402.state_machine import StatusBit
+
+__all__ = [
+    "ACCELERATION",
+    "AT_ONCE",
+    "MODES",
+    "START",
+    "TARGETS",
+    "Homing",
+    "OperationMode",
+    "Target",
+    "homing_state",
+    "mode_named",
+    "modes_of",
+    "status_words",
+]
+
+Key = tuple[int, int]
+
+START = 1 << 4
+"""Control bit 4: new set-point in PP, start in HM, follow in IP."""
+AT_ONCE = 1 << 5
+"""Control bit 5 in PP: do not finish the move under way first."""
+ACCELERATION = (0x6083, 0x6084)
+
+_REACHED, _LIMIT = StatusBit.TARGET_REACHED, StatusBit.INTERNAL_LIMIT
+_BIT_12, _BIT_13 = 1 << 12, 1 << 13
+
+
+class Target(Enum):
+    """What kind of target a mode follows."""
+
+    ANGLE = "angle"
+    VELOCITY = "velocity"
+    TORQUE = "torque"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class OperationMode:
+    """A row of the table."""
+
+    name: str
+    number: int
+    """Of 6060h and 6061h."""
+    bit: int
+    """Of 6502h."""
+    kind: Target
+    target: Key | None
+    """The object that its target is written to."""
+    cyclic: bool
+    """Whether it takes a target every SYNC and interpolates by 60C2h."""
+    bits: Mapping[int, str]
+    """Status bits 10, 12 and 13 in words, by mask."""
+
+    @property
+    def moves_alone(self) -> bool:
+        """Whether the drive goes on to a goal of its own, whatever the host sends next."""
+        return self.name in ("PP", "HM")
+
+    @property
+    def can_run_down(self) -> bool:
+        """Whether it can be ramped to rest while it stays enabled; no torque holds a load."""
+        return self.kind is not Target.TORQUE
+
+
+def _row(
+    name: str, number: int, kind: Target, target: Key | None, *bits: str, cyclic: bool = False
+) -> OperationMode:
+    masks = (_REACHED, _BIT_12, _BIT_13)
+    words = {int(mask): word for mask, word in zip(masks, bits, strict=True) if word}
+    return OperationMode(name, number, number - 1, kind, target, cyclic, words)
+
+
+_FOLLOWS, _ERROR = "follows the command", "following error"
+_ROWS = (
+    _row("PP", 1, Target.ANGLE, (0x607A, 0), "target reached", "set-point acknowledged", _ERROR),
+    _row("PV", 3, Target.VELOCITY, (0x60FF, 0), "target reached", "speed zero", "slipping"),
+    _row("PT", 4, Target.TORQUE, (0x6071, 0), "target reached", "", ""),
+    _row("HM", 6, Target.NONE, None, "target reached", "homing attained", "homing error"),
+    _row("IP", 7, Target.ANGLE, (0x60C1, 1), "target reached", "following", "", cyclic=True),
+    _row("CSP", 8, Target.ANGLE, (0x607A, 0), "", _FOLLOWS, _ERROR, cyclic=True),
+    _row("CSV", 9, Target.VELOCITY, (0x60FF, 0), "", _FOLLOWS, "", cyclic=True),
+    _row("CST", 10, Target.TORQUE, (0x6071, 0), "", _FOLLOWS, "", cyclic=True),
+)
+
+MODES: dict[str, OperationMode] = {row.name: row for row in _ROWS}
+TARGETS: tuple[Key, ...] = tuple(dict.fromkeys(row.target for row in _ROWS if row.target))
+"""Every object that some mode takes its target from."""
+
+
+def modes_of(supported: int) -> tuple[str, ...]:
+    """Names of the modes in 6502h."""
+    return tuple(row.name for row in _ROWS if supported & 1 << row.bit)
+
+
+def mode_named(number: int) -> str:
+    """How messages call a value of 6061h."""
+    return next((row.name for row in _ROWS if row.number == number), f"mode {number}")
+
+
+def status_words(mode: str, status: int) -> tuple[str, ...]:
+    """The bits of a status word that are set beside the state, in words, for a mode."""
+    common = {
+        int(StatusBit.WARNING): "warning",
+        int(_LIMIT): "internal limit active",
+    }
+    meaning = common | dict(MODES[mode].bits)
+    return tuple(word for mask, word in meaning.items() if status & mask)
+
+
+class Homing(Enum):
+    """How far a homing is, by status bits 13, 12 and 10."""
+
+    RUNNING = "running"
+    INTERRUPTED = "interrupted or not started"
+    ATTAINED = "attained, still moving"
+    DONE = "done"
+    FAILED_MOVING = "failed, still moving"
+    FAILED = "failed"
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended, well or not."""
+        return self in (Homing.DONE, Homing.FAILED)
+
+
+_HOMING = {
+    (False, False, False): Homing.RUNNING,
+    (False, False, True): Homing.INTERRUPTED,
+    (False, True, False): Homing.ATTAINED,
+    (False, True, True): Homing.DONE,
+    (True, False, False): Homing.FAILED_MOVING,
+    (True, False, True): Homing.FAILED,
+}
+
+
+def homing_state(status: int) -> Homing:
+    """State of a homing in the mode HM; a reserved pattern of the bits counts as failed."""
+    bits = (bool(status & _BIT_13), bool(status & _BIT_12), bool(status & _REACHED))
+    return _HOMING.get(bits, Homing.FAILED)

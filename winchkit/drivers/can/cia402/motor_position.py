@@ -1,0 +1,49 @@
+"""What an axis remembers of its motor's position: turns counted, and whether it stands still."""
+
+from __future__ import annotations
+
+from winchkit.drivers.can.cia402.commission import Commissioned
+from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
+from winchkit.drivers.can.cia402.position_counter import PositionCounter
+from winchkit.drivers.can.cia402.standstill import Standstill
+from winchkit.schema.devices.servo import ServoSpec
+
+__all__ = ["MotorPosition"]
+
+
+class MotorPosition:
+    """One axis's; it outlives every commissioning, so that crossings of the counter's end count."""
+
+    def __init__(self, servo: ServoSpec, fastest: float = 0.0) -> None:
+        """Take the greatest speed of the motor, rad/s; 0 where it is not known."""
+        self._wraps, self._fastest = servo.position_wraps, fastest
+        self.counter: PositionCounter | None = None
+        """Of its 6064h; None before it is commissioned."""
+        self._standstill: Standstill | None = None
+        self._boot_ups = 0
+
+    def begin(self, drive: Commissioned, boot_ups: int) -> PositionCounter:
+        """The counter of a drive that has been set up; after a boot-up it has begun anew."""
+        counter = self.counter
+        if counter is None:
+            low, high = self._wraps or counter_range(drive.tpdo)
+            counter = PositionCounter(low, high, self._fastest / drive.scale.angle)
+        counter.restart(forgotten=boot_ups != self._boot_ups)
+        self.counter, self._boot_ups = counter, boot_ups
+        self._standstill = Standstill(drive.scale)
+        return counter
+
+    def at_rest(self, seen: AxisFeedback | None) -> bool:
+        """Whether the newest feedback says that the motor stands still."""
+        if seen is None or self._standstill is None:
+            return False
+        return self._standstill.take(seen.time, seen.angle, seen.velocity)
+
+    def changed_mode(self, before: str, mode: str, *, homed: bool) -> None:
+        """While it homes, the drive's count jumps to the new zero: it is taken as it is."""
+        if self.counter is None or before == mode:
+            return
+        if mode == "HM":
+            self.counter.suspend()
+        elif before == "HM":
+            self.counter.resume(homed=homed)

@@ -1,0 +1,121 @@
+"""Speeds and ramps that a drive makes itself, in profile modes and homing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo import parse_object
+from winchkit.drivers.can.cia402.units import Scale
+from winchkit.errors import NotPermitted
+from winchkit.schema.devices.servo import ServoSpec
+
+__all__ = ["HERE", "HomingSpec", "check_homing", "set_homing", "set_profile"]
+
+_RAMP_SPEED = 3000 * 2 * pi / 60
+"""Speed that a ramp declared as a time reaches from standstill, rad/s."""
+_MS = 1e-3
+METHODS = range(-128, 128)
+HERE = (37, 35)
+"""Methods that take the present position for the zero: the present number and the old one."""
+_INSTEAD = {
+    0x6098: "it cannot home; set reference.motor_angle in the winch's profile",
+    0x6099: "use method 37, or a method of the drive's own tools",
+}
+"""What to do without an object."""
+_NO_OFFSET = (
+    "home without a length (`winchkit home --method`) and set reference.motor_angle in the winch's "
+    "profile, or name the maker's object as home_offset in the device file"
+)
+
+
+@dataclass(frozen=True)
+class HomingSpec:
+    """How a drive finds its zero; SI at the motor shaft."""
+
+    method: int
+    """6098h, e.g. 17 and 18 for the limit switches, 33 and 34 for the index, 37 for "here"."""
+    fast: float
+    """Speed on the way to the switch, rad/s."""
+    slow: float
+    """Speed on the way to the zero, rad/s."""
+    acceleration: float
+    """rad/s^2."""
+    offset: float = 0.0
+    """Motor angle that the zero position gets (607Ch), rad."""
+
+
+def set_profile(
+    node: SdoNode,
+    servo: ServoSpec,
+    scale: Scale,
+    *,
+    speed: float | None = None,
+    acceleration: float | None = None,
+) -> None:
+    """Set speed (6081h, rad/s) and ramps (6083h, 6084h, rad/s^2) of the profile modes.
+
+    Raises NotPermitted, NoReply, DeviceRefused.
+    """
+    if speed is not None:
+        node.write_verified(0x6081, 0, scale.velocity_counts(_positive(speed, "speed", "rad/s")))
+    if acceleration is not None:
+        counts = _ramp(servo, scale, acceleration)
+        for index in (0x6083, 0x6084):
+            if node.read_if_there(index) is not None:
+                node.write_verified(index, 0, counts)
+
+
+def check_homing(node: SdoNode, servo: ServoSpec, homing: HomingSpec, *, defines: bool) -> None:
+    """Read every object that a homing needs, before anything is written or moves.
+
+    ``defines`` says that the zero is to get a position (the home offset). Raises NotPermitted
+    naming what the drive lacks, NoReply, DeviceRefused.
+    """
+    if homing.method not in METHODS:
+        raise NotPermitted(f"{node.place(0x6098)}: there is no homing method {homing.method}")
+    needed = [(0x6098, 0)]
+    if homing.method not in HERE:
+        needed += [(0x6099, 1), (0x6099, 2)]
+    if homing.offset or defines:
+        needed.append(parse_object(servo.home_offset))
+    for index, sub in needed:
+        if node.read_if_there(index, sub) is None:
+            raise NotPermitted(
+                f"{node.place(index, sub)}: the drive has no such object, which this homing needs; "
+                f"{_INSTEAD.get(index, _NO_OFFSET)}"
+            )
+
+
+def set_homing(node: SdoNode, servo: ServoSpec, scale: Scale, homing: HomingSpec) -> None:
+    """Write a homing's parameters and read them back.
+
+    Speeds and the acceleration (609Ah) are left out where the drive has none and the method needs
+    none. Raises NotPermitted, NoReply, DeviceRefused (a method that the drive lacks).
+    """
+    check_homing(node, servo, homing, defines=False)
+    node.write_verified(0x6098, 0, homing.method)
+    for sub, speed in ((1, homing.fast), (2, homing.slow)):
+        counts = scale.velocity_counts(_positive(speed, "homing speed", "rad/s"))
+        if node.read_if_there(0x6099, sub) is not None:
+            node.write_verified(0x6099, sub, counts)
+    if node.read_if_there(0x609A) is not None:
+        node.write_verified(0x609A, 0, _ramp(servo, scale, homing.acceleration))
+    home_offset = parse_object(servo.home_offset)
+    if node.read_if_there(*home_offset) is not None:
+        node.write_verified(*home_offset, scale.angle_counts(homing.offset))
+
+
+def _ramp(servo: ServoSpec, scale: Scale, acceleration: float) -> int:
+    """Counts of an acceleration, or of the time that a drive wants instead; never none."""
+    _positive(acceleration, "acceleration", "rad/s^2")
+    if servo.quirks.ramps_are_times:
+        return max(1, round(_RAMP_SPEED / acceleration / _MS))
+    return max(1, round(acceleration / scale.velocity))
+
+
+def _positive(value: float, name: str, unit: str) -> float:
+    if not value > 0:
+        raise NotPermitted(f"motor {name} {value:g} {unit} is not above zero")
+    return value

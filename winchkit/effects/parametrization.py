@@ -1,0 +1,166 @@
+"""The numbers in which an effect is fitted: near one in size, zero where it vanishes.
+
+Amplitudes are fitted as (value − null)/scale, stiffnesses as compliances, an amplitude with its
+phase as a cosine and a sine amplitude, shapes that are positive by their logarithm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import atan2, cos, exp, hypot, inf, log, sin
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.effects.effect import Effect, Parameter
+
+__all__ = ["Coordinates"]
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Between an effect's values as files have them and a vector to fit."""
+
+    effect: Effect
+
+    @cached_property
+    def _polar(self) -> tuple[str, ...]:
+        return self.effect.polar or ()
+
+    @cached_property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """Parameters that make it larger or smaller; an amplitude and its phase count as two."""
+        return tuple(
+            p for p in self.effect.parameters if p.role == "amplitude" or p.name in self._polar
+        )
+
+    @cached_property
+    def shapes(self) -> tuple[Parameter, ...]:
+        """Parameters that say how it looks and are refined by a fit."""
+        return tuple(
+            p
+            for p in self.effect.parameters
+            if p.role == "shape" and not p.whole and p.name not in self._polar
+        )
+
+    @cached_property
+    def _fitted(self) -> tuple[Parameter, ...]:
+        return self.amplitudes + self.shapes
+
+    def __len__(self) -> int:
+        return len(self._fitted)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters in the order of the vector."""
+        return tuple(p.name for p in self._fitted)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom, a scanned order included."""
+        return len(self) + sum(p.whole for p in self.effect.parameters)
+
+    def vector(self, values: Mapping[str, float]) -> Array:
+        """Coordinates of values, shape (len,)."""
+        out = [_to_coordinate(p, values[p.name]) for p in self._fitted]
+        if self._polar:
+            size, phase = (values[name] for name in self._polar)
+            scale = self.effect.parameter(self._polar[0]).typical
+            for index, parameter in enumerate(self._fitted):
+                if parameter.name == self._polar[0]:
+                    out[index] = size * cos(phase) / scale
+                elif parameter.name == self._polar[1]:
+                    out[index] = size * sin(phase) / scale
+        return np.array(out)
+
+    def values(self, vector: Array, base: Mapping[str, float]) -> dict[str, float]:
+        """Values at coordinates; what is not fitted comes from ``base``."""
+        out = dict(base)
+        at = {p.name: float(x) for p, x in zip(self._fitted, vector, strict=True)}
+        for parameter in self._fitted:
+            if parameter.name not in self._polar:
+                out[parameter.name] = _to_value(parameter, at[parameter.name])
+        if self._polar:
+            size, phase = self._polar
+            scale = self.effect.parameter(size).typical
+            out[size] = min(scale * hypot(at[size], at[phase]), self.effect.parameter(size).high)
+            out[phase] = atan2(at[phase], at[size])
+        return out
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper coordinates, each of shape (len,)."""
+        low, high = [], []
+        for parameter in self._fitted:
+            if parameter.name in self._polar:
+                ends = [-inf, inf]
+            else:
+                ends = sorted(_to_coordinate(parameter, x) for x in (parameter.low, parameter.high))
+            low.append(ends[0])
+            high.append(ends[1])
+        return np.array(low), np.array(high)
+
+    def deviations(self, vector: Array, std: Array, base: Mapping[str, float]) -> dict[str, float]:
+        """Standard deviations of values from those of coordinates, by the delta method.
+
+        To the side that moves a value more: at a bound it can move one way only.
+        """
+        here, out = self.values(vector, base), {p.name: 0.0 for p in self._fitted}
+        for index, step in enumerate(std):
+            sides = []
+            for nudge in (1e-3 * step, -1e-3 * step):
+                moved = vector.copy()
+                moved[index] += nudge
+                sides.append(self.values(moved, base))
+            for name, so_far in out.items():
+                change = max(abs(side[name] - here[name]) for side in sides) / 1e-3
+                out[name] = hypot(so_far, change)
+        return out
+
+    def grid(self) -> list[dict[str, float]]:
+        """Combinations of coarse shape values to score at; at least the default."""
+        shaped = [
+            p
+            for p in self.effect.parameters
+            if p.role == "shape" and p.grid and p.name not in self._polar
+        ]
+        combinations = product(*(p.grid for p in shaped))
+        return [dict(zip((p.name for p in shaped), point, strict=True)) for point in combinations]
+
+    def secants(self) -> list[dict[str, float]]:
+        """Values of a usual size, one set per column of the effect's signature."""
+        if self.effect.probes:
+            return [dict(probe) for probe in self.effect.probes]
+        out: list[dict[str, float]] = []
+        for parameter in self.amplitudes:
+            if not self._polar or parameter.name not in self._polar:
+                out.append({parameter.name: parameter.typical})
+        if self._polar:
+            size, phase = self._polar
+            typical = self.effect.parameter(size).typical
+            out += [{size: typical, phase: 0.0}, {size: typical, phase: np.pi / 2}]
+        return out
+
+
+def _scale(parameter: Parameter) -> float:
+    return abs(parameter.typical - parameter.null) or 1.0
+
+
+def _to_coordinate(parameter: Parameter, value: float) -> float:
+    if parameter.reciprocal:
+        return parameter.typical / value if value else inf
+    if parameter.role == "shape" and parameter.low > 0:
+        return log(value / parameter.typical) if value < inf else inf
+    return (value - parameter.null) / _scale(parameter)
+
+
+def _to_value(parameter: Parameter, x: float) -> float:
+    if parameter.reciprocal:
+        value = parameter.typical / x if x else inf
+    elif parameter.role == "shape" and parameter.low > 0:
+        value = parameter.typical * exp(min(x, 700.0))
+    else:
+        value = parameter.null + x * _scale(parameter)
+    return min(max(value, parameter.low), parameter.high)

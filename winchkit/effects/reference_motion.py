@@ -1,0 +1,81 @@
+"""The standard motion: one winch and one run on which every effect of the catalogue can show.
+
+Two strokes, a fast and a slow one, are driven under a light and then a heavy load while it
+grows warmer; cards draw an effect's signature on it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.model.line import GRAVITY, Line, Motion
+from winchkit.model.stages import Signals
+from winchkit.model.trajectory import plan
+from winchkit.schema.profiles.winch import (
+    CableSpec,
+    DrumSpec,
+    GearboxSpec,
+    GuideSpec,
+    PathSpec,
+    PulleySpec,
+    ReferenceSpec,
+    WinchProfile,
+)
+
+__all__ = ["STANDARD_PROFILE", "standard_motion"]
+
+
+STANDARD_PROFILE = WinchProfile(
+    name="standard",
+    drum=DrumSpec(kind="spiral", winding_radius=0.06),
+    gearbox=GearboxSpec(ratio=20.4),
+    reference=ReferenceSpec(cable_length=6.0, wound_turns=4.3),
+    cable=CableSpec(diameter=0.006, dead_length=1.5),
+    path=PathSpec(inclination=pi / 3),
+    guide=GuideSpec(screw_lead=0.006),
+    pulley=(PulleySpec(0.04, pi / 2), PulleySpec(0.04, pi)),
+)
+_STEP = 0.02
+_STROKE = 3.0
+_HOLD = 4.0
+_SPEEDS = 0.5, 0.12
+_MASSES = 15.0, 45.0
+_WARM_FROM, _WARM_TO = 18.0, 26.0
+
+
+@cache
+def standard_motion() -> Motion:
+    """The nominal line along the standard motion, sampled at 50 Hz."""
+    length, mass = _ride()
+    line = Line(STANDARD_PROFILE)
+    time: Array = _STEP * np.arange(len(length), dtype=np.float64)
+    unique, place = np.unique(length, return_inverse=True)
+    angle = np.array([line.motor_angle(x) for x in unique.tolist()])[place]
+    acceleration = np.gradient(np.gradient(length, time), time)
+    return line.motion(
+        Signals(
+            time=time,
+            motor_angle=angle,
+            load=mass * (GRAVITY - acceleration),
+            temperature=np.linspace(_WARM_FROM, _WARM_TO, len(time)),
+        )
+    )
+
+
+def _ride() -> tuple[Array, Array]:
+    """Cable length and hanging mass, sample by sample; the mass changes while the winch holds."""
+    pieces: list[Array] = []
+    here = STANDARD_PROFILE.reference.cable_length or 0.0
+    for speed in _SPEEDS:
+        for distance in (-_STROKE, _STROKE):
+            move = plan(distance, speed, 0.5, 5.0)
+            pieces.append(here + move.at(np.arange(0.0, move.duration + _HOLD, _STEP))[0])
+            here += distance
+    once = np.concatenate(pieces)
+    samples = np.arange(2 * len(once)) - len(once)
+    mass = np.interp(samples * _STEP, [-_HOLD / 2, 0.0], _MASSES)
+    return np.tile(once, 2), mass

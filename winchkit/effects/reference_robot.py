@@ -1,0 +1,89 @@
+"""The standard robot: eight lines in a cube, and poses on which every effect of a robot shows."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import product
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.effects.bind import Term
+from winchkit.effects.bind_robot import robot_with_terms
+from winchkit.effects.effect import Effect
+from winchkit.effects.placement import at_line
+from winchkit.model.robot import Pose, Robot, approximate_forces, robot_of, rotation_of
+from winchkit.schema.profiles.robot import HomeSpec, LineSpec, PlatformSpec, RobotProfile
+from winchkit.schema.profiles.winch import (
+    CableSpec,
+    DrumSpec,
+    GearboxSpec,
+    ReferenceSpec,
+    WinchProfile,
+)
+
+__all__ = ["STANDARD_ROBOT", "robot_changes", "standard_poses"]
+
+_POSES = 120
+_MIDDLE = 40.0
+_WINCH = WinchProfile(
+    name="standard",
+    drum=DrumSpec(kind="spiral", winding_radius=0.06),
+    gearbox=GearboxSpec(ratio=20.4),
+    reference=ReferenceSpec(wound_turns=4.3),
+    cable=CableSpec(diameter=0.001),
+)
+_CORNERS = tuple(product((0.0, 1.0), repeat=3))
+STANDARD_ROBOT = RobotProfile(
+    name="standard",
+    home=HomeSpec((0.5, 0.5, 0.5)),
+    platform=PlatformSpec(mass=3.0),
+    line=tuple(
+        LineSpec(
+            name=str(number),
+            exit_point=(x, y, z),
+            anchor_point=(0.1 * (y - 0.5), 0.1 * (x - 0.5), 0.16 * (0.5 - z)),
+            swivel_radius=0.0086,
+            swivel_axis=(0.0, 0.0, 1.0 if z else -1.0),
+            winch=_WINCH,
+        )
+        for number, (x, y, z) in enumerate(_CORNERS, start=1)
+    ),
+)
+"""A metre each way, ropes from every corner."""
+
+
+def standard_poses() -> Pose:
+    """Poses along a closed path through the cube, turning as they go."""
+    at = np.linspace(0.0, 2 * np.pi, _POSES)
+    place = 0.5 + 0.25 * np.stack([np.sin(at), np.sin(2 * at + 0.6), np.cos(3 * at)], axis=1)
+    turned = rotation_of(0.15 * np.sin(2 * at), 0.15 * np.cos(at), 0.2 * np.sin(3 * at + 1.0))
+    return Pose(place, turned)
+
+
+def robot_changes(effect: Effect, values: dict[str, float]) -> tuple[Array, dict[str, Array]]:
+    """Length of line 1 along the standard poses, and what an effect there changes, (p,), SI.
+
+    A length's change is what the rope by the drum gains against the rope by geometry; a
+    tension's, what the forces gain that balance the weight nearest to 40 N.
+    """
+    there = at_line(effect, "1") if "one" in effect.on_robot else effect
+    bare = _shown(_bare())
+    changed = _shown(robot_with_terms(STANDARD_ROBOT, [Term(there, values)]))
+    moved = {name: changed[name] - bare[name] for name in bare}
+    length = _bare().lengths(standard_poses())[:, 0]
+    return length, {name: change for name, change in moved.items() if np.any(change != 0)}
+
+
+@cache
+def _bare() -> Robot:
+    return robot_of(STANDARD_ROBOT)
+
+
+def _shown(robot: Robot) -> dict[str, Array]:
+    pose, bare = standard_poses(), _bare()
+    force = approximate_forces(
+        bare.structure(pose), robot.weight(pose), np.full(len(robot.names), _MIDDLE)
+    )
+    by_drum = robot.lengths_at(bare.motor_angles(pose), force)
+    return {"cable_length": (by_drum - robot.lengths(pose))[:, 0], "tension": force[:, 0]}

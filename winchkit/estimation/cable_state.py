@@ -1,0 +1,188 @@
+"""The rope sample by sample: true length and tension from what a winch measures, for control.
+
+The effects of a profile are functions of whole runs. Here each is handed two samples, the last and
+the new one; what has a memory begins in the state that the sample before left (``Effect.carry``).
+So every formula stands once, and the two agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from math import exp, isfinite, isnan, nan
+from typing import Any
+
+import numpy as np
+
+from winchkit.effects.bind import Term, act, modifiers_of
+from winchkit.model.line import Line
+from winchkit.model.stages import At, Modifier, Stage
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["RopeNow", "RopeState", "Sample"]
+
+_CALMING = 0.2
+"""Of the tension on its way to strains and friction, s: well below a load's swing on its rope."""
+_HELD = 3e-3
+"""Share of the tension that must change before it counts: a loop of friction forgets in noise."""
+_SHORTEST = 1e-4
+"""Of a step in time, s."""
+_JUMP = 1.0
+"""Motor angle that its speed does not explain: a new zero and no motion, rad."""
+_USUAL = 20.0
+"""Temperature where none is measured, at which every thermal effect vanishes, degrees Celsius."""
+_GOOD = 1e-3
+"""Of the cell's reading, to which the tension is solved, N."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What a winch measures at one moment; SI, NaN where it has no instrument."""
+
+    time: float
+    motor_angle: float
+    motor_rate: float
+    cell: float = nan
+    load: float = nan
+    temperature: float = nan
+
+
+@dataclass(frozen=True, slots=True)
+class RopeState:
+    """What follows from it."""
+
+    length: float
+    """True cable length, m."""
+    tension: float
+    """In the rope at the platform end, calmed; where nothing measures it the last known, N."""
+    correction: float
+    """Of the cell: tension at the platform end less its reading, N; 0 where that is not used."""
+
+
+@dataclass
+class _Carried:
+    """A term and the state of its memory, by pulley."""
+
+    term: Term
+    start: dict[int, float] = field(default_factory=dict)
+    end: dict[int, float] = field(default_factory=dict)
+
+    def modifier(self) -> Modifier:
+        return Modifier(self.term.effect.stage, self._apply, self.term.effect.order)
+
+    def _apply(self, value: Any, at: At) -> Any:
+        effect, values = self.term.effect, self.term.values
+        if effect.carry is None:
+            return act(effect, values, value, at)
+        begun = self.start.get(at.pulley, effect.rested)
+        values = {**values, "start": begun}
+        after = act(effect, values, value, at)
+        self.end[at.pulley] = effect.carry(after, value, at, values)
+        return after
+
+    def go_on(self) -> None:
+        """What it ended in is what follows begins with."""
+        self.start.update(self.end)
+
+
+def _on_length(term: Term) -> bool:
+    return term.effect.stage <= Stage.FRAME
+
+
+class RopeNow:
+    """The line of a profile, one sample after the other."""
+
+    def __init__(
+        self, profile: WinchProfile, terms: Iterable[Term], weight: float | None = None
+    ) -> None:
+        """Take the terms of a profile; ``weight`` (N) hangs where no instrument tells."""
+        used = [term for term in terms if not term.effect.not_in_control]
+        self.at_rest = Line(profile, modifiers_of(t for t in used if not t.effect.memory))
+        """Without what has a memory, for planning."""
+        self.yields = any(
+            _on_length(t) and (t.effect.memory or t.effect.stage >= Stage.ROPE) for t in used
+        )
+        """Whether the length depends on more than the motor angle."""
+        self._carried = [_Carried(term) for term in used]
+        self._line = Line(profile, tuple(item.modifier() for item in self._carried))
+        self._on_tension = any(Stage.ROPE_WEIGHT <= t.effect.stage <= Stage.CELL for t in used)
+        self.trivial = not (self.yields or self._on_tension)
+        """Whether ``at_rest`` says all that there is to say."""
+        self._weight = weight or 0.0
+        self._last: Sample | None = None
+        self._calm = self._reading = nan
+        self._tension = nan
+
+    def update(self, sample: Sample) -> RopeState:
+        """Take the next sample; those with a motor angle that is not finite are not for here."""
+        before = self._before(sample)
+        step = max(sample.time - before.time, _SHORTEST)
+        measured = sample.load if isfinite(sample.load) else sample.cell
+        reading = self._calmed(measured, step)
+        last = self._tension if isfinite(self._tension) else nan
+        correction = 0.0
+        if isnan(reading):
+            tension = self._weight
+        elif isfinite(sample.load) or not self._on_tension:
+            tension = reading
+        else:
+            tension = self._at_platform(self._moments(before, sample, step, last, reading), reading)
+            correction = tension - reading
+        at = self._moments(before, sample, step, last, tension)
+        length = float(self._line.lengths(at)[-1])
+        for item in self._carried:
+            item.go_on()
+        self._last, self._tension, self._reading = sample, tension, reading
+        return RopeState(length, tension, correction)
+
+    def _before(self, sample: Sample) -> Sample:
+        """The sample before; where the motor angle jumped without motion, a new beginning."""
+        last = self._last
+        if last is None:
+            return sample
+        turned = (sample.time - last.time) * (sample.motor_rate + last.motor_rate) / 2
+        missing = abs(sample.motor_angle - last.motor_angle - turned)
+        if missing <= _JUMP + abs(turned):
+            return last
+        return Sample(last.time, sample.motor_angle, sample.motor_rate)
+
+    def _calmed(self, measured: float, step: float) -> float:
+        """The reading without its noise, which stays where it is until it really changes."""
+        if not isfinite(measured):
+            return self._reading
+        if isnan(self._calm):
+            self._calm = measured
+            return measured
+        self._calm += (measured - self._calm) * (1 - exp(-step / _CALMING))
+        moved = abs(self._calm - self._reading) > _HELD * abs(self._calm)
+        return self._calm if moved or isnan(self._reading) else self._reading
+
+    def _at_platform(self, at: At, reading: float) -> float:
+        """Tension at the platform end under which the cell shows ``reading``, by two secants."""
+        begun = isfinite(self._tension) and isfinite(self._reading)
+        guess = self._tension + reading - self._reading if begun else reading
+        shown = self._shown(at, guess)
+        miss = reading - shown
+        if abs(miss) < _GOOD:
+            return guess
+        slope = (self._shown(at, guess + miss) - shown) / miss
+        solved = guess + miss / slope if slope > 0 else guess + miss
+        self._shown(at, solved)
+        return solved
+
+    def _shown(self, at: At, load: float) -> float:
+        first = self._tension if isfinite(self._tension) else load
+        return float(self._line.readings(np.array([first, load]), at)[-1])
+
+    def _moments(
+        self, before: Sample, sample: Sample, step: float, last: float, tension: float
+    ) -> At:
+        first = tension if isnan(last) else last
+        warm = sample.temperature if isfinite(sample.temperature) else _USUAL
+        return self._line.moments(
+            np.array([0.0, step]),
+            np.array([before.motor_angle, sample.motor_angle]),
+            np.array([sample.motor_rate, sample.motor_rate]),
+            np.array([first, tension]),
+            np.array([warm, warm]),
+        )

@@ -1,0 +1,292 @@
+"""Friction, presliding stiffness and shape of pulley groups, with uncertainties, from runs.
+
+The runs hold both ends of the rope: the cell at the drum, and a cell or a known weight at the
+platform. What the estimator would have said about the platform is held against what was there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.errors import RunError, UsageError
+from winchkit.estimation.groups import PulleyGroup, flat_pulleys
+from winchkit.estimation.kernels import PLAIN, Kernels
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = [
+    "Identified",
+    "Record",
+    "correlation_time",
+    "covariance_of",
+    "identify_dahl",
+    "record_of",
+]
+
+_SINGULAR = 1e-10
+
+
+def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> Array:
+    """Covariance of least squares values, shape (p, p); residuals (n,), jacobian (n, p).
+
+    The variance is that of the residuals times the time over which they stay alike, in samples,
+    within each run of ``lengths``. NaN for values without any influence, and for those that only
+    a direction shared with others moves.
+    """
+    rows, columns = jacobian.shape
+    scale = np.sqrt(np.sum(jacobian**2, axis=0))
+    used = scale > 0
+    out = np.full((columns, columns), np.nan)
+    freedom = max(1, rows - int(np.count_nonzero(used)))
+    noise = float(np.sum(residuals**2)) / freedom * correlation_time(residuals, lengths)
+    _, singular, rotation = np.linalg.svd(jacobian[:, used] / scale[used], full_matrices=False)
+    known = singular > _SINGULAR * singular[:1].max(initial=0.0)
+    inverse = (rotation[known].T / singular[known] ** 2) @ rotation[known]
+    lost = np.any(np.abs(rotation[~known]) > np.sqrt(_SINGULAR), axis=0)
+    block = noise * inverse / np.outer(scale[used], scale[used])
+    block[lost, :] = block[:, lost] = np.nan
+    out[np.ix_(used, used)] = block
+    return out
+
+
+def correlation_time(residuals: Array, lengths: Sequence[int]) -> float:
+    """1 + 2 Σ ρ_k up to the first lag that is not positive, in samples, at least 1."""
+    parts = np.split(residuals, np.cumsum(lengths)[:-1])
+    size = max(len(part) for part in parts)
+    padded = 2 ** int(np.ceil(np.log2(2 * size)))
+    power = sum(np.abs(np.fft.rfft(part - part.mean(), padded)) ** 2 for part in parts if len(part))
+    covariance = np.fft.irfft(power, padded)[:size]
+    if not covariance[0] > 0:
+        return 1.0
+    rho = covariance[1:] / covariance[0]
+    end = np.flatnonzero(rho <= 0)
+    return float(1.0 + 2.0 * np.sum(rho[: end[0]] if end.size else rho))
+
+
+_LEAST_SAMPLES = 20
+_BOUNDS = ((1e-5, 0.5), (1.0, 1e8), (0.05, 4.0))
+"""Of μ, σ (N/m) and β."""
+_BEGINNINGS = 3
+"""To fit from for every group after the first."""
+_LENGTHS = (3e-4, 3e-3, 0.02, 0.1)
+"""Distances of presliding to begin with, as shares of the stroke."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """Both tensions of one run and the rope's motion; arrays (n,), finite."""
+
+    cell: Array
+    """At the drum, N."""
+    platform: Array
+    """At the other end, N."""
+    wound: Array
+    """Rope wound in, any origin, m."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Pulley groups as identified, ready for a :class:`~winchkit.estimation.DahlEstimator`."""
+
+    groups: tuple[PulleyGroup, ...]
+    """With the covariance of μ, σ and β; NaN where the runs do not tell them."""
+    residual_std: float
+    """What is left between estimate and measurement, N."""
+    starts: tuple[float, ...]
+    """Friction at the start of each run as a share of its limit, −1 to 1."""
+    samples: int
+    at_bound: tuple[str, ...] = ()
+    """Parameters that ended at a bound of what is searched; their std means little."""
+
+
+def record_of(run: Run, profile: WinchProfile) -> Record:
+    """Both tensions and the nominal line's motion of a run of one winch; rows with gaps left out.
+
+    Raises RunError without a cell (``tension``) or the platform's end (``load``, ``load_mass``).
+    """
+    load = run["load"] if "load" in run.channels else None
+    if load is None and run.load_mass is None:
+        raise RunError(
+            f"{run.path or run.name}: no tension at the platform is known; pulley friction needs "
+            "a column 'load [N]' or the metadata 'load_mass' beside 'tension [N]'"
+        )
+    motion = Line(profile).motion(
+        Signals(run.time, run["motor_angle"], load=load, load_mass=run.load_mass)
+    )
+    assert motion.load is not None
+    rows = np.column_stack([run["tension"], motion.load, -motion.at.free_length])
+    good = rows[np.isfinite(rows).all(axis=1)]
+    return Record(*(np.ascontiguousarray(column) for column in good.T))
+
+
+def identify_dahl(
+    records: Sequence[Record],
+    wraps: Sequence[Sequence[float]],
+    *,
+    shape: float | None = None,
+    kernels: Kernels = PLAIN,
+) -> Identified:
+    """Fit μ, σ and β of every pulley group; ``wraps`` of each group from the drum on, rad.
+
+    ``shape`` holds β at a value instead of fitting it. Least squares with analytic derivatives,
+    from the best of a few distances of presliding; how far friction was built up at the start of
+    a run is fitted beside. Raises UsageError without enough samples.
+    """
+    from scipy.optimize import least_squares
+
+    samples = sum(len(record.cell) for record in records)
+    if samples < _LEAST_SAMPLES or not wraps:
+        raise UsageError(
+            f"{samples} samples and {len(wraps)} pulley groups cannot be identified; give at "
+            f"least {_LEAST_SAMPLES} samples and one group"
+        )
+    problem = _Problem(tuple(records), tuple(tuple(group) for group in wraps), shape, kernels)
+    # Two groups of pulleys that swap their parts look nearly alike: one beginning is not enough.
+    begins = sorted(problem.beginnings(), key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
+    fits = [
+        least_squares(
+            problem.residuals, begin, jac=problem.slopes, bounds=problem.bounds, x_scale="jac"
+        )
+        for begin in begins[: _BEGINNINGS * len(wraps) - _BEGINNINGS + 1]
+    ]
+    return problem.answer(min(fits, key=lambda fit: float(fit.cost)).x)
+
+
+@dataclass
+class _Problem:
+    """Residuals and derivatives over (ln μ, ln σ, β) of every group and the start of every run."""
+
+    records: tuple[Record, ...]
+    wraps: tuple[tuple[float, ...], ...]
+    shape: float | None
+    kernels: Kernels
+    _last: tuple[bytes, Array, Array] | None = field(default=None, repr=False)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest values."""
+        ends = []
+        for end, share in ((0, -1.0), (1, 1.0)):
+            group = [np.log(_BOUNDS[0][end]), np.log(_BOUNDS[1][end]), _BOUNDS[2][end]]
+            ends.append(np.array(group * len(self.wraps) + [share] * len(self.records)))
+        return ends[0], ends[1]
+
+    def groups(self, x: Array) -> list[PulleyGroup]:
+        """Pulley groups at values."""
+        out = []
+        for wraps, part in zip(self.wraps, x[: 3 * len(self.wraps)].reshape(-1, 3), strict=True):
+            shape = float(part[2]) if self.shape is None else self.shape
+            out.append(PulleyGroup(wraps, float(np.exp(part[0])), float(np.exp(part[1])), shape))
+        return out
+
+    def beginnings(self) -> list[Array]:
+        """Values to begin with: friction from the spread of the ratio, several distances."""
+        ratio = np.concatenate([r.cell / r.platform for r in self.records])
+        force = float(np.median(np.concatenate([r.platform for r in self.records])))
+        stroke = max(float(np.ptp(record.wound)) for record in self.records)
+        pressure = sum(2 * abs(np.sin(wrap / 2)) for group in self.wraps for wrap in group)
+        lost = float(np.median(np.abs(ratio - 1.0)))
+        friction = float(np.clip(lost / max(pressure, 1e-9), 1e-4, 0.3))
+        out = []
+        for lengths in product(_LENGTHS, repeat=len(self.wraps)):
+            x: list[float] = []
+            for length in lengths:
+                stiffness = friction * force / max(length * stroke, 1e-9)
+                x += [np.log(friction), np.log(max(stiffness, 1.0)), self.shape or 1.0]
+            out.append(np.clip([*x, *[0.0] * len(self.records)], *self.bounds))
+        return out
+
+    def both(self, x: Array) -> tuple[Array, Array]:
+        """Residuals (n,), N, and their derivatives (n, p)."""
+        if self._last is None or self._last[0] != x.tobytes():
+            parts = [self._one(k, x) for k in range(len(self.records))]
+            residuals = np.concatenate([residual for residual, _ in parts])
+            self._last = (x.tobytes(), residuals, np.vstack([slope for _, slope in parts]))
+        return self._last[1], self._last[2]
+
+    def residuals(self, x: Array) -> Array:
+        """Estimate less measurement, N, shape (n,)."""
+        return self.both(x)[0]
+
+    def slopes(self, x: Array) -> Array:
+        """Derivatives of the residuals, shape (n, p)."""
+        return self.both(x)[1]
+
+    def _one(self, index: int, x: Array) -> tuple[Array, Array]:
+        """Residuals and derivatives of one run."""
+        record, groups, array = self.records[index], self.groups(x), self.kernels.array
+        width, share = 3 * len(groups), float(x[3 * len(groups) + index])
+        pulleys, state = flat_pulleys(groups), []
+        for group in groups:
+            for wrap in group.wraps:
+                limit = group.friction * abs(record.cell[0]) * 2 * abs(np.sin(wrap / 2))
+                state += [share * limit, share * limit / group.friction, 0.0, 0.0, limit]
+        plain = self.kernels is PLAIN
+        moved = -np.diff(record.wound, prepend=record.wound[:1])
+        out, slopes = np.empty(len(moved)), np.empty((len(moved), width + 1))
+        told = [0.0] * len(moved), [[0.0] * (width + 1) for _ in moved] if plain else []
+        self.kernels.follow(
+            record.cell.tolist() if plain else record.cell,
+            moved.tolist() if plain else moved,
+            array(state),
+            array(pulleys),
+            array([0.0] * (6 * len(groups))),
+            array([0.0] * width),
+            told[0] if plain else out,
+            told[1] if plain else slopes,
+        )
+        if plain:
+            out, slopes = np.array(told[0]), np.array(told[1])
+        return out - record.platform, self._chain(slopes, index, x)
+
+    def _chain(self, slopes: Array, index: int, x: Array) -> Array:
+        """Derivatives by the fitted values from those by the physical ones."""
+        full = np.zeros((len(slopes), len(x)))
+        width = 3 * len(self.wraps)
+        scale = np.ones(width)
+        logs = np.arange(width) % 3 < 2
+        scale[logs] = np.exp(x[:width][logs])
+        full[:, :width] = slopes[:, :width] * scale
+        if self.shape is not None:
+            full[:, 2:width:3] = 0.0
+        full[:, width + index] = slopes[:, width]
+        return full
+
+    def answer(self, x: Array) -> Identified:
+        """Groups with their covariances at the values found."""
+        residuals, jacobian = self.both(x)
+        spread = covariance_of(residuals, jacobian, [len(r.cell) for r in self.records])
+        groups = []
+        for k, group in enumerate(self.groups(x)):
+            scale = np.array([group.friction, group.stiffness, 1.0])
+            held = np.array([False, False, self.shape is not None])
+            block = spread[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] * np.outer(scale, scale)
+            block[held, :] = block[:, held] = 0.0
+            rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in block)
+            groups.append(
+                PulleyGroup(group.wraps, group.friction, group.stiffness, group.shape, rows)
+            )
+        return Identified(
+            tuple(groups),
+            float(np.sqrt(np.mean(residuals**2))),
+            tuple(float(share) for share in x[3 * len(groups) :]),
+            len(residuals),
+            self._at_bound(x),
+        )
+
+    def _at_bound(self, x: Array) -> tuple[str, ...]:
+        low, high = self.bounds
+        near = np.minimum(x - low, high - x) < 1e-6 * (high - low)
+        names = ("friction", "stiffness", "shape")
+        return tuple(
+            f"group {k // 3 + 1} {names[k % 3]}"
+            for k in range(3 * len(self.wraps))
+            if near[k] and not (k % 3 == 2 and self.shape is not None)
+        )

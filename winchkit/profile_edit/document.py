@@ -1,0 +1,68 @@
+"""A profile file as a document: its comments, order and shorthands stay the user's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import ParseError
+from tomlkit.items import AoT
+
+from winchkit.errors import Fault, FileError
+from winchkit.regular_file import read_text
+from winchkit.schema.profiles.winch import SHORTHANDS
+from winchkit.units import format_quantity
+
+__all__ = ["effect_tables", "read_document", "shorthands", "tables", "write_document", "written"]
+
+
+def read_document(path: Path) -> Any:
+    """Parse a profile with everything a parser usually drops. Raises FileError."""
+    try:
+        return tomlkit.parse(read_text(path))
+    except OSError as error:
+        raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from error
+    except (ParseError, UnicodeDecodeError) as error:
+        raise FileError(Fault(f"is no TOML: {error}", str(path))) from error
+
+
+def write_document(document: Any, path: Path) -> None:
+    """Write a document, empty lists of tables left out. Raises FileError."""
+    for name in ("effect", "ledger"):
+        if name in document and not len(document[name]):
+            del document[name]
+    try:
+        path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    except OSError as error:
+        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from error
+
+
+def tables(document: Any, name: str) -> AoT:
+    """The ``[[name]]`` tables of a document; made where there are none."""
+    there = document.get(name)
+    if not isinstance(there, AoT):
+        there = tomlkit.aot()
+        document[name] = there
+    return there
+
+
+def effect_tables(document: Any) -> AoT:
+    """The ``[[effect]]`` tables."""
+    return tables(document, "effect")
+
+
+def shorthands(document: Any) -> dict[str, Any]:
+    """Shorthand keys that a document has, such as ``cable.axial_stiffness``, as written."""
+    out = {}
+    for key in SHORTHANDS:
+        part, _, name = key.partition(".")
+        if name in document.get(part, {}):
+            out[key] = document[part][name]
+    return out
+
+
+def written(value: float, unit: str) -> str | float:
+    """A quantity as files have it; a bare number only where there is no unit."""
+    text = format_quantity(value, unit, digits=8)
+    return float(text) if unit == "1" else text

@@ -1,0 +1,65 @@
+"""The history of a profile as a ladder: what each step left of the held-out error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from typing import Any
+
+from winchkit.errors import FileError
+from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.schema.profiles.winch import LedgerEntry, WinchProfile
+from winchkit.units import dimension_of, parse
+
+__all__ = ["LADDER_UNITS", "Rung", "ladder"]
+
+LADDER_UNITS: Mapping[str, str] = {**OUTPUT_UNITS, "platform_position": "m"}
+"""Outputs of winches and robots, in the order in which they are told, with their SI units."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One step with its held-out errors by output, SI."""
+
+    did: str
+    effect: str
+    date: date
+    runs: tuple[str, ...] = ()
+    before: Mapping[str, float] = field(default_factory=dict)
+    after: Mapping[str, float] = field(default_factory=dict)
+    noise: Mapping[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``winchkit ledger --json`` prints it."""
+        return {
+            "did": self.did,
+            "effect": self.effect,
+            "date": self.date.isoformat(),
+            "runs": list(self.runs),
+            "before": dict(self.before),
+            "after": dict(self.after),
+            "noise": dict(self.noise),
+        }
+
+
+def ladder(profile: WinchProfile | RobotProfile) -> tuple[Rung, ...]:
+    """Every step of a profile's ledger, oldest first. Raises FileError for a wrong quantity."""
+    return tuple(_rung(entry) for entry in profile.ledger)
+
+
+def _rung(entry: LedgerEntry) -> Rung:
+    before, after, noise = (_si(entry, name) for name in ("before", "after", "noise"))
+    return Rung(entry.did, entry.effect, entry.date, entry.runs, before, after, noise)
+
+
+def _si(entry: LedgerEntry, name: str) -> dict[str, float]:
+    written: Mapping[str, str] = getattr(entry, name)
+    unknown = [output for output in written if output not in LADDER_UNITS]
+    if unknown:
+        raise FileError(
+            f"ledger, step {entry.did} {entry.effect}: {name} has '{unknown[0]}'; "
+            f"outputs are {', '.join(LADDER_UNITS)}"
+        )
+    return {o: parse(text, dimension_of(LADDER_UNITS[o]) or "ratio") for o, text in written.items()}

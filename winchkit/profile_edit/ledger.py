@@ -1,0 +1,103 @@
+"""The ledger of a profile file: what was done to it, judged on what, and how to take it back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import Any, Literal
+
+import tomlkit
+
+from winchkit.errors import Fault, FileError
+from winchkit.profile_edit.document import (
+    effect_tables,
+    read_document,
+    shorthands,
+    tables,
+    write_document,
+    written,
+)
+
+__all__ = ["Judged", "note", "undo"]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """On which runs a step was judged, and its held-out errors by output, SI."""
+
+    date: date
+    runs: Sequence[str] = ()
+    unit: Mapping[str, str] = field(default_factory=dict)
+    before: Mapping[str, float] = field(default_factory=dict)
+    after: Mapping[str, float] = field(default_factory=dict)
+    noise: Mapping[str, float] = field(default_factory=dict)
+
+
+def note(document: Any, did: Literal["add", "remove"], effect_id: str, judged: Judged) -> None:
+    """Append a step to the ledger of a document that is still as it was before it."""
+    entry = tomlkit.table()
+    entry["did"], entry["effect"], entry["date"] = did, effect_id, judged.date
+    if judged.runs:
+        entry["runs"] = list(judged.runs)
+    for name in ("before", "after", "noise"):
+        values = getattr(judged, name)
+        if values:
+            row = tomlkit.inline_table()
+            row.update({o: str(written(v, judged.unit[o])) for o, v in values.items()})
+            entry[name] = row
+    was = tomlkit.array()
+    for table in effect_tables(document):
+        was.append(_inline(table))
+    entry["was"] = was
+    if short := shorthands(document):
+        entry["shorthand"] = _inline(short)
+    tables(document, "ledger").append(entry)
+
+
+def undo(source: Path, out: Path) -> str:
+    """Copy a profile with its last step taken back; returns what that was, in words.
+
+    Raises FileError where the ledger is empty or a file cannot be read or written.
+    """
+    document = read_document(source)
+    steps = tables(document, "ledger")
+    if not len(steps):
+        raise FileError(Fault("has no ledger: there is nothing to undo", str(source)))
+    last = steps[-1].unwrap()
+    effects = tomlkit.aot()
+    for values in last.get("was", ()):
+        effects.append(_table(values))
+    for key, value in last.get("shorthand", {}).items():
+        part, _, name = key.partition(".")
+        document[part][name] = value
+    del steps[len(steps) - 1]
+    _replace(document, effects)
+    write_document(document, out)
+    return f"{last['did']} {last['effect']}"
+
+
+def _replace(document: Any, effects: Any) -> None:
+    """Put other effects where the present ones stand."""
+    there = effect_tables(document)
+    while len(there):
+        del there[len(there) - 1]
+    for table in effects:
+        there.append(table)
+
+
+def _inline(values: Any) -> Any:
+    """A table in one line."""
+    out = tomlkit.inline_table()
+    plain = values.unwrap() if hasattr(values, "unwrap") else values
+    for key, value in plain.items():
+        out[key] = _inline(value) if isinstance(value, dict) else value
+    return out
+
+
+def _table(values: Mapping[str, Any]) -> Any:
+    out = tomlkit.table()
+    for key, value in values.items():
+        out[key] = _inline(value) if isinstance(value, dict) else value
+    return out

@@ -1,0 +1,71 @@
+"""A diagnosis as JSON with everything that its page shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.residuals.maps import residual_maps
+from winchkit.diagnosis.robot.diagnose import RobotAnswer
+from winchkit.report.detectability import unseen
+from winchkit.report.figures.pose_traces import traces
+from winchkit.report.figures.reduction import curve_of, strongest
+from winchkit.report.figures.waterfall import Waterfall, waterfall_of
+from winchkit.report.words.sentence import changes_text, sentence
+
+__all__ = ["report_json"]
+
+
+def report_json(answer: Answer) -> dict[str, Any]:
+    """As ``winchkit diagnose --json`` prints it; figures in SI."""
+    diagnosis, ladder = answer.diagnosis, waterfall_of(answer)
+    drawn = _of_poses(answer) if isinstance(answer, RobotAnswer) else _of_runs(answer)
+    return {
+        **diagnosis.to_json(),
+        "sentence": sentence(diagnosis),
+        "would_change": changes_text(diagnosis),
+        "not_looked_for": [{"effect": e, "needs": list(needs)} for e, needs in unseen(answer)],
+        "evidence_of_noise": max(answer.found.threshold, 0.0),
+        "waterfall": None if ladder is None else _waterfall(ladder),
+        **drawn,
+    }
+
+
+def _of_runs(answer: Answer) -> dict[str, Any]:
+    return {"residuals": _states(answer, _curves), "maps": _states(answer, _maps)}
+
+
+def _of_poses(answer: RobotAnswer) -> dict[str, Any]:
+    """Errors over what they followed before, beside those that are left."""
+    seen = answer.seen
+    drawn = traces(seen.final.problem, *seen.errors)
+    after = [t.to_json(t.after) for t in drawn if t.after is not None]
+    before = [t.to_json(t.before) for t in drawn]
+    return {"residuals": {"before": before, "after": after if answer.diagnosis.steps else None}}
+
+
+def _states(answer: Answer, drawn: Callable[[Problem, Array], list[Any]]) -> dict[str, Any]:
+    """What is drawn of the residual before, and after where something was named."""
+    found, problem = answer.found, answer.inquiry.problem
+    after = drawn(problem, found.final.residual) if answer.diagnosis.steps else None
+    return {"before": drawn(problem, found.begin.residual), "after": after}
+
+
+def _curves(problem: Problem, residual: Array) -> list[Any]:
+    found = strongest(problem, residual).values()
+    return [curve_of(problem, residual, over).to_json() for over in found]
+
+
+def _maps(problem: Problem, residual: Array) -> list[Any]:
+    return [drawn.to_json() for drawn in residual_maps(problem, residual)]
+
+
+def _waterfall(ladder: Waterfall) -> dict[str, Any]:
+    return {
+        "rungs": [{"model": name, "heldout_rms": dict(rms)} for name, rms in ladder.rungs],
+        "first": {name: dict(rms) for name, rms in ladder.first.items()},
+        "last": {name: dict(rms) for name, rms in ladder.last.items()},
+    }

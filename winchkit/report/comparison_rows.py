@@ -1,0 +1,65 @@
+"""A comparison's figures in words, the same at the terminal and on the page."""
+
+from __future__ import annotations
+
+from winchkit.diagnosis.results import Comparison, OutputError
+from winchkit.report.figures.maps import map_text
+from winchkit.report.words.numbers import percent, quantity, scale_for
+from winchkit.report.words.sentence import CLEAR_ORDER, often_per_turn
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
+
+__all__ = ["HEAD", "followed", "map_lines", "offset_text", "size_rows"]
+
+HEAD = ("error", "rms", "bias", "largest", "noise", "measured, rms")
+_FOLLOWED = 3
+
+
+def size_rows(comparison: Comparison) -> list[list[str]]:
+    """Per output its name and the figures under :data:`HEAD`."""
+    rows = []
+    for name, error in comparison.outputs.items():
+        scale = scale_for(error.rms, error.unit)
+        noise = "unknown" if error.noise_rms is None else scale.text(error.noise_rms)
+        sizes = [scale.text(v) for v in (error.rms, _noticeable(error.bias, error.rms), error.max)]
+        signal = quantity(error.signal_rms, error.unit)
+        rows.append([OUTPUT_NAMES.get(name, name), *sizes, noise, signal])
+    return rows
+
+
+def followed(error: OutputError) -> str:
+    """``follows load 82 % and time 10 %; repeats 5 times per drum turn, 47 %``."""
+    shares = [
+        f"{VARIABLE_NAMES.get(variable, variable)} {percent(share)}"
+        for variable, share in error.follows[:_FOLLOWED]
+    ]
+    told = [f"follows {listed(shares)}"] if shares else []
+    told += [f"repeats {often_per_turn(a, order)}, {percent(s)}" for a, order, s in _clear(error)]
+    return "; ".join(told) or "follows nothing that was measured"
+
+
+def map_lines(comparison: Comparison) -> list[str]:
+    """Per output its most telling residual map in a line."""
+    out: dict[str, str] = {}
+    for drawn in comparison.maps:
+        error = comparison.outputs[drawn.output]
+        name = OUTPUT_NAMES.get(drawn.output, drawn.output)
+        told = map_text(drawn, scale_for(3 * error.rms, error.unit))
+        out.setdefault(drawn.output, f"{name} {told}")
+    return list(out.values())
+
+
+def offset_text(offset: float) -> str:
+    """The one value that a comparison fits."""
+    return f"offset of the length instrument, fitted: {quantity(offset, 'm')}"
+
+
+def _noticeable(bias: float, rms: float) -> float:
+    """A bias, zero where it is only what rounding leaves of a fitted offset."""
+    return 0.0 if abs(bias) < 1e-6 * rms else bias
+
+
+def _clear(error: OutputError) -> list[tuple[str, int, float]]:
+    """The clearest order within a turn, where no trend says twice as much."""
+    trend = max((share for _, share in error.follows), default=0.0)
+    orders = [o for o in error.orders if o[2] > CLEAR_ORDER and trend <= 2 * o[2]]
+    return sorted(orders, key=lambda o: -o[2])[:1]

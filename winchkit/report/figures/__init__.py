@@ -1,0 +1,1 @@
+"""Data of the figures: reduced curves, residual maps, waterfalls; without any markup."""

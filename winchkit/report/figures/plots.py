@@ -1,0 +1,244 @@
+"""The curves of a report: residuals before and after, over time and over what they follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isclose
+from typing import Any
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.residuals.attribution import Followed, variables_of
+from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.report.figures.reduction import bin_edges, bin_means, strongest, thin, thin_points
+from winchkit.report.html.chart import reading
+from winchkit.report.words.numbers import Scale, percent, scale_for
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+
+__all__ = ["AT_NOISE", "OutputPlots", "Plot", "Residuals", "plots_of"]
+
+AT_NOISE = 1.15
+"""Up to how many times its noise an error counts as noise."""
+_POINTS = 2000
+_DOTS = 600
+_DIGITS = 4
+_SAME = 1e-3
+_SPREAD = 0.2
+_DEGREES = 360.0
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What to draw: residuals of a problem, (rows,), and the noise beside them."""
+
+    problem: Problem
+    before: Array
+    after: Array | None
+    """None where the model was not changed."""
+    noise: Mapping[str, float | None]
+    """Rms per output, SI; None where it is unknown."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One drawing: what the page's script needs, and words for who cannot see it."""
+
+    id: str
+    caption: str
+    data: dict[str, Any]
+    """Plain lists and texts: ``x``, ``series``, labels, scale, marks."""
+
+
+@dataclass(frozen=True)
+class OutputPlots:
+    """The drawings of one output."""
+
+    output: str
+    scale: Scale
+    over_time: Plot
+    over_variable: Plot | None
+    followed: Followed | None
+    """What the residual is drawn over; None where it follows nothing that was measured."""
+
+
+@dataclass(frozen=True)
+class _Curves:
+    """Residuals of one output, all its runs one after another, in the unit shown."""
+
+    output: str
+    scale: Scale
+    runs: tuple[int, ...]
+    before: tuple[Array, ...]
+    after: tuple[Array, ...] | None
+    noise: float | None
+    tone: str
+    """How to colour a residual that nothing changes: ``residual`` at the noise, else ``before``."""
+
+
+def plots_of(residuals: Residuals) -> tuple[OutputPlots, ...]:
+    """Drawings per output; ``after`` only of outputs that the change of the model changed."""
+    problem = residuals.problem
+    found = strongest(problem, residuals.before)
+    out = []
+    for output in problem.dataset.outputs:
+        curves = _curves(residuals, output)
+        followed = found.get(output)
+        out.append(
+            OutputPlots(
+                output,
+                curves.scale,
+                _over_time(problem, curves),
+                _over_variable(problem, curves, followed) if followed else None,
+                followed,
+            )
+        )
+    return tuple(out)
+
+
+def _curves(residuals: Residuals, output: str) -> _Curves:
+    problem, noise = residuals.problem, residuals.noise.get(output)
+    recordings = problem.dataset.recordings
+    own = [i for i, s in enumerate(problem.segments) if s.output == output]
+
+    def in_runs(rows: Array) -> tuple[Array, ...]:
+        times = problem.in_time(rows)
+        return tuple(
+            np.where(recordings[problem.segments[i].run].valid[output], times[i], np.nan)
+            for i in own
+        )
+
+    before = in_runs(residuals.before)
+    after = None if residuals.after is None else in_runs(residuals.after)
+    size = _rms(before)
+    if after is not None and isclose(_rms(after), size, rel_tol=_SAME):
+        after = None
+    scale = scale_for(3 * size, OUTPUT_UNITS[output])
+    return _Curves(
+        output,
+        scale,
+        tuple(problem.segments[i].run for i in own),
+        tuple(part / scale.worth for part in before),
+        None if after is None else tuple(part / scale.worth for part in after),
+        None if noise is None else noise / scale.worth,
+        "residual" if size < AT_NOISE * (noise or 0.0) else "before",
+    )
+
+
+def _rms(parts: Sequence[Array]) -> float:
+    """Rms of the compared samples of all runs."""
+    return float(np.sqrt(np.nanmean(np.concatenate(parts) ** 2)))
+
+
+def _over_time(problem: Problem, curves: _Curves) -> Plot:
+    """All runs one after another, at most ``_POINTS`` samples."""
+    recordings = problem.dataset.recordings
+    share = max(2, _POINTS // len(curves.runs))
+    parts: list[tuple[Array, list[Array]]] = []
+    marks, begin = [], 0.0
+    for position, run in enumerate(curves.runs):
+        time = recordings[run].signals.time - recordings[run].signals.time[0]
+        marks.append({"at": _number(begin), "name": recordings[run].name})
+        lines = [curves.before[position]]
+        if curves.after is not None:
+            lines.append(curves.after[position])
+        parts.append(thin(begin + time, lines, share))
+        begin += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
+    x = np.concatenate([part[0] for part in parts])
+    lines = [np.concatenate([part[1][i] for part in parts]) for i in range(len(parts[0][1]))]
+    name = OUTPUT_NAMES.get(curves.output, curves.output)
+    band = "" if curves.noise is None else "; the grey band is the noise, ± its rms"
+    return Plot(
+        f"time-{curves.output}",
+        f"Measured less predicted {name} over time, all runs one after another{band}.",
+        {
+            "kind": "time",
+            "x": _numbers(x, 6),
+            "xLabel": "time, runs one after another [s]",
+            "yLabel": _labelled("residual", curves.scale.label),
+            "unit": curves.scale.label,
+            "series": _series(lines, curves.tone),
+            "marks": marks,
+            "noise": None if curves.noise is None else _number(curves.noise),
+        },
+    )
+
+
+def _over_variable(problem: Problem, curves: _Curves, followed: Followed) -> Plot:
+    """Samples as dots and means over bins as lines."""
+    variable, label, logarithmic = _axis(problem, curves, followed)
+    before = np.concatenate(curves.before)
+    lines = [before] if curves.after is None else [before, np.concatenate(curves.after)]
+    good = np.isfinite(before) & np.isfinite(variable)
+    x, lines = variable[good], [line[good] for line in lines]
+    dots = thin_points(x, _DOTS)
+    centres, means = bin_means(x, lines, bin_edges(x, followed, _DEGREES))
+    placed = _spread(x[dots]) if followed.variable == "direction" else x[dots]
+    whole = np.concatenate([placed, centres])
+    order = np.argsort(whole, kind="stable")
+    nothing_here, nothing_there = np.full(len(centres), np.nan), np.full(len(dots), np.nan)
+    drawn = [np.concatenate([line[dots], nothing_here])[order] for line in lines]
+    binned = [np.concatenate([nothing_there, mean])[order] for mean in means]
+    output = OUTPUT_NAMES.get(curves.output, curves.output)
+    name = VARIABLE_NAMES.get(followed.variable, followed.variable)
+    often = "" if followed.order is None else f", {followed.order} per turn"
+    return Plot(
+        f"over-{curves.output}",
+        f"Residual of the {output} over the {name}{often}, which takes "
+        f"{percent(followed.share)} of it. Dots are samples, lines their means.",
+        {
+            "kind": "over",
+            "x": _numbers(whole[order], 5),
+            "xLabel": label,
+            "yLabel": _labelled("residual", curves.scale.label),
+            "unit": curves.scale.label,
+            "series": _series(drawn, curves.tone),
+            "means": _series(binned, curves.tone),
+            "log": logarithmic,
+            "noise": None if curves.noise is None else _number(curves.noise),
+        },
+    )
+
+
+def _spread(values: Array) -> Array:
+    """Dots of a variable with few values side by side, so that they do not hide each other."""
+    out = values.copy()
+    for value in np.unique(values):
+        alike = values == value
+        out[alike] += np.linspace(-_SPREAD, _SPREAD, np.count_nonzero(alike))
+    return out
+
+
+def _axis(problem: Problem, curves: _Curves, followed: Followed) -> tuple[Array, str, bool]:
+    """Values of a variable along the runs as people read them, its label, and if it is a power."""
+    recordings = problem.dataset.recordings
+    values = np.concatenate(
+        [variables_of(recordings[run])[followed.variable] for run in curves.runs]
+    )
+    within = followed.order is not None
+    how = reading(followed.variable, within_turn=within)
+    return how.shown(np.mod(values, _TURN) if within else values), how.label, how.logarithmic
+
+
+def _series(lines: list[Array], tone: str) -> list[dict[str, Any]]:
+    names = ("before", "after") if len(lines) > 1 else ("residual",)
+    return [
+        {"name": name, "tone": name if len(lines) > 1 else tone, "values": _numbers(line)}
+        for name, line in zip(names, lines, strict=True)
+    ]
+
+
+def _labelled(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _numbers(values: Array, digits: int = _DIGITS) -> list[float | None]:
+    """Values to a few significant digits; None for NaN."""
+    return [_number(float(v), digits) if np.isfinite(v) else None for v in values]
+
+
+def _number(value: float, digits: int = _DIGITS) -> float:
+    return float(f"{value:.{digits}g}")

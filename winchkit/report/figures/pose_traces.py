@@ -1,0 +1,118 @@
+"""What the errors of poses are drawn over: the variable that each output follows most."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.robot.attribution import (
+    AXES,
+    follows_of,
+    most_telling,
+    on_ropes,
+    variables_of_poses,
+)
+from winchkit.diagnosis.robot.errors import UNITS, Errors
+from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.model.variables import VARIABLE_UNITS
+from winchkit.report.figures.reduction import bin_means, filled_edges
+
+__all__ = ["NUMBER", "Trace", "trace_over", "traces", "unit_of"]
+
+NUMBER = "number"
+"""Poses one after another, for an error that follows nothing."""
+_BINS = 12
+_DIGITS = 5
+_POOLED = ("winch", "pose", NUMBER)
+"""What is drawn of all lines; else of the one that tells most."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Errors of one output along one variable, SI; a value per pose and line, or axis."""
+
+    over: Followed
+    x: Array
+    """(k,), finite."""
+    before: Array
+    """Measured less predicted, (k,)."""
+    after: Array | None = None
+    line: str | None = None
+    """The line, or axis, that is drawn; None where all are."""
+
+    def means(self, values: Array) -> tuple[Array, Array]:
+        """Mean of the variable and of an error in every bin."""
+        edges = filled_edges(self.x, _BINS)
+        if self.over.variable == "winch":
+            edges = np.unique(self.x)[:-1] + 0.5
+        centres, (mean,) = bin_means(self.x, [values], edges)
+        return centres, mean
+
+    def to_json(self, values: Array) -> dict[str, Any]:
+        """As the commands print the mean of an error."""
+        x, mean = self.means(values)
+        return {
+            "output": self.over.output,
+            "variable": self.over.variable,
+            "unit": unit_of(self.over.variable),
+            "line": self.line,
+            "share": self.over.share,
+            "x": [float(f"{v:.{_DIGITS}g}") for v in x],
+            "mean": [float(f"{v:.{_DIGITS}g}") for v in mean],
+        }
+
+
+def unit_of(variable: str) -> str:
+    """SI unit of a variable of poses."""
+    if variable.startswith("platform_"):
+        return "m" if variable.endswith(AXES) else "rad"
+    return VARIABLE_UNITS.get(variable, "1")
+
+
+def traces(problem: RobotProblem, before: Errors, after: Errors | None = None) -> list[Trace]:
+    """Per output its errors over what they follow most, before anything was added."""
+    found: dict[str, Followed] = {}
+    for followed in follows_of(problem, before):
+        if followed.variable != "pose":
+            found.setdefault(followed.output, followed)
+    return [
+        trace_over(problem, found.get(name, Followed(name, NUMBER, float("nan"))), before, after)
+        for name in UNITS
+        if name in before
+    ]
+
+
+def trace_over(
+    problem: RobotProblem, over: Followed, before: Errors, after: Errors | None = None
+) -> Trace:
+    """Errors of one output over one variable, of the line that shows it most."""
+    name = over.output
+    error = on_ropes(problem, {name: before[name]})[name]
+    then = None if after is None else on_ropes(problem, {name: after[name]})[name]
+    x = np.broadcast_to(_values(problem, over, error), error.shape)
+    line = None
+    if over.variable not in _POOLED:
+        lines = list(AXES if name == "platform_position" else problem.dataset.names)
+        column = lines.index(over.line) if over.line else most_telling(x, error)
+        line = lines[column]
+        x, error = x[:, [column]], error[:, [column]]
+        then = None if then is None else then[:, [column]]
+    known = np.isfinite(error) & np.isfinite(x)
+    if then is not None:
+        known &= np.isfinite(then)
+    return Trace(over, x[known], error[known], None if then is None else then[known], line)
+
+
+def _values(problem: RobotProblem, over: Followed, error: Array) -> Array:
+    count, lines = error.shape
+    if over.variable == "winch":
+        return np.arange(1.0, lines + 1)[None, :]
+    if over.variable == NUMBER:
+        return np.arange(1.0, count + 1)[:, None]
+    if over.variable == "pose":
+        return np.asarray(problem.dataset.pose[:, None] + 1.0, dtype=np.float64)
+    return variables_of_poses(problem)[over.variable]

@@ -1,0 +1,148 @@
+"""Long signals made short for drawing: the lowest and the highest of every stretch are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.residuals.attribution import Followed, follows, harmonics, variables_of
+from winchkit.model.variables import VARIABLE_UNITS
+from winchkit.report.words.sentence import CLEAR_ORDER
+
+__all__ = [
+    "Curve",
+    "bin_edges",
+    "bin_means",
+    "curve_of",
+    "filled_edges",
+    "strongest",
+    "thin",
+    "thin_points",
+]
+
+_FEW = 5
+
+
+def thin(x: Array, series: Sequence[Array], points: int) -> tuple[Array, list[Array]]:
+    """At most ``points`` samples of some signals over one x, every extreme kept.
+
+    ``x`` and each signal are (n,); a stretch in which a signal is NaN throughout stays NaN. Within
+    a stretch the extremes stand in their order, at the stretch's first and last x.
+    """
+    if len(x) <= points:
+        return x, [np.asarray(values, dtype=float) for values in series]
+    edges = np.linspace(0, len(x), points // 2 + 1).astype(int)
+    at = np.column_stack([x[edges[:-1]], x[edges[1:] - 1]]).ravel()
+    return at, [_extremes(np.asarray(values, dtype=float), edges) for values in series]
+
+
+def _extremes(values: Array, edges: NDArray[np.intp]) -> Array:
+    out = np.full((len(edges) - 1, 2), np.nan)
+    for row, (first, last) in enumerate(pairwise(edges)):
+        stretch = values[first:last]
+        if np.isfinite(stretch).any():
+            ends = sorted([int(np.nanargmin(stretch)), int(np.nanargmax(stretch))])
+            out[row] = stretch[ends]
+    return out.ravel()
+
+
+def thin_points(x: Array, points: int) -> NDArray[np.intp]:
+    """Indices of at most ``points`` samples, evenly through the recording, sorted by x."""
+    step = max(1, -(-len(x) // points))
+    chosen = np.arange(0, len(x), step)
+    return np.asarray(chosen[np.argsort(x[chosen], kind="stable")])
+
+
+def filled_edges(x: Array, bins: int) -> Array:
+    """Inner edges of at most ``bins`` equally filled bins; between the values where they are few.
+
+    x is (n,) and finite.
+    """
+    distinct = np.unique(x)
+    if len(distinct) <= _FEW:
+        return np.asarray((distinct[1:] + distinct[:-1]) / 2)
+    return np.unique(np.quantile(x, np.linspace(0, 1, bins + 1)[1:-1]))
+
+
+def bin_means(x: Array, values: Sequence[Array], edges: Array) -> tuple[Array, list[Array]]:
+    """Mean x of every bin that holds samples and, per signal, its mean there.
+
+    x and each signal are (n,) and finite, ``edges`` are inner and sorted.
+    """
+    index = np.searchsorted(edges, x, side="right")
+    count = np.bincount(index)
+    used = count > 0
+    means = [np.bincount(index, weights=v)[used] / count[used] for v in (x, *values)]
+    return means[0], means[1:]
+
+
+_BINS = 20
+_PER_PERIOD = 8
+_WORTH_DRAWING = 0.05
+_DIGITS = 5
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Mean residual of one output along one variable, SI."""
+
+    over: Followed
+    x: Array
+    """Mean of the variable in every bin, (bins,); an angle with an order within its turn, rad."""
+    mean: Array
+    """Measured less predicted, (bins,)."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As the commands print it."""
+        return {
+            "output": self.over.output,
+            "variable": self.over.variable,
+            "unit": VARIABLE_UNITS.get(self.over.variable, "1"),
+            "order": self.over.order,
+            "share": self.over.share,
+            "x": [float(f"{v:.{_DIGITS}g}") for v in self.x],
+            "mean": [float(f"{v:.{_DIGITS}g}") for v in self.mean],
+        }
+
+
+def strongest(problem: Problem, residual: Array) -> dict[str, Followed]:
+    """Per output what to draw its residual over: a clear order, else the largest share."""
+    orders = [f for f in harmonics(problem, residual) if f.share > CLEAR_ORDER]
+    trends = [f for f in follows(problem, residual) if f.share > _WORTH_DRAWING]
+    out: dict[str, Followed] = {}
+    for found in (*sorted(orders, key=lambda f: -f.share), *sorted(trends, key=lambda f: -f.share)):
+        known = out.get(found.output)
+        if known is None or (known.order is not None and found.share > 2 * known.share):
+            out[found.output] = found
+    return out
+
+
+def curve_of(problem: Problem, residual: Array, over: Followed) -> Curve:
+    """The curve of a residual, (rows,), along what it follows."""
+    x, error = [], []
+    for segment, time in zip(problem.segments, problem.in_time(residual), strict=True):
+        if segment.output == over.output:
+            recording = problem.dataset.recordings[segment.run]
+            good = recording.valid[over.output]
+            x.append(variables_of(recording)[over.variable][good])
+            error.append(time[good])
+    values = np.concatenate(x)
+    if over.order is not None:
+        values = np.mod(values, 2 * np.pi)
+    edges = bin_edges(values, over, 2 * np.pi)
+    centres, (mean,) = bin_means(values, [np.concatenate(error)], edges)
+    return Curve(over, centres, mean)
+
+
+def bin_edges(values: Array, over: Followed, turn: float) -> Array:
+    """Inner edges of bins: even within a turn, fine enough for the order; else equally filled."""
+    if over.order is None:
+        return filled_edges(values, _BINS)
+    return np.linspace(0, turn, max(_BINS, _PER_PERIOD * over.order) + 1)[1:-1]

@@ -1,0 +1,84 @@
+"""What every step buys out of sample: in the order of growth, added first, and dropped last."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.stepwise import Found
+
+__all__ = ["GEOMETRY_NAME", "Waterfall", "waterfall_of"]
+
+GEOMETRY_NAME = "the geometry, all of it"
+"""What a robot's model lacks where its whole geometry had to be let go."""
+
+
+@dataclass(frozen=True)
+class Waterfall:
+    """Held-out rms per output, SI, at every rung."""
+
+    rungs: tuple[tuple[str, Mapping[str, float]], ...]
+    """The profile as it is, then with each addition in the order of growth."""
+    first: Mapping[str, Mapping[str, float]]
+    """By effect: with it alone beside the profile."""
+    last: Mapping[str, Mapping[str, float]]
+    """By effect: with everything else that was found, but without it."""
+
+
+def waterfall_of(answer: Answer) -> Waterfall | None:
+    """The ladder of a diagnosis; None where it names nothing."""
+    diagnosis, inquiry, filed = answer.diagnosis, answer.inquiry, answer.filed
+    if not diagnosis.steps:
+        return None
+    whole = answer.found.final.hypothesis
+    added = tuple(range(inquiry.given, len(whole.terms)))
+    names = [whole.terms[index].label for index in added]
+    before = {o: fit.heldout_rms_before for o, fit in diagnosis.outputs.items()}
+    after = {o: fit.heldout_rms_after for o, fit in diagnosis.outputs.items()}
+    ladder = _Ladder(inquiry, answer.found, {added: after})
+    rungs: list[tuple[str, Mapping[str, float]]] = [("profile as it is", before)]
+    first: dict[str, Mapping[str, float]] = {}
+    last: dict[str, Mapping[str, float]] = {}
+    if filed is inquiry:
+        ladder.known[()] = before
+        plain = ladder
+    else:
+        plain = _Ladder(filed, answer.found, {(): before})
+        rungs.append((f"+ {GEOMETRY_NAME}", ladder.error()))
+        first[GEOMETRY_NAME], last[GEOMETRY_NAME] = ladder.error(), plain.error(*added)
+    rungs += [(f"+ {name}", ladder.error(*added[: n + 1])) for n, name in enumerate(names)]
+    for name, index in zip(names, added, strict=True):
+        first[name] = plain.error(index)
+        last[name] = ladder.error(*(other for other in added if other != index))
+    return Waterfall(tuple(rungs), first, last)
+
+
+@dataclass(frozen=True)
+class _Ladder:
+    """Held-out errors of one inquiry's model with some of the terms found."""
+
+    inquiry: Inquiry
+    found: Found
+    known: dict[tuple[int, ...], Mapping[str, float]]
+
+    def error(self, *terms: int) -> Mapping[str, float]:
+        """With what the profile has and these additions, refitted."""
+        if terms not in self.known:
+            inquiry, noise = self.inquiry, self.found.noise
+            kept = _only(self.found.final.hypothesis, (*range(inquiry.given), *terms))
+            fitted = inquiry.refit(kept, noise)
+            folds = inquiry.folds(self.found.final, noise)
+            self.known[terms] = inquiry.held_out_errors(fitted, noise, folds)
+        return self.known[terms]
+
+
+def _only(whole: Hypothesis, kept: tuple[int, ...]) -> Hypothesis:
+    """Some terms of a hypothesis; nuisances are linear and start anew."""
+    return Hypothesis(
+        tuple(whole.terms[index] for index in kept),
+        (),
+        tuple(whole.starts[index] for index in kept),
+    )

@@ -1,0 +1,106 @@
+"""HTML from data: everything is escaped unless it is already markup."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from html import escape
+from math import isfinite
+from typing import Any
+
+__all__ = [
+    "Markup",
+    "compact",
+    "details",
+    "element",
+    "inline",
+    "join",
+    "section",
+    "table",
+]
+
+
+class Markup(str):
+    """Text that is HTML already; any other text is escaped where it enters a page."""
+
+    __slots__ = ()
+
+
+def element(name: str, *children: str, **attributes: str) -> Markup:
+    """An element; ``class_`` and ``aria_label`` become ``class`` and ``aria-label``."""
+    written = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{escape(value)}"'
+        for key, value in attributes.items()
+    )
+    return Markup(f"<{name}{written}>{join(children)}</{name}>")
+
+
+def join(children: Iterable[str]) -> Markup:
+    """Children one after another."""
+    return Markup("".join(c if isinstance(c, Markup) else escape(c) for c in children))
+
+
+def section(id_: str, heading: str, *children: str) -> Markup:
+    """A section with its heading, for both eye and ear; nothing where it has no content."""
+    if not any(children):
+        return Markup("")
+    title = element("h2", heading, id=f"{id_}-heading")
+    return element("section", title, *children, id=id_, aria_labelledby=f"{id_}-heading")
+
+
+def details(summary: str, *children: str) -> Markup:
+    """Something to open."""
+    return element("details", element("summary", summary), *children)
+
+
+def table(
+    caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1
+) -> Markup:
+    """A table whose first ``words`` columns are text and whose others are figures."""
+
+    def row(cells: Sequence[str]) -> Markup:
+        first = element("th", cells[0], scope="row")
+        rest = [
+            element("td", cell, class_="words")
+            if at < words
+            else element("td", cell, class_="figure")
+            for at, cell in enumerate(cells[1:], start=1)
+        ]
+        return element("tr", first, *rest)
+
+    top = [
+        element("th", name, scope="col", **({} if at < words else {"class_": "figure"}))
+        for at, name in enumerate(head)
+    ]
+    inside = element(
+        "table",
+        element("caption", caption),
+        element("thead", element("tr", *top)),
+        element("tbody", *(row(cells) for cells in rows)),
+    )
+    return element("div", inside, class_="wide", tabindex="0", role="group", aria_label=caption)
+
+
+def compact(value: Any, indent: int | None = None) -> str:
+    """JSON with null where there is no finite number."""
+    separators = (",", ":") if indent is None else (",", ": ")
+    plain = _finite(value)
+    return json.dumps(
+        plain, ensure_ascii=False, allow_nan=False, indent=indent, separators=separators
+    )
+
+
+def inline(value: Any) -> str:
+    """JSON that no text in it can end the script element of."""
+    text = compact(value)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if isfinite(value) else None
+    return value

@@ -1,0 +1,129 @@
+"""The sections of an addition's page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from winchkit.diagnosis.add import Addition
+from winchkit.diagnosis.results import Estimate, OutputFit
+from winchkit.report import tables
+from winchkit.report.html.markup import Markup, element, join, section, table
+from winchkit.report.pages.parts import bullets, lead
+from winchkit.report.reproducibility import Command, repeat
+from winchkit.report.words.numbers import quantity, scale_for
+from winchkit.report.words.sentence import (
+    gain_text,
+    moved_outputs,
+    still_text,
+    worse_text,
+)
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, estimate_text, meaning
+
+__all__ = ["addition_sections", "addition_sentence"]
+
+
+def addition_sections(
+    addition: Addition,
+    figures: Sequence[Markup],
+    command: Command,
+    better: str,
+) -> Markup:
+    """Everything below the title; ``better`` is the profile that was written."""
+    effect = addition.added[0].effect.id
+    commands = [
+        command.add(effect, command.profile, better),
+        command.compare(better),
+        command.diagnose(better),
+    ]
+    return join(
+        [
+            _lead(addition, better),
+            section("residuals", "What it changes", *figures),
+            section("parameters", "All effects of the new profile", _parameters(addition)),
+            section("notes", "Notes", bullets(addition.notes)),
+            repeat(command, commands, "addition", addition.to_json()),
+        ]
+    )
+
+
+def addition_sentence(addition: Addition) -> str:
+    """What was added with its values, and what it bought."""
+    term, values = addition.added
+    told = ", ".join(part for part in (meaning(term.effect.id), _values(values)) if part)
+    named = f"Added {term.label} to the profile{f': {told}' if told else ''}."
+    outputs = addition.outputs
+    gain = gain_text(outputs, "With it")
+    worse = worse_text(outputs)
+    nothing = "" if gain or worse else "It leaves the held-out errors as they are."
+    return " ".join(part for part in (named, gain, nothing, worse, still_text(outputs)) if part)
+
+
+def _lead(addition: Addition, better: str) -> Markup:
+    term, values = addition.added
+    chip, tone = _chip(addition.outputs)
+    return lead(
+        chip,
+        tone,
+        [addition_sentence(addition)],
+        tables.named([(term.effect, term.label, values)]),
+        _errors(addition.outputs),
+        element("p", "Written to ", element("code", better), ".", class_="quiet"),
+    )
+
+
+def _chip(outputs: Mapping[str, OutputFit]) -> tuple[str, str]:
+    """The addition in a word, and its tone."""
+    if worse_text(outputs):
+        return "Added, and worse", "unknown"
+    if not moved_outputs(outputs):
+        return "Added without gain", "partly"
+    return "Added", "explained"
+
+
+def _errors(outputs: Mapping[str, OutputFit]) -> Markup:
+    """Errors before and after per output, fitted and held out, beside the noise."""
+    rows = []
+    for name, output in outputs.items():
+        scale = scale_for(output.heldout_rms_before, output.unit)
+        errors = [
+            output.rms_before,
+            output.rms_after,
+            output.heldout_rms_before,
+            output.heldout_rms_after,
+        ]
+        noise = output.noise_rms
+        rows.append(
+            [
+                OUTPUT_NAMES.get(name, name),
+                quantity(output.signal_rms, output.unit),
+                *(scale.text(error) for error in errors),
+                "unknown" if noise is None else scale.text(noise),
+                f"{output.heldout_rms_after / noise:.2f}" if noise else "–",
+            ]
+        )
+    head = ["output", "measured, rms", "fitted, before", "after", "held out, before", "after"]
+    caption = (
+        "Error, rms, of the runs fitted, and held out: each group of runs predicted with values "
+        "fitted without it. The last column is the held-out error after, in units of the noise."
+    )
+    return table(caption, [*head, "noise", "error / noise"], rows)
+
+
+def _parameters(addition: Addition) -> Markup:
+    last = len(addition.terms) - 1
+    rows = [
+        [
+            element("code", term.label),
+            "added" if at == last else "refitted",
+            meaning(term.effect.id) or term.effect.what,
+            _values(values),
+        ]
+        for at, (term, values) in enumerate(addition.terms)
+    ]
+    head = ["effect", "status", "what it means", "values"]
+    caption = "All values are fitted together, ± one standard deviation."
+    return table(caption, head, rows, words=4)
+
+
+def _values(values: Mapping[str, Estimate]) -> str:
+    return ", ".join(estimate_text(name, value) for name, value in values.items())

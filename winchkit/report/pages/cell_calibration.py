@@ -1,0 +1,157 @@
+"""The report of a cell's calibration as one page without network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from winchkit.report.html.chart import Chart, axis_over, legend
+from winchkit.report.html.markup import Markup, element, join, section, table
+from winchkit.report.html.page import page
+
+if TYPE_CHECKING:
+    from winchkit.calibration.cell.fit import CellFit, Figure
+    from winchkit.schema.calibration import CalibrationPoint, CellCalibration
+
+__all__ = [
+    "NAMES",
+    "figures",
+    "report_lines",
+    "report_page",
+]
+
+NAMES = ("c0 [N]", "c1 [1]", "c2 [1/N]")
+"""Of the coefficients."""
+_WIDTH = 56
+_ROWS = 11
+_MARKS = {"up": "^", "down": "v"}
+
+
+def report_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
+    """Coefficients, figures of merit, residuals drawn with characters, warnings."""
+    lines = [f"calibration over {fit.span:.5g} N from {len(points)} points:"]
+    lines += [
+        f"  {name:9}{value:+.6g} ± {std:.2g}"
+        for name, value, std in zip(NAMES, fit.coefficients, fit.std, strict=False)
+    ]
+    lines += [f"  {name:16}{value}" for name, value in figures(fit)]
+    lines += ["  residuals (true less fitted), ^ going up, v going down:"]
+    lines += [f"  {line}" for line in _residual_lines(fit, points)]
+    return lines + [f"  ! {warning}" for warning in fit.warnings]
+
+
+def figures(fit: CellFit) -> list[tuple[str, str]]:
+    """Figures of merit and what they are."""
+    return [
+        ("residual std", f"{fit.residual_std:.3g} N ({fit.residual_std / fit.span:.3%} of span)"),
+        ("non-linearity", _share(fit.nonlinearity)),
+        ("hysteresis", _share(fit.hysteresis)),
+        ("repeatability", _share(fit.repeatability)),
+    ]
+
+
+def _share(figure: Figure) -> str:
+    if math.isnan(figure.value):
+        return "unknown"
+    spread = "" if math.isnan(figure.std) else f" ± {figure.std:.3%}"
+    return f"{figure.value:.3%}{spread} of span"
+
+
+def _residual_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
+    """Residuals over the load, in characters."""
+    largest = max(abs(residual) for residual in fit.residuals) or 1.0
+    low = min(point.load for point in points)
+    grid = [[" "] * _WIDTH for _ in range(_ROWS)]
+    middle = _ROWS // 2
+    grid[middle] = ["-"] * _WIDTH
+    for point, residual in zip(points, fit.residuals, strict=True):
+        column = round((point.load - low) / fit.span * (_WIDTH - 1))
+        row = middle - round(residual / largest * middle)
+        there, mark = grid[row][column], _MARKS[point.going]
+        grid[row][column] = mark if there in (" ", "-", mark) else "x"
+    labels = {0: f"{largest:+.2g}", middle: "0", _ROWS - 1: f"{-largest:+.2g}"}
+    drawn = [f"{labels.get(row, ''):>8} |{''.join(cells)}" for row, cells in enumerate(grid)]
+    high = f"{low + fit.span:.4g} N"
+    return [*drawn, f"{'':10}{f'{low:.4g}':<{_WIDTH - len(high)}}{high}"]
+
+
+_FORMULA = "True force = c0 + c1 x + c2 x², x the indicated force in N; a line has no c2."
+_SPAN = "How well it fits; the span is from the least to the largest load."
+_TONES = {"up": "above", "down": "below"}
+
+
+def report_page(calibration: CellCalibration, fit: CellFit) -> str:
+    """What was calibrated, the fit, the residuals, the points."""
+    coefficients = [
+        (name, f"{value:.6g}", f"{std:.2g}")
+        for name, value, std in zip(NAMES, fit.coefficients, fit.std, strict=False)
+    ]
+    return page(
+        f"Calibration of {calibration.name}",
+        (),
+        section("about", "What was calibrated", _about(calibration)),
+        section(
+            "fit",
+            "Fit",
+            table(_FORMULA, ("coefficient", "value", "one standard deviation"), coefficients),
+            table(
+                "How well it fits; span is from the least to the largest load.",
+                ("figure", "value"),
+                figures(fit),
+            ),
+            join(element("p", warning) for warning in fit.warnings),
+        ),
+        section("residuals", "Residuals", _drawing(fit, calibration.point)),
+        section("points", "Points", _points(calibration.point, fit)),
+    )
+
+
+def _about(calibration: CellCalibration) -> Markup:
+    warm = calibration.temperature
+    rows = [
+        ("device", calibration.device or "not told"),
+        ("serial number", calibration.serial_number or "not told"),
+        ("date", calibration.date.isoformat()),
+        ("direction", calibration.direction),
+        ("temperature", "not told" if warm is None else f"{warm:g} °C"),
+    ]
+    pairs = [part for name, said in rows for part in (element("dt", name), element("dd", said))]
+    return element("dl", *pairs, class_="facts")
+
+
+def _points(points: Sequence[CalibrationPoint], fit: CellFit) -> Markup:
+    rows = [
+        (
+            str(point.series),
+            point.going,
+            f"{point.load:.4f}",
+            f"{point.indicated:.4f}",
+            f"{point.std:.2g}",
+            f"{residual:+.4f}",
+        )
+        for point, residual in zip(points, fit.residuals, strict=True)
+    ]
+    head = ("series", "going", "load [N]", "indicated [N]", "std [N]", "residual [N]")
+    return table("Loads in the order in which they were hung; std is the reading's.", head, rows, 2)
+
+
+def _drawing(fit: CellFit, points: Sequence[CalibrationPoint]) -> Markup:
+    """Residuals over the load."""
+    caption = "True less fitted force over the load; a loop between up and down is hysteresis."
+    chart = Chart(
+        axis_over("load [N]", [point.load for point in points]),
+        axis_over("residual [N]", fit.residuals, zero=True),
+        caption,
+    )
+    marks = [
+        chart.dot(
+            point.load,
+            residual,
+            _TONES[point.going],
+            f"{point.load:.4g} N going {point.going}: {residual:+.3g} N",
+        )
+        for point, residual in zip(points, fit.residuals, strict=True)
+    ]
+    colours = legend([(tone, f"load going {going}") for going, tone in _TONES.items()])
+    return element("figure", chart.draw(*marks), colours, element("figcaption", caption))

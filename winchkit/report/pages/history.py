@@ -1,0 +1,96 @@
+"""A profile's ledger as a page: what every step left of the held-out error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from winchkit.profile_edit.history import LADDER_UNITS, Rung
+from winchkit.report.html.markup import Markup, element, join, section, table
+from winchkit.report.html.page import page
+from winchkit.report.tables import bar
+from winchkit.report.words.columns import aligned
+from winchkit.report.words.numbers import scale_for
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, meaning
+
+__all__ = [
+    "ladder_html",
+    "ladder_text",
+]
+
+_SIGN = {"add": "+", "remove": "−"}
+_ROOM = 1.05
+
+
+def ladder_html(name: str, rungs: Sequence[Rung]) -> str:
+    """The page; a step on other runs than the one before begins anew."""
+    title = f"{name}: how it grew"
+    if not rungs:
+        return page(title, (), element("p", "Nothing was added to it or removed from it."))
+    caption = (
+        "Held-out error, rms, after each step, each group of runs predicted with values fitted "
+        "without it. The upright mark is the noise at that step; bars compare within a column."
+    )
+    shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]
+    head = ["step", "what it means", *(OUTPUT_NAMES[o] for o in shown)]
+    steps = table(caption, head, _rows(rungs, shown), words=2)
+    return page(title, (), section("waterfall", "Held-out error per step", steps))
+
+
+def _rows(rungs: Sequence[Rung], shown: Sequence[str]) -> list[list[str]]:
+    longest = {o: _longest(rungs, o) for o in shown}
+    rows: list[list[str]] = []
+    runs: tuple[str, ...] = ()
+    for rung in rungs:
+        if rung.runs and rung.runs != runs:
+            runs = rung.runs
+            bars = _bars(rung.before, rung.noise, shown, longest)
+            rows.append(["before", f"on {len(runs)} runs", *bars])
+        step = element("code", f"{_SIGN[rung.did]} {rung.effect}")
+        bars = _bars(rung.after, rung.noise, shown, longest)
+        day = element("small", rung.date.isoformat())
+        rows.append([step, join([meaning(rung.effect), day]), *bars])
+    return rows
+
+
+def _bars(
+    errors: Mapping[str, float],
+    noise: Mapping[str, float],
+    shown: Sequence[str],
+    longest: Mapping[str, float],
+) -> list[Markup]:
+    """A bar per output; a dash where a step was not judged."""
+    return [
+        bar(errors[o], longest[o], noise.get(o), scale_for(errors[o], LADDER_UNITS[o]))
+        if o in errors
+        else Markup("–")
+        for o in shown
+    ]
+
+
+def _longest(rungs: Sequence[Rung], output: str) -> float:
+    sizes = [m[output] for rung in rungs for m in (rung.before, rung.after) if output in m]
+    return _ROOM * max(sizes)
+
+
+def ladder_text(name: str, rungs: Sequence[Rung]) -> str:
+    """Held-out error per step; a step on other runs than the one before begins anew."""
+    if not rungs:
+        return f"{name}: nothing was added to it or removed from it"
+    shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]
+    rows = [["held-out error, rms", "", *(OUTPUT_NAMES[o] for o in shown)]]
+    runs: tuple[str, ...] = ()
+    for rung in rungs:
+        if rung.runs and rung.runs != runs:
+            rows.append([f"before, on {len(rung.runs)} runs", "", *_cells(rung.before, shown)])
+            runs = rung.runs
+        step = f"{_SIGN[rung.did]} {rung.effect}"
+        rows.append([step, rung.date.isoformat(), *_cells(rung.after, shown)])
+    rows.append(["noise", "", *_cells(rungs[-1].noise, shown)])
+    return "\n".join([name, *aligned(rows, words=2)])
+
+
+def _cells(values: Mapping[str, float], shown: Sequence[str]) -> list[str]:
+    """Values of the shown outputs, a dash where a step was not judged."""
+    return [
+        scale_for(values[o], LADDER_UNITS[o]).text(values[o]) if o in values else "—" for o in shown
+    ]

@@ -1,0 +1,88 @@
+"""A diagnosis, a comparison or an addition as one self-contained page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from winchkit.diagnosis.add import Grown
+from winchkit.diagnosis.compare import Compared
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.report.figures.maps import maps_drawn
+from winchkit.report.figures.plots import OutputPlots, Residuals, plots_of
+from winchkit.report.html.markup import Markup
+from winchkit.report.html.page import page
+from winchkit.report.pages.addition import addition_sections
+from winchkit.report.pages.comparison import comparison_sections
+from winchkit.report.pages.diagnosis import sections
+from winchkit.report.pages.parts import drawings
+from winchkit.report.reproducibility import Command
+from winchkit.report.words.sentence import moved_outputs
+
+__all__ = ["addition_html", "comparison_html", "report_html", "residuals_of"]
+
+
+def report_html(
+    answer: Answer,
+    title: str,
+    story: Sequence[str] = (),
+    truth: Mapping[str, object] | None = None,
+    profile: str = "",
+    *,
+    options: Sequence[str] = (),
+) -> str:
+    """The page of a diagnosis.
+
+    ``story`` tells in sentences what was done; ``truth`` is what a simulated bench hid, revealed
+    last; ``profile`` is the profile as the user named it and ``options`` what else the command
+    was given, for the commands that repeat all this.
+    """
+    residuals, diagnosis = residuals_of(answer), answer.diagnosis
+    plots = plots_of(residuals)
+    moved = moved_outputs(diagnosis.outputs) if diagnosis.steps else []
+    figures = _figures(residuals, plots, moved)
+    command = Command(residuals.problem.dataset, profile, options)
+    return page(title, plots, sections(answer, figures, story, truth, command))
+
+
+def residuals_of(answer: Answer) -> Residuals:
+    """What the page of a diagnosis draws; an ``after`` only where something was named."""
+    diagnosis, found = answer.diagnosis, answer.found
+    return Residuals(
+        answer.inquiry.problem,
+        found.begin.residual,
+        found.final.residual if diagnosis.steps else None,
+        {name: output.noise_rms for name, output in diagnosis.outputs.items()},
+    )
+
+
+def comparison_html(
+    compared: Compared, title: str, profile: str = "", *, options: Sequence[str] = ()
+) -> str:
+    """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`."""
+    noise = {name: error.noise_rms for name, error in compared.comparison.outputs.items()}
+    residuals = Residuals(compared.problem, compared.residual, None, noise)
+    plots = plots_of(residuals)
+    figures = _figures(residuals, plots)
+    command = Command(compared.problem.dataset, profile, options)
+    over = {own.output: own.followed for own in plots if own.followed}
+    return page(title, plots, comparison_sections(compared.comparison, over, figures, command))
+
+
+def addition_html(
+    grown: Grown, title: str, profile: str = "", better: str = "", *, options: Sequence[str] = ()
+) -> str:
+    """The page of an addition; ``better`` is the profile that was written, the rest as above."""
+    noise = {name: output.noise_rms for name, output in grown.addition.outputs.items()}
+    residuals = Residuals(grown.problem, grown.begin.residual, grown.final.residual, noise)
+    plots = plots_of(residuals)
+    figures = _figures(residuals, plots, moved_outputs(grown.addition.outputs))
+    command = Command(grown.problem.dataset, profile, options)
+    better = better or "better.toml"
+    return page(title, plots, addition_sections(grown.addition, figures, command, better))
+
+
+def _figures(
+    residuals: Residuals, plots: Sequence[OutputPlots], first: Sequence[str] = ()
+) -> list[Markup]:
+    """Curves and maps of every output; some outputs come first."""
+    return drawings(plots, maps_drawn(residuals, {p.output: p.scale for p in plots}), first)

@@ -1,0 +1,120 @@
+"""How to repeat what a page tells, and how to go on: the runs, the versions, the commands."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from platform import python_version
+from typing import Any
+
+import numpy as np
+
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.report.html.markup import Markup, compact, details, element, section, table
+
+__all__ = ["Command", "repeat"]
+
+
+@dataclass(frozen=True)
+class Command:
+    """What a command was given: it writes itself again, and what may follow it."""
+
+    dataset: Dataset
+    named: str = ""
+    """The profile as the user named it; empty where only its own name is known."""
+    options: Sequence[str] = ()
+
+    @property
+    def profile(self) -> str:
+        """The profile to write into commands."""
+        if isinstance(self.dataset, RobotDataset):
+            return self.named or self.dataset.robot.name
+        return self.named or self.dataset.profile.name
+
+    def compare(self, profile: str) -> str:
+        """Hold the runs against a profile."""
+        return f"winchkit compare {self._runs} --profile {_quoted(profile)}{self._options}"
+
+    def diagnose(self, profile: str) -> str:
+        """Ask what a profile lacks."""
+        asked = f"winchkit diagnose {self._runs} --profile {_quoted(profile)}{self._options}"
+        return f"{asked} --html report.html"
+
+    def add(self, effect: str, profile: str, better: str) -> str:
+        """Write the better profile."""
+        named = f"{_quoted(effect)} --profile {_quoted(profile)}"
+        return f"winchkit add {named} --fit {self._runs} -o {_quoted(better)}{self._options}"
+
+    def calibrate(self, profile: str, better: str) -> str:
+        """Fit a robot's geometry anew."""
+        return f"winchkit calibrate {_quoted(profile)} {self._runs} -o {_quoted(better)}"
+
+    def begin_effect(self, profile: str, file: str) -> str:
+        """Begin an effect of one's own from what is left."""
+        named = f"{_quoted(file)} --profile {_quoted(profile)}"
+        return f"winchkit effects new {named} --fit {self._runs}{self._options}"
+
+    @property
+    def _runs(self) -> str:
+        if isinstance(self.dataset, RobotDataset):
+            return " ".join(map(_quoted, self.dataset.runs))
+        return " ".join(_quoted(r.path or r.name) for r in self.dataset.recordings)
+
+    @property
+    def _options(self) -> str:
+        return "".join(f" {_quoted(option)}" for option in self.options)
+
+
+def repeat(command: Command, commands: Sequence[str], what: str, raw: Mapping[str, Any]) -> Markup:
+    """The section on how to repeat all this; ``what`` names the answer that ``raw`` holds."""
+    versions = ", ".join(f"{name} {version(name)}" for name in ("winchkit", "numpy", "scipy"))
+    profile = element("code", command.profile)
+    return section(
+        "repeat",
+        "How to repeat this and go on",
+        _runs(command.dataset),
+        element("p", "Profile: ", profile, f". {versions}, Python {python_version()}."),
+        element("pre", element("code", "\n".join(commands)), tabindex="0"),
+        details(f"The {what} as JSON", element("pre", compact(raw, indent=1))),
+    )
+
+
+def _runs(dataset: Dataset) -> Markup:
+    if isinstance(dataset, RobotDataset):
+        return _poses(dataset)
+    sets = {run: n for n, group in enumerate(dataset.repeated, 1) for run in group.runs}
+    rows = []
+    for index, recording in enumerate(dataset.recordings):
+        time = recording.signals.time
+        left_out = sum(int((~valid).sum()) for valid in recording.valid.values())
+        rows.append(
+            [
+                recording.name,
+                recording.programme or "–",
+                f"set {sets[index]}" if index in sets else "none",
+                f"{len(time)}",
+                f"{time[-1] - time[0]:.1f} s",
+                f"{left_out}",
+            ]
+        )
+    head = ["run", "programme", "repeats", "samples", "length", "left out"]
+    return table("Runs used; runs of one set repeat each other.", head, rows, words=3)
+
+
+def _poses(dataset: RobotDataset) -> Markup:
+    """Runs of a robot: a row is a pose."""
+    often = np.bincount(dataset.pose)
+    rows = []
+    for number, name in enumerate(dataset.runs):
+        own = dataset.pose[dataset.measured.run == number]
+        again = int(np.count_nonzero(often[own] > 1))
+        rows.append([name, f"{len(own)}", f"{len(np.unique(own))}", f"{again}"])
+    head = ["run", "poses", "distinct", "taken more than once"]
+    return table("Runs used; a row of a run is a pose.", head, rows)
+
+
+def _quoted(text: str) -> str:
+    return shlex.quote(text)

@@ -1,0 +1,233 @@
+"""The tables of a report: figures, waterfall, candidates, confusion, what could be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from math import degrees, isfinite
+
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.results import Candidate, Diagnosis, Estimate, OutputFit
+from winchkit.effects.effect import Effect
+from winchkit.report.detectability import unseen, visible
+from winchkit.report.figures.waterfall import Waterfall
+from winchkit.report.html.markup import Markup, details, element, join, table
+from winchkit.report.words.numbers import (
+    Scale,
+    grouped,
+    quantity,
+    scale_for,
+    significant,
+    unbroken,
+)
+from winchkit.report.words.vocabulary import (
+    OUTPUT_NAMES,
+    clause,
+    estimate_text,
+    interval_text,
+    listed,
+    parameter_name,
+)
+
+__all__ = [
+    "bar",
+    "candidates",
+    "confusion",
+    "detectable",
+    "figures",
+    "named",
+    "output_scale",
+    "waterfall",
+]
+
+_TOP = 10
+
+
+def output_scale(output: OutputFit) -> Scale:
+    """One scale for all errors of an output."""
+    return scale_for(output.heldout_rms_before, output.unit)
+
+
+def figures(diagnosis: Diagnosis) -> Markup:
+    """Held-out error before and after per output, beside the noise."""
+    grown = bool(diagnosis.steps)
+    head = ["output", "measured, rms", "error before"]
+    head += ["error after"] if grown else []
+    rows = []
+    for name, output in diagnosis.outputs.items():
+        scale = output_scale(output)
+        last = output.heldout_rms_after if grown else output.heldout_rms_before
+        cells = [OUTPUT_NAMES.get(name, name), quantity(output.signal_rms, output.unit)]
+        cells.append(scale.text(output.heldout_rms_before))
+        if grown:
+            cells.append(scale.text(last))
+        noise = output.noise_rms
+        cells.append("unknown" if noise is None else scale.text(noise))
+        cells.append(f"{last / noise:.2f}" if noise else "–")
+        rows.append(cells)
+    caption = (
+        f"Held-out error, rms: each group of {diagnosis.data} predicted with values fitted "
+        "without it."
+    )
+    return table(caption, [*head, "noise", "error / noise"], rows)
+
+
+def named(
+    found: Iterable[tuple[Effect | None, str, Mapping[str, Estimate]]],
+) -> Markup:
+    """What every named effect is, with its values, formula and source; one unknown has no words."""
+    entries: list[Markup] = []
+    for effect, effect_id, estimates in found:
+        values = [_sure(name, estimate) for name, estimate in estimates.items()]
+        entries.append(element("dt", element("code", effect_id), " ", unbroken(", ".join(values))))
+        if effect is not None:
+            words = join([effect.what, " ", element("span", effect.formula, class_="formula")])
+            entries.append(element("dd", words, element("small", f"Source: {effect.source}")))
+    return element("dl", *entries, class_="named") if entries else Markup("")
+
+
+def _sure(name: str, estimate: Estimate) -> str:
+    """A value with its deviation and, where it is known, its interval."""
+    interval = interval_text(name, estimate)
+    return estimate_text(name, estimate) + (f" ({interval})" if interval else "")
+
+
+def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
+    """Bars of held-out error per rung beside the noise floor."""
+    if ladder is None:
+        return Markup("")
+    outputs = diagnosis.outputs
+    longest = {name: 1.05 * _longest(ladder, name, output) for name, output in outputs.items()}
+
+    def row(label: str, errors: Mapping[str, float]) -> list[str]:
+        return [
+            label,
+            *(bar(errors[n], longest[n], o.noise_rms, output_scale(o)) for n, o in outputs.items()),
+        ]
+
+    head = ["model", *(OUTPUT_NAMES.get(name, name) for name in outputs)]
+    caption = "Held-out error, rms, as the model grew. The upright mark is the noise."
+    out = [table(caption, head, [row(label, errors) for label, errors in ladder.rungs])]
+    if len(ladder.first) > 1:
+        alone = [row(f"only {name}", errors) for name, errors in ladder.first.items()]
+        without = [row(f"all but {name}", errors) for name, errors in ladder.last.items()]
+        caption = "Each effect added first, alone; and each dropped last, all others kept."
+        out.append(table(caption, head, [*alone, *without]))
+    return join(out)
+
+
+def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
+    rungs = (errors for _, errors in ladder.rungs)
+    errors = [e[name] for e in chain(rungs, ladder.first.values(), ladder.last.values())]
+    return max([output.noise_rms or 0.0, *(e for e in errors if isfinite(e))])
+
+
+def bar(error: float, longest: float, noise: float | None, scale: Scale, tone: str = "") -> Markup:
+    """A bar as a share of the longest, the noise marked on it, and the figure below.
+
+    ``tone`` is a colour of the page, else the table's own.
+    """
+    colour = f";background:var(--{tone})" if tone else ""
+    inside = [element("span", class_="fill", style=f"width:{_part(error, longest)}%{colour}")]
+    if noise:
+        floor = f"left:{_part(noise, longest)}%"
+        inside.append(element("span", class_="floor", style=floor))
+    track = element("span", *inside, class_="track", aria_hidden="true")
+    return join([track, element("span", scale.text(error), class_="value")])
+
+
+def _part(value: float, full: float) -> str:
+    share = 100 * value / full if full > 0 and isfinite(value) else 0.0
+    return f"{min(max(share, 0.0), 100.0):.1f}"
+
+
+def candidates(answer: Answer) -> Markup:
+    """Every effect that was tried beside the profile, the strongest evidence first."""
+    diagnosis = answer.diagnosis
+    ranked = diagnosis.candidates
+    if not ranked:
+        return Markup("")
+    outputs = diagnosis.outputs
+    scales = {name: output_scale(output) for name, output in outputs.items()}
+    head = ["effect", "what it would mean", "evidence"]
+    head += [f"{OUTPUT_NAMES.get(n, n)} [{scale.label}]" for n, scale in scales.items()]
+    rows = [_candidate(candidate, scales) for candidate in ranked]
+    caption = (
+        "Evidence: whitened squares that an effect saves, less the price of its freedom; noise "
+        f"alone reaches {significant(max(answer.found.threshold, 0.0), 2)} once in a hundred "
+        "cases. The held-out error is that with this effect alone, where its evidence earned a fit."
+    )
+    return _shortened(caption, head, rows, "more, with less evidence")
+
+
+def _shortened(
+    caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], rest: str
+) -> Markup:
+    """The first rows, the others to be opened; two columns of words."""
+    top = table(caption, head, rows[:_TOP], words=2)
+    if len(rows) <= _TOP:
+        return top
+    others = table("The remaining effects.", head, rows[_TOP:], words=2)
+    return join([top, details(f"{len(rows) - _TOP} {rest}", others)])
+
+
+def _times(share: float) -> str:
+    """A size in units of the usual one."""
+    return f"{significant(share, 2)} ×" if isfinite(share) else "–"
+
+
+def _candidate(candidate: Candidate, scales: Mapping[str, Scale]) -> list[str]:
+    errors = [
+        significant(candidate.heldout_rms[name] / scale.worth)
+        if name in candidate.heldout_rms
+        else "–"
+        for name, scale in scales.items()
+    ]
+    name = element("code", candidate.effect)
+    return [name, clause(candidate.effect), grouped(candidate.score), *errors]
+
+
+def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
+    """Sets that these runs cannot tell apart, with the angles between their signatures."""
+    out: list[Markup] = []
+    for step in diagnosis.steps:
+        if len(step.effects) < 2 or step.whole:
+            continue
+        rows = []
+        for effect_id in step.effects:
+            values = [estimate_text(n, e) for n, e in step.parameters.get(effect_id, {}).items()]
+            angle = step.angles.get(effect_id)
+            shown = "–" if angle is None else f"{degrees(angle):.1f}°"
+            effect = effects.get(effect_id)
+            tell = effect.told_apart if effect is not None else ""
+            rows.append([element("code", effect_id), ", ".join(values), tell, shown])
+        head = ["effect", "fitted values", "told apart by", "angle"]
+        caption = (
+            f"These {diagnosis.data} cannot tell {listed(list(step.effects))} apart. The angle is "
+            "that between the signatures of a rival and of the effect that the search took (–): "
+            "0° look alike."
+        )
+        out.append(table(caption, head, rows, words=3))
+    return join(out)
+
+
+def detectable(answer: Answer) -> Markup:
+    """What these runs could have shown at all, and how small."""
+    rows = [
+        [element("code", row.effect), parameter_name(row.parameter), row.text, _times(row.share)]
+        for row in visible(answer)
+    ]
+    if not rows:
+        return Markup("")
+    data = answer.diagnosis.data
+    caption = (
+        f"The smallest size of each effect that these {data} would have shown in 9 of 10 cases."
+    )
+    head = ["effect", "parameter", "would have been seen", "of its usual size"]
+    seen = _shortened(caption, head, rows, "more, seen less easily")
+    blind = [
+        element("li", element("code", effect), f" needs {listed(needs)}")
+        for effect, needs in unseen(answer)
+    ]
+    lost = details("Not looked for: a part or a channel is missing", element("ul", *blind))
+    return join([seen, lost]) if blind else seen

@@ -1,0 +1,230 @@
+"""Comparison, diagnosis and addition as short plain text for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import degrees, isnan
+from typing import TYPE_CHECKING
+
+from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, Where
+from winchkit.effects.card import sparkline
+from winchkit.effects.placement import HOME
+from winchkit.profile_edit.history import LADDER_UNITS
+from winchkit.report.comparison_rows import (
+    HEAD,
+    followed,
+    map_lines,
+    offset_text,
+    size_rows,
+)
+from winchkit.report.detectability import unseen, visible
+from winchkit.report.figures.rest import rest_of
+from winchkit.report.figures.waterfall import waterfall_of
+from winchkit.report.words.columns import aligned, hanging, paragraph
+from winchkit.report.words.numbers import Scale, grouped, percent, scale_for, significant
+from winchkit.report.words.sentence import changes_text, sentence, telling, where_text
+from winchkit.report.words.vocabulary import (
+    OUTPUT_NAMES,
+    VERDICT_NAMES,
+    clause,
+    estimate_text,
+    interval_text,
+    parameter_name,
+)
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.add import Addition, Removal
+    from winchkit.diagnosis.diagnose import Answer
+
+__all__ = ["addition_text", "compare_text", "report_text"]
+
+_MOST_LINES = 70
+_FEW = 3
+_SOONEST = 4
+_BARS = 40
+
+
+def report_text(answer: Answer) -> str:
+    """The story of a diagnosis in at most 70 lines of at most 80 characters."""
+    diagnosis = answer.diagnosis
+    blocks = [
+        [VERDICT_NAMES[diagnosis.verdict].upper(), *paragraph(sentence(diagnosis))],
+        _errors(diagnosis.outputs, grown=bool(diagnosis.steps), data=diagnosis.data),
+        _ladder(answer),
+        _confusion(diagnosis),
+        _places(answer),
+        _next(diagnosis),
+        paragraph(changes_text(diagnosis)),
+        _shown(answer),
+        _candidates(answer),
+        _notes(diagnosis.notes),
+    ]
+    lines = [line for block in blocks if block for line in (*block, "")][:-1]
+    if len(lines) > _MOST_LINES:
+        lines = [*lines[: _MOST_LINES - 1], "… the rest is in --json and --html"]
+    return "\n".join(lines)
+
+
+def compare_text(comparison: Comparison) -> str:
+    """How far the profile is off per output, and what the error follows."""
+    followings: list[str] = []
+    for name, error in comparison.outputs.items():
+        told = f"{OUTPUT_NAMES.get(name, name)} {followed(error)}"
+        followings += paragraph(told, "  ", "    ")
+    blocks = [aligned([HEAD, *size_rows(comparison)])]
+    if followings:
+        blocks.append(["what the errors follow", *followings])
+    maps = [line for told in map_lines(comparison) for line in paragraph(told, "  ", "    ")]
+    if maps:
+        blocks.append(["over two variables at once, mean error", *maps])
+    if comparison.offset is not None:
+        blocks.append([offset_text(comparison.offset)])
+    blocks.append(_notes(comparison.notes))
+    return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
+
+
+def addition_text(addition: Addition | Removal) -> str:
+    """What was fitted, and what the step did to the error out of sample."""
+    fitted = []
+    for term, every in addition.terms:
+        values = {name: e for name, e in every.items() if not name.startswith(HOME)}
+        told = ", ".join(estimate_text(name, value) for name, value in values.items())
+        beside = "; the lines' home lengths beside it" if len(values) < len(every) else ""
+        fitted.append([term.label, told + beside])
+        sure = {n: interval_text(n, v) for n, v in values.items()}
+        fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
+    blocks = [
+        ["fitted", *hanging(fitted)] if fitted else [],
+        _errors(addition.outputs, grown=True),
+        _notes(addition.notes),
+    ]
+    return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
+
+
+def _errors(outputs: Mapping[str, OutputFit], *, grown: bool, data: str = "runs") -> list[str]:
+    head = ["held-out error, rms", "before", "after", "noise"]
+    rows = [head if grown else [head[0], "error", "noise"]]
+    for name, output in outputs.items():
+        scale = scale_for(output.heldout_rms_before, output.unit)
+        noise = "unknown" if output.noise_rms is None else scale.text(output.noise_rms)
+        after = [scale.text(output.heldout_rms_after)] if grown else []
+        before = scale.text(output.heldout_rms_before)
+        rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
+    told = f"held out: each group of {data} is predicted with values fitted without it"
+    return [*aligned(rows), f"  ({told})"]
+
+
+def _ladder(answer: Answer) -> list[str]:
+    """What each of several effects buys: added first alone, and dropped last."""
+    ladder = waterfall_of(answer)
+    if ladder is None or len(ladder.first) < 2:
+        return []
+    outputs = answer.diagnosis.outputs
+    scales = {n: scale_for(o.heldout_rms_before, o.unit) for n, o in outputs.items()}
+    states = [
+        *ladder.rungs,
+        *((f"only {name}", rms) for name, rms in ladder.first.items()),
+        *((f"all but {name}", rms) for name, rms in ladder.last.items()),
+    ]
+    rows = [["held-out error, rms", *(OUTPUT_NAMES.get(name, name) for name in scales)]]
+    rows += [[label, *(scales[n].text(rms[n]) for n in scales)] for label, rms in states]
+    noise = {name: output.noise_rms for name, output in outputs.items()}
+    rows.append(["noise", *(_text_or_unknown(scales[n], noise[n]) for n in scales)])
+    return ["what each effect buys", *aligned(rows)]
+
+
+def _text_or_unknown(scale: Scale, value: float | None) -> str:
+    return "unknown" if value is None else scale.text(value)
+
+
+def _shown(answer: Answer) -> list[str]:
+    """Which effects these runs could show at all, and how small."""
+    rows, blind = visible(answer), [effect for effect, _ in unseen(answer)]
+    if not rows:
+        return []
+    able, count = [row for row in rows if row.usual], len(rows) + len(blind)
+    data = answer.diagnosis.data
+    head = (
+        f"these {data} would have shown {len(able)} of {count} effects in their usual size, soonest"
+    )
+    soonest = [[row.effect, f"{row.parameter} {row.text}"] for row in able[:_SOONEST]]
+    lines = [head, *aligned(soonest, words=2)]
+    large = [f"{r.effect} ({significant(r.share, 2)} ×)" for r in rows if r.share > 1.0]
+    if large:
+        told = f"only where larger than usual: {', '.join(large)}"
+        lines += paragraph(told, "  ", "    ")
+    never = [row.effect for row in rows if isnan(row.share)]
+    if never:
+        lines += paragraph(f"at no size that can be: {', '.join(never)}", "  ", "    ")
+    if large or never:
+        lines.append("  'winchkit plan' proposes what shows most of them")
+    if blind:
+        lines += paragraph(
+            f"not looked for, a part or channel lacks: {', '.join(blind)}", "  ", "    "
+        )
+    return lines
+
+
+def _confusion(diagnosis: Diagnosis) -> list[str]:
+    rows = []
+    for step in (step for step in diagnosis.steps if not step.whole):
+        for effect, angle in step.angles.items():
+            own = next(name for name in step.effects if name not in step.angles)
+            rows.append([f"{own} / {effect}", f"{degrees(angle):.1f}° apart"])
+    return [f"these {diagnosis.data} cannot tell apart", *aligned(rows, words=2)] if rows else []
+
+
+def _places(answer: Answer) -> list[str]:
+    """Where an unexplained rest lives, its shape, and how to go on with it."""
+    diagnosis, lines = answer.diagnosis, []
+    for where in telling(diagnosis.where)[:_FEW]:
+        lines += paragraph(where_text(where), "  ", "    ")
+        if not where.frequency and diagnosis.verdict in {"partly", "unknown"}:
+            lines.append(f"    {_shape(answer, where)}")
+    if not lines:
+        return []
+    if diagnosis.empirical:
+        name = diagnosis.empirical[0]
+        lines += paragraph(
+            f"'winchkit add {name}' adds it as a curve, marked as not understood; "
+            "'winchkit effects new' begins an effect of your own from it",
+            "  ",
+            "  ",
+        )
+    return ["where the rest lives", *lines]
+
+
+def _shape(answer: Answer, where: Where) -> str:
+    """The mean residual along where it lives, as bars from its lowest to its highest."""
+    _, mean = rest_of(answer, where)
+    low, high = float(mean.min()), float(mean.max())
+    scale = scale_for((low, high), LADDER_UNITS[where.output])
+    bars = sparkline(mean, min(_BARS, len(mean)))
+    return f"{bars}  {scale.text(low, 2)} to {scale.text(high, 2)}"
+
+
+def _next(diagnosis: Diagnosis) -> list[str]:
+    lines = []
+    for run in diagnosis.next_runs[:_FEW]:
+        power = "" if isnan(run.power) else f" (power {percent(run.power)})"
+        text = f"{' / '.join(run.separates)}: {run.programme}{power}"
+        lines += paragraph(text, "  ", "    ")
+    return ["what to run next", *lines] if lines else []
+
+
+def _candidates(answer: Answer) -> list[str]:
+    diagnosis = answer.diagnosis
+    if diagnosis.verdict == "adequate":
+        return []
+    best = [c for c in diagnosis.candidates if c.score > 0][:_FEW]
+    if not best:
+        return []
+    chance = significant(max(answer.found.threshold, 0.0), 2)
+    rows = [[c.effect, grouped(c.score), clause(c.effect)] for c in best]
+    head = f"strongest evidence, each alone (noise reaches {chance} once in a hundred cases)"
+    return [head, *hanging(rows)]
+
+
+def _notes(notes: tuple[str, ...]) -> list[str]:
+    lines = [line for note in notes for line in paragraph(note, "  ", "    ")]
+    return ["notes", *lines] if lines else []

@@ -1,0 +1,1 @@
+"""Numbers with units and uncertainty, the vocabulary, and sentences of verdicts."""

@@ -1,0 +1,50 @@
+"""Plain-text columns for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import wrap
+
+from winchkit.report.words.numbers import unbroken
+
+__all__ = ["aligned", "hanging", "paragraph"]
+
+_WIDTH = 80
+
+
+def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
+    """Rows indented by two, the first ``words`` columns flush left and the others flush right."""
+    if not rows:
+        return []
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = [
+            cell.ljust(width) if at < words else cell.rjust(width)
+            for at, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  " + "  ".join(cells).rstrip())
+    return lines
+
+
+def hanging(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
+    """Rows as by :func:`aligned`, the last cell of each as words that go on below themselves."""
+    heads = aligned([row[:-1] for row in rows], words)
+    width = max((len(head) for head in heads), default=0) + 2
+    return [
+        line
+        for head, row in zip(heads, rows, strict=True)
+        for line in paragraph(row[-1], head.ljust(width), " " * width)
+    ]
+
+
+def paragraph(text: str, first: str = "", then: str = "") -> list[str]:
+    """Text in lines of at most 80 characters."""
+    lines = wrap(
+        unbroken(text),
+        _WIDTH,
+        initial_indent=first,
+        subsequent_indent=then,
+        break_on_hyphens=False,
+    )
+    return [line.replace("\u00a0", " ") for line in lines]

@@ -1,0 +1,1 @@
+"""File formats of runs and logs: CSV, MCAP, Parquet and MF4."""

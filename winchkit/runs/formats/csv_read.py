@@ -1,0 +1,353 @@
+"""Reads a run from CSV: metadata lines ``# key: value``, one header line, numbers."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.errors import Fault, RunError
+from winchkit.regular_file import regular
+from winchkit.runs.assemble import Recording, assemble, refuse
+from winchkit.runs.columns import column_dimension, header_of
+from winchkit.runs.formats.csv_write import CSV_MARK
+from winchkit.runs.recording.log_file import is_written
+from winchkit.runs.run import Run
+
+__all__ = [
+    "cut_off",
+    "read_bytes",
+    "read_csv",
+    "read_lines",
+]
+
+_PIECE = 1 << 20
+
+
+def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
+    """Content of a file; raises RunError where there is none to read."""
+    try:
+        with open(path, "rb", opener=regular) as file:
+            data = file.read()
+    except FileNotFoundError:
+        raise RunError(Fault("there is no such file", str(path))) from None
+    except IsADirectoryError:
+        raise RunError(Fault("is a directory, not a run", str(path))) from None
+    except OSError as error:
+        raise RunError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
+    except ValueError as error:
+        raise RunError(Fault(f"is no usable file name: {error}", repr(str(path)))) from None
+    if not data and not may_be_empty:
+        raise RunError(Fault("the file is empty", str(path)))
+    return data
+
+
+def cut_off(path: str, whole: str) -> str:
+    """What is said of a log without its end, of which something whole was read."""
+    if is_written(Path(path)):
+        return f"the log is still being written; its {whole} so far are read"
+    return (
+        f"the file is cut off; its {whole} are read, what follows is left out "
+        f"(`winchkit log recover {path}` writes a whole file)"
+    )
+
+
+def read_lines(path: Path) -> Iterator[str]:
+    """Lines of a text file in UTF-8, UTF-16 with its mark, or Windows-1252, one after another.
+
+    Each has its line feed, but for a last line that the file ends without one.
+    The file is gone through twice and never held whole: an hour of eight winches is gigabytes.
+    """
+    encoding = _encoding(path)
+    with open(path, encoding=encoding, opener=regular) as file:
+        yield from file
+
+
+def _encoding(path: Path) -> str:
+    """The first encoding in which all of a file reads; raises RunError where it is no text."""
+    marked = _beginning(path).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
+        try:
+            is_text = _holds_no_zero(path, encoding)
+        except UnicodeDecodeError:
+            continue
+        if not is_text:
+            raise RunError(Fault("is a binary file, not CSV text", str(path)))
+        return encoding
+    raise RunError(Fault("is not a text file; save it as CSV in UTF-8", str(path)))
+
+
+def _holds_no_zero(path: Path, encoding: str) -> bool:
+    with open(path, encoding=encoding, opener=regular) as file:
+        return not any("\0" in piece for piece in iter(lambda: file.read(_PIECE), ""))
+
+
+def _beginning(path: Path) -> bytes:
+    """First bytes of a file; raises RunError where there is none to read."""
+    try:
+        with open(path, "rb", opener=regular) as file:
+            data = file.read(4)
+    except (OSError, ValueError):
+        return read_bytes(path)
+    return data or read_bytes(path)
+
+
+Rows = list[list[str]]
+_BLOCK = 4096
+"""Rows whose text is held at a time."""
+
+
+def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
+    """Read a run; raises RunError with every fault of the file, each with its line.
+
+    A last line without a line feed is no row where winchkit wrote the file, whose rows all have
+    one; in a file of another program it is, when it has every column. A part of a log may be
+    without rows.
+    """
+    name, lines = str(path), read_lines(Path(path))
+    above: list[str] = []
+    first = next((line for line in lines if not _is_comment_kept(line, above)), None)
+    metadata, metadata_lines, faults = _metadata(name, above)
+    if first is None:
+        faults.append(Fault("there is no header line; it names the columns, 'time [s],…'", name))
+    is_own = above[:1] == [f"{CSV_MARK}\n"]
+    if is_own and first is not None and not _is_ended(first):
+        faults.append(Fault("was cut off within its header; there is no row to recover", name))
+    refuse(faults)
+    number = len(above) + 1
+    header = _header(name, first or "", number)
+    table, notes = _Table(name, header), _Notes(name, is_own=is_own)
+    for rows, numbers in _blocks(name, notes.whole(lines, len(header)), number):
+        table.add(rows, numbers)
+    refuse(table.ragged())
+    return assemble(
+        Recording(
+            name,
+            header,
+            table.columns(),
+            table.line_of,
+            metadata,
+            metadata_lines,
+            number,
+            notes.told,
+            faults + table.faults,
+            is_part,
+        )
+    )
+
+
+class _Notes:
+    """Judges the last line of a file that ends without a line feed."""
+
+    def __init__(self, path: str, *, is_own: bool) -> None:
+        self.told: list[str] = []
+        self._path, self._is_own = path, is_own
+
+    def whole(self, lines: Iterator[str], width: int) -> Iterator[str]:
+        """The lines that are whole; what is said of a last one that is not, is in ``told``."""
+        for line in lines:
+            if not _is_ended(line) and line.strip():
+                if self._is_own:
+                    self.told.append(cut_off(self._path, "rows before its last line"))
+                    return
+                if (cells := _width(line)) < width:
+                    self.told.append(
+                        f"the last line has {cells} cells of {width} and no line end; it is left "
+                        "out: is the file cut off?"
+                    )
+                    return
+                self.told.append(
+                    "the last row has no line end; if the file was cut off there, its last number "
+                    "may lack digits"
+                )
+            yield line
+
+
+def _is_ended(line: str) -> bool:
+    return line.endswith("\n")
+
+
+def _width(line: str) -> int:
+    """Number of cells in a line."""
+    try:
+        return len(next(csv.reader([line])))
+    except csv.Error:
+        return 0
+
+
+class _Table:
+    """Columns of numbers that grow block by block; the text of a block is not kept."""
+
+    def __init__(self, path: str, header: Sequence[tuple[str, str]]) -> None:
+        self.faults: list[Fault] = []
+        self._path, self._names = path, [name for name, _ in header]
+        self._pieces: list[list[Array] | None] = [[] for _ in header]
+        self._numbers: list[NDArray[np.intp]] = []
+        self._ragged: list[tuple[int, int]] = []
+        """Line and cells of rows of another width than the header."""
+
+    def add(self, rows: Rows, numbers: list[int]) -> None:
+        """Take the next rows, with the line of each."""
+        self._numbers.append(np.array(numbers, dtype=np.intp))
+        width = len(self._names)
+        self._ragged += [
+            (number, len(row))
+            for row, number in zip(rows, numbers, strict=True)
+            if len(row) != width
+        ]
+        if self._ragged:
+            return
+        for index, (name, cells) in enumerate(
+            zip(self._names, zip(*rows, strict=True), strict=True)
+        ):
+            self._extend(index, name, cells, numbers)
+
+    def _extend(self, index: int, name: str, cells: Sequence[str], numbers: list[int]) -> None:
+        pieces = self._pieces[index]
+        if pieces is None:
+            return
+        values, wrong = _numbers(cells)
+        if wrong and column_dimension(name) is None:
+            self._pieces[index] = None
+            return
+        pieces.append(values)
+        self.faults += [
+            Fault(f"column '{name}' holds {cells[row]!r}, not a number", self._path, numbers[row])
+            for row in wrong
+        ]
+
+    def ragged(self) -> list[Fault]:
+        """A fault for every row that has another width than the header."""
+        width = len(self._names)
+        faults = [
+            Fault(f"{cells} cells in this row, {width} columns in the header", self._path, line)
+            for line, cells in self._ragged
+        ]
+        if faults and faults[-1].line == self.line_of(-1) and self._ragged[-1][1] < width:
+            last = faults.pop()
+            faults.append(Fault(last.message + "; is the file cut off?", self._path, last.line))
+        return faults
+
+    def columns(self) -> list[Array | None]:
+        """All values so far; None for an unknown column that holds text."""
+        out: list[Array | None] = []
+        for index, pieces in enumerate(self._pieces):
+            out.append(None if pieces is None else np.concatenate([np.empty(0), *pieces]))
+            self._pieces[index] = []  # Each column once: a long run is as large as its numbers.
+        return out
+
+    def line_of(self, row: int) -> int:
+        """Line at which a row stands."""
+        block = -1 if row < 0 else row // _BLOCK
+        return int(self._numbers[block][row if row < 0 else row % _BLOCK])
+
+
+def _is_comment_kept(line: str, above: list[str]) -> bool:
+    """Whether a line stands above the header; it is kept then."""
+    if not _is_comment(line):
+        return False
+    above.append(line)
+    return True
+
+
+def _is_comment(line: str) -> bool:
+    return not line.strip() or line.lstrip().startswith("#")
+
+
+def _metadata(
+    path: str, lines: Sequence[str]
+) -> tuple[dict[str, str], dict[str, int], list[Fault]]:
+    """Metadata and the line of each key; a comment without a colon is only a comment."""
+    values: dict[str, str] = {}
+    places: dict[str, int] = {}
+    faults: list[Fault] = []
+    for number, line in enumerate(lines, start=1):
+        key, colon, value = line.strip().lstrip("#").partition(":")
+        key = key.strip()
+        if not colon or not key:
+            continue
+        if key in values:
+            faults.append(
+                Fault(f"given a second time, after line {places[key]}", path, number, key)
+            )
+        values[key], places[key] = value.strip(), number
+    return values, places, faults
+
+
+def _header(path: str, line: str, number: int) -> list[tuple[str, str]]:
+    for mark, called in ((";", "semicolons"), ("\t", "tabs")):
+        if line.count(mark) > line.count(","):
+            message = (
+                f"columns are separated by {called}; save the file with commas between columns "
+                "and points in numbers"
+            )
+            raise RunError(Fault(message, path, number))
+    try:
+        cells = next(csv.reader([line], strict=True))
+    except csv.Error as error:
+        raise RunError(Fault(f"the header cannot be read: {error}", path, number)) from None
+    if not any(_numbers([cell])[1] for cell in cells):
+        message = (
+            "the first line holds numbers; a header such as 'time [s],motor_angle [rad]' is due"
+        )
+        raise RunError(Fault(message, path, number))
+    header = [(cell, header_of(cell)) for cell in cells]
+    refuse(
+        [
+            Fault(f"column {n} is called '{cell}'; write it as 'name [unit]'", path, number)
+            for n, (cell, read) in enumerate(header, start=1)
+            if read is None
+        ]
+    )
+    return [read for _, read in header if read is not None]
+
+
+def _blocks(path: str, lines: Iterator[str], start: int) -> Iterator[tuple[Rows, list[int]]]:
+    """Cells of every row that is not blank, and its line, so many rows at a time."""
+    rows: Rows = []
+    numbers: list[int] = []
+    reader = csv.reader(lines)
+    try:
+        for row in reader:
+            if row and (len(row) > 1 or row[0].strip()):
+                rows.append(row)
+                numbers.append(start + reader.line_num)
+            if len(rows) == _BLOCK:
+                yield rows, numbers
+                rows, numbers = [], []
+    except csv.Error as error:
+        raise RunError(Fault(f"cannot be read: {error}", path, start + reader.line_num)) from None
+    if rows:
+        yield rows, numbers
+
+
+def _numbers(cells: Sequence[str]) -> tuple[Array, list[int]]:
+    """Values of a column, NaN where a cell is empty, and the rows that hold no number."""
+    try:
+        values = np.array(list(map(float, cells)), dtype=np.float64)
+    except ValueError:
+        pass
+    else:
+        if not any("_" in cell for cell in cells):
+            return values, []
+    read = [_number(cell) for cell in cells]
+    wrong = [row for row, value in enumerate(read) if value is None]
+    filled = [math.nan if value is None else value for value in read]
+    return np.array(filled, dtype=np.float64), wrong
+
+
+def _number(cell: str) -> float | None:
+    """A cell's value; Python would also read ``1_000``, which no instrument writes."""
+    text = cell.strip()
+    if not text:
+        return math.nan
+    try:
+        return None if "_" in text else float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,74 @@
+"""Writes a log as ASAM MDF 4, a group per source with its own time; needs the extra ``mf4``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from winchkit.errors import Fault, FileError, UsageError
+from winchkit.runs.log import Log
+from winchkit.runs.run import Run
+
+__all__ = [
+    "write_mf4",
+    "write_parquet",
+]
+
+
+def write_mf4(log: Log, path: str | Path) -> None:
+    """Channels keep their own time stamps, counted from the first sample of any.
+
+    Raises UsageError without asammdf, FileError where the file cannot be written.
+    """
+    try:
+        from asammdf import MDF, Signal
+    except ImportError:
+        raise UsageError(
+            f"{path}: MF4 needs asammdf; install it with pip install 'winchkit[mf4]'"
+        ) from None
+    start, _ = log.span
+    with MDF(version="4.10") as mdf:
+        for source in log.layout.sources:
+            samples = log.samples[source.topic]
+            signals = [
+                Signal(
+                    samples=samples.values[:, n],
+                    timestamps=samples.times - start,
+                    unit=signal.unit,
+                    name=signal.column
+                    or f"{source.topic.strip('/').replace('/', '.')}.{signal.name}",
+                )
+                for n, signal in enumerate(source.signals)
+            ]
+            mdf.append(signals, acq_name=source.topic, common_timebase=True)
+        mdf.header.comment = "\n".join(f"{key}: {value}" for key, value in log.metadata.items())
+        try:
+            mdf.save(Path(path), overwrite=True)
+        except OSError as error:
+            raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from None
+
+
+def write_parquet(run: Run, path: str | Path) -> None:
+    """One column per channel, null for a missing value, the unit in the column's metadata.
+
+    Raises UsageError without pyarrow, FileError where the file cannot be written.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        raise UsageError(
+            f"{path}: Parquet needs pyarrow; install it with pip install 'winchkit[parquet]'"
+        ) from None
+    units = {"time": "s", **{name: item.unit for name, item in run.channels.items()}}
+    values = {"time": run.time, **{name: item.values for name, item in run.channels.items()}}
+    schema = pa.schema(
+        [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in units.items()],
+        metadata=dict(run.metadata),
+    )
+    # From pandas, where NaN is how a missing value is written.
+    columns = [pa.array(item, from_pandas=True) for item in values.values()]
+    try:
+        with Path(path).open("wb") as stream:
+            parquet.write_table(pa.table(columns, schema=schema), stream, compression="zstd")
+    except OSError as error:
+        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from None

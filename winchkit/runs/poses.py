@@ -1,0 +1,194 @@
+"""What a robot's runs say of its poses: one row a pose, NaN where nothing was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.errors import Fault, RunError
+from winchkit.model.robot.rotation import angles_of, rotation_from_quaternion
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.units import suggest
+
+__all__ = ["Measured", "joined", "read_poses"]
+
+_POSITION = ("platform_x", "platform_y", "platform_z")
+_QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
+_ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What was measured at p poses of a robot with n lines."""
+
+    motor_angle: Array
+    """(p, n), rad."""
+    position: Array
+    """Of the platform's origin in the base frame, (p, 3), m."""
+    angles: Array
+    """Roll, pitch, yaw, (p, 3), rad."""
+    swivel: Array
+    """(p, n), rad, each line with a zero of its own."""
+    cable_length: Array
+    """By an instrument at the rope, (p, n), m, each with an offset of its own."""
+    tension: Array
+    """(p, n), N."""
+    temperature: Array
+    """Of the ropes, (p, n), degrees Celsius."""
+    run: NDArray[np.intp]
+    """Which of the runs each pose is from, (p,)."""
+    place: NDArray[np.str_]
+    """Which row of which run each pose is, in words, (p,)."""
+    length_zeroed: bool = False
+    """Whether the length instruments have no offset."""
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.motor_angle)
+
+    def __getitem__(self, rows: NDArray[np.bool_]) -> Measured:
+        """The poses of a mask."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in _ARRAYS})
+
+
+_ARRAYS = tuple(
+    field.name for field in fields(Measured) if field.name not in {"length_zeroed", "notes"}
+)
+
+
+def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
+    """Gather the poses of all runs; rows without a motor angle are left out and noted.
+
+    Raises RunError with the faults of all runs: lines that the robot does not have, lines without
+    motor angles, half a quaternion.
+    """
+    faults: list[Fault] = []
+    parts: list[Measured] = []
+    for run in runs:
+        found = _faults(run, profile)
+        faults += found
+        if not found:
+            parts.append(_of_run(run, profile, len(parts)))
+    if faults:
+        raise RunError(faults)
+    return joined(parts)
+
+
+def joined(parts: Sequence[Measured]) -> Measured:
+    """Poses of several parts, one after another."""
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
+    }
+    notes = tuple(note for part in parts for note in part.notes)
+    return Measured(**arrays, length_zeroed=all(part.length_zeroed for part in parts), notes=notes)
+
+
+def _faults(run: Run, profile: RobotProfile) -> list[Fault]:
+    names, place = [line.name for line in profile.line], run.path or run.name
+    there = [name for name in run.winches() if name]
+    if not there:
+        message = (
+            f"no column '{names[0]}.motor_angle'; a robot's run has one for each of its lines "
+            f"{', '.join(names)}"
+        )
+        return [Fault(message, place)]
+    faults = [
+        Fault(
+            f"column '{name}.motor_angle' is of no line of the robot '{profile.name}'; its lines "
+            f"are {', '.join(names)}{suggest(name, names)}",
+            place,
+        )
+        for name in there
+        if name not in names
+    ]
+    if missing := [name for name in names if name not in there]:
+        columns = ", ".join(f"'{name}.motor_angle'" for name in missing)
+        faults.append(Fault(f"no column {columns}; every line of the robot needs its own", place))
+    faults += [
+        Fault(f"column '{name}.motor_angle' holds no value", place)
+        for name in names
+        if name in there and not np.any(np.isfinite(run[f"{name}.motor_angle"]))
+    ]
+    given, lacking = _present(run, _QUATERNION)
+    if given and lacking:
+        faults.append(Fault(f"has {', '.join(given)} but not {', '.join(lacking)}", place))
+    return faults
+
+
+def _present(run: Run, names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Which of these columns the run has, and which it lacks."""
+    given = [name for name in names if name in run]
+    return given, [name for name in names if name not in given]
+
+
+def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
+    names = [line.name for line in profile.line]
+
+    def per_line(kind: str) -> Array:
+        return np.stack([_column(run, f"{name}.{kind}") for name in names], axis=1)
+
+    found = Measured(
+        motor_angle=per_line("motor_angle"),
+        position=np.stack([_column(run, name) for name in _POSITION], axis=1),
+        angles=_angles(run),
+        swivel=per_line("swivel"),
+        cable_length=per_line("cable_length"),
+        tension=per_line("tension"),
+        temperature=_temperature(run, names),
+        run=np.full(len(run), number, dtype=np.intp),
+        place=np.array([f"row {n} of {run.path or run.name}" for n in range(1, len(run) + 1)]),
+        length_zeroed=run.length_zeroed,
+    )
+    moved = np.any(np.isfinite(found.motor_angle), axis=1)
+    told = [*_partly(run), *_gaps(found, moved)]
+    notes = [f"{run.path or run.name}: {note}" for note in told]
+    return replace(found[moved], notes=tuple(notes))
+
+
+def _partly(run: Run) -> list[str]:
+    """Fair, but more often a misspelt column."""
+    given, lacking = _present(run, _POSITION)
+    if not given or not lacking:
+        return []
+    return [
+        f"has {', '.join(given)} but not {', '.join(lacking)}: fitted so; distances from measured "
+        "positions are not known"
+    ]
+
+
+def _gaps(found: Measured, moved: NDArray[np.bool_]) -> list[str]:
+    notes = []
+    if left := int(np.count_nonzero(~moved)):
+        notes.append(f"{left} rows without any motor angle were left out")
+    kept = found[moved]
+    for name in ("motor_angle", "position"):
+        values = getattr(kept, name)
+        missing = int(np.count_nonzero(np.isnan(values)))
+        if 0 < missing < values.size:
+            notes.append(f"{missing} of {values.size} values of {name} are missing")
+    return notes
+
+
+def _temperature(run: Run, names: Sequence[str]) -> Array:
+    """Line by line where it was measured so, else one for all."""
+    common = _column(run, "temperature")
+    own = [_column(run, f"{name}.temperature") for name in names]
+    return np.stack([np.where(np.isfinite(t), t, common) for t in own], axis=1)
+
+
+def _column(run: Run, name: str) -> Array:
+    return run[name] if name in run else np.full(len(run), np.nan)
+
+
+def _angles(run: Run) -> Array:
+    angles = np.stack([_column(run, name) for name in _ANGLES], axis=1)
+    quaternion = np.stack([_column(run, name) for name in _QUATERNION], axis=1)
+    whole = np.linalg.norm(quaternion, axis=1) > 0.5
+    angles[whole] = angles_of(rotation_from_quaternion(quaternion[whole]))
+    return angles

@@ -1,0 +1,169 @@
+"""A log by channels: MCAP in which every source keeps its own time stamps."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.runs.align import Aligner, Moments
+from winchkit.runs.files import abandoned
+from winchkit.runs.formats.mcap_file import (
+    CDR,
+    COUNTERS,
+    END,
+    EVENTS,
+    LOG,
+    METADATA,
+    PROFILE,
+    McapFile,
+    message_definition,
+    message_name,
+)
+from winchkit.runs.formats.mcap_records import pack_messages
+from winchkit.runs.layout import Layout, Samples, write_layout
+from winchkit.runs.recording.log_file import require_in_place
+from winchkit.runs.recording.writer import LogWriter
+
+__all__ = ["ChannelLog"]
+
+
+class ChannelLog(LogWriter):
+    """One topic per source, beside events and counters."""
+
+    _file: McapFile
+
+    def __init__(self, path: Path, layout: Layout, *others: Any, replace: bool) -> None:
+        self._aligner, self._moments = Aligner(layout), Moments(layout.rule)
+        self._numbers = {source.topic: n for n, source in enumerate(layout.sources, start=1)}
+        self._notes = {EVENTS: len(self._numbers) + 1, COUNTERS: len(self._numbers) + 2}
+        self._sequences = dict.fromkeys([*self._numbers, *self._notes], 0)
+        self._waiting: list[bytes] = []
+        self._pending: list[NDArray[np.float64]] = []
+        super().__init__(path, layout, *others, replace=replace)
+
+    def tell(self, time: float, event: Mapping[str, Any]) -> None:
+        """Keep an event at a moment (s)."""
+        self._note(EVENTS, time, event)
+
+    def count(self, time: float, counters: Mapping[str, Any]) -> None:
+        """Keep what was counted until a moment (s)."""
+        self._note(COUNTERS, time, counters)
+
+    def _note(self, topic: str, time: float, value: Mapping[str, Any]) -> None:
+        data = np.frombuffer(_json(value), np.uint8)[None, :]
+        stamp = self._stamps(np.array([time]))
+        self._waiting.append(self._packed(topic, self._notes[topic], stamp, stamp, data))
+
+    def _open_part(self, path: Path, stream: BinaryIO, about: Mapping[str, str]) -> None:
+        self._whole = 0
+        self._stream = stream
+        with self._writing():
+            self._watch(self._stream.fileno())
+            self._file = McapFile(self._stream, PROFILE, "winchkit")
+            for source in self._layout.sources:
+                number = self._numbers[source.topic]
+                definition = message_definition(source.signals)
+                self._file.put_schema(number, message_name(source), "ros2msg", definition)
+                self._file.put_channel(number, number, source.topic, "cdr")
+            note = len(self._numbers) + 1
+            self._file.put_schema(note, "winchkit.Note", "jsonschema", b'{"type":"object"}')
+            for topic, number in self._notes.items():
+                self._file.put_channel(number, note, topic, "json")
+            self._file.put_metadata(METADATA, {**self.metadata, **about})
+            rule = replace(self._layout.rule, start=self._aligner.start)
+            layout = write_layout(replace(self._layout, rule=rule))
+            self._file.put_metadata(LOG, {"layout": layout, **about})
+
+    def _put(self, pieces: Mapping[str, Samples], now: float) -> None:
+        content = [self._message_block(topic, samples) for topic, samples in pieces.items()]
+        self._put_chunk([*content, *self._waiting])
+        if self._aligner.start is None:
+            # Later parts have to know when the first row was, to count time from there.
+            for topic, samples in pieces.items():
+                self._aligner.add(topic, samples.times, samples.values)
+            self._aligner.rows(now)
+        if self._layout.rule.topic in pieces:
+            self._pending.append(pieces[self._layout.rule.topic].times)
+        start = self._aligner.start
+        if start is not None and self._pending:
+            times = np.concatenate(self._pending)
+            self._pending.clear()
+            self.rows += len(self._moments.of(times[times >= start]))
+
+    def _close_part(self, end: Mapping[str, str]) -> None:
+        if self._stream.closed:
+            return
+        self._put_chunk(self._waiting)
+        with self._writing():
+            if end:
+                self._file.put_metadata(END, end)
+            self._file.finish()
+        self._stream.close()
+
+    def require_in_place(self) -> None:
+        """Raise FileError where another program has removed, replaced or cut the file."""
+        require_in_place(self.parts[-1], self._stream, self._whole)
+
+    def _size(self) -> int:
+        return self._file.size
+
+    def _put_chunk(self, blocks: list[bytes]) -> None:
+        content = b"".join(blocks)
+        self._waiting = []
+        if content:
+            with self._writing():
+                self._file.put_chunk(content)
+
+    def _message_block(self, topic: str, samples: Samples) -> bytes:
+        known = np.isfinite(samples.times)
+        times, received = samples.times[known], samples.received[known]
+        values = np.ascontiguousarray(samples.values[known], dtype="<f8")
+        data = np.empty((len(values), len(CDR) + 8 * values.shape[1]), np.uint8)
+        data[:, : len(CDR)] = np.frombuffer(CDR, np.uint8)
+        data[:, len(CDR) :] = values.view(np.uint8)
+        arrived = self._stamps(np.where(np.isfinite(received), received, times))
+        return self._packed(topic, self._numbers[topic], self._stamps(times), arrived, data)
+
+    def _stamps(self, times: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.rint(times * 1e9).astype(np.int64) + self._layout.clock_offset
+
+    def _packed(
+        self,
+        topic: str,
+        number: int,
+        sampled: NDArray[np.int64],
+        arrived: NDArray[np.int64],
+        data: NDArray[np.uint8],
+    ) -> bytes:
+        begin = self._sequences[topic]
+        self._sequences[topic] = begin + len(data)
+        return pack_messages(number, begin, sampled, arrived, data)
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Flush at the end; of a full disk make FileError, and keep what was whole before."""
+        try:
+            yield
+            self._stream.flush()
+            self._whole = self._file.size
+        except OSError as error:
+            raise abandoned(self._stream, self.parts[-1], self._whole, error) from None
+
+
+def _json(value: object) -> bytes:
+    """JSON with null for what is no finite number."""
+    return json.dumps(_finite(value), separators=(",", ":"), allow_nan=False).encode()
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

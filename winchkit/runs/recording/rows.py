@@ -1,0 +1,51 @@
+"""A log as rows: CSV as it grows, aligned while it is recorded."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from winchkit.runs.align import Aligner
+from winchkit.runs.layout import Layout, Samples
+from winchkit.runs.recording.writer import LogWriter
+from winchkit.runs.run_writer import RunWriter
+from winchkit.runs.writer import kind_for
+
+__all__ = ["RowLog"]
+
+
+class RowLog(LogWriter):
+    """Rows at the moments of the slowest instrument."""
+
+    _writer: RunWriter
+
+    def __init__(self, path: Path, layout: Layout, *others: Any, replace: bool) -> None:
+        self._aligner = Aligner(layout)
+        super().__init__(path, layout, *others, replace=replace)
+
+    def _open_part(self, path: Path, stream: BinaryIO, about: Mapping[str, str]) -> None:
+        metadata = {**self.metadata, **about}
+        columns = self._layout.columns()
+        self._writer = kind_for(path)(path, columns, metadata, time.monotonic, lambda: stream)
+        self._watch(self._writer.descriptor)
+
+    def _put(self, pieces: Mapping[str, Samples], now: float) -> None:
+        for topic, samples in pieces.items():
+            self._aligner.add(topic, samples.times, samples.values)
+        rows = self._aligner.rows(now)
+        for row in rows.tolist():
+            self._writer.append_values(row)
+        self._writer.flush()
+        self.rows += len(rows)
+
+    def _close_part(self, end: Mapping[str, str]) -> None:
+        self._writer.close()
+
+    def require_in_place(self) -> None:
+        """Raise FileError where another program has removed, replaced or cut the file."""
+        self._writer.require_in_place()
+
+    def _size(self) -> int:
+        return self._writer.size

@@ -1,0 +1,60 @@
+"""What a device file declares: a device of one kind, with source and trust of its numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from winchkit.schema.devices.modbus import ModbusSpec
+from winchkit.schema.devices.process import ProcessSpec
+from winchkit.schema.devices.servo import ServoSpec
+from winchkit.schema.devices.stream import StreamSpec
+from winchkit.schema.table import Rule, Table
+
+__all__ = ["TABLES", "DeviceSpec"]
+
+TABLES = ("servo", "modbus", "stream", "process")
+"""One for each kind of device."""
+
+
+@dataclass(frozen=True)
+class DeviceSpec(Table):
+    """A device; exactly one of its tables is given."""
+
+    name: str
+    maker: str
+    model: str
+    source: str
+    """Where its numbers come from: a manual's name and page."""
+    trust: Literal["manual", "interoperability", "hardware", "generic", "eds"]
+    """Who has confirmed it: the manual, another program, the device itself, nobody (a generic
+    file), or nobody beyond the maker's EDS (``eds``)."""
+    servo: ServoSpec | None = None
+    modbus: ModbusSpec | None = None
+    stream: StreamSpec | None = None
+    process: ProcessSpec | None = None
+    unconfirmed: tuple[str, ...] = ()
+    """What stands in the file without a source: to be compared with the manual."""
+    description: str = ""
+    path: str = dataclasses.field(default="", compare=False)
+
+    @property
+    def kind(self) -> str:
+        """Name of the table that is given."""
+        return next((table for table in TABLES if getattr(self, table) is not None), "nothing")
+
+    @property
+    def commands(self) -> dict[str, bool]:
+        """Commands of an instrument by name, and whether each writes its EEPROM."""
+        table = self.modbus or self.stream or self.process
+        if table is None:
+            return {}
+        return {name: getattr(item, "permanent", False) for name, item in table.command.items()}
+
+    def rules(self) -> Iterator[Rule]:
+        """A device is of one kind."""
+        if sum(getattr(self, table) is not None for table in TABLES) != 1:
+            *most, last = (f"[{table}]" for table in TABLES)
+            yield "", f"a device has exactly one of the tables {', '.join(most)} and {last}"

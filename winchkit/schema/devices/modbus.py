@@ -1,0 +1,236 @@
+"""What a device file declares of an instrument that is read over Modbus."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from winchkit.schema.quantity import (
+    Duration,
+    Flag,
+    Number,
+    PositiveDuration,
+    PositiveNumber,
+    Whole,
+    WholeNumber,
+)
+from winchkit.schema.table import Rule, Table
+from winchkit.units import dimension_of
+
+__all__ = [
+    "REGISTERS",
+    "BusLink",
+    "CommandSpec",
+    "DecimalsSpec",
+    "FieldSpec",
+    "ModbusSpec",
+    "Order",
+    "ReadBlock",
+    "StatusMeaning",
+    "UnlockStep",
+    "ValueType",
+]
+
+StatusMeaning = Literal[
+    "fault", "overload", "underload", "stable", "unstable", "net", "zero", "valid", "busy"
+]
+"""``valid``: without it there is no value. ``busy``: with it the value is an old one. ``zero``: the
+gross value is within a quarter of a count of zero."""
+ValueType = Literal["u16", "i16", "u32", "i32", "f32"]
+Order = Literal["ABCD", "CDAB", "BADC", "DCBA"]
+"""Bytes as they come over the wire; A is the most significant. 16-bit types: AB or BA."""
+
+REGISTERS: dict[str, int] = {"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2}
+"""Registers that a value of each type takes."""
+_RANGES: dict[str, tuple[float, float]] = {
+    "u16": (0, 0xFFFF),
+    "i16": (-0x8000, 0x7FFF),
+    "u32": (0, 0xFFFFFFFF),
+    "i32": (-0x80000000, 0x7FFFFFFF),
+    "f32": (-3.4e38, 3.4e38),
+}
+
+
+@dataclass(frozen=True)
+class DecimalsSpec(Table):
+    """Where the device says how many decimals its counts have: bits of a register."""
+
+    register: int
+    """Wire address (from 0), within a block that is read."""
+    bit: Annotated[int, Whole(0, 15)] = 0
+    """Lowest bit of the number."""
+    bits: Annotated[int, Whole(1, 16)] = 16
+
+
+@dataclass(frozen=True)
+class FieldSpec(Table):
+    """One value within a read block of Modbus registers."""
+
+    name: str
+    register: int
+    """Wire address (from 0) of its first register."""
+    type: ValueType
+    order: Order = "ABCD"
+    unit: str = "1"
+    scale: Number = 1.0
+    """Physical value in ``unit`` of one count."""
+    sign_bit: int | None = None
+    """Bit of the status word that makes this magnitude negative."""
+    limit: Number | None = None
+    """The device never shows more counts than this without a flag; what is beyond contradicts
+    its status, and is no number."""
+    decimals: DecimalsSpec | None = None
+    """Counts are divided by ten to this power, which the device tells itself."""
+
+
+@dataclass(frozen=True)
+class ReadBlock(Table):
+    """Registers that are read in one query, so that they belong together."""
+
+    start: int
+    """Wire address (from 0)."""
+    count: Annotated[int, Whole(1, 125)]
+    function: Literal[3, 4] = 3
+    fixed: Flag = False
+    """The device answers this length only, so queries cannot alternate with ``count + 1``."""
+
+    @property
+    def end(self) -> int:
+        """The address behind the last one."""
+        return self.start + self.count
+
+
+@dataclass(frozen=True)
+class UnlockStep(Table):
+    """A register that must be written before a command is taken."""
+
+    register: int
+    value: Annotated[int, Whole(0, 0xFFFF)]
+
+
+@dataclass(frozen=True)
+class CommandSpec(Table):
+    """A command (tare, zero): the value written to a register (wire address, from 0)."""
+
+    register: int
+    value: Number
+    type: ValueType = "u16"
+    order: Order = "ABCD"
+    function: Literal[6, 16] = 6
+    """Modbus function; two registers always take 16."""
+    unlock: tuple[UnlockStep, ...] = ()
+    """Written before it, with the same function."""
+    comes: StatusMeaning | None = None
+    """This status must come, or the command was not obeyed."""
+    goes: StatusMeaning | None = None
+    """This status must go, or the command was not obeyed."""
+    within: PositiveDuration = 1.0
+    """So long the status may take, s."""
+    permanent: Flag = False
+    """It writes the device's EEPROM: only ``winchkit cell store`` sends it."""
+
+    @property
+    def writes_many(self) -> bool:
+        """Whether it goes out as function 16."""
+        return self.function == 16 or REGISTERS[self.type] > 1
+
+    def rules(self) -> Iterator[Rule]:
+        """A number that the type holds: a whole one, unless it is a float."""
+        if self.type != "f32" and self.value != int(self.value):
+            yield "value", f"{self.value:g} is no whole number, as {self.type} is"
+        low, high = _RANGES[self.type]
+        if not low <= self.value <= high:
+            yield "value", f"{self.value:g} is beyond what {self.type} holds, {low:g} to {high:g}"
+
+
+@dataclass(frozen=True)
+class BusLink(Table):
+    """A line as the device is set in the factory."""
+
+    baudrate: WholeNumber = 9600
+    parity: Literal["N", "E", "O"] = "N"
+    stopbits: Literal[1, 2] = 1
+
+
+@dataclass(frozen=True)
+class ModbusSpec(Table):
+    """An instrument read over Modbus RTU or TCP."""
+
+    read: ReadBlock
+    field: tuple[FieldSpec, ...]
+    value: str
+    """Name of the field that is the measurement; a field ``gross`` is it before any tare."""
+    status_read: ReadBlock | None = None
+    """A second block with status and decimals, for a device where one query cannot hold all. It
+    is read after the value; the status before and the one after both count for the value."""
+    status_register: int | None = None
+    status_type: ValueType = "u16"
+    status_order: Order = "ABCD"
+    status: Mapping[StatusMeaning, tuple[int, ...]] = dataclasses.field(default_factory=dict)
+    """Status bits by meaning; any of the bits will do."""
+    command: Mapping[str, CommandSpec] = dataclasses.field(default_factory=dict)
+    identity: tuple[FieldSpec, ...] = ()
+    """What `winchkit cell info` asks once: serial number, firmware."""
+    link: BusLink | None = None
+    """The device's factory setting of its line."""
+    max_registers: Annotated[int, Whole(1, 125)] = 125
+    """It answers at most so many in one query."""
+    gap: Duration = 0.0
+    """Silence that it needs between an answer and the next query, s."""
+    rate: PositiveNumber = 100.0
+    """Conversions per second."""
+    filter_delay: Duration = 0.0
+    """By this much a value is older than the moment at which it was read, s."""
+    longest_reply: PositiveDuration = 0.1
+    """After this long a reply cannot come any more, s."""
+
+    def rules(self) -> Iterator[Rule]:
+        """What is measured is among the fields, everything within what is read."""
+        names = [field.name for field in self.field]
+        if self.value not in names:
+            yield "value", f"'{self.value}' is none of the fields {', '.join(names) or '(none)'}"
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            yield "field", f"{names.count(name)} fields are named '{name}'"
+        for field in self.field:
+            yield from self._field_rules(field)
+        yield from self._status_rules()
+        for key, block in (("read", self.read), ("status_read", self.status_read)):
+            wanted = 0 if block is None else block.count + (not block.fixed)
+            if wanted > self.max_registers:
+                yield key, f"asks for {wanted} registers of {self.max_registers} at most"
+
+    def holds(self, first: int, count: int) -> bool:
+        """Whether the registers lie within one of the blocks that are read."""
+        blocks = [block for block in (self.read, self.status_read) if block is not None]
+        return any(block.start <= first and first + count <= block.end for block in blocks)
+
+    def _field_rules(self, field: FieldSpec) -> Iterator[Rule]:
+        end = field.register + REGISTERS[field.type]
+        if field.register < self.read.start or end > self.read.end:
+            yield (
+                "field",
+                f"'{field.name}' in registers {field.register} to {end - 1} is not within the "
+                f"block {self.read.start} to {self.read.end - 1}",
+            )
+        if dimension_of(field.unit) is None:
+            yield "field", f"'{field.name}' has the unknown unit '{field.unit}'"
+        if field.sign_bit is not None and self.status_register is None:
+            yield "status_register", f"missing; '{field.name}' takes its sign from there"
+        if field.decimals is not None and not self.holds(field.decimals.register, 1):
+            yield "field", f"'{field.name}': the register of its decimals is in no block"
+
+    def _status_rules(self) -> Iterator[Rule]:
+        if self.status_register is None:
+            if self.status:
+                yield "status_register", "missing; the status bits stand there"
+        elif not self.holds(self.status_register, REGISTERS[self.status_type]):
+            yield "status_register", f"{self.status_register} is in no block that is read"
+        for name, command in self.command.items():
+            for meaning in (command.comes, command.goes):
+                if meaning is not None and meaning not in self.status:
+                    yield (
+                        "command",
+                        f"'{name}' is verified by the status '{meaning}', which has no bit",
+                    )

@@ -1,0 +1,160 @@
+"""What a device file declares of a CiA 402 servo drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from winchkit.schema.host_loss import VendorWatchdog, unknown_mechanism
+from winchkit.schema.quantity import Duration, Flag, Quantity, Whole, WholeNumber
+from winchkit.schema.table import Rule, Table
+
+__all__ = [
+    "Mode",
+    "OptionSpec",
+    "PdoSpec",
+    "QuirkSpec",
+    "ServoSpec",
+]
+
+
+@dataclass(frozen=True)
+class QuirkSpec(Table):
+    """How a drive differs from the standard; what the simulated one then does too."""
+
+    quick_stop_codes: tuple[int, ...] = ()
+    """Values that 605Ah takes; empty for 0 to 8. -1 is a quick stop that is ignored."""
+    fault_reaction_codes: tuple[int, ...] = ()
+    """Values that 605Eh takes; empty for 0 to 4."""
+    toggles_bit_10: Flag = False
+    """Status bit 10 changes with every SYNC in the cyclic modes."""
+    needs_mode: Flag = False
+    """Operation is not enabled while no mode is chosen (6061h is 0)."""
+    needs_both_heartbeats: Flag = False
+    """1016h watches only while 1017h is set too."""
+    stops_outside_operational: Flag = False
+    """Leaving the NMT state Operational shuts the drive down."""
+    ramps_are_times: Flag = False
+    """6083h to 6085h and 609Ah are times from standstill to 3000 rpm, ms."""
+    home_gets_offset: Flag = False
+    """After homing the home has the position 607Ch; by the standard zero lies that far from it."""
+    brake_release: Duration = 0.0
+    """From enabling until the brake is open and set-points count, s."""
+    brake_apply: Duration = 0.0
+    """For which the motor holds the load while the brake closes, s."""
+
+
+Mode = Literal["PP", "PV", "PT", "HM", "IP", "CSP", "CSV", "CST"]
+MotionMode = Literal["CSP", "CSV", "PV", "IP"]
+
+_ON_REQUEST = (252, 253)
+_RESERVED = range(241, 252)
+_EVENT = (254, 255)
+Count = Annotated[int, Whole(-(2**31), 2**32 - 1)]
+"""Of a position counter."""
+_I16 = Whole(-(2**15), 2**15 - 1)
+
+
+@dataclass(frozen=True)
+class PdoSpec(Table):
+    """One PDO: its objects in order as ``index`` or ``index:sub``, e.g. ``0x6041`` ``0x6064``."""
+
+    number: Annotated[int, Whole(1, 4)]
+    """Within the predefined connection set; TPDO 1 has its communication record at 1800h."""
+    objects: tuple[str, ...]
+    """In the order in which the PDO carries them."""
+    transmission: Annotated[int, Whole(0, 255)] = 1
+    """CANopen transmission type: 1 every SYNC, n every n-th, 0 with a SYNC after a change, 254
+    and 255 by events of the drive."""
+    event_timer: Duration = 0.0
+    """Of types 254 and 255: sent at the latest after this long, s; 0 only after a change."""
+    inhibit_time: Duration = 0.0
+    """Of types 254 and 255: never sent sooner again than after this, s."""
+
+    @property
+    def every_sync(self) -> bool:
+        """Whether it comes with each SYNC."""
+        return self.transmission == 1
+
+    @property
+    def by_event(self) -> bool:
+        """Whether the drive sends it of its own accord."""
+        return self.transmission in _EVENT
+
+    def rules(self) -> Iterator[Rule]:
+        """Types that the standard reserves, and timers that nothing reads, are mistakes."""
+        kind = self.transmission
+        if kind in _RESERVED or kind in _ON_REQUEST:
+            why = "is reserved" if kind in _RESERVED else "answers remote requests only"
+            yield "transmission", f"{kind} {why}; use 1 to 240 (SYNC), 254 or 255 (events)"
+        for key in ("event_timer", "inhibit_time"):
+            if getattr(self, key) and not self.by_event:
+                yield key, f"has no effect with transmission {kind}; it is for 254 and 255"
+
+
+@dataclass(frozen=True)
+class OptionSpec(Table):
+    """What the drive shall do when it stops; a key that is left out leaves the drive's own."""
+
+    quick_stop: Annotated[int, _I16] | None = None
+    """605Ah: 1 to 4 ramp, then switched off; 5 to 8 ramp and stay in quick stop; 0 coast."""
+    shutdown: Annotated[int, _I16] | None = None
+    """605Bh: 1 ramp, 0 coast."""
+    disable_operation: Annotated[int, _I16] | None = None
+    """605Ch: 1 ramp, 0 coast."""
+    halt: Annotated[int, _I16] | None = None
+    """605Dh: 1 to 4, ramp and stay enabled."""
+    fault: Annotated[int, _I16] | None = None
+    """605Eh: 1 to 4 ramp, 0 coast."""
+    connection_lost: Annotated[int, _I16] | None = None
+    """6007h: 1 fault, 2 disable voltage, 3 quick stop, 0 go on as if nothing had happened."""
+
+
+@dataclass(frozen=True)
+class ServoSpec(Table):
+    """A CiA 402 drive."""
+
+    eds: str
+    """Name of the EDS file beside the device file."""
+    modes: tuple[Mode, ...]
+    """Modes of operation that it has: PP, PV, PT, HM, IP, CSP, CSV, CST."""
+    motion_mode: MotionMode = "CSV"
+    """The mode in which the bench moves it."""
+    increments_per_turn: WholeNumber = 65_536
+    """Position units of one motor turn unless the drive's objects say otherwise."""
+    home_offset: str = "0x607C"
+    """Object that gives the home its position, as ``index`` or ``index:sub``; a maker's own where
+    the drive lacks 607Ch."""
+    position_wraps: tuple[Count, Count] | None = None
+    """Lowest and highest count that 6064h shows before it goes on at the other end, where that is
+    not the range of its own 32 bits."""
+    speed_unit: Literal["increments/s", "rpm", "0.1 rpm"] = "increments/s"
+    """Of 606Ch, 60FFh, 6081h and, per second, of 6083h to 6085h, where 60A9h does not say."""
+    units: Literal["drive", "file"] = "drive"
+    """Whose word counts on units: the drive's 608Fh, 6091h, 6092h, 60A8h and 60A9h, or this
+    file's, for drives whose objects stand at values that they do not use."""
+    rated_torque: Annotated[float, Quantity("torque", 0.0, above=True)] = 1.0
+    """N m, unless object 6076h says otherwise."""
+    tpdo: tuple[PdoSpec, ...] = ()
+    """What the drive sends: at least 6041h, 6064h and 606Ch, the first two with every SYNC."""
+    rpdo: tuple[PdoSpec, ...] = ()
+    """What the drive is sent: 6040h and the target of ``motion_mode``."""
+    options: OptionSpec = field(default_factory=OptionSpec)
+    """Written at commissioning and read back."""
+    boot_time: Duration = 1.0
+    """From power-on or NMT reset to the boot-up message at the latest, s."""
+    quirks: QuirkSpec = field(default_factory=QuirkSpec)
+    """Ways in which it departs from CiA 402."""
+    host_loss: str = "heartbeat"
+    """How it notices that the host has gone: ``heartbeat`` (1016h), ``guarding`` (100Ch, 100Dh),
+    ``rpdo-timeout`` (14xxh:05), ``sync-loss`` (1006h) or ``vendor:NAME``."""
+    vendor_watchdog: Mapping[str, VendorWatchdog] = field(default_factory=dict)
+    """Watchdogs of the maker's own, by name."""
+
+    def rules(self) -> Iterator[Rule]:
+        """The way in which it notices a dead host is one that is known."""
+        if self.position_wraps is not None and self.position_wraps[0] >= self.position_wraps[1]:
+            yield "position_wraps", "the lowest count is not below the highest"
+        if wrong := unknown_mechanism(self.host_loss, tuple(self.vendor_watchdog)):
+            yield "host_loss", wrong

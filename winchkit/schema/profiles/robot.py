@@ -1,0 +1,118 @@
+"""What a profile of a cable robot declares: platform, home pose, priors and lines."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from winchkit.schema.profiles.winch import EffectTable, LedgerEntry, WinchProfile
+from winchkit.schema.quantity import (
+    Angle,
+    Length,
+    Mass,
+    Number,
+    PositiveLength,
+    Quantity,
+    WholeNumber,
+)
+from winchkit.schema.table import Rule, Table
+
+__all__ = ["FittedSpec", "HomeSpec", "LineSpec", "PlatformSpec", "PriorSpec", "RobotProfile"]
+
+Point = tuple[Length, Length, Length]
+
+PriorName = Literal["exit_point", "anchor_point", "winding_radius", "swivel_radius", "layer_growth"]
+
+
+@dataclass(frozen=True)
+class PriorSpec(Table):
+    """What is believed of a parameter before calibration; a bare quantity is ``std``."""
+
+    std: PositiveLength
+    """Standard deviation, m."""
+    bounds: tuple[Length, Length] | None = None
+
+    def rules(self) -> Iterator[Rule]:
+        """The lower bound lies below the upper one."""
+        if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
+            yield "bounds", "the lower bound is not below the upper one"
+
+
+@dataclass(frozen=True)
+class PlatformSpec(Table):
+    """The moving platform."""
+
+    mass: Mass = 0.0
+    center_of_mass: Point = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class HomeSpec(Table):
+    """The pose at which every line has its reference motor angle."""
+
+    position: Point
+    rotation: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw; R = Rz(yaw) Ry(pitch) Rx(roll), platform to base."""
+
+
+@dataclass(frozen=True)
+class LineSpec(Table):
+    """One line: its winch, exit point, anchor point and swivel pulley."""
+
+    name: str
+    exit_point: Point
+    anchor_point: Point
+    winch: str | WinchProfile
+    swivel_radius: Annotated[float, Quantity("length", 0.0)] = 0.0
+    swivel_axis: tuple[Number, Number, Number] = (0.0, 0.0, 1.0)
+
+    def rules(self) -> Iterator[Rule]:
+        """A direction has a length."""
+        if not any(self.swivel_axis):
+            yield "swivel_axis", "is zero; it is the direction of the rope at the pulley"
+
+
+@dataclass(frozen=True)
+class FittedSpec(Table):
+    """Where the numbers of a calibrated robot came from; written by ``winchkit calibrate``."""
+
+    date: datetime.date
+    runs: tuple[str, ...] = ()
+    poses: WholeNumber = 0
+    position_rms: Length | None = None
+    """Of the poses fitted, m."""
+    held_out_rms: Length | None = None
+    """Of poses that were not fitted, m."""
+    std: Mapping[str, str] = field(default_factory=dict)
+    """Posterior standard deviation by parameter, with its unit."""
+
+
+@dataclass(frozen=True)
+class RobotProfile(Table):
+    """A cable robot as declared; frozen, SI."""
+
+    name: str
+    home: HomeSpec
+    line: tuple[LineSpec, ...]
+    platform: PlatformSpec = field(default_factory=PlatformSpec)
+    prior: Mapping[PriorName, PriorSpec] = field(default_factory=dict)
+    effect: tuple[EffectTable, ...] = ()
+    fitted: FittedSpec | None = None
+    ledger: tuple[LedgerEntry, ...] = ()
+    description: str = ""
+
+    def rules(self) -> Iterator[Rule]:
+        """A robot has lines, each by its own name and from its own exit point."""
+        if not self.line:
+            yield "line", "a robot needs at least one [[line]]"
+        names = [line.name for line in self.line]
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            yield "line", f"{names.count(name)} lines are named '{name}'"
+        seen: dict[Point, str] = {}
+        for n, line in enumerate(self.line):
+            other = seen.setdefault(line.exit_point, line.name)
+            if other != line.name:
+                message = f"is that of line {other}; two lines leave the frame in two points"
+                yield f"line.{n}.exit_point", message

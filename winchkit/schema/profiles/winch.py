@@ -1,0 +1,208 @@
+"""What a profile of a winch declares: drum, gearbox, guide, rope, pulleys, reference, effects."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import pi
+from typing import Annotated, Any, Literal
+
+from winchkit.schema.quantity import (
+    Angle,
+    Count,
+    Length,
+    LinearDensity,
+    PositiveForce,
+    PositiveLength,
+    PositiveNumber,
+    Quantity,
+)
+from winchkit.schema.table import Rule, Table
+
+__all__ = [
+    "LAYERED",
+    "SHORTHANDS",
+    "CableSpec",
+    "DrumSpec",
+    "EffectTable",
+    "GearboxSpec",
+    "GuideSpec",
+    "LedgerEntry",
+    "PathSpec",
+    "PulleySpec",
+    "ReferenceSpec",
+    "WinchProfile",
+]
+
+
+@dataclass(frozen=True)
+class LedgerEntry(Table):
+    """One step: an effect added or removed, what it was judged on, and how to take it back."""
+
+    did: Literal["add", "remove"]
+    effect: str
+    date: datetime.date
+    runs: tuple[str, ...] = ()
+    before: Mapping[str, str] = field(default_factory=dict)
+    """Held-out error per output before the step, rms with its unit."""
+    after: Mapping[str, str] = field(default_factory=dict)
+    noise: Mapping[str, str] = field(default_factory=dict)
+    was: tuple[Mapping[str, Any], ...] = ()
+    """The ``[[effect]]`` tables before the step, in order."""
+    shorthand: Mapping[str, Any] = field(default_factory=dict)
+    """Shorthand keys such as ``cable.axial_stiffness`` as they were before the step."""
+
+
+LAYERED = frozenset({"spiral", "archimedean"})
+"""Drum kinds that wind in layers."""
+
+SHORTHANDS: dict[str, str] = {
+    "cable.axial_stiffness": "cable-elongation-linear",
+    "cable.mass_per_length": "cable-weight",
+    "gearbox.efficiency": "gear-efficiency",
+}
+"""Profile keys that say the same as an effect."""
+
+
+@dataclass(frozen=True)
+class DrumSpec(Table):
+    """The drum; which of the optional numbers count depends on ``kind``."""
+
+    kind: Literal["spiral", "archimedean", "grooved", "squared"]
+    winding_radius: PositiveLength
+    """Axis to rope centre on the first layer, m."""
+    groove_pitch: Annotated[float, Quantity("length", 0.0)] | None = None
+    """Of a grooved drum, m a turn."""
+    layer_growth: Annotated[float, Quantity("length", 0.0)] | None = None
+    """Radius gained per turn (spiral, archimedean), m; default is the rope's diameter."""
+    build_up: Annotated[float, Quantity("length", 0.0)] | None = None
+    """k of r² = r0² + k L (squared): an area per length, m."""
+    width: PositiveLength | None = None
+    """Between the flanges, m; with ``groove_pitch`` it says how many turns the drum takes."""
+    flange_radius: PositiveLength | None = None
+    """Axis to the flange's rim, m; says how many layers the drum takes."""
+
+    def rules(self) -> Iterator[Rule]:
+        """A grooved drum needs its pitch, a squared one its build-up."""
+        needed = {"grooved": "groove_pitch", "squared": "build_up"}.get(self.kind)
+        if needed and getattr(self, needed) is None:
+            yield needed, f"missing; a {self.kind} drum needs it"
+        if self.build_up is not None and self.kind != "squared":
+            yield "build_up", f"belongs to a squared drum, not to a {self.kind} one"
+        if self.layer_growth is not None and self.kind not in LAYERED:
+            yield (
+                "layer_growth",
+                f"belongs to a layered drum, not to a {self.kind} one",
+            )
+        if self.flange_radius is not None and self.flange_radius <= self.winding_radius:
+            yield (
+                "flange_radius",
+                f"{self.flange_radius:g} m must be above winding_radius {self.winding_radius:g} m",
+            )
+
+
+@dataclass(frozen=True)
+class CableSpec(Table):
+    """The rope."""
+
+    diameter: PositiveLength | None = None
+    dead_length: Annotated[float, Quantity("length", 0.0)] = 0.0
+    """Stressed rope between drum and exit point, m."""
+    axial_stiffness: PositiveForce | None = None
+    """Shorthand for the effect cable-elongation-linear, N."""
+    mass_per_length: LinearDensity | None = None
+    """Shorthand for the effect cable-weight, kg/m."""
+
+
+@dataclass(frozen=True)
+class PathSpec(Table):
+    """Where the free rope runs."""
+
+    inclination: Angle = pi / 2
+    """Of the free rope against the horizontal, rad; 90 degrees is hanging."""
+
+
+@dataclass(frozen=True)
+class GearboxSpec(Table):
+    """The gearbox between motor and drum."""
+
+    ratio: Annotated[
+        float, Quantity("ratio", 1e-3, 1e5, why="gearboxes of winches have 1 to some thousands")
+    ]
+    """Motor turns per drum turn."""
+    direction: Literal[1, -1] = 1
+    efficiency: Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)] | None = None
+    """Shorthand for the effect gear-efficiency."""
+
+
+@dataclass(frozen=True)
+class GuideSpec(Table):
+    """The lead-screw guide that lays the rope on the drum."""
+
+    screw_lead: PositiveLength
+    belt_ratio: PositiveNumber = 1.0
+    """Screw turns per drum turn."""
+    distance: PositiveLength = 0.4
+    """From drum to guide, m."""
+
+
+@dataclass(frozen=True)
+class PulleySpec(Table):
+    """One pulley on the rope's way, in order from the drum to the platform."""
+
+    radius: PositiveLength
+    wrap: Annotated[float, Quantity("angle", 0.0)] = pi / 2
+    """Wrap angle, rad."""
+
+
+@dataclass(frozen=True)
+class ReferenceSpec(Table):
+    """The state that every angle and length is counted from."""
+
+    motor_angle: Angle = 0.0
+    cable_length: Length | None = None
+    """Free length at that motor angle, m; a robot's winches may leave it out."""
+    wound_turns: Count = 0.0
+    """Turns on the drum at that motor angle."""
+
+
+@dataclass(frozen=True)
+class EffectTable:
+    """An ``[[effect]]`` table, unread: the layer ``effects`` binds it, with its line in errors."""
+
+    id: str
+    values: Mapping[str, Any]
+    path: str = ""
+    line: int | None = None
+
+
+@dataclass(frozen=True)
+class WinchProfile(Table):
+    """A winch as declared; frozen, SI."""
+
+    name: str
+    drum: DrumSpec
+    gearbox: GearboxSpec
+    reference: ReferenceSpec
+    cable: CableSpec = field(default_factory=CableSpec)
+    path: PathSpec = field(default_factory=PathSpec)
+    guide: GuideSpec | None = None
+    pulley: tuple[PulleySpec, ...] = ()
+    effect: tuple[EffectTable, ...] = ()
+    ledger: tuple[LedgerEntry, ...] = ()
+    description: str = ""
+
+    def rules(self) -> Iterator[Rule]:
+        """Layers grow by the rope's diameter unless told; a number is given in one place."""
+        drum = self.drum
+        if drum.kind in LAYERED and drum.layer_growth is None and self.cable.diameter is None:
+            yield (
+                "drum.layer_growth",
+                f"missing; a {drum.kind} drum needs it, or cable.diameter as its default",
+            )
+        effects = {table.id for table in self.effect}
+        for key, effect in SHORTHANDS.items():
+            part, _, name = key.partition(".")
+            if getattr(getattr(self, part), name) is not None and effect in effects:
+                yield key, f"is shorthand for the effect {effect}, which is given too; keep one"

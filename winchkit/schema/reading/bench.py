@@ -1,0 +1,195 @@
+"""Reads benches, real and simulated: tables, and that winches, buses and devices fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from winchkit.errors import FileError
+from winchkit.schema.bench import BenchSpec, latch_path
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.schema.reading.lines import Key
+from winchkit.schema.reading.parts import Reading
+from winchkit.schema.reading.source import spelled
+from winchkit.schema.reading.tables import marker_at
+from winchkit.schema.simbench import FaultSpec, HiddenSpec, NoiseSpec, SimBench, WinchTruth
+from winchkit.units import suggest
+
+__all__ = ["bench", "sim_bench"]
+
+ROLES = ("servo", "cell", "load", "length", "temperature")
+DeviceReader = Callable[[str | Path], DeviceSpec]
+_FITTING = {
+    "servo": ("can",),
+    "modbus": ("modbus-rtu", "modbus-tcp"),
+    "stream": ("serial",),
+    "process": ("can",),
+}
+"""Kinds of buses by the kind of a device."""
+
+
+def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> BenchSpec | None:
+    """Read a bench and check what it refers to."""
+    for key in tree.keys() & {"path", "latch_file"}:
+        reading.fault((key,), "unknown key")
+    _check_references(reading, tree, read_device)
+    path = reading.source.path
+    named = {"name": reading.stem, **tree, "path": path, "latch_file": latch_path(path)}
+    spec = reading.table(BenchSpec, named)
+    for index, file in enumerate(spec.effect_files if spec is not None else ()):
+        if not file.is_file():
+            at: Key = ("effects", index)
+            reading.fault(at, f"no such file of effects: {file}; a path is as seen from this file")
+    if spec is not None and not spec.winch:
+        reading.fault(("winch",), "a bench has at least one winch, in a table [winch.NAME]")
+    return spec
+
+
+def sim_bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> SimBench | None:
+    """Read a simulated bench: a bench, and what is true, hidden, noisy and faulty."""
+    tree = dict(tree)
+    noise = reading.table(NoiseSpec, tree.pop("noise", {}), ("noise",))
+    faults = tuple(_numbered(reading, FaultSpec, tree.pop("fault", []), ("fault",)))
+    truths = {}
+    winches = tree.get("winch")
+    if isinstance(winches, dict):
+        tree["winch"] = dict(winches)
+        for name, winch in winches.items():
+            if isinstance(winch, dict):
+                tree["winch"][name] = wiring = dict(winch)
+                truth = wiring.pop("truth", {})
+                truths[name] = _truth(reading, name, truth, wiring.pop("hidden", []))
+    wired = bench(reading, tree, read_device)
+    if wired is None or noise is None or None in truths.values():
+        return None
+    known = {name: truth for name, truth in truths.items() if truth is not None}
+    # A simulation dies with its process, and its trips with it.
+    wired = replace(wired, latch_file="")
+    return SimBench(wired.name, wired, known, noise, faults, wired.description)
+
+
+def _truth(reading: Reading, name: str, raw: object, hidden: object) -> WinchTruth | None:
+    at: Key = ("winch", name, "truth")
+    if not isinstance(raw, dict):
+        reading.fault(at, f"expected a table, not {raw!r}")
+        return None
+    own = {key: raw[key] for key in ("load_mass", "temperature", "temperature_drift") if key in raw}
+    overrides = dict(_flat({key: value for key, value in raw.items() if key not in own}))
+    for key, value in overrides.items():
+        _check_override(reading, at, key, value)
+    pieces = tuple(_numbered(reading, HiddenSpec, hidden, ("winch", name, "hidden")))
+    return reading.table(WinchTruth, {**own, "overrides": overrides, "hidden": pieces}, at)
+
+
+def _flat(tree: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Tables within tables as dotted keys."""
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _check_override(reading: Reading, at: Key, key: str, value: object) -> None:
+    words: Key = tuple(int(word) if word.isdecimal() else word for word in key.split("."))
+    marker = marker_at(WinchProfile, words)
+    place: Key = (*at, key) if (*at, key) in reading.source.lines else (*at, *key.split("."))
+    if marker is None:
+        message = "is no number of a winch profile; write such as drum.winding_radius"
+        reading.fault(place, message)
+        return
+    try:
+        marker.read(value)
+    except ValueError as error:
+        reading.fault(place, str(error))
+
+
+def _numbered(
+    reading: Reading, kind: type[HiddenSpec] | type[FaultSpec], raw: object, at: Key
+) -> Iterator[Any]:
+    """Read ``[[hidden]]`` or ``[[fault]]`` tables; the keys that they do not know are numbers."""
+    if not isinstance(raw, list) or not all(isinstance(item, dict) for item in raw):
+        reading.fault(at, f"expected tables, each opened by [[{'.'.join(map(str, at))}]]")
+        return
+    own = set(kind.__dataclass_fields__) - {"numbers"}
+    for index, item in enumerate(raw):
+        known = {key: value for key, value in item.items() if key in own}
+        numbers = {key: value for key, value in item.items() if key not in own}
+        piece = reading.table(kind, {**known, "numbers": numbers}, (*at, index))
+        if piece is not None:
+            yield piece
+
+
+def _check_references(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> None:
+    """Profiles and devices exist, buses exist and fit, no two devices share an address."""
+    winches, buses = tree.get("winch"), tree.get("bus")
+    taken: dict[tuple[str, str, int], str] = {}
+    for name, winch in winches.items() if isinstance(winches, dict) else ():
+        if not isinstance(winch, dict):
+            continue
+        at: Key = ("winch", name)
+        reading.shipped("profiles", winch.get("profile"), (*at, "profile"))
+        for role in ROLES:
+            if isinstance(raw := winch.get(role), dict):
+                place: Key = (*at, role)
+                known = buses if isinstance(buses, dict) else {}
+                _check_device(reading, raw, known, place, read_device)
+                _check_address(reading, raw, place, taken)
+
+
+def _check_address(
+    reading: Reading, raw: dict[str, Any], at: Key, taken: dict[tuple[str, str, int], str]
+) -> None:
+    for key in ("node", "unit"):
+        bus, address = raw.get("bus"), raw.get(key)
+        if not isinstance(bus, str) or not isinstance(address, int):
+            continue
+        user = taken.setdefault((bus, key, address), spelled(at))
+        if user != spelled(at):
+            reading.fault((*at, key), f"{address} on this bus is taken by {user}")
+
+
+def _check_device(
+    reading: Reading,
+    raw: dict[str, Any],
+    buses: dict[str, Any],
+    at: Key,
+    read_device: DeviceReader,
+) -> None:
+    bus = raw.get("bus")
+    if isinstance(bus, str) and bus not in buses:
+        known = ", ".join(buses) or "none"
+        near = suggest(bus, list(buses))
+        reading.fault((*at, "bus"), f"there is no [bus.{bus}]; buses are {known}{near}")
+    path = reading.shipped("devices", raw.get("device"), (*at, "device"))
+    if path is None:
+        return
+    try:
+        device = read_device(path)
+    except FileError as error:
+        reading.faults += error.faults
+        return
+    servo = device.servo is not None
+    if servo != (at[-1] == "servo"):
+        what = "a servo drive" if servo else "an instrument"
+        reading.fault((*at, "device"), f"'{device.name}' is {what}, which does not fit here")
+        return
+    fitting = _FITTING[device.kind]
+    address, other = ("node", "unit") if fitting == ("can",) else ("unit", "node")
+    if address not in raw and _is_addressed(device):
+        reading.fault((*at, address), f"missing; '{device.name}' is reached by its {address}")
+    if other in raw:
+        reading.fault((*at, other), f"'{device.name}' has no {other}; it is reached by {address}")
+    wired = buses.get(str(bus))
+    kind = wired.get("kind") if isinstance(wired, dict) else None
+    if kind is not None and kind not in fitting:
+        message = f"[bus.{bus}] is of kind {kind}; '{device.name}' needs {' or '.join(fitting)}"
+        reading.fault((*at, "bus"), message)
+
+
+def _is_addressed(device: DeviceSpec) -> bool:
+    """Whether a device must be given its address; one alone on a serial line need not."""
+    return device.stream is None or "{address" in device.stream.poll

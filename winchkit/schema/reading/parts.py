@@ -1,0 +1,86 @@
+"""Parts that several kinds of declaration share, read with every fault collected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from winchkit.catalog import Kind, find
+from winchkit.errors import Fault, FileError
+from winchkit.schema.profiles.winch import EffectTable, WinchProfile
+from winchkit.schema.reading.lines import Key
+from winchkit.schema.reading.source import Source
+from winchkit.schema.reading.tables import read_table
+
+__all__ = ["Reading"]
+
+T = TypeVar("T")
+
+
+@dataclass
+class Reading:
+    """One file being read: its source and the faults found so far."""
+
+    source: Source
+    faults: list[Fault] = field(default_factory=list)
+
+    @property
+    def stem(self) -> str:
+        """The name of a thing whose file does not name it."""
+        return Path(self.source.path).stem
+
+    def fault(self, key: Key, message: str) -> None:
+        """Note a fault at a key."""
+        self.faults.append(self.source.fault(key, message))
+
+    def table(self, kind: type[T], raw: object, at: Key = ()) -> T | None:
+        """Read a table, or note its faults."""
+        result = read_table(self.source, kind, raw, at)
+        if isinstance(result, list):
+            self.faults += result
+            return None
+        return result
+
+    def refuse_faults(self) -> None:
+        """Raise FileError with all faults in line order, if there are any."""
+        if self.faults:
+            unique = dict.fromkeys(self.faults)
+            raise FileError(sorted(unique, key=lambda fault: (fault.path, fault.line or 0)))
+
+    def effects(self, raw: object, at: Key = ()) -> tuple[EffectTable, ...]:
+        """Keep ``[[effect]]`` tables unread, each with its line."""
+        key: Key = (*at, "effect")
+        if not isinstance(raw, list) or not all(isinstance(item, dict) for item in raw):
+            self.fault(key, "expected tables, each opened by [[effect]]")
+            return ()
+        tables = []
+        for index, item in enumerate(raw):
+            values = dict(item)
+            name = values.pop("id", None)
+            place: Key = (*key, index)
+            if not isinstance(name, str):
+                wrong = "missing" if name is None else f"{name!r} is no name"
+                self.fault((*place, "id"), f"{wrong}; an effect is named by its id in quotes")
+                continue
+            line = self.source.fault(place, "").line
+            tables.append(EffectTable(name, values, self.source.path, line))
+        return tuple(tables)
+
+    def winch(self, raw: Mapping[str, Any], name: str, at: Key = ()) -> WinchProfile | None:
+        """Read a winch's own tables."""
+        tree = {"name": name, **raw}
+        if "effect" in tree:
+            tree["effect"] = self.effects(tree["effect"], at)
+        return self.table(WinchProfile, tree, at)
+
+    def shipped(self, kind: Kind, name: object, at: Key) -> Path | None:
+        """The file of a declaration that this one names; notes a fault where there is none."""
+        if not isinstance(name, str):
+            return None
+        try:
+            return find(kind, name, beside=self.source.path)
+        except FileError as error:
+            self.faults += [self.source.fault(at, fault.message) for fault in error.faults]
+            return None

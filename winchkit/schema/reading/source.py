@@ -1,0 +1,121 @@
+"""Opens a declaration: TOML text to a tree of plain values with the line of every key."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from winchkit.errors import Fault, FileError
+from winchkit.regular_file import regular
+from winchkit.schema.reading.lines import Key, line_of, lines_of_keys
+from winchkit.units import suggest
+
+__all__ = ["KINDS", "Source", "open_source", "spelled"]
+
+KINDS = (
+    "winch",
+    "robot",
+    "bench",
+    "programme",
+    "sim-bench",
+    "device",
+    "size",
+    "calibration",
+    "tares",
+)
+SCHEMA = 1
+_LARGEST = 4_000_000
+
+
+@dataclass(frozen=True)
+class Source:
+    """A TOML file as read: its values, and where each of them stands."""
+
+    path: str
+    kind: str
+    tree: dict[str, Any]
+    """The top-level table without ``schema`` and ``kind``."""
+    lines: dict[Key, int]
+
+    def fault(self, key: Key, message: str) -> Fault:
+        """A fault at a key, on its line or that of the table where it is missing."""
+        return Fault(message, self.path, line_of(key, self.lines), spelled(key))
+
+
+def spelled(key: Key) -> str:
+    """A place as the user counts: ``("pulley", 0, "radius")`` is ``pulley[1].radius``."""
+    words = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in key)
+    return words.removeprefix(".")
+
+
+def open_source(path: str | Path) -> Source:
+    """Read a declaration of any kind; raises FileError when it is none."""
+    text = _text(Path(path))
+    if not text.strip():
+        raise FileError(Fault("the file is empty; a declaration starts with schema = 1", str(path)))
+    try:
+        tree = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(_syntax_fault(str(error), str(path), text)) from None
+    except RecursionError:
+        raise FileError(Fault("tables or lists are nested too deep", str(path))) from None
+    return _source(str(path), tree, lines_of_keys(text))
+
+
+def _text(path: Path) -> str:
+    try:
+        with open(path, "rb", opener=regular) as stream:
+            data = stream.read(_LARGEST + 1)
+    except FileNotFoundError:
+        raise FileError(Fault("there is no such file", str(path))) from None
+    except IsADirectoryError:
+        raise FileError(Fault("is a directory, not a file", str(path))) from None
+    except OSError as error:
+        raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
+    except ValueError as error:
+        raise FileError(Fault(f"is no usable file name: {error}", repr(str(path)))) from None
+    if len(data) > _LARGEST:
+        limit = f"larger than {_LARGEST / 1e6:g} MB, so it is no declaration"
+        raise FileError(Fault(limit, str(path)))
+    if b"\0" in data:
+        raise FileError(Fault("is a binary file, not TOML text", str(path)))
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        message = f"byte {data[error.start]:02X}h is not UTF-8; save the file as UTF-8 text"
+        raise FileError(Fault(message, str(path), line)) from None
+
+
+def _syntax_fault(message: str, path: str, text: str) -> Fault:
+    found = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
+    if found is None:
+        return Fault(f"TOML syntax: {message}", path)
+    reason = message[: found.start()]
+    if found[1] is None:
+        return Fault(f"TOML syntax: {reason} at the end of the file", path, text.count("\n") + 1)
+    return Fault(f"TOML syntax: {reason} at column {found[2]}", path, int(found[1]))
+
+
+def _source(path: str, tree: dict[str, Any], lines: dict[Key, int]) -> Source:
+    kind = tree.pop("kind", None)
+    schema = tree.pop("schema", None)
+    source = Source(path, str(kind), tree, lines)
+    faults: list[Fault] = []
+    if schema is None:
+        faults.append(source.fault(("schema",), f"missing; write schema = {SCHEMA} first"))
+    elif schema is True or schema != SCHEMA:
+        faults.append(
+            source.fault(("schema",), f"{schema!r} is unknown; this winchkit reads {SCHEMA}")
+        )
+    if kind is None:
+        faults.append(source.fault(("kind",), f"missing; use one of {', '.join(KINDS)}"))
+    elif kind not in KINDS:
+        message = f"unknown kind {kind!r}; use one of {', '.join(KINDS)}"
+        faults.append(source.fault(("kind",), message + suggest(str(kind), list(KINDS))))
+    if faults:
+        raise FileError(faults)
+    return source

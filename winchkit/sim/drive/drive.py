@@ -1,0 +1,296 @@
+"""A simulated CiA 402 servo drive: an independent device on a CAN bus that moves a plant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from winchkit.schema.devices.servo import QuirkSpec, ServoSpec
+from winchkit.sim.drive.actions import Actions
+from winchkit.sim.drive.axis import Axis
+from winchkit.sim.drive.faults import FAULTS, FaultKind, known
+from winchkit.sim.drive.homing import Switches
+from winchkit.sim.drive.line import Line
+from winchkit.sim.drive.modes import Mode, check_objects, modes_of, supported
+from winchkit.sim.drive.motion import Motion
+from winchkit.sim.drive.nmt import Heartbeats, NmtState, emergency_frame
+from winchkit.sim.drive.object_dictionary import ObjectDictionary
+from winchkit.sim.drive.pdo import Pdos
+from winchkit.sim.drive.power import PowerStage, State
+from winchkit.sim.drive.sdo import SdoServer
+from winchkit.sim.drive.settings import Settings
+from winchkit.sim.drive.shaft import HoldingBrake, Shaft
+from winchkit.sim.drive.status import StatusBits
+
+__all__ = ["SimDrive"]
+
+_BOOT_SHARE = 0.8
+"""Of the boot time that a device file declares as the longest."""
+_HEARTBEAT_LOST = FaultKind(0x8130)
+_PDO_TOO_SHORT = 0x8210
+_NMT_COMMANDS = {
+    0x01: NmtState.OPERATIONAL,
+    0x02: NmtState.STOPPED,
+    0x80: NmtState.PRE_OPERATIONAL,
+}
+_COMMUNICATION = range(0x1000, 0x2000)
+
+
+class SimDrive:
+    """One drive, driven by a clock that is handed in.
+
+    ``objects`` is its object dictionary, which it takes over. ``send`` takes an identifier and
+    data. Frames come in through :meth:`receive`, time through
+    :meth:`tick`; both take the time in s of one steady clock and are called from one thread.
+    ``smoothing`` is the length of its set-point filter in CSV, CSP and IP, s. Raises FileError
+    where the objects do not suffice for the modes that the device file declares.
+    """
+
+    def __init__(
+        self,
+        send: Callable[[int, bytes], None],
+        node: int,
+        servo: ServoSpec,
+        objects: ObjectDictionary,
+        shaft: Shaft,
+        *,
+        brake: bool,
+        smoothing: float = 0.0,
+        now: float = 0.0,
+    ) -> None:
+        check_objects(objects, modes_of(servo.modes), node)
+        self.node = node
+        self.objects = objects
+        self.nmt = NmtState.BOOTING
+        self._servo, self._shaft, self._quirks = servo, shaft, servo.quirks
+        self._booted_at = now
+        self._error = 0
+        self._sdo_refuses = self._inhibited = False
+        self._line = Line(send, self._emergency)
+        self._sdo = SdoServer(objects)
+        short = partial(self._emergency, _PDO_TOO_SHORT)
+        self._pdos = Pdos(objects, self._line.send, self._sample, short)
+        lost, back = self._host_lost, self._host_back
+        self._heartbeats = Heartbeats(objects, self._send_heartbeat, lost, back)
+        self._heartbeats.needs_both = self._quirks.needs_both_heartbeats
+        self._power = PowerStage(objects, self._state_changed)
+        self._power.may_enable = self._may_enable
+        self._motion = Motion(
+            Settings(objects, servo),
+            {Mode.NONE, *modes_of(servo.modes)},
+            _brake_of(self._quirks, fitted=brake),
+            smoothing=smoothing,
+        )
+        self._status = StatusBits(objects, self._motion, toggling=self._quirks.toggles_bit_10)
+        self._axis = Axis(objects, shaft, self._power, self._motion, self._status, now=now)
+        self._axis.following_failed = lambda: self._fault(FAULTS["following error"])
+        Actions(objects, shaft, self._power, self._motion, self._axis, quirks=self._quirks)
+        self._show_modes()
+
+    # What it is doing.
+
+    @property
+    def state(self) -> State:
+        """Of CiA 402."""
+        return self._power.state
+
+    @property
+    def error_code(self) -> int:
+        """603Fh; 0 while there is no fault."""
+        return self._error
+
+    @property
+    def switches(self) -> Switches:
+        """Limit and home switches of the axis, which may be moved."""
+        return self._motion.switches
+
+    # What happens to it.
+
+    def power_on(self, now: float, *, boot_time: float | None = None) -> None:
+        """Begin from power-on; by default it takes a good part of the declared boot time."""
+        self.advance(now)
+        wait = self._servo.boot_time * _BOOT_SHARE if boot_time is None else boot_time
+        self._booted_at = now + wait
+        self._power.reset()
+        self.objects.reset()
+        self._show_modes()
+        self._motion.set_mode(Mode.NONE, self._shaft.motor_angle)
+        self._motion.halted = False
+        self._motion.settings.zero = 0.0
+        self._motion.settings.read_units()
+        self._error = 0
+        self._sdo.reset()
+        self._pdos.rebuild()
+        self._heartbeats.producing = True
+        self.nmt = NmtState.BOOTING
+
+    def receive(self, identifier: int, data: bytes, now: float) -> None:
+        """Take a frame from the bus."""
+        if self._line.cut or self.nmt is NmtState.BOOTING:
+            return
+        if identifier == 0x000:
+            self._manage(data, now)
+        elif identifier == 0x600 + self.node:
+            self._serve_sdo(data, now)
+        elif 0x700 < identifier <= 0x77F:
+            self._heartbeats.heard(identifier - 0x700, now)
+        elif self.nmt is NmtState.OPERATIONAL:
+            self.advance(now)
+            if identifier == self.objects.number(0x1005, 0, 0x80) & 0x7FF:
+                self._status.syncs += 1
+                self._pdos.latch()
+                self._pdos.on_sync(now)
+            else:
+                self._pdos.receive(identifier, data)
+
+    def tick(self, now: float) -> None:
+        """Let time pass until ``now``."""
+        self.advance(now)
+        if self.nmt is NmtState.BOOTING:
+            if now >= self._booted_at:
+                self._boot_up(now)
+            return
+        self._heartbeats.tick(now)
+        self._line.tick(now)
+        if self.nmt is NmtState.OPERATIONAL:
+            self._pdos.poll(now)
+
+    def inject(self, kind: str) -> None:
+        """Make something go wrong now; raises UsageError for an unknown kind."""
+        known(kind)
+        if kind in FAULTS:
+            self._fault(FAULTS[kind])
+        else:
+            self._disturb(kind)
+
+    def _disturb(self, kind: str) -> None:
+        if kind == "reboot":
+            self.power_on(self._axis.now)
+        elif kind == "map lost":
+            self._pdos.forget()
+        elif kind == "host lost":
+            self._heartbeats.lose()
+        elif kind == "heartbeat stop":
+            self._heartbeats.producing = False
+        elif kind == "tpdo stop":
+            self._pdos.mute = True
+        elif kind == "slow sdo":
+            self._line.slow_sdo = True
+        elif kind == "sdo abort":
+            self._sdo_refuses = True
+        elif kind == "emergency storm":
+            self._line.storm = True
+        elif kind == "enable input open":
+            self._inhibited = True
+            self._power.disable_voltage()
+        elif kind == "silence":
+            self._line.cut = True
+        else:
+            self._line.recover()
+            self._heartbeats.producing = True
+            self._pdos.mute = self._sdo_refuses = self._inhibited = False
+
+    # Network.
+
+    def _boot_up(self, now: float) -> None:
+        self._line.send(0x700 + self.node, b"\0")
+        self.nmt = NmtState.PRE_OPERATIONAL
+        self._heartbeats.start(now)
+        if self.state is State.NOT_READY:
+            self._power.ready()
+
+    def _manage(self, data: bytes, now: float) -> None:
+        if len(data) != 2 or data[1] not in (0, self.node):
+            return
+        self.advance(now)
+        command = data[0]
+        if command == 0x81:
+            self.power_on(now)
+        elif command == 0x82:
+            self._reset_communication(now)
+        elif command in _NMT_COMMANDS:
+            self._enter_nmt(_NMT_COMMANDS[command])
+
+    def _enter_nmt(self, state: NmtState) -> None:
+        before, self.nmt = self.nmt, state
+        if state is before:
+            return
+        if state is NmtState.STOPPED:
+            self._abort_connection()
+        elif before is NmtState.OPERATIONAL and self._quirks.stops_outside_operational:
+            self._power.shut_down()
+
+    def _reset_communication(self, now: float) -> None:
+        self._abort_connection()
+        self.objects.reset(_COMMUNICATION)
+        self._sdo.reset()
+        self._pdos.rebuild()
+        self.nmt, self._booted_at = NmtState.BOOTING, now
+
+    def _serve_sdo(self, data: bytes, now: float) -> None:
+        if self.nmt is NmtState.STOPPED:
+            return
+        self.advance(now)
+        self._sample()
+        reply = self._sdo.refuse(data) if self._sdo_refuses else self._sdo.answer(data)
+        if reply is not None:
+            self._line.answer(0x580 + self.node, reply, now)
+
+    def _host_lost(self, _node: int) -> None:
+        if not self._power.faults_on_abort:
+            self._emergency(_HEARTBEAT_LOST.code)
+        self._abort_connection()
+        behaviour = self.objects.number(0x1029, 1, 0)
+        if behaviour == 2:
+            self._enter_nmt(NmtState.STOPPED)
+        elif behaviour == 0 and self.nmt is NmtState.OPERATIONAL:
+            self._enter_nmt(NmtState.PRE_OPERATIONAL)
+
+    def _host_back(self) -> None:
+        if not self._error:
+            self._emergency(0)
+
+    def _abort_connection(self) -> None:
+        if self._power.faults_on_abort:
+            self._fault(_HEARTBEAT_LOST)
+        else:
+            self._power.abort_connection()
+
+    def _emergency(self, code: int) -> None:
+        if self.nmt is not NmtState.BOOTING:
+            self._line.send(0x80 + self.node, emergency_frame(self.objects, code))
+
+    def _send_heartbeat(self) -> None:
+        self._line.send(0x700 + self.node, bytes((self.nmt,)))
+
+    # Power and motion.
+
+    def _may_enable(self) -> bool:
+        chosen = not self._quirks.needs_mode or self._motion.mode is not Mode.NONE
+        return chosen and not self._inhibited
+
+    def _fault(self, kind: FaultKind) -> None:
+        if self.state in (State.FAULT, State.FAULT_REACTION, State.NOT_READY):
+            return
+        self._error = kind.code
+        self._emergency(kind.code)
+        self._power.fault(cut=kind.cuts)
+
+    def _state_changed(self, state: State) -> None:
+        if state is State.SWITCH_ON_DISABLED and self._error:
+            self._error = 0
+            self._emergency(0)
+
+    def advance(self, now: float) -> None:
+        """Move until ``now``, without looking at the network's timers."""
+        self._axis.advance(now)
+
+    def _sample(self) -> None:
+        self._axis.sample(self._error)
+
+    def _show_modes(self) -> None:
+        self.objects.put(0x6502, 0, supported(self._motion.modes))
+
+
+def _brake_of(quirks: QuirkSpec, *, fitted: bool) -> HoldingBrake:
+    return HoldingBrake(fitted=fitted, release=quirks.brake_release, apply=quirks.brake_apply)

@@ -1,0 +1,151 @@
+"""Motion of a simulated drive: its mode's set-points, or a stop, slice by slice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from winchkit.sim.drive.cyclic_modes import (
+    CyclicPosition,
+    CyclicTorque,
+    CyclicVelocity,
+    InterpolatedPosition,
+)
+from winchkit.sim.drive.demand import Demand, SetPoints, approach
+from winchkit.sim.drive.homing import Homing, Switches
+from winchkit.sim.drive.modes import Mode
+from winchkit.sim.drive.power import RAMPS, Order
+from winchkit.sim.drive.profile_modes import ProfilePosition, ProfileTorque, ProfileVelocity
+from winchkit.sim.drive.settings import Settings
+from winchkit.sim.drive.shaft import HoldingBrake
+from winchkit.sim.plant.servo import DriveCommand
+
+__all__ = ["Motion"]
+
+_STANDSTILL = 0.05
+"""rad/s below which a ramp has ended."""
+_PATIENCE = 0.5
+"""s for which a stop waits for the motor to stand after its ramp."""
+
+
+class Motion:
+    """Makes :class:`DriveCommand` of an order, the mode and the targets.
+
+    ``angle`` and ``speed`` of the methods are the motor's own, in rad and rad/s.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        modes: Iterable[Mode],
+        brake: HoldingBrake,
+        *,
+        smoothing: float = 0.0,
+    ) -> None:
+        self.settings = settings
+        self.demand = Demand()
+        self.switches = Switches()
+        self.mode = Mode.NONE
+        self.halted = False
+        self.stopping = False
+        self._brake = brake
+        self._set_points = _all(settings, self.demand, smoothing, lambda: self.switches)
+        self.modes = frozenset(modes) & frozenset(self._set_points)
+        self._following = False
+        self._last_word = 0
+        self._stood = 0.0
+
+    @property
+    def set_points(self) -> SetPoints:
+        """Those of the present mode."""
+        return self._set_points[self.mode]
+
+    @property
+    def controls_position(self) -> bool:
+        """Whether the demanded angle is followed now."""
+        return self._following and not self.stopping and self.set_points.position
+
+    def set_mode(self, mode: Mode, angle: float) -> None:
+        """Change the mode; set-points begin where the motor is."""
+        self.mode = mode
+        self.set_points.reset()
+        self._begin(angle)
+
+    def control(self, word: int, angle: float, *, enabled: bool) -> None:
+        """Take a control word that was just written."""
+        rising, self._last_word = word & ~self._last_word, word
+        self.set_points.control(word, rising, angle, enabled=enabled)
+
+    def aim(self) -> None:
+        """A target of a cyclic mode was written."""
+        self.set_points.aim()
+
+    def step(self, order: Order, angle: float, speed: float, dt: float) -> DriveCommand:
+        """Command for the next ``dt`` s, given where the motor is."""
+        if order in (Order.OFF, Order.CUT):
+            self._brake.off(dt, still=abs(speed) < _STANDSTILL, cut=order is Order.CUT)
+            return self._rest(angle, speed)
+        self._brake.power(dt)
+        if self._brake.closed:
+            return self._rest(angle, speed)
+        if not self._following:
+            self._following = True
+            self.demand.speed = speed
+            self._begin(angle)
+        self.demand.limited = False
+        if order is not Order.FOLLOW or self.halted:
+            return self._stop(order, angle, dt)
+        if self.stopping:
+            self.stopping = False
+            self._begin(angle)
+        return self.set_points.step(angle, speed, dt)
+
+    def at_rest(self, speed: float) -> bool:
+        """Whether it stands still at the end of a stop."""
+        return self.stopping and self.demand.speed == 0 and abs(speed) < _STANDSTILL
+
+    def stop_is_over(self, speed: float) -> bool:
+        """Whether a stop has ended, or has had time enough: a motor may be dragged along."""
+        return self.at_rest(speed) or (self.stopping and self._stood > _PATIENCE)
+
+    def _begin(self, angle: float) -> None:
+        """Let the set-points go on from the present speed, at an angle."""
+        self.demand.angle = angle
+        self.set_points.begin()
+
+    def _rest(self, angle: float, speed: float) -> DriveCommand:
+        """Follow nothing: the brake holds, or the motor until it does, or nobody."""
+        self._following = self.stopping = False
+        self.set_points.reset()
+        self.demand.angle, self.demand.speed = angle, speed
+        if self._brake.holding:
+            return DriveCommand()
+        return DriveCommand.off(brake=self._brake.closed)
+
+    def _stop(self, order: Order, angle: float, dt: float) -> DriveCommand:
+        if order is Order.FOLLOW:
+            order = RAMPS.get(self.settings.number(0x605D, 0, 1), Order.SLOW_DOWN)
+        else:
+            self.set_points.reset()
+        if not self.stopping:
+            self.stopping, self._stood = True, 0.0
+        index = {Order.SLOW_DOWN: 0x6084, Order.QUICK_STOP: 0x6085}.get(order, 0x60C6)
+        demand = self.demand
+        demand.speed = approach(demand.speed, 0.0, self.settings.ramp(index) * dt)
+        self._stood = self._stood + dt if demand.speed == 0 else 0.0
+        return self.set_points.by_speed(angle)
+
+
+def _all(
+    settings: Settings, demand: Demand, smoothing: float, switches: Callable[[], Switches]
+) -> dict[Mode, SetPoints]:
+    return {
+        Mode.NONE: SetPoints(settings, demand),
+        Mode.PP: ProfilePosition(settings, demand),
+        Mode.PV: ProfileVelocity(settings, demand),
+        Mode.PT: ProfileTorque(settings, demand),
+        Mode.HM: Homing(settings, demand, switches),
+        Mode.IP: InterpolatedPosition(settings, demand, smoothing),
+        Mode.CSP: CyclicPosition(settings, demand, smoothing),
+        Mode.CSV: CyclicVelocity(settings, demand, smoothing),
+        Mode.CST: CyclicTorque(settings, demand),
+    }

@@ -1,0 +1,248 @@
+"""The object dictionary of a simulated CANopen device: types, access, limits and present values."""
+
+from __future__ import annotations
+
+import configparser
+import io
+import struct
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+from winchkit.errors import Fault, FileError
+from winchkit.schema.eds.eds import read_eds_text
+
+__all__ = ["Abort", "Entry", "Guard", "Key", "ObjectDictionary", "Value", "read_eds"]
+
+Key = tuple[int, int]
+"""Index and sub-index."""
+Value = int | bytes
+"""Numbers are ints, everything else bytes."""
+Guard = Callable[[int, int], "Abort | None"]
+Watcher = Callable[[int, int], None]
+
+_FORMATS = {0x02: "b", 0x03: "h", 0x04: "i", 0x05: "B", 0x06: "H", 0x07: "I", 0x15: "q", 0x1B: "Q"}
+_BOOLEAN = 0x01
+_LIMITS = {0x6065, 0x6072, 0x6073, 0x607F, 0x6080, 0x60E0, 0x60E1}
+"""Limits that do not limit where the EDS states no default."""
+_FIRST_OBJECT = 0x1000
+"""Below stand data types."""
+_SAVE = 0x65766173
+_LOAD = 0x64616F6C
+
+
+class Abort(IntEnum):
+    """SDO abort codes of CiA 301."""
+
+    TOGGLE = 0x05030000
+    COMMAND = 0x05040001
+    WRITE_ONLY = 0x06010001
+    READ_ONLY = 0x06010002
+    NO_OBJECT = 0x06020000
+    NOT_MAPPABLE = 0x06040041
+    PDO_LENGTH = 0x06040042
+    INCOMPATIBLE = 0x06040043
+    LENGTH = 0x06070010
+    NO_SUB_INDEX = 0x06090011
+    RANGE = 0x06090030
+    GENERAL = 0x08000000
+    SIGNATURE = 0x08000020
+    STATE = 0x08000022
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One object as the EDS declares it."""
+
+    name: str
+    format: str
+    """Letter of :mod:`struct`; empty for strings and domains."""
+    access: str
+    """ro, rw, wo, const, rwr or rww."""
+    default: Value
+    low: int | None = None
+    high: int | None = None
+    mappable: bool = False
+
+    @property
+    def size(self) -> int:
+        """In bytes; 0 where it varies."""
+        return struct.calcsize(self.format) if self.format else 0
+
+    @property
+    def readable(self) -> bool:
+        """Whether it can be read."""
+        return self.access != "wo"
+
+    @property
+    def writable(self) -> bool:
+        """Whether it can be written."""
+        return self.access not in ("ro", "const")
+
+    def pack(self, value: Value) -> bytes:
+        """Bytes on the wire, little end first."""
+        return value if isinstance(value, bytes) else struct.pack("<" + self.format, value)
+
+    def unpack(self, data: bytes) -> Value | Abort:
+        """Value of bytes on the wire, or why they are none."""
+        if not self.format:
+            return data
+        if len(data) != self.size:
+            return Abort.LENGTH
+        return int(struct.unpack("<" + self.format, data)[0])
+
+
+class ObjectDictionary:
+    """Entries with their present values.
+
+    ``guards`` may refuse a new number before it is stored, ``watchers`` hear of it afterwards;
+    both are kept by index. Storing (1010h) and restoring (1011h) take effect at ``reset``.
+    """
+
+    def __init__(self, entries: Mapping[Key, Entry]) -> None:
+        self._entries = dict(entries)
+        self._indices = {index for index, _ in entries}
+        self._values: dict[Key, Value] = {}
+        self._stored: dict[Key, Value] = {}
+        self.guards: dict[int, Guard] = {0x1010: self._store, 0x1011: self._restore}
+        self.watchers: dict[int, Watcher] = {}
+        self.reset()
+
+    def __contains__(self, key: Key) -> bool:
+        return key in self._entries
+
+    def __iter__(self) -> Iterator[Key]:
+        return iter(self._entries)
+
+    def entry(self, key: Key) -> Entry | Abort:
+        """Look up a declaration, or the abort code that says what does not exist."""
+        found = self._entries.get(key)
+        if found is not None:
+            return found
+        return Abort.NO_SUB_INDEX if key[0] in self._indices else Abort.NO_OBJECT
+
+    def reset(self, indices: range = range(0x10000)) -> None:
+        """Take the stored values, else the defaults, as after power-on, of a range of indices."""
+        for key, entry in self._entries.items():
+            if key[0] in indices:
+                self._values[key] = self._stored.get(key, entry.default)
+
+    def number(self, index: int, sub: int = 0, default: int | None = None) -> int:
+        """Present value of a numeric object, or the default where the EDS does not declare it.
+
+        KeyError where there is no default either.
+        """
+        value = self._values.get((index, sub), default)
+        if value is None:
+            raise KeyError((index, sub))
+        return value if isinstance(value, int) else int.from_bytes(value, "little")
+
+    def put(self, index: int, sub: int, value: int) -> None:
+        """Set a value from the device's inside: no access rights, guards or watchers."""
+        if (index, sub) in self._entries:
+            self._values[index, sub] = value
+
+    def read(self, key: Key) -> bytes | Abort:
+        """Read as a client does."""
+        entry = self.entry(key)
+        if isinstance(entry, Abort):
+            return entry
+        return entry.pack(self._values[key]) if entry.readable else Abort.WRITE_ONLY
+
+    def refusal(self, key: Key) -> Abort | None:
+        """Why a client could not write here whatever the value; None where it could."""
+        entry = self.entry(key)
+        if isinstance(entry, Abort):
+            return entry
+        return None if entry.writable else Abort.READ_ONLY
+
+    def write(self, key: Key, data: bytes) -> Abort | None:
+        """Write as a client does; None when it was taken."""
+        entry = self.entry(key)
+        if isinstance(entry, Abort):
+            return entry
+        if not entry.writable:
+            return Abort.READ_ONLY
+        value = entry.unpack(data)
+        if isinstance(value, Abort):
+            return value
+        if isinstance(value, int):
+            refused = self._check(key, entry, value)
+            if refused is not None:
+                return refused
+        self._values[key] = value
+        watcher = self.watchers.get(key[0])
+        if watcher is not None and isinstance(value, int):
+            watcher(key[1], value)
+        return None
+
+    def _check(self, key: Key, entry: Entry, value: int) -> Abort | None:
+        if entry.low is not None and value < entry.low:
+            return Abort.RANGE
+        if entry.high is not None and value > entry.high:
+            return Abort.RANGE
+        guard = self.guards.get(key[0])
+        return None if guard is None else guard(key[1], value)
+
+    def _store(self, sub: int, signature: int) -> Abort | None:
+        if signature != _SAVE:
+            return Abort.SIGNATURE
+        self._stored = {
+            key: value for key, value in self._values.items() if self._entries[key].access == "rw"
+        }
+        return None
+
+    def _restore(self, sub: int, signature: int) -> Abort | None:
+        if signature != _LOAD:
+            return Abort.SIGNATURE
+        self._stored = {}
+        return None
+
+
+def read_eds(path: Path, node: int) -> dict[Key, Entry]:
+    """Objects that an EDS or DCF file declares for a node id; FileError where it is none."""
+    from canopen.objectdictionary import eds
+
+    library: Any = eds
+    text = read_eds_text(path).text
+    try:
+        declared = library.import_eds(io.StringIO(text), node)
+    except (ValueError, KeyError, configparser.Error) as error:
+        raise FileError(Fault(f"cannot be read as an EDS: {error}", str(path))) from error
+    entries: dict[Key, Entry] = {}
+    for thing in declared.values():
+        members = [thing] if not hasattr(thing, "subindices") else thing.subindices.values()
+        entries.update({(one.index, one.subindex): _entry(one) for one in members})
+    return {key: entry for key, entry in entries.items() if key[0] >= _FIRST_OBJECT}
+
+
+def _entry(variable: Any) -> Entry:
+    letter = "B" if variable.data_type == _BOOLEAN else _FORMATS.get(variable.data_type, "")
+    default = variable.default if variable.value is None else variable.value
+    if letter:
+        unlimited = default is None and variable.index in _LIMITS
+        default = _most(letter) if unlimited else _fitting(int(default or 0), letter)
+    elif not isinstance(default, bytes):
+        default = str(default or "").encode()
+    return Entry(
+        variable.name,
+        letter,
+        variable.access_type,
+        default,
+        variable.min if letter else None,
+        variable.max if letter else None,
+        bool(variable.pdo_mappable),
+    )
+
+
+def _most(letter: str) -> int:
+    bits = 8 * struct.calcsize(letter)
+    return (1 << bits - letter.islower()) - 1
+
+
+def _fitting(value: int, letter: str) -> int:
+    """A signed number from one whose bits were written as unsigned, as EDS files do."""
+    bits = 8 * struct.calcsize(letter)
+    return value - (1 << bits) if letter.islower() and value >= 1 << (bits - 1) else value

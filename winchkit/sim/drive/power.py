@@ -1,0 +1,249 @@
+"""The power stage of a simulated drive: its CiA 402 state, and how motion ends when it must."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum, IntEnum
+from typing import NamedTuple
+
+from winchkit.sim.drive.object_dictionary import ObjectDictionary
+
+__all__ = [
+    "FAULT_RESET",
+    "HALT",
+    "TRANSITIONS",
+    "Command",
+    "Order",
+    "PowerStage",
+    "State",
+    "Transition",
+    "command_of",
+]
+
+FAULT_RESET = 0x0080
+HALT = 0x0100
+
+
+class State(IntEnum):
+    """The value is the status word's bits 0 to 3, 5 and 6."""
+
+    NOT_READY = 0x00
+    SWITCH_ON_DISABLED = 0x40
+    READY = 0x21
+    SWITCHED_ON = 0x23
+    OPERATION_ENABLED = 0x27
+    QUICK_STOP_ACTIVE = 0x07
+    FAULT_REACTION = 0x0F
+    FAULT = 0x08
+
+
+class Command(IntEnum):
+    """What bits 0 to 3 of a control word ask for."""
+
+    DISABLE_VOLTAGE = 0
+    QUICK_STOP = 1
+    SHUTDOWN = 2
+    SWITCH_ON = 3
+    ENABLE = 4
+
+
+class Transition(NamedTuple):
+    """A row of the standard's table."""
+
+    number: int
+    target: State
+
+
+TRANSITIONS: dict[tuple[State, Command], Transition] = {
+    (State.SWITCH_ON_DISABLED, Command.SHUTDOWN): Transition(2, State.READY),
+    (State.READY, Command.SWITCH_ON): Transition(3, State.SWITCHED_ON),
+    (State.READY, Command.ENABLE): Transition(3, State.SWITCHED_ON),
+    (State.SWITCHED_ON, Command.ENABLE): Transition(4, State.OPERATION_ENABLED),
+    (State.OPERATION_ENABLED, Command.SWITCH_ON): Transition(5, State.SWITCHED_ON),
+    (State.SWITCHED_ON, Command.SHUTDOWN): Transition(6, State.READY),
+    (State.READY, Command.QUICK_STOP): Transition(7, State.SWITCH_ON_DISABLED),
+    (State.READY, Command.DISABLE_VOLTAGE): Transition(7, State.SWITCH_ON_DISABLED),
+    (State.OPERATION_ENABLED, Command.SHUTDOWN): Transition(8, State.READY),
+    (State.OPERATION_ENABLED, Command.DISABLE_VOLTAGE): Transition(9, State.SWITCH_ON_DISABLED),
+    (State.SWITCHED_ON, Command.QUICK_STOP): Transition(10, State.SWITCH_ON_DISABLED),
+    (State.SWITCHED_ON, Command.DISABLE_VOLTAGE): Transition(10, State.SWITCH_ON_DISABLED),
+    (State.OPERATION_ENABLED, Command.QUICK_STOP): Transition(11, State.QUICK_STOP_ACTIVE),
+    (State.QUICK_STOP_ACTIVE, Command.DISABLE_VOLTAGE): Transition(12, State.SWITCH_ON_DISABLED),
+    (State.QUICK_STOP_ACTIVE, Command.ENABLE): Transition(16, State.OPERATION_ENABLED),
+}
+"""Transitions by command. 0, 1 (boot), 13, 14 (fault) and 15 (reset) need none."""
+
+
+def command_of(word: int) -> Command:
+    """Decode a control word; bits that a command ignores do not count."""
+    if not word & 0b0010:
+        return Command.DISABLE_VOLTAGE
+    if not word & 0b0100:
+        return Command.QUICK_STOP
+    if not word & 0b0001:
+        return Command.SHUTDOWN
+    return Command.ENABLE if word & 0b1000 else Command.SWITCH_ON
+
+
+_ABORT_FAULT, _ABORT_DISABLE, _ABORT_QUICK_STOP = 1, 2, 3
+_STAYS = 5
+"""From this quick-stop option code on, the drive stays in Quick Stop Active."""
+
+
+class Order(Enum):
+    """What the motion is told."""
+
+    OFF = "no torque"
+    CUT = "no torque at once, whatever hangs on it"
+    FOLLOW = "follow the set-points"
+    SLOW_DOWN = "stop on 6084h"
+    QUICK_STOP = "stop on 6085h"
+    HARD_STOP = "stop on 60C6h, at the current or voltage limit"
+
+
+RAMPS = {1: Order.SLOW_DOWN, 2: Order.QUICK_STOP, 3: Order.HARD_STOP, 4: Order.HARD_STOP}
+"""Ramps of the option codes 605Ah (which adds 4 for staying), 605Dh and 605Eh."""
+_DEFAULTS = {0x605A: 2, 0x605B: 0, 0x605C: 1, 0x605E: 2, 0x6007: 1}
+"""What the standard asks of a drive that lacks an option code."""
+
+
+class PowerStage:
+    """Takes control words as they are written, and keeps the state.
+
+    A ramp is under way while ``order`` is one of the stops; :meth:`standstill` ends it. Commands
+    count when they are written: an old control word never moves a drive that stopped by itself.
+    """
+
+    def __init__(self, objects: ObjectDictionary, changed: Callable[[State], None]) -> None:
+        self._objects = objects
+        self._changed = changed
+        self.may_enable: Callable[[], bool] = lambda: True
+        self.state = State.NOT_READY
+        self.order = Order.OFF
+        self._after: State | None = None
+        self._last_word = 0
+        self.cause_persists = False
+        """A fault whose cause is still there cannot be reset."""
+
+    def reset(self) -> None:
+        """Power on: not ready to switch on."""
+        self._last_word = 0
+        self._enter(State.NOT_READY)
+
+    def ready(self) -> None:
+        """Transition 1: the self-test is over."""
+        self._enter(State.SWITCH_ON_DISABLED)
+
+    def control(self, word: int) -> None:
+        """Take a control word that was just written."""
+        rising = word & ~self._last_word & FAULT_RESET
+        self._last_word = word
+        if self.state is State.FAULT:
+            if rising and not self.cause_persists:
+                self._enter(State.SWITCH_ON_DISABLED)
+            return
+        command = command_of(word)
+        if command is Command.ENABLE and self._ramp_can_be_cancelled():
+            self._after, self.order = None, Order.FOLLOW
+        while self._obey(command):
+            pass
+
+    def quick_stop(self) -> None:
+        """Stop as if a control word had asked for it."""
+        while self._obey(Command.QUICK_STOP):
+            pass
+
+    def shut_down(self) -> None:
+        """Go down to ready to switch on as if a control word had asked for it."""
+        while self._obey(Command.SHUTDOWN):
+            pass
+
+    def disable_voltage(self) -> None:
+        """Remove the power as if a control word had asked for it."""
+        while self._obey(Command.DISABLE_VOLTAGE):
+            pass
+
+    def abort_connection(self) -> None:
+        """React to a lost connection as 6007h says, short of the fault, which the drive raises."""
+        option = self._option(0x6007)
+        if option == _ABORT_DISABLE:
+            self.disable_voltage()
+        elif option == _ABORT_QUICK_STOP:
+            self.quick_stop()
+
+    @property
+    def faults_on_abort(self) -> bool:
+        """Whether 6007h makes a fault of a lost connection."""
+        return self._option(0x6007) == _ABORT_FAULT
+
+    def fault(self, *, cut: bool = False) -> None:
+        """Transition 13, with the reaction of 605Eh or with a ``cut`` of the power, then 14."""
+        if self.state in (State.FAULT, State.FAULT_REACTION, State.NOT_READY):
+            return
+        ramp = RAMPS.get(self._option(0x605E))
+        if cut or ramp is None or self.order in (Order.OFF, Order.CUT):
+            self._enter(State.FAULT)
+            self.order = Order.CUT if cut else Order.OFF
+        else:
+            self._ramp(ramp, State.FAULT_REACTION, State.FAULT)
+
+    def standstill(self) -> None:
+        """A ramp has ended."""
+        after, self._after = self._after, None
+        if after is not None:
+            self._enter(after)
+
+    def _ramp_can_be_cancelled(self) -> bool:
+        return self.state is State.OPERATION_ENABLED and self._after is not None
+
+    def _obey(self, command: Command) -> bool:
+        row = TRANSITIONS.get((self.state, command))
+        if row is None:
+            return False
+        if row.number == 11:
+            return self._begin_quick_stop()
+        if row.number == 16:
+            if self._option(0x605A) < _STAYS:
+                return False
+            self._enter(row.target)
+        elif row.number == 4 and not self.may_enable():
+            return False
+        elif row.number in (5, 8):
+            option = self._option(0x605C if row.number == 5 else 0x605B)
+            if option == 1:
+                if self._after is not row.target:
+                    self._ramp(Order.SLOW_DOWN, self.state, row.target)
+                return False
+            self._enter(row.target)
+        else:
+            self._enter(row.target)
+        return True
+
+    def _option(self, index: int) -> int:
+        return self._objects.number(index, 0, _DEFAULTS[index])
+
+    def _begin_quick_stop(self) -> bool:
+        option = self._option(0x605A)
+        if option < 0:
+            return False
+        if option == 0:
+            self._enter(State.SWITCH_ON_DISABLED)
+        elif option < _STAYS:
+            self._ramp(RAMPS[option], State.QUICK_STOP_ACTIVE, State.SWITCH_ON_DISABLED)
+        else:
+            self._ramp(RAMPS[option - 4], State.QUICK_STOP_ACTIVE, None)
+        return True
+
+    def _ramp(self, order: Order, state: State, after: State | None) -> None:
+        self.order, self._after = order, after
+        self._set(state)
+
+    def _enter(self, state: State) -> None:
+        self.order = Order.FOLLOW if state is State.OPERATION_ENABLED else Order.OFF
+        self._after = None
+        self._set(state)
+
+    def _set(self, state: State) -> None:
+        if state is not self.state:
+            self.state = state
+            self._changed(state)

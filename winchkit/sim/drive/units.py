@@ -1,0 +1,77 @@
+"""What a simulated drive's counts mean at the motor shaft, in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+from winchkit.schema.devices.servo import ServoSpec
+from winchkit.sim.drive.object_dictionary import ObjectDictionary
+
+__all__ = ["SCALES", "Units", "units_of", "wrapped"]
+
+_TURN = 2 * pi
+SCALES = (0x608F, 0x6091, 0x6092, 0x6076, 0x60A8, 0x60A9)
+"""Objects that say what a count is."""
+_ANGLES = {0x10: 1.0, 0x41: pi / 180, 0xB4: _TURN}
+"""rad, degree and revolution by their codes of CiA 303-2, in rad."""
+_TIMES = {0x03: 1.0, 0x47: 60.0}
+"""Second and minute, in s."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """SI value of one count."""
+
+    angle: float
+    """rad of 6064h and 607Ah."""
+    speed: float
+    """rad/s of 606Ch, 60FFh and, per second, of the accelerations."""
+    torque: float
+    """N m of 6077h, which counts per mille of the rated torque."""
+
+
+def units_of(objects: ObjectDictionary, servo: ServoSpec) -> Units:
+    """Units by 608Fh, 6091h, 6092h, 60A8h, 60A9h and 6076h; the device file for what is absent.
+
+    A device file may also declare that the drive's own scales say nothing. By CiA 402 a position
+    counts the feed constant a shaft turn, or the encoder's increments where there is none.
+    """
+    by_drive = servo.units == "drive"
+
+    def ratio(index: int) -> float | None:
+        above, below = objects.number(index, 1, 0), objects.number(index, 2, 0)
+        return above / below if by_drive and above and below else None
+
+    def code(index: int) -> int:
+        return objects.number(index, 0, 0) if by_drive else 0
+
+    gear = ratio(0x6091) or 1.0
+    per_shaft_turn = ratio(0x6092) or ratio(0x608F) or float(servo.increments_per_turn)
+    angle = _angle_of(code(0x60A8)) or _TURN / per_shaft_turn
+    declared = {"increments/s": angle * gear, "rpm": _TURN / 60, "0.1 rpm": _TURN / 600}
+    speed = _speed_of(code(0x60A9))
+    rated = objects.number(0x6076, 0, 0) * 1e-3 or servo.rated_torque
+    return Units(angle * gear, speed * gear if speed else declared[servo.speed_unit], rated * 1e-3)
+
+
+def _angle_of(code: int) -> float:
+    """Angle (rad) that an SI unit names; 0 for increments and what is no angle."""
+    return _prefix(code) * _ANGLES.get(code >> 16 & 0xFF, 0.0)
+
+
+def _speed_of(code: int) -> float:
+    """Speed (rad/s) that an SI unit names; 0 for increments and what is no angle per time."""
+    time = _TIMES.get(code >> 8 & 0xFF)
+    return _angle_of(code) / time if time else 0.0
+
+
+def _prefix(code: int) -> float:
+    exponent = code >> 24 & 0xFF
+    return 10.0 ** (exponent - 256 if exponent > 127 else exponent)
+
+
+def wrapped(value: float, bits: int) -> int:
+    """Round to a signed integer that wraps around like a position counter."""
+    half = 1 << (bits - 1)
+    return (round(value) + half) % (1 << bits) - half

@@ -1,0 +1,1 @@
+"""Simulated load cells and encoders behind CANopen, Modbus and serial lines."""

@@ -1,0 +1,174 @@
+"""What simulated instruments of every kind share: conversions, zero, tare, faults, status."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import ClassVar
+
+from winchkit.errors import UsageError
+from winchkit.schema.devices.modbus import StatusMeaning
+from winchkit.units import suggest
+
+__all__ = [
+    "Converted",
+    "Converter",
+    "SimulatedInstrument",
+    "status_word",
+]
+
+_FAST, _SLOW = 0.05, 0.5
+"""Time constants of the averages whose difference is motion, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """One conversion, in the unit of the device."""
+
+    due: float
+    """When it has passed the filter, s."""
+    value: float
+    """NaN where nothing could be measured."""
+    overload: bool = False
+    broken: bool = False
+
+
+class Converter:
+    """Samples ``measure`` at the instants of :attr:`next_conversion`, and at no others.
+
+    The filter delays and does not smooth, since a lag would be an effect of its own.
+    """
+
+    def __init__(
+        self, measure: Callable[[], float], rate: float, filter_delay: float, *, now: float
+    ) -> None:
+        self.next_conversion = now
+        self._measure = measure
+        self._step = 1.0 / rate
+        self._delay = filter_delay
+        self._pipeline: deque[Converted] = deque()
+        self._fast: float | None = None
+        self._slow: float | None = None
+        self._last = nan
+        """What was measured last; one that is frozen says it again."""
+
+    def deviate(self, share: float) -> None:
+        """Let its clock run slower by a share of the declared period."""
+        self._step *= 1.0 + share
+
+    def convert(self, faults: set[str]) -> None:
+        """Sample at the instant ``next_conversion``, which then moves on by one period."""
+        now = self.next_conversion
+        self.next_conversion = now + self._step
+        value = self._last if "frozen" in faults else self._measure()
+        self._last = value
+        broken = "sensor break" in faults or not isfinite(value)
+        seen = nan if broken else value
+        self._pipeline.append(Converted(now + self._delay, seen, "overload" in faults, broken))
+        if not broken:
+            self._average(value)
+
+    def take(self, now: float) -> list[Converted]:
+        """Conversions that have come through the filter by ``now``, each once."""
+        found = []
+        while self._pipeline and self._pipeline[0].due <= now:
+            found.append(self._pipeline.popleft())
+        return found
+
+    @property
+    def motion(self) -> float:
+        """How far a fast and a slow average are apart, in the unit of the device."""
+        if self._fast is None or self._slow is None:
+            return 0.0
+        return abs(self._fast - self._slow)
+
+    def _average(self, value: float) -> None:
+        if self._fast is None or self._slow is None:
+            self._fast = self._slow = value
+            return
+        self._fast += (value - self._fast) * min(1.0, self._step / _FAST)
+        self._slow += (value - self._slow) * min(1.0, self._step / _SLOW)
+
+
+class SimulatedInstrument:
+    """Converts at its own instants, shows what has passed its filter, zeroes and tares itself."""
+
+    KIND: ClassVar[str]
+    """What it is called in messages."""
+    FAULTS: ClassVar[tuple[str, ...]]
+    """What can go wrong; ``recover`` ends it."""
+
+    def __init__(
+        self, measure: Callable[[], float], rate: float, filter_delay: float, *, now: float
+    ) -> None:
+        """``measure`` gives the quantity now in the unit of the device; nobody else looks at it."""
+        self.faults: set[str] = set()
+        self.stored = 0
+        """How often its EEPROM was written."""
+        self._converter = Converter(measure, rate, filter_delay, now=now)
+        self._shown = Converted(now, 0.0)
+        self._zero = self._tare = 0.0
+        self._net = False
+
+    @property
+    def next_conversion(self) -> float:
+        """Instant of the next conversion, s."""
+        return self._converter.next_conversion
+
+    @property
+    def gross(self) -> float:
+        """What it shows before any tare; NaN where it can measure nothing."""
+        return self._shown.value - self._zero
+
+    def deviate(self, share: float) -> None:
+        """Let its clock run slower by a share of the declared period."""
+        self._converter.deviate(share)
+
+    def convert(self) -> None:
+        """Sample at the instant ``next_conversion``, which then moves on by one period."""
+        self._converter.convert(self.faults)
+
+    def show(self, now: float) -> None:
+        """Let the conversions that are through the filter by ``now`` be seen."""
+        for shown in self._converter.take(now):
+            self._shown = shown
+            self._showing()
+
+    def _showing(self) -> None:
+        """A conversion is seen for the first time; nothing follows, unless a kind says so."""
+        return
+
+    def inject(self, kind: str) -> None:
+        """Make something go wrong; raises UsageError for an unknown kind."""
+        self.check_fault(kind)
+        if kind == "recover":
+            self.faults.clear()
+        else:
+            self.faults.add(kind)
+
+    @classmethod
+    def check_fault(cls, kind: str) -> None:
+        """Raise UsageError for a fault that it cannot have."""
+        if kind not in cls.FAULTS:
+            raise UsageError(
+                f"{cls.KIND} has no fault '{kind}'; use one of {', '.join(cls.FAULTS)}"
+                + suggest(kind, list(cls.FAULTS))
+            )
+
+    def _obey(self, name: str) -> None:
+        """Zero or tare itself; one that measures nothing does not."""
+        if name == "gross":
+            self._tare, self._net = 0.0, False
+        elif name == "zero" and not self._shown.broken:
+            self._zero = self._shown.value
+        elif name == "tare" and not self._shown.broken:
+            self._tare, self._net = self.gross, True
+
+
+def status_word(
+    bits: Mapping[StatusMeaning, Sequence[int]], says: Mapping[StatusMeaning, bool]
+) -> int:
+    """The status with the first declared bit of each meaning that holds."""
+    return sum(1 << numbers[0] for meaning, numbers in bits.items() if says.get(meaning, False))

@@ -1,0 +1,205 @@
+"""A simulated instrument on a serial line: answers, sends by itself, tares, goes wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import nan
+
+from winchkit.errors import UsageError
+from winchkit.schema.devices.stream import AskSpec, StreamSpec, UnitSpec
+from winchkit.sim.instruments.instrument import SimulatedInstrument
+from winchkit.sim.instruments.stream_frames import Speech, State, example_fields
+from winchkit.units import convert, dimension_of, factor
+
+__all__ = ["StreamInstrument", "shown_by"]
+
+
+class StreamInstrument(SimulatedInstrument):
+    """One device on a serial line; ``receive`` what the host sends, ``take_output`` what it gets.
+
+    ``measure`` gives the quantity now as the device counts it (see :func:`shown_by`).
+    """
+
+    KIND = "a simulated serial instrument"
+    FAULTS = (
+        "silence",
+        "late reply",
+        "frozen",
+        "overload",
+        "sensor break",
+        "garbage",
+        "bad checksum",
+        "half line",
+        "refusal",
+        "unplug",
+        "replug",
+        "recover",
+    )
+    """``unplug`` and ``replug`` are of the whole line."""
+
+    def __init__(
+        self,
+        spec: StreamSpec,
+        measure: Callable[[], float],
+        *,
+        now: float,
+        address: int | None = None,
+    ) -> None:
+        """Raise FileError where the device file's example does not fit its frame."""
+        super().__init__(measure, spec.rate, spec.filter_delay, now=now)
+        self.spec = spec
+        self.address = address
+        self.reply_delay = 2 * spec.longest_reply
+        """How late a late reply is, s."""
+        self._old = True
+        self._sending = spec.mode == "continuous" and not spec.start
+        self._open = spec.select is None or address is None
+        self._received = b""
+        self._output: list[tuple[float, bytes]] = []
+        self._speech = Speech(spec)
+        self._actions = self._known_requests()
+
+    def _showing(self) -> None:
+        self._old = False
+        if self._sending:
+            self._send(self._speech.frame(self._state()), self._shown.due)
+
+    # What the host does and gets.
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that the host sent."""
+        self._received += data
+        while self._received:
+            found = next((text for text in self._actions if self._received.startswith(text)), None)
+            if found is not None:
+                self._received = self._received[len(found) :]
+                self._actions[found](now)
+            elif any(text.startswith(self._received) for text in self._actions):
+                return
+            else:
+                self._received = self._received[1:]
+
+    def take_output(self, now: float) -> bytes:
+        """Bytes that are on the line by ``now``."""
+        due = [data for time, data in self._output if time <= now]
+        self._output = [item for item in self._output if item[0] > now]
+        return b"".join(due)
+
+    def inject(self, kind: str) -> None:
+        """Make something go wrong; raises UsageError for an unknown kind."""
+        super().inject(kind)
+        if kind == "recover":
+            self.faults.add("replug")
+
+    def _known_requests(self) -> dict[bytes, Callable[[float], None]]:
+        """What this device understands, longest first, and what it does then."""
+        spec = self.spec
+        known: dict[str, Callable[[float], None]] = {}
+        if spec.poll:
+            known[spec.poll] = lambda now: self._answer(self._read(), now)
+        if spec.fresh is not None:
+            known[spec.fresh.send] = lambda now: self._answer(
+                self._speech.status(self._state(), old=self._old), now
+            )
+        if spec.stop:
+            known[spec.stop] = lambda now: self._stop()
+        for ask in spec.start:
+            known[ask.send] = self._doing(ask, "start")
+        for name, ask in spec.command.items():
+            known[ask.send] = self._doing(ask, name)
+        if spec.select is not None:
+            for address in range(256):
+                send = spec.select.send.format(address=_Digits(address))
+                known[send] = self._selecting(spec.select, address)
+        mine = {self._bytes(text): action for text, action in known.items()}
+        return dict(sorted(mine.items(), key=lambda item: -len(item[0])))
+
+    def _doing(self, ask: AskSpec, name: str) -> Callable[[float], None]:
+        def do(now: float) -> None:
+            if not self._open:
+                return
+            no = self._speech.reply("refused", "busy") if "refusal" in self.faults else None
+            if no is not None:
+                self._answer(self._speech.line(no), now)
+                return
+            if name == "start":
+                self._sending = self.spec.mode == "continuous"
+            self._obey(name)
+            if ask.answer:
+                self._answer(self._speech.line(ask.answer[0].replace("*", "")), now)
+
+        return do
+
+    def _selecting(self, ask: AskSpec, address: int) -> Callable[[float], None]:
+        def do(now: float) -> None:
+            self._open = address == self.address
+            if self._open:
+                self._answer(self._speech.line(ask.answer[0]), now)
+
+        return do
+
+    def _stop(self) -> None:
+        self._sending = False
+
+    def _answer(self, data: bytes, now: float) -> None:
+        if self._open:
+            self._send(data, now + (self.reply_delay if "late reply" in self.faults else 0.0))
+
+    def _send(self, data: bytes, time: float) -> None:
+        if "silence" in self.faults:
+            return
+        if "garbage" in self.faults:
+            data = b"\xff" + data
+        if "half line" in self.faults:
+            data = data[len(data) // 2 :]
+        self._output.append((time, data))
+
+    # What is said.
+
+    def _read(self) -> bytes:
+        self._old = True
+        return self._speech.frame(self._state())
+
+    def _state(self) -> State:
+        """What it knows of the conversion that is shown."""
+        shown = self._shown
+        gross = self.gross
+        capacity = self.spec.capacity
+        over = shown.overload or (capacity is not None and abs(gross) > capacity)
+        if over or shown.broken:
+            gross = nan
+        return State(
+            gross - self._tare,
+            gross,
+            self._converter.motion,
+            self._net,
+            over,
+            shown.broken,
+            self.address,
+            spoilt="bad checksum" in self.faults,
+        )
+
+    def _bytes(self, template: str) -> bytes:
+        return template.format(address=_Digits(self.address or 0)).encode("latin-1")
+
+
+class _Digits:
+    """An address in a template: ``{address:3}`` is three digits."""
+
+    def __init__(self, address: int) -> None:
+        self._address = address
+
+    def __format__(self, width: str) -> str:
+        return str(self._address).rjust(int(width or "0"), "0")
+
+
+def shown_by(spec: StreamSpec, measure: Callable[[], float]) -> Callable[[], float]:
+    """Turn a measurement in SI into what the device counts, in the unit of its example."""
+    one = UnitSpec(spec.scale, spec.unit)
+    if spec.units:
+        one = spec.units[example_fields(spec)["unit"].strip()]
+    dimension = dimension_of(one.unit)
+    if dimension is None:
+        raise UsageError(f"unknown unit '{one.unit}' of a simulated instrument")
+    size, origin = factor(one.unit, dimension) * one.scale, convert(0.0, one.unit, dimension)
+    return lambda: (measure() - origin) / size

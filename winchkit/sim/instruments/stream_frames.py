@@ -1,0 +1,225 @@
+"""What a simulated serial instrument says: its frames, status and replies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+from math import isfinite
+from operator import xor
+
+from winchkit.errors import FileError
+from winchkit.schema.devices.stream import ChecksumSpec, Says, StreamSpec
+from winchkit.schema.template import Part, fields_of
+
+__all__ = [
+    "NumberStyle",
+    "Speech",
+    "State",
+    "example_fields",
+    "style_of",
+    "write_line",
+]
+
+
+@dataclass(frozen=True)
+class NumberStyle:
+    """How a number is written."""
+
+    width: int | None
+    decimals: int
+    plus: bool
+    zeros: bool
+    """Padded by zeros, else by spaces."""
+    sign_first: bool
+    """The sign stands before the padding."""
+
+    def write(self, number: float) -> str | None:
+        """Text of a number, None where it does not fit its width."""
+        digits = f"{abs(number):.{self.decimals}f}"
+        negative = number < 0 and float(digits) != 0.0
+        sign = "-" if negative else ("+" if self.plus else "")
+        if self.width is None:
+            return sign + digits
+        room = self.width - len(sign)
+        if len(digits) > room:
+            return None
+        if self.zeros:
+            return sign + digits.rjust(room, "0")
+        if self.sign_first:
+            return (sign or " ") + digits.rjust(self.width - 1)
+        return (sign + digits).rjust(self.width)
+
+
+def style_of(text: str, width: int | None) -> NumberStyle:
+    """The style of a number as an example shows it."""
+    bare = text.strip()
+    signed = bare[:1] in "+-"
+    digits = bare[signed:]
+    return NumberStyle(
+        width,
+        len(digits.partition(".")[2]),
+        bare.startswith("+"),
+        digits.startswith("0") and digits[1:2].isdigit(),
+        signed and text[0] in "+-" and digits.startswith(" "),
+    )
+
+
+def example_fields(spec: StreamSpec) -> dict[str, str]:
+    """Fields of the example by its first template; FileError where it does not fit."""
+    fields = fields_of(spec.templates()[0], spec.example)
+    if fields is None:
+        raise FileError(f"the example '{spec.example}' does not fit '{spec.frame[0]}'")
+    return fields
+
+
+def write_line(
+    parts: tuple[Part, ...], fields: dict[str, str], checksum: ChecksumSpec | None
+) -> str:
+    """A line of the fields; its check sum is computed where one is declared."""
+    line = ""
+    for part in parts:
+        text = part.literal or fields.get(part.field, "")
+        line += text[: part.width].ljust(part.width) if part.width is not None else text
+    if checksum is None or "checksum" not in {part.field for part in parts}:
+        return line
+    width = next(part.width or 2 for part in parts if part.field == "checksum")
+    blank = write_line(parts, {**fields, "checksum": "#" * width}, None)
+    return blank.replace("#" * width, f"{_sum(checksum, blank, width):0{width}X}")
+
+
+def _sum(checksum: ChecksumSpec, line: str, width: int) -> int:
+    counted = line[: len(line) - width]
+    if checksum.before:
+        counted = line.rpartition(checksum.before)[0]
+    if checksum.after:
+        counted = counted.partition(checksum.after)[2]
+    codes = [ord(letter) for letter in counted]
+    if checksum.kind == "xor":
+        return reduce(xor, codes, 0)
+    total = sum(codes) % 256
+    return total if checksum.kind == "sum" else 255 - total
+
+
+_STABLE_DIGITS = 100
+_ALARMS: tuple[Says, ...] = ("fault", "overload")
+_IN_BITS: tuple[Says, ...] = ("overload", "underload", "fault", "unstable", "stable", "net")
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What an instrument knows, in the unit that its frames count."""
+
+    net: float
+    """NaN where nothing could be measured."""
+    gross: float
+    motion: float
+    tared: bool
+    overload: bool
+    broken: bool
+    address: int | None
+    spoilt: bool = False
+    """The check sum is to be wrong."""
+
+
+class Speech:
+    """Writes what one kind of device says."""
+
+    def __init__(self, spec: StreamSpec) -> None:
+        """Raise FileError where the device file's example does not fit its frame."""
+        self._spec = spec
+        self._example = example_fields(spec) if spec.binary is None else {}
+
+    def line(self, text: str) -> bytes:
+        """A line of text."""
+        return (text + self._spec.terminator).encode("latin-1")
+
+    def reply(self, *wanted: Says) -> str | None:
+        """The reply that says one of these, None where the device has none."""
+        found = [text for text, says in self._spec.replies.items() if says in wanted]
+        return found[0].replace("*", " ").strip() if found else None
+
+    def status(self, state: State, *, old: bool) -> bytes:
+        """The answer to the question whether there is a new value."""
+        assert self._spec.fresh is not None, "asked where the device file has the question"
+        bits = self._bits(self._truths(state)) | self._bit("stale", old)
+        return self.line(self._spec.fresh.frame.replace("{bits}", str(bits)))
+
+    def frame(self, state: State) -> bytes:
+        """The frame that says the state."""
+        truths = self._truths(state)
+        if self._spec.binary is not None:
+            return self._binary(state, truths)
+        said: Says | None = next((one for one in _ALARMS if truths[one]), None)
+        if said is not None and (reply := self.reply(said)) is not None:
+            return self.line(reply)
+        fields = {**self._example, **self._fields(state, truths, said)}
+        line = write_line(self._spec.templates()[0], fields, self._spec.checksum)
+        if state.spoilt and "checksum" in self._example:
+            line = line[:-1] + ("0" if line[-1] != "0" else "1")
+        return self.line(line)
+
+    def _fields(self, state: State, truths: dict[Says, bool], said: Says | None) -> dict[str, str]:
+        fields = {}
+        for name, number in (("value", state.net), ("gross", state.gross)):
+            if name in self._example:
+                fields[name] = self._digits(name, number, said)
+        for name, letters in self._spec.letter.items():
+            fits = [text for text, says in letters.items() if truths.get(says, False)]
+            fields[name] = fits[0] if fits else self._example.get(name, "")
+        if "bits" in self._example:
+            fields["bits"] = f"{self._bits(truths):0{len(self._example['bits'])}d}"
+        if "address" in self._example and state.address is not None:
+            fields["address"] = f"{state.address:0{len(self._example['address'])}d}"
+        return fields
+
+    def _digits(self, name: str, number: float, said: Says | None) -> str:
+        width = next(part.width for part in self._spec.templates()[0] if part.field == name)
+        if said is not None and self._can_say(said):
+            word = next((text for text, says in self._spec.words.items() if says == said), "")
+            return word.center(width or 0)
+        text = style_of(self._example[name], width).write(number)
+        return text if text is not None else "-" * (width or 0)
+
+    def _binary(self, state: State, truths: dict[Says, bool]) -> bytes:
+        layout = self._spec.binary
+        assert layout is not None, "called for a binary frame"
+        first, size = layout.value
+        highest = (1 << (8 * size - 1)) - 1
+        counts = round(state.net) if isfinite(state.net) else 0
+        clipped = min(max(counts, -highest - 1), highest)
+        frame = bytearray(layout.length)
+        frame[first : first + size] = clipped.to_bytes(size, layout.order, signed=True)
+        if layout.bits is not None:
+            frame[layout.bits] = self._bits(truths) | self._bit("overload", clipped != counts)
+        return bytes(frame) + self._spec.terminator.encode("latin-1")
+
+    def _truths(self, state: State) -> dict[Says, bool]:
+        """What is true of the conversion that is shown."""
+        alarm = state.overload or state.broken
+        stable = state.motion < _STABLE_DIGITS * self._one_digit()
+        says_fault = self._can_say("fault")
+        return {
+            "overload": state.overload or (state.broken and not says_fault),
+            "fault": state.broken and says_fault,
+            "unstable": not stable and not alarm,
+            "stable": stable and not alarm,
+            "net": state.tared,
+            "gross": not state.tared,
+        }
+
+    def _one_digit(self) -> float:
+        if not self._example:
+            return 1.0
+        return float(10.0 ** -len(self._example["value"].strip().partition(".")[2]))
+
+    def _can_say(self, says: Says) -> bool:
+        spec = self._spec
+        said = [*spec.words.values(), *spec.replies.values(), *spec.bits]
+        return says in said or any(says in one.values() for one in spec.letter.values())
+
+    def _bits(self, truths: dict[Says, bool]) -> int:
+        return sum(self._bit(says, truths.get(says, False)) for says in _IN_BITS)
+
+    def _bit(self, says: Says, true: bool) -> int:
+        numbers = self._spec.bits.get(says, ())
+        return 1 << numbers[-1] if true and numbers else 0

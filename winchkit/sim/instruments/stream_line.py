@@ -1,0 +1,125 @@
+"""Simulated serial instruments behind a pseudo-terminal, on a thread of its own."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from winchkit.errors import ConnectionLost
+from winchkit.sim.instruments.stream import StreamInstrument
+
+__all__ = ["StreamLine"]
+
+_TICK = 2e-3
+_JOIN = 5.0
+_AT_ONCE = 4096
+
+
+class StreamLine:
+    """One serial line with its instruments, reached at :attr:`port`.
+
+    ``up_to_date`` is called on this line's thread; it brings the simulation to now, and is a
+    context in which nobody else touches it. ``now`` is the simulation's time then. The port is a
+    link that stays the same when the line is unplugged and plugged in again.
+    """
+
+    def __init__(
+        self,
+        instruments: Sequence[StreamInstrument],
+        up_to_date: Callable[[], AbstractContextManager[None]],
+        now: Callable[[], float],
+    ) -> None:
+        self._instruments = tuple(instruments)
+        self._up_to_date = up_to_date
+        self._now = now
+        self._folder = tempfile.TemporaryDirectory(prefix="winchkit-")
+        self.port = str(Path(self._folder.name) / "tty")
+        self._ends: tuple[int, int] | None = None
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="sim-serial", daemon=True)
+
+    def start(self) -> None:
+        """Begin to serve; raises ConnectionLost where the system has no pseudo-terminals."""
+        if sys.platform == "win32":
+            self._folder.cleanup()
+            raise ConnectionLost(
+                "Windows has no pseudo-terminals; simulate serial instruments on Linux or macOS"
+            )
+        self._plug_in()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Take the port away and end the thread."""
+        self._stopping.set()
+        if self._thread.is_alive():
+            self._thread.join(_JOIN)
+        self._unplug()
+        self._folder.cleanup()
+
+    def _plug_in(self) -> None:
+        import pty
+        import tty
+
+        if self._ends is not None:
+            return
+        ours, theirs = pty.openpty()
+        tty.setraw(theirs)
+        os.set_blocking(ours, False)
+        Path(self.port).symlink_to(os.ttyname(theirs))
+        self._ends = ours, theirs
+
+    def _unplug(self) -> None:
+        if self._ends is None:
+            return
+        Path(self.port).unlink()
+        for end in self._ends:
+            os.close(end)
+        self._ends = None
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            self._obey_the_cable()
+            if self._ends is None:
+                self._stopping.wait(_TICK)
+                self._serve(b"")
+                continue
+            ours, _ = self._ends
+            ready, _, _ = select.select([ours], [], [], _TICK)
+            data = self._serve(os.read(ours, _AT_ONCE) if ready else b"")
+            if data:
+                _write(ours, data)
+
+    def _obey_the_cable(self) -> None:
+        """Do what the faults ``unplug`` and ``replug`` say; each is done once."""
+        for instrument in self._instruments:
+            if "unplug" in instrument.faults:
+                instrument.faults.discard("unplug")
+                self._unplug()
+            if "replug" in instrument.faults:
+                instrument.faults.discard("replug")
+                self._plug_in()
+
+    def _serve(self, received: bytes) -> bytes:
+        """Let the instruments hear what came; what they have to say by now."""
+        said = b""
+        with self._up_to_date():
+            now = self._now()
+            for instrument in self._instruments:
+                if received:
+                    instrument.receive(received, now)
+                said += instrument.take_output(now)
+        return said
+
+
+def _write(end: int, data: bytes) -> None:
+    """Put bytes on the line; where nobody reads them they are lost, as on a real one."""
+    try:
+        os.write(end, data)
+    except BlockingIOError:
+        return

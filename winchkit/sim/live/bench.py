@@ -1,0 +1,299 @@
+"""A simulated bench: plants, drives and instruments behind CAN buses and serial lines."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+
+from winchkit.errors import UsageError
+from winchkit.schema.bench import BenchSpec, BusSpec
+from winchkit.schema.programme import Step
+from winchkit.schema.simbench import FaultSpec, SimBench
+from winchkit.sim.bench import hiding, profiles_of
+from winchkit.sim.clock.can_bus import SimulatedCanBus
+from winchkit.sim.clock.simulated_clock import SimulatedClock
+from winchkit.sim.live.bench_file import write_bench
+from winchkit.sim.live.buses import CanPort, Interface, Wire, wired
+from winchkit.sim.live.lines import Line, Placed, open_line
+from winchkit.sim.live.real_time import TICK, serve
+from winchkit.sim.live.winch import LiveWinch
+from winchkit.units import suggest
+
+__all__ = ["LiveBench"]
+
+_OVERRUN = 0.02
+"""A tick later than this is counted, s."""
+_SUSPENDED = 1.0
+"""After a longer gap the process was suspended, and simulated time stood still with it, s."""
+
+
+class LiveBench:
+    """A simulated bench that runs while the ``with`` block does.
+
+    ``bench_spec`` is the wiring that a user connects to: the declaration with channels and
+    ports of this run. ``hidden`` replaces what the declaration hides, as in
+    :func:`winchkit.sim.bench.hiding`. CAN is python-can's ``virtual`` (within this process) or
+    ``udp_multicast`` (between processes); Modbus instruments are reached over TCP on
+    127.0.0.1, serial ones at a pseudo-terminal. Raises FileError for a declaration that
+    does not hold together, ConnectionLost where a bus cannot be opened.
+
+    With ``simulated_time`` it runs on that clock instead of in real time: everything stays within
+    the process, and whoever opens ``bench_spec`` on the same clock is connected to it.
+    """
+
+    def __init__(
+        self,
+        sim_bench: SimBench,
+        *,
+        seed: int = 0,
+        hidden: Sequence[str] = (),
+        interface: Interface = "virtual",
+        clock: Callable[[], float] = monotonic,
+        simulated_time: SimulatedClock | None = None,
+    ) -> None:
+        self.sim_bench = hiding(sim_bench, hidden) if hidden else sim_bench
+        self.seed = seed
+        self._interface = interface
+        self._simulated = simulated_time
+        self._clock = clock = clock if simulated_time is None else simulated_time.now
+        self._lock = threading.RLock()
+        self._stopping = threading.Event()
+        self._pool: ThreadPoolExecutor | None = None
+        self._loops: list[Future[None]] = []
+        self._ports: dict[str, CanPort | SimulatedCanBus] = {}
+        self._lines: dict[str, Line] = {}
+        self.wire: dict[str, Wire] = {}
+        """Cables of the CAN buses, by bus."""
+        self.winches: dict[str, LiveWinch] = {}
+        self.bench_spec: BenchSpec = self.sim_bench.bench
+        self.overruns = 0
+        """Ticks that came later than 20 ms, because the machine was busy."""
+        self.worst_lateness = 0.0
+        """s."""
+        self._skipped = 0.0
+        self._started_at = self._last = clock()
+        self._faults = sorted(self.sim_bench.fault, key=lambda fault: fault.time)
+
+    def __enter__(self) -> LiveBench:
+        try:
+            self._open()
+        except BaseException:
+            self._close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._close()
+        if kind is None:
+            self.check()
+
+    # What a user does.
+
+    def write_bench_file(self, path: str | Path) -> Path:
+        """Write the wiring file to connect to; returns its path."""
+        return write_bench(self.bench_spec, Path(path))
+
+    def answer(self, step: Step) -> None:
+        """Do what a programme's ``ask`` asks for: its ``load_mass``, its ``temperature``."""
+        for name in self.winches if step.winch == "all" else [step.winch]:
+            if step.load_mass is not None:
+                self.hang(name, step.load_mass)
+            if step.temperature is not None:
+                self.warm(name, step.temperature)
+
+    def hang(self, winch: str, mass: float) -> None:
+        """Hang a load (kg) on a winch; NotPermitted while it moves."""
+        with self.up_to_date():
+            self._winch(winch).hang(mass)
+
+    def warm(self, winch: str, temperature: float) -> None:
+        """Bring a winch to a temperature (degC); NotPermitted while it moves."""
+        with self.up_to_date():
+            self._winch(winch).warm(temperature)
+
+    def inject(self, target: str, kind: str) -> None:
+        """Make ``WINCH.ROLE`` go wrong, e.g. ``A.servo`` or ``A.cell``."""
+        winch, _, role = target.partition(".")
+        with self.up_to_date():
+            self._winch(winch).inject(role, kind)
+
+    def temperature(self, winch: str) -> float:
+        """True temperature at a winch, degC."""
+        with self.up_to_date():
+            return self._winch(winch).plant.temperature
+
+    def check(self) -> None:
+        """Raise what ended the simulation, if something has."""
+        for loop in self._loops:
+            if loop.done():
+                loop.result()
+
+    @contextmanager
+    def up_to_date(self) -> Iterator[None]:
+        """Hold the simulation still at this very moment."""
+        with self._lock:
+            now = self._now()
+            for winch in self.winches.values():
+                winch.advance(now)
+            yield
+
+    def _winch(self, name: str) -> LiveWinch:
+        if name not in self.winches:
+            known = list(self.winches)
+            raise UsageError(
+                f"there is no winch '{name}' on {self.bench_spec.name}; it has {', '.join(known)}"
+                + suggest(name, known)
+            )
+        return self.winches[name]
+
+    # Opening and closing.
+
+    def _open(self) -> None:
+        declared = self.sim_bench.bench
+        buses: dict[str, BusSpec] = {}
+        for name, bus in declared.bus.items():
+            if bus.kind == "can":
+                buses[name] = wired(bus, f"{declared.name}-{name}", self._interface)
+                self.wire[name] = Wire(self._clock, seed=self.seed)
+                self._ports[name] = self._can_port(name, buses[name])
+        self._make_winches()
+        for fault in self._faults:
+            winch, _, role = fault.target.partition(".")
+            self._winch(winch).check_fault(role, fault.kind)
+        time = self._simulated or self._now
+        for name in declared.bus:
+            if name not in buses:
+                self._lines[name], buses[name] = open_line(
+                    declared.bus[name], self._placed(name), self.up_to_date, time
+                )
+        self.bench_spec = replace(declared, bus=buses)
+        self._started_at = self._now()
+        if self._simulated is not None:
+            self._tick_simulated(self._simulated)
+            return
+        ports = {name: port for name, port in self._ports.items() if isinstance(port, CanPort)}
+        self._pool = ThreadPoolExecutor(max(1, len(ports)), "sim-can")
+        self._loops = [self._pool.submit(self._serve, name, port) for name, port in ports.items()]
+
+    def _can_port(self, name: str, spec: BusSpec) -> CanPort | SimulatedCanBus:
+        if self._simulated is None:
+            return CanPort(spec, self.wire[name])
+
+        def deliver(identifier: int, data: bytes) -> None:
+            self._deliver(self._on_bus(name), identifier, data)
+
+        bus = SimulatedCanBus(self._simulated, self.wire[name], spec.bitrate, deliver)
+        self._simulated.serve_can(spec.channel or "", bus.connect)
+        return bus
+
+    def _make_winches(self) -> None:
+        sim, now = self.sim_bench, self._now()
+        profiles = profiles_of(sim)
+        for name, wiring in sim.bench.winch.items():
+            port = self._ports.get(wiring.servo.bus)
+            if port is None:
+                raise UsageError(
+                    f"winch {name}: the bus '{wiring.servo.bus}' of its servo is no CAN bus"
+                )
+            self.winches[name] = LiveWinch(
+                name,
+                wiring,
+                profiles[name],
+                sim.truth[name],
+                sim.noise,
+                seed=self.seed,
+                send=port.send,
+                beside=sim.bench.path,
+                now=now,
+                clocks_deviate=self._simulated is not None,
+            )
+
+    def _placed(self, bus: str) -> Iterator[Placed]:
+        """Instruments on one bus."""
+        for name, winch in self.winches.items():
+            wiring = self.sim_bench.bench.winch[name]
+            for role, instrument in winch.instruments.items():
+                ref = getattr(wiring, role)
+                if ref.bus == bus:
+                    yield Placed(f"winch {name}: {role}", ref, instrument)
+
+    def _close(self) -> None:
+        self._stopping.set()
+        for line in self._lines.values():
+            line.stop()
+        if self._pool is not None:
+            self._pool.shutdown()
+        for port in self._ports.values():
+            if isinstance(port, CanPort):
+                port.close()
+
+    def _on_bus(self, bus: str) -> list[LiveWinch]:
+        wiring = self.sim_bench.bench.winch
+        return [one for name, one in self.winches.items() if wiring[name].servo.bus == bus]
+
+    # Time.
+
+    def _tick_simulated(self, clock: SimulatedClock) -> None:
+        """A tick of everything, and the next one scheduled."""
+        if self._stopping.is_set():
+            return
+        for port in self._ports.values():
+            if isinstance(port, SimulatedCanBus):
+                port.tick()
+        self._tick(list(self.winches.values()))
+        clock.call_at(clock.now() + TICK, lambda: self._tick_simulated(clock))
+
+    def _now(self) -> float:
+        """Simulated time; it stands still while the process is suspended."""
+        now = self._clock() - self._skipped
+        if now - self._last > _SUSPENDED:
+            self._skipped += now - self._last
+            now = self._last
+        self._last = max(self._last, now)
+        return self._last
+
+    def _serve(self, bus: str, port: CanPort) -> None:
+        winches = self._on_bus(bus)
+        serve(
+            port,
+            self._clock,
+            self._stopping.is_set,
+            deliver=partial(self._deliver, winches),
+            tick=lambda: self._tick(winches),
+            late=self._note_lateness,
+        )
+
+    def _deliver(self, winches: list[LiveWinch], identifier: int, data: bytes) -> None:
+        with self._lock:
+            now = self._now()
+            for winch in winches:
+                winch.receive(identifier, data, now)
+
+    def _tick(self, winches: list[LiveWinch]) -> None:
+        with self._lock:
+            now = self._now()
+            while self._faults and now - self._started_at >= self._faults[0].time:
+                self._go_wrong(self._faults.pop(0))
+            for winch in winches:
+                winch.advance(now)
+                winch.tick(now)
+
+    def _go_wrong(self, fault: FaultSpec) -> None:
+        winch, _, role = fault.target.partition(".")
+        self._winch(winch).inject(role, fault.kind)
+
+    def _note_lateness(self, late: float) -> None:
+        self.worst_lateness = max(self.worst_lateness, late)
+        self.overruns += late > _OVERRUN

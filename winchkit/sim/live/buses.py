@@ -1,0 +1,227 @@
+"""CAN buses of a simulated bench, and which of them reach other processes."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+from collections.abc import Callable, Container
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+from itertools import count
+from random import Random
+from typing import Any, Literal
+
+import can
+
+from winchkit.errors import ConnectionLost, UsageError
+from winchkit.schema.bench import BusSpec
+
+__all__ = [
+    "CanPort",
+    "Carried",
+    "Interface",
+    "Wire",
+    "wired",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """A frame between the simulated drives and everybody else."""
+
+    time: float
+    """On the simulation's clock, s."""
+    identifier: int
+    data: bytes
+    from_drive: bool
+    lost: bool = False
+    """Whether it never arrived."""
+
+
+@dataclass(frozen=True)
+class _Trouble:
+    identifiers: Container[int]
+    share: float
+    delay: float | None
+    """s; None loses the frame."""
+
+
+class Wire:
+    """Between the simulated drives and everybody else on one bus.
+
+    ``taps`` are called with every frame, in the order of their arrival at the other end. Safe to
+    use from several threads.
+    """
+
+    def __init__(self, clock: Callable[[], float], *, seed: int | str = 0) -> None:
+        self.taps: list[Callable[[Carried], None]] = []
+        self._clock, self._random = clock, Random(f"wire/{seed}")
+        self._lock = threading.Lock()
+        self._troubles: list[_Trouble] = []
+        self._late: dict[bool, list[tuple[float, int, int, bytes]]] = {False: [], True: []}
+        self._order = count()
+
+    def disturb(
+        self, identifiers: Container[int], *, share: float = 1.0, delay: float | None = None
+    ) -> Callable[[], None]:
+        """Lose a share of these frames, or let them come ``delay`` s late.
+
+        Returns a function that ends it. Raises UsageError for a share or a delay that cannot be.
+        """
+        if not 0 < share <= 1 or not (delay is None or delay > 0):
+            raise UsageError(
+                f"a wire cannot disturb a share of {share:g} of its frames by {delay} s; "
+                "a share is above 0 and at most 1, a delay above 0 s"
+            )
+        trouble = _Trouble(identifiers, share, delay)
+        with self._lock:
+            self._troubles.append(trouble)
+
+        def end() -> None:
+            with self._lock:
+                self._troubles = [one for one in self._troubles if one is not trouble]
+
+        return end
+
+    def carry(self, identifier: int, data: bytes, *, from_drive: bool) -> bool:
+        """Take a frame; True where it goes through at once, else it is lost or comes ``due``."""
+        with self._lock:
+            if not self.taps and not self._troubles:
+                return True
+            now = self._clock()
+            trouble = self._trouble_of(identifier)
+            if trouble is not None and trouble.delay is not None:
+                late = (now + trouble.delay, next(self._order), identifier, data)
+                heappush(self._late[from_drive], late)
+                return False
+            self._tell(Carried(now, identifier, data, from_drive, trouble is not None))
+            return trouble is None
+
+    def due(self, *, from_drive: bool) -> tuple[int, bytes] | None:
+        """Next late frame whose time has come, of one direction."""
+        with self._lock:
+            late = self._late[from_drive]
+            if not late:
+                return None
+            now = self._clock()
+            if late[0][0] > now:
+                return None
+            _, _, identifier, data = heappop(late)
+            self._tell(Carried(now, identifier, data, from_drive))
+            return identifier, data
+
+    def _trouble_of(self, identifier: int) -> _Trouble | None:
+        for trouble in self._troubles:
+            if identifier in trouble.identifiers and self._random.random() < trouble.share:
+                return trouble
+        return None
+
+    def _tell(self, carried: Carried) -> None:
+        for tap in self.taps:
+            tap(carried)
+
+
+Interface = Literal["udp_multicast", "virtual"]
+
+_GROUP = "239.74.163.2"
+"""The group of python-can's own default."""
+_BETWEEN_PROCESSES = 0.2
+"""Least heartbeat period of a bench that is served to other processes, s: its drives are a program
+without priority, which stands still for 0.25 s now and then while other programs start."""
+_PROBE = can.Message(arbitration_id=0x7FF, is_extended_id=False)
+_ROUTE = (
+    "this machine has no route for multicast; add one with: ip route add 239.0.0.0/8 dev lo "
+    "(as root), or keep to one process with the interface 'virtual'"
+)
+
+
+def wired(spec: BusSpec, name: str, interface: Interface) -> BusSpec:
+    """Bus as the simulation opens it: a channel that no other simulation uses."""
+    if interface == "virtual":
+        return replace(
+            spec,
+            interface="virtual",
+            channel=f"{name}-{os.getpid()}-{os.urandom(4).hex()}",
+            port=None,
+        )
+    return replace(
+        spec,
+        interface="udp_multicast",
+        channel=_GROUP,
+        port=_free_udp_port(),
+        heartbeat=max(spec.heartbeat, _BETWEEN_PROCESSES),
+    )
+
+
+class CanPort:
+    """An open CAN bus that hands frames over and takes them; raises ConnectionLost.
+
+    ``wire`` stands between the simulated drives and the bus.
+    """
+
+    def __init__(self, spec: BusSpec, wire: Wire) -> None:
+        self.wire = wire
+        self._name = f"{spec.interface} channel '{spec.channel}'"
+        options: dict[str, Any] = {"interface": spec.interface, "channel": spec.channel}
+        if spec.interface == "udp_multicast":
+            options["port"] = spec.port
+        elif spec.interface != "virtual":
+            options["bitrate"] = spec.bitrate
+        try:
+            self._bus = can.Bus(**options)
+        except (can.CanError, OSError, ValueError, ImportError) as error:
+            raise ConnectionLost(self._trouble(spec, error)) from error
+        if spec.interface == "udp_multicast":
+            self._try_sending(spec)
+
+    def _try_sending(self, spec: BusSpec) -> None:
+        try:
+            self._bus.send(_PROBE)
+        except (can.CanError, OSError) as error:
+            self._bus.shutdown()
+            raise ConnectionLost(self._trouble(spec, error)) from error
+
+    def _trouble(self, spec: BusSpec, error: Exception) -> str:
+        hint = f"; {_ROUTE}" if spec.interface == "udp_multicast" else ""
+        return f"cannot open {self._name} for the simulated drives: {error}{hint}"
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Send a frame with an 11-bit identifier; raises ConnectionLost."""
+        if self.wire.carry(identifier, data, from_drive=True):
+            self._put(identifier, data)
+
+    def _put(self, identifier: int, data: bytes) -> None:
+        message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise ConnectionLost(f"{self._name}: cannot send: {error}") from error
+
+    def receive(self, timeout: float) -> tuple[int, bytes] | None:
+        """Take the next frame, waiting at most ``timeout`` s; raises ConnectionLost."""
+        while (late := self.wire.due(from_drive=True)) is not None:
+            self._put(*late)
+        arrived = self.wire.due(from_drive=False)
+        if arrived is not None:
+            return arrived
+        try:
+            message = self._bus.recv(timeout)
+        except (can.CanError, OSError) as error:
+            raise ConnectionLost(f"{self._name}: cannot receive: {error}") from error
+        if message is None or message.is_error_frame or message.is_extended_id:
+            return None
+        frame = message.arbitration_id, bytes(message.data)
+        return frame if self.wire.carry(*frame, from_drive=False) else None
+
+    def close(self) -> None:
+        """Let the bus go."""
+        with suppress(can.CanError, OSError):
+            self._bus.shutdown()
+
+
+def _free_udp_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])

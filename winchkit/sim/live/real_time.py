@@ -1,0 +1,42 @@
+"""Serves one CAN bus of a simulated bench in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from winchkit.sim.live.buses import CanPort
+
+__all__ = ["TICK", "serve"]
+
+TICK = 2e-3
+"""Period at which the timers of simulated devices are evaluated, s."""
+_FRAMES_AT_ONCE = 500
+
+
+def serve(
+    port: CanPort,
+    clock: Callable[[], float],
+    stopped: Callable[[], bool],
+    *,
+    deliver: Callable[[int, bytes], None],
+    tick: Callable[[], None],
+    late: Callable[[float], None],
+) -> None:
+    """Deliver frames as they come and tick every two milliseconds, until ``stopped``.
+
+    Frames that wait are taken before the tick, so that a stall of this process is not mistaken
+    for a master that fell silent. ``late`` is called with each tick's lateness, s.
+    """
+    due = clock()
+    while not stopped():
+        frame = port.receive(max(0.0, due - clock()))
+        for _ in range(_FRAMES_AT_ONCE):
+            if frame is None:
+                break
+            deliver(*frame)
+            frame = port.receive(0.0)
+        lateness = clock() - due
+        if lateness >= 0:
+            tick()
+            due = max(due + TICK, clock())
+            late(lateness)

@@ -1,0 +1,159 @@
+"""One winch of a live simulated bench: plant, drive and instruments on one time line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from math import inf
+from pathlib import Path
+from random import Random
+
+from winchkit.errors import FileError, NotPermitted, UsageError
+from winchkit.schema.bench import DeviceRef, WinchWiring
+from winchkit.schema.devices.servo import ServoSpec
+from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.schema.simbench import NoiseSpec, WinchTruth
+from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.faults import known
+from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
+from winchkit.sim.instruments.process import ProcessInstrument
+from winchkit.sim.live.instruments import device_of, instruments_of
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.units import suggest
+
+__all__ = ["LiveWinch"]
+
+_QUANTITIES = {
+    "cell": "tension",
+    "load": "load",
+    "length": "cable_length",
+    "temperature": "temperature",
+}
+"""What the instrument in each role of a wiring file measures."""
+_SMOOTHING = 0.024
+"""Set-point filter of the drives, s: an ordinary computer's cycle jitters by a millisecond."""
+_TO_ALL, _NODE = 0x080, 0x07F
+"""Identifiers up to SYNC concern every node, others mostly the node in their lower bits."""
+_DEVIATION = (1e-3, 3e-3)
+"""Of an instrument's clock in simulated time: without it its conversions would stay in step with
+the host's polls, at one age, which no time stamp can know."""
+_AT_REST = 0.5
+"""rad/s of the motor, below which a load can be changed."""
+
+
+class LiveWinch:
+    """Advances drive, rope and instruments together; not safe for threads by itself."""
+
+    def __init__(
+        self,
+        name: str,
+        wiring: WinchWiring,
+        profile: WinchProfile,
+        truth: WinchTruth,
+        noise: NoiseSpec,
+        *,
+        seed: int | str,
+        send: Callable[[int, bytes], None],
+        beside: str,
+        now: float,
+        clocks_deviate: bool = False,
+    ) -> None:
+        self.name = name
+        self.plant = WinchPlant(profile, truth, seed=f"{seed}/{name}", noise=noise)
+        servo, eds = _servo(wiring.servo, beside)
+        if wiring.servo.node is None:
+            raise UsageError(f"winch {name}: its servo has no node; give it one, e.g. node = 1")
+        node = wiring.servo.node
+        objects = ObjectDictionary(read_eds(eds, node))
+        self.drive = SimDrive(
+            send,
+            node,
+            servo,
+            objects,
+            self.plant,
+            brake=wiring.brake,
+            smoothing=_SMOOTHING,
+            now=now,
+        )
+        self.drive.power_on(now, boot_time=0.0)
+        read = self.plant.read
+        measuring = {role: partial(read, quantity) for role, quantity in _QUANTITIES.items()}
+        self.instruments = instruments_of(wiring, beside, measuring, send, now=now)
+        if clocks_deviate:
+            for role, one in self.instruments.items():
+                random = Random(f"{seed}/{name}/{role}/clock")
+                one.deviate(random.choice((-1.0, 1.0)) * random.uniform(*_DEVIATION))
+
+    def advance(self, now: float) -> None:
+        """Move everything up to ``now``, each conversion at its own instant."""
+        instruments = list(self.instruments.values())
+        while (due := min([one.next_conversion for one in instruments], default=inf)) <= now:
+            self.drive.advance(due)
+            for one in instruments:
+                if one.next_conversion <= due:
+                    one.convert()
+        self.drive.advance(now)
+        for one in instruments:
+            one.show(now)
+
+    def receive(self, identifier: int, data: bytes, now: float) -> None:
+        """Take a frame from the CAN bus."""
+        if identifier <= _TO_ALL or identifier & _NODE == self.drive.node:
+            self.advance(now)
+        self.drive.receive(identifier, data, now)
+        for one in self.instruments.values():
+            if isinstance(one, ProcessInstrument):
+                one.receive(identifier, data, now)
+
+    def tick(self, now: float) -> None:
+        """Let the timers of what hangs on the CAN bus run."""
+        self.drive.tick(now)
+        for one in self.instruments.values():
+            if isinstance(one, ProcessInstrument):
+                one.tick(now)
+
+    def hang(self, mass: float) -> None:
+        """Hang another load (kg); NotPermitted while the winch moves."""
+        self._at_rest("a load")
+        self.plant.hang(mass)
+
+    def warm(self, temperature: float) -> None:
+        """Bring rope and machine to a temperature (degC); NotPermitted while the winch moves."""
+        self._at_rest("the temperature")
+        self.plant.warm(temperature)
+
+    def _at_rest(self, what: str) -> None:
+        speed = self.plant.motor_velocity
+        if abs(speed) > _AT_REST:
+            raise NotPermitted(
+                f"winch {self.name}: its motor turns at {speed:.3g} rad/s; {what} can be "
+                f"changed below {_AT_REST:g} rad/s only; stop it first"
+            )
+
+    def check_fault(self, role: str, kind: str) -> None:
+        """Raise UsageError where there is no such device on this winch, or no such fault of it."""
+        if role == "servo":
+            known(kind)
+            return
+        if role not in self.instruments:
+            roles = ["servo", *self.instruments]
+            raise UsageError(
+                f"winch {self.name} has no '{role}'; it has {', '.join(roles)}"
+                + suggest(role, roles)
+            )
+        self.instruments[role].check_fault(kind)
+
+    def inject(self, role: str, kind: str) -> None:
+        """Make a device of this winch go wrong; raises as :meth:`check_fault`."""
+        self.check_fault(role, kind)
+        if role == "servo":
+            self.drive.inject(kind)
+        else:
+            self.instruments[role].inject(kind)
+
+
+def _servo(ref: DeviceRef, beside: str) -> tuple[ServoSpec, Path]:
+    path, device = device_of(ref, beside)
+    if device.servo is None:
+        raise FileError(f"{path}: '{ref.device}' is no servo drive; it has no [servo] table")
+    return device.servo, path.parent / device.servo.eds

@@ -1,0 +1,119 @@
+"""Physics of the rope and what carries it: stretch, creep, heat, weight, frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, sin
+from typing import ClassVar
+
+from winchkit.schema.quantity import (
+    LinearDensity,
+    PositiveDuration,
+    PositiveForce,
+    PositiveNumber,
+)
+from winchkit.sim.physics.base import Expansion, Physics, Stiffness
+from winchkit.sim.physics.presliding import relax
+from winchkit.sim.physics.state import GRAVITY, State
+
+__all__ = [
+    "CreepingRope",
+    "ElasticRope",
+    "HeavyRope",
+    "LaggingRope",
+    "SoftFrame",
+    "WarmRope",
+]
+
+_WARM = 20.0
+
+
+@dataclass
+class ElasticRope(Physics):
+    """The rope is a spring of stiffness EA over all of its stressed length."""
+
+    axial_stiffness: PositiveForce = 300e3
+    size: ClassVar[str] = "axial_stiffness"
+    inverse: ClassVar[bool] = True
+
+    def compliance(self, state: State) -> float:
+        """Stressed length over EA."""
+        return (state.unstrained + state.dead_length) / self.axial_stiffness
+
+
+@dataclass
+class SoftFrame(Physics):
+    """The frame yields, however long the rope is."""
+
+    stiffness: Stiffness = 60e3
+    size: ClassVar[str] = "stiffness"
+    inverse: ClassVar[bool] = True
+
+    def compliance(self, state: State) -> float:
+        """Inverse of the stiffness."""
+        return 1.0 / self.stiffness
+
+
+@dataclass
+class WarmRope(Physics):
+    """The rope lengthens with temperature above 20 degC."""
+
+    expansion: Expansion = 1.1e-5
+    size: ClassVar[str] = "expansion"
+
+    def stretch(self, state: State, dt: float) -> float:
+        """Thermal strain of the stressed length."""
+        strain = self.expansion * (state.temperature - _WARM)
+        return strain * (state.unstrained + state.dead_length)
+
+
+@dataclass
+class CreepingRope(Physics):
+    """Strain that follows the tension slowly, from zero at the start."""
+
+    creep_stiffness: PositiveForce = 300e3
+    time_constant: PositiveDuration = 4.0
+    size: ClassVar[str] = "creep_stiffness"
+    inverse: ClassVar[bool] = True
+    _strain: float = 0.0
+
+    def stretch(self, state: State, dt: float) -> float:
+        """First-order creep, stepped exactly at constant tension."""
+        goal = state.load / self.creep_stiffness
+        self._strain += (goal - self._strain) * (1.0 - exp(-dt / self.time_constant))
+        return self._strain * (state.unstrained + state.dead_length)
+
+
+@dataclass
+class LaggingRope(Physics):
+    """Inner friction of the strands holds back strain: a loop of strain over tension.
+
+    The friction takes half of a change of tension from rest, all of it after a full reversal,
+    and at most ``fraction`` of the tension.
+    """
+
+    axial_stiffness: PositiveForce = 80e3
+    fraction: PositiveNumber = 0.1
+    size: ClassVar[str] = "fraction"
+    _held: float = 0.0
+    _before: float | None = None
+    _SLOPE: ClassVar[float] = 0.5
+
+    def stretch(self, state: State, dt: float) -> float:
+        """Strain that the friction holds back, over the stressed length; a Dahl law in tension."""
+        change = 0.0 if self._before is None else state.load - self._before
+        self._before = state.load
+        self._held = relax(self._held, change, self.fraction * state.load, self._SLOPE, 1.0)
+        return -self._held / self.axial_stiffness * (state.unstrained + state.dead_length)
+
+
+@dataclass
+class HeavyRope(Physics):
+    """The hanging rope weighs on everything above the platform."""
+
+    mass_per_length: LinearDensity = 0.15
+    size: ClassVar[str] = "mass_per_length"
+
+    def weight(self, state: State) -> float:
+        """Weight of the free rope along its slope."""
+        return self.mass_per_length * GRAVITY * state.unstrained * sin(state.inclination)

@@ -1,0 +1,113 @@
+"""Reads numbers with units into dataclass fields by their markers, and overrides of a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, get_args, get_type_hints
+
+from winchkit.errors import Fault, FileError, UsageError
+from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.schema.quantity import Quantity
+from winchkit.units import UNITS, suggest
+
+__all__ = ["number_names", "overridden", "read_numbers", "with_unit"]
+
+
+def _markers(kind: type[Any]) -> dict[str, Quantity]:
+    """Quantity markers of a dataclass's fields by name."""
+    hints = get_type_hints(kind, include_extras=True)
+    found = {}
+    for field in fields(kind):
+        marker = _marker(hints[field.name])
+        if marker is not None and not field.name.startswith("_"):
+            found[field.name] = marker
+    return found
+
+
+def _marker(hint: Any) -> Quantity | None:
+    for part in (*getattr(hint, "__metadata__", ()), *get_args(hint)):
+        if isinstance(part, Quantity):
+            return part
+        inner = _marker(part) if get_args(part) else None
+        if inner is not None:
+            return inner
+    return None
+
+
+def read_numbers(kind: type, raw: Mapping[str, Any], where: str) -> dict[str, float]:
+    """SI values of the numbers in ``raw``; FileError with every fault among them."""
+    markers = _markers(kind)
+    faults: list[Fault] = []
+    values: dict[str, float] = {}
+    for name, text in raw.items():
+        key = f"{where}.{name}"
+        if name not in markers:
+            known = ", ".join(markers) or "none"
+            near = suggest(name, list(markers))
+            faults.append(Fault(f"unknown number; known are {known}{near}", key=key))
+            continue
+        try:
+            values[name] = markers[name].read(text)
+        except UsageError as error:
+            faults.append(Fault(str(error), key=key))
+    if faults:
+        raise FileError(faults)
+    return values
+
+
+def number_names(kind: type[Any]) -> list[str]:
+    """Names of the fields that hold a quantity."""
+    return list(_markers(kind))
+
+
+def with_unit(kind: type, name: str, value: float) -> str | float:
+    """Write an SI value of a field as a file would, e.g. ``"0.0003 m"``."""
+    unit = next(iter(UNITS[_markers(kind)[name].dimension]))
+    return value if unit == "1" else f"{value!r} {unit}"
+
+
+def overridden(profile: WinchProfile, overrides: Mapping[str, Any]) -> WinchProfile:
+    """Put true numbers in place of a profile's, by dotted keys as ``pulley.0.radius``.
+
+    Raises FileError with every key that does not exist and every number that cannot be read.
+    """
+    faults: list[Fault] = []
+    for key, raw in _flat(overrides, ""):
+        try:
+            profile = _replaced(profile, key.split("."), raw)
+        except UsageError as error:
+            faults.append(Fault(str(error), key=f"truth.{key}"))
+    if faults:
+        raise FileError(faults)
+    return profile
+
+
+def _flat(table: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _replaced(owner: Any, path: list[str], raw: Any) -> Any:
+    """A copy of a dataclass or tuple with the number at ``path`` replaced."""
+    head, rest = path[0], path[1:]
+    if isinstance(owner, tuple):
+        if not head.isdigit() or int(head) >= len(owner) or not rest:
+            raise UsageError(f"'{head}' is no place in a list of {len(owner)}, counted from 0")
+        place = int(head)
+        return (*owner[:place], _replaced(owner[place], rest, raw), *owner[place + 1 :])
+    names = [field.name for field in fields(owner)] if is_dataclass(owner) else []
+    if head not in names:
+        raise UsageError(f"no key '{head}' here" + suggest(head, names))
+    if rest:
+        inner = getattr(owner, head)
+        if inner is None:
+            raise UsageError(f"the profile has no table '{head}' that could differ")
+        return replace(owner, **{head: _replaced(inner, rest, raw)})
+    markers = _markers(type(owner))
+    if head not in markers:
+        raise UsageError(f"'{head}' is no number and cannot be overridden")
+    return replace(owner, **{head: markers[head].read(raw)})

@@ -1,0 +1,90 @@
+"""The instruments of a simulated winch: what they read, with their noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, sqrt
+from random import Random
+
+from winchkit.schema.simbench import NoiseSpec
+from winchkit.sim.physics.state import State
+
+__all__ = [
+    "Instruments",
+    "Measurement",
+    "Noise",
+]
+
+
+class Noise:
+    """Zero-mean Gaussian noise of standard deviation ``sigma``, sampled whenever it is asked.
+
+    ``colour`` is the share of the variance in an Ornstein-Uhlenbeck process of correlation
+    time ``colour_time`` s, stepped exactly over any interval.
+    """
+
+    def __init__(self, sigma: float, colour: float, colour_time: float, random: Random) -> None:
+        self._white = sigma * sqrt(1.0 - colour)
+        self._slow_sigma = sigma * sqrt(colour)
+        self._time = colour_time
+        self._random = random
+        self._slow = random.gauss(0.0, 1.0) * self._slow_sigma
+
+    def sample(self, interval: float) -> float:
+        """Next value, ``interval`` s after the one before."""
+        if self._slow_sigma > 0.0:
+            keep = exp(-interval / self._time) if self._time > 0.0 else 0.0
+            kick = self._slow_sigma * sqrt(1.0 - keep * keep)
+            self._slow = keep * self._slow + kick * self._random.gauss(0.0, 1.0)
+        return self._slow + self._white * self._random.gauss(0.0, 1.0)
+
+
+_NOISY = ("motor_torque", "tension", "load", "cable_length", "temperature")
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """What the instruments read at one instant, SI, with their noise."""
+
+    time: float
+    motor_angle: float
+    motor_velocity: float
+    motor_torque: float
+    tension: float
+    load: float
+    cable_length: float
+    temperature: float
+
+
+class Instruments:
+    """Adds to every reading noise of its own, which a seed brings back."""
+
+    def __init__(self, noise: NoiseSpec, seed: int | str) -> None:
+        self._noise = {
+            name: Noise(
+                getattr(noise, name), noise.colour, noise.colour_time, Random(f"{seed}/{name}")
+            )
+            for name in _NOISY
+        }
+        self._sampled_at = dict.fromkeys(_NOISY, 0.0)
+
+    def noise(self, name: str, time: float) -> float:
+        """Noise of one quantity at a time (s)."""
+        interval, self._sampled_at[name] = time - self._sampled_at[name], time
+        return self._noise[name].sample(interval)
+
+    def read(
+        self, state: State, *, motor_torque: float, tension: float, cable_length: float
+    ) -> Measurement:
+        """Read now; the arguments are what drive, cell and length instrument make of the truth."""
+        noise = {name: self.noise(name, state.time) for name in _NOISY}
+        return Measurement(
+            state.time,
+            state.motor_angle,
+            state.motor_speed,
+            motor_torque + noise["motor_torque"],
+            tension + noise["tension"],
+            state.load + noise["load"],
+            cable_length + noise["cable_length"],
+            state.temperature + noise["temperature"],
+        )
