@@ -22,7 +22,7 @@ from winchkit.errors import WinchkitError
 from winchkit.runs.info import info_of
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
 from winchkit.runs.read import read_log, read_run
-from winchkit.runs.recording.writer import open_log
+from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recover import recover
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.eds.eds import read_eds_text

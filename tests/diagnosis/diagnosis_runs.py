@@ -15,8 +15,8 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import inquire
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.selection.engine import Inquiry
-from winchkit.effects.bind import Term, modifiers_of
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.effects.term import Term, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.runs.run import Channel, Run

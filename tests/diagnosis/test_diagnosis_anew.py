@@ -12,7 +12,7 @@ from winchkit.diagnosis.selection.exchange import recoupled
 from winchkit.diagnosis.selection.signatures import Signatures, redrawn
 from winchkit.diagnosis.selection.stepwise import _replaced
 from winchkit.diagnosis.verdict.equivalence import confusion_of
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
 

@@ -11,7 +11,7 @@ from diagnosis_runs import CATALOGUE, GROOVED, SPIRAL, Ride, made, term
 
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import GuideSpec, WinchProfile
 
 HIDDEN = {

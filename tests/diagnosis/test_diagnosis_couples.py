@@ -8,7 +8,7 @@ from diagnosis_runs import Ride, inquiry_into, term
 from winchkit.diagnosis.selection.engine import best_of_each
 from winchkit.diagnosis.selection.pairs import couples
 from winchkit.diagnosis.selection.stepwise import _coupled
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 
 RIDE = Ride(samples=600, stroke=400.0)
 MASSES = (18.0, 20.0, 22.0)

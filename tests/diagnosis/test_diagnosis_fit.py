@@ -13,7 +13,7 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import GuideSpec
 
 RIDE = Ride(samples=400)

@@ -22,7 +22,7 @@ from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 
 RIDE = Ride(samples=300)
 GAIN = term("cell-gain", gain_error=0.02)

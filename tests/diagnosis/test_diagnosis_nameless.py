@@ -24,7 +24,7 @@ from winchkit.diagnosis.verdict.specification_test import (
     judge_and_doubt,
 )
 from winchkit.diagnosis.verdict.spline_alternatives import PLACES, columns_of, hats_over, laws_over
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 
 OUTPUTS = ("cable_length", "tension", "motor_torque")

@@ -16,7 +16,7 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
 from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 
 FINER = 16

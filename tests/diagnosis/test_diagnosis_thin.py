@@ -15,7 +15,7 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import spread_of
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.selection.engine import Inquiry
-from winchkit.effects.bind import Term, modifiers_of
+from winchkit.effects.term import Term, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.runs.run import Channel, Run

@@ -11,7 +11,7 @@ from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import EffectTable
 

@@ -22,8 +22,9 @@ from winchkit.diagnosis.add import Addition, add
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import Answer, diagnose, inquire
 from winchkit.diagnosis.results import Diagnosis
-from winchkit.effects.bind import line_of, modifiers_of
+from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.effects.term import modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.runs import read_run

@@ -9,9 +9,9 @@ import pytest
 from effect_lines import profile_with, standard_on
 
 from winchkit.effects import load_catalogue
-from winchkit.effects.bind import Term
 from winchkit.effects.effect_template import write_own, write_wave_on_drum
 from winchkit.effects.empirical import EMPIRICAL, KNOTS, empirical_id, knots, placed, variable_of
+from winchkit.effects.term import Term
 from winchkit.errors import FileError
 from winchkit.model.line import Line, Motion
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLES

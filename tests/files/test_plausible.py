@@ -12,7 +12,7 @@ from declared import BENCH, WINCH
 
 from winchkit.cli import main
 from winchkit.errors import FileError, UsageError
-from winchkit.schema.plausible import doubts
+from winchkit.schema.bench_warnings import doubts
 from winchkit.schema.read import read_bench, read_device
 
 DEVICES = Path(__file__).parents[2] / "devices"

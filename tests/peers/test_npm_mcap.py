@@ -13,7 +13,7 @@ import pytest
 from npm_install import install
 
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
-from winchkit.runs.recording.writer import open_log
+from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recover import recover
 
 PACKAGES = (

@@ -14,8 +14,8 @@ from report_parsed import HOSTILE, Page
 from winchkit.catalog import find
 from winchkit.diagnosis.add import Addition, Grown, add, grow
 from winchkit.diagnosis.results import Estimate, OutputFit
-from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.effects.term import Term
 from winchkit.report.pages.addition import addition_sentence
 from winchkit.report.pages.pages import addition_html
 from winchkit.schema.profiles.winch import WinchProfile

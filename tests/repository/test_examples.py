@@ -14,8 +14,8 @@ from snippets import ROOT
 from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.effects import load_catalogue
-from winchkit.effects.bind import Term
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
+from winchkit.effects.term import Term
 from winchkit.model.line import Line
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_programme, read_simbench, read_winch

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recording.rotation import Rotation
-from winchkit.runs.recording.writer import open_log
 
 OFFSET = 1_700_000_000_123_456_789
 OPENED = 1000.0

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from winchkit.catalog import find
-from winchkit.effects.bind import Term, modifiers_of
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.effects.term import Term, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.schema.read import read_programme, read_simbench

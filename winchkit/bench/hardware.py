@@ -33,7 +33,7 @@ from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import ConnectionLost, Fault, FileError
 from winchkit.model.line import GRAVITY
 from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
-from winchkit.schema.plausible import doubts
+from winchkit.schema.bench_warnings import doubts
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Wired", "wire"]

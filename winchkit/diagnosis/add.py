@@ -20,10 +20,10 @@ from winchkit.diagnosis.selection.engine import Inquiry
 from winchkit.diagnosis.selection.scores import Score, score
 from winchkit.diagnosis.selection.weighting import weighed
 from winchkit.diagnosis.verdict.decision import output_fits
-from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL, placed, variable_of
+from winchkit.effects.term import Term
 from winchkit.errors import UsageError
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile

@@ -32,9 +32,9 @@ from winchkit.diagnosis.selection.stepwise import Found, search
 from winchkit.diagnosis.verdict.decision import Judgement, by_best_weights
 from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.verdict.specification_test import judge_and_doubt
-from winchkit.effects.bind import Term
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 

@@ -2,85 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import partial
-from traceback import extract_tb
-from typing import Any
-
-import numpy as np
+from collections.abc import Mapping
 
 from winchkit.effects.catalogue import Catalogue, load_catalogue
-from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.errors import Fault, FileError, UsageError, WinchkitError
+from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.term import Term, modifiers_of
+from winchkit.errors import Fault, FileError, UsageError
 from winchkit.model.line import Line
-from winchkit.model.stages import At, Modifier
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse, suggest
 
-__all__ = [
-    "Term",
-    "act",
-    "check_profile",
-    "line_of",
-    "modifiers_of",
-    "not_in",
-    "terms_of",
-    "values_of",
-]
-
-
-def act(effect: Effect, values: Values, value: Any, at: At) -> Any:
-    """What an effect makes of the value of its stage.
-
-    Raises FileError with file and line where its function, perhaps a user's own, raises or does
-    not give as many numbers as it was given.
-    """
-    try:
-        after = effect.apply(value, at, values)
-    except WinchkitError:
-        raise
-    except Exception as error:
-        place = extract_tb(error.__traceback__)[-1]
-        message = f"effect '{effect.id}': its function fails: {error!r}; mend it there"
-        raise FileError(Fault(message, place.filename, place.lineno)) from error
-    if isinstance(value, np.ndarray) and np.shape(after) != value.shape:
-        code = getattr(effect.apply, "__code__", None)
-        gives = "nothing" if after is None else f"values of shape {np.shape(after)}"
-        message = (
-            f"effect '{effect.id}': its function gives {gives} for values of shape "
-            f"{value.shape}; return an array of the same shape, e.g. value + ..."
-        )
-        place_of = (code.co_filename, code.co_firstlineno) if code is not None else ("", None)
-        raise FileError(Fault(message, *place_of))
-    return after
+__all__ = ["check_profile", "line_of", "not_in", "terms_of", "values_of"]
 
 
 _BESIDE_PARAMETERS = {"id", "fitted"}
-
-
-@dataclass(frozen=True)
-class Term:
-    """An effect with its values, as one profile or one hypothesis has it."""
-
-    effect: Effect
-    values: Mapping[str, float]
-
-    @property
-    def label(self) -> str:
-        """Its id, with the order where it has one."""
-        orders = [f"{self.values[p.name]:g}" for p in self.effect.parameters if p.whole]
-        return self.effect.id + (f"[{', '.join(orders)}]" if orders else "")
-
-    def modifier(self) -> Modifier:
-        """The term ready to act on a line."""
-        apply = partial(act, self.effect, self.values)
-        return Modifier(self.effect.stage, apply, self.effect.order)
-
-
-def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:
-    """Modifiers of several terms."""
-    return tuple(term.modifier() for term in terms)
 
 
 def line_of(profile: WinchProfile, catalogue: Catalogue | None = None) -> Line:

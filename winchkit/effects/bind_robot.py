@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from winchkit.effects.bind import Term, not_in, terms_of, values_of
+from winchkit.effects.bind import not_in, terms_of, values_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
-from winchkit.effects.placement import HOME, at_line, line_of_effect
+from winchkit.effects.placement import at_line
+from winchkit.effects.term import Term, robot_with_terms
 from winchkit.errors import Fault, FileError
-from winchkit.model.robot import Robot, robot_of
-from winchkit.model.stages import Modifier, Stage
+from winchkit.model.robot import Robot
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
 from winchkit.units import suggest
@@ -26,7 +26,6 @@ __all__ = [
     "lines_with_home_length",
     "robot_terms",
     "robot_with_effects",
-    "robot_with_terms",
 ]
 
 _HOME_LENGTH = "home-length"
@@ -35,32 +34,6 @@ _HOME_LENGTH = "home-length"
 def robot_with_effects(profile: RobotProfile, catalogue: Catalogue | None = None) -> Robot:
     """The robot that a profile declares, its effects included. Raises FileError."""
     return robot_with_terms(profile, robot_terms(profile, catalogue))
-
-
-def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
-    """The robot with other effects than its own."""
-    lines: dict[str, list[Modifier]] = {line.name: [] for line in profile.line}
-    payload: list[Modifier] = []
-    for term in terms:
-        modifier, place = term.modifier(), line_of_effect(term.effect)
-        if term.effect.stage is Stage.PAYLOAD:
-            payload.append(modifier)
-            continue
-        for name in [place] if place else lines:
-            lines[name].append(modifier)
-            if offset := term.values.get(HOME + name):
-                lines[name].append(Modifier(Stage.HOME_LENGTH, _Longer(offset)))
-    return robot_of(profile, list(lines.values()), payload)
-
-
-class _Longer:
-    """A constant more of rope."""
-
-    def __init__(self, offset: float) -> None:
-        self.offset = offset
-
-    def __call__(self, length: float, at: object) -> float:
-        return length + self.offset
 
 
 def robot_terms(profile: RobotProfile, catalogue: Catalogue | None = None) -> tuple[Term, ...]:

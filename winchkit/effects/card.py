@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.effects.reference_robot import robot_changes
+from winchkit.effects.term import Term
 from winchkit.model.line import Line
 
 __all__ = [

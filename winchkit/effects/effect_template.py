@@ -6,9 +6,9 @@ import re
 from collections.abc import Container, Mapping
 from pathlib import Path
 
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import heights, knots, variable_of
+from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 

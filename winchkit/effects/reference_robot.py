@@ -8,10 +8,9 @@ from itertools import product
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.bind import Term
-from winchkit.effects.bind_robot import robot_with_terms
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import at_line
+from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot, approximate_forces, robot_of, rotation_of
 from winchkit.schema.profiles.robot import HomeSpec, LineSpec, PlatformSpec, RobotProfile
 from winchkit.schema.profiles.winch import (

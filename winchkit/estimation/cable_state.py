@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.effects.bind import Term, act, modifiers_of
+from winchkit.effects.term import Term, act, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import At, Modifier, Stage
 from winchkit.schema.profiles.winch import WinchProfile

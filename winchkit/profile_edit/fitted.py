@@ -16,8 +16,8 @@ from typing import Any
 import tomlkit
 from tomlkit.items import InlineTable
 
-from winchkit.effects.bind import Term
 from winchkit.effects.placement import HOME, base_of, line_of_effect
+from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError
 from winchkit.profile_edit.document import (
     effect_tables,

@@ -1,21 +1,19 @@
 """Bounds beyond which a number in a file or on a command line is taken for a mistake, with reasons.
 
 A value beyond them is refused where it is read: ``winchkit check`` says so, and nothing opens.
-They are wide; what is possible but rarely meant is a warning (:func:`doubts`).
+They are wide; what is possible but rarely meant is a warning
+(:mod:`winchkit.schema.bench_warnings`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 from winchkit.errors import UsageError
 
-if TYPE_CHECKING:
-    from winchkit.schema.bench import BenchSpec, LimitSpec
-
-__all__ = ["LARGEST", "Bound", "check_size", "doubts"]
+__all__ = ["LARGEST", "Bound", "check_size"]
 
 
 class Bound(NamedTuple):
@@ -40,8 +38,6 @@ LARGEST: Mapping[str, Bound] = {
     "temperature": Bound(1e4, "no cable stands it"),
 }
 """By dimension; others, and ratios, have none in general."""
-_SLOW_HEARTBEAT = 0.25
-"""After 2.5 of them a drive stops by itself: 0.6 s, 0.3 m of cable at 0.5 m/s."""
 
 
 def check_size(value: float, dimension: str, text: object) -> float:
@@ -55,33 +51,3 @@ def check_size(value: float, dimension: str, text: object) -> float:
         unit = next(iter(UNITS[dimension]))
         raise UsageError(f"'{text}' must be at most {bound.value:g} {unit}: {bound.why}")
     return value
-
-
-def doubts(spec: BenchSpec) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Limits of a bench file that are possible and rarely meant: the key, and the warning."""
-    for name, winch in spec.winch.items():
-        yield from _of_limits(("winch", name, "limits"), winch.limits, cell=winch.cell is not None)
-    for name, bus in spec.bus.items():
-        if bus.kind == "can" and bus.heartbeat > _SLOW_HEARTBEAT:
-            yield (
-                ("bus", name, "heartbeat"),
-                f"{bus.heartbeat:g} s: when this computer dies, the drives go on for up to "
-                f"{2.5 * bus.heartbeat:g} s; 50 to 100 ms are usual",
-            )
-
-
-def _of_limits(
-    at: tuple[str, ...], limits: LimitSpec, *, cell: bool
-) -> Iterator[tuple[tuple[str, ...], str]]:
-    if limits.length is None:
-        yield (
-            at,
-            "there are no length limits: the cable may be paid out to its end or wound in to its "
-            'stop; declare such as length = ["0.5 m", "9 m"]',
-        )
-    if limits.tension_high is None:
-        yield (
-            at,
-            "there is no upper tension limit: nothing stops a load that is caught"
-            + ("; declare tension_high" if cell else ", and there is no load cell to see it"),
-        )

@@ -27,9 +27,9 @@ from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.scheduling import event_of, thread_of
 from winchkit.errors import Fault, FileError
+from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recording.rotation import Rotation
 from winchkit.runs.recording.sync import Syncer
-from winchkit.runs.recording.writer import open_log
 
 __all__ = ["CHANNELS", "Recorder", "counters_of", "tares_in_force"]
 

@@ -160,7 +160,7 @@ def _declaration(file: str, effects: Sequence[str]) -> Verdict:
 
 def _doubts(file: str, bench: BenchSpec | None) -> list[Fault]:
     """Limits of a bench that are possible and rarely meant."""
-    from winchkit.schema.plausible import doubts
+    from winchkit.schema.bench_warnings import doubts
     from winchkit.schema.reading.source import open_source
 
     if bench is None or not (found := list(doubts(bench))):

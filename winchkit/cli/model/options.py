@@ -15,8 +15,8 @@ from winchkit.errors import Fault, FileError, UsageError
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.results import Estimate, OutputFit
-    from winchkit.effects.bind import Term
     from winchkit.effects.catalogue import Catalogue
+    from winchkit.effects.term import Term
     from winchkit.profile_edit.fitted import Fitted
     from winchkit.profile_edit.ledger import Judged
     from winchkit.runs.run import Run

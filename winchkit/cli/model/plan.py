@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.design.plan import Offer
     from winchkit.diagnosis.design.programmes import Room
     from winchkit.diagnosis.robot.plan import PosePlan
-    from winchkit.effects.bind import Term
+    from winchkit.effects.term import Term
     from winchkit.schema.bench import LimitSpec
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile

@@ -18,8 +18,8 @@ from winchkit.diagnosis.design.programmes import KINDS, imagined
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.results import NextRun
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import told_apart
+from winchkit.effects.term import Term
 
 __all__ = ["APART", "SoFar", "next_runs", "power_of", "separation", "so_far"]
 

@@ -19,9 +19,9 @@ from winchkit.diagnosis.design.programmes import (
 )
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.selection.candidates import missing_needs
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 from winchkit.schema.programme import Programme, Step
 
 __all__ = ["Offer", "hopeless", "offers", "programme_of"]

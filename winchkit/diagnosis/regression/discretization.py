@@ -20,7 +20,7 @@ from winchkit.diagnosis.data.spectrum import to_frequency
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.effects.bind import modifiers_of
+from winchkit.effects.term import modifiers_of
 from winchkit.model.derivatives import is_calmer
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals

@@ -15,7 +15,7 @@ import numpy as np
 from winchkit.diagnosis.data.dataset import Dataset, Recording
 from winchkit.diagnosis.data.transients import around
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 
 __all__ = ["calmed"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
+from winchkit.effects.term import Term
 
 __all__ = ["START", "Hypothesis", "started"]
 

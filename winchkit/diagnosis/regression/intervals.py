@@ -24,9 +24,9 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.results import Estimate
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Parameter
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 
 __all__ = [
     "Spread",

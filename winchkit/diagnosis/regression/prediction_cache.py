@@ -16,7 +16,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
 from winchkit.diagnosis.data.spectrum import to_frequency
-from winchkit.effects.bind import Term, modifiers_of
+from winchkit.effects.term import Term, modifiers_of
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Stage, Way
 from winchkit.schema.profiles.winch import WinchProfile

@@ -20,8 +20,8 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.spectrum import Band, band_edges, narrow_edges, to_time
 from winchkit.diagnosis.regression.hypothesis import START, Hypothesis, started
 from winchkit.diagnosis.regression.prediction_cache import Predictor, masked
-from winchkit.effects.bind import Term
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 from winchkit.model.line import Line
 from winchkit.model.stages import Stage
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.prior import Believed
-from winchkit.effects.bind import Term
 from winchkit.effects.bind_robot import lines_with_home_length
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
@@ -20,6 +19,7 @@ from winchkit.effects.placement import (
     placements,
     with_home_lengths,
 )
+from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
 __all__ = ["GEOMETRY", "candidates_at", "geometry_believed", "lacking", "lacking_parts", "needless"]

@@ -12,10 +12,10 @@ from winchkit.diagnosis.design.discrimination import APART
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.diagnosis.robot.pose_design import POSES, WORTHWHILE, PoseOffer, Question, pose_offers
 from winchkit.diagnosis.verdict.equivalence import pairs_of
-from winchkit.effects.bind import Term
 from winchkit.effects.card import usual_values
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.placement import base_of
+from winchkit.effects.term import Term
 from winchkit.model.robot import angles_of
 from winchkit.runs.run import Channel, Run
 

@@ -14,8 +14,8 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.results import NextRun
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.regression import RobotProblem
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import told_apart
+from winchkit.effects.term import Term
 from winchkit.model.robot import (
     ForceLimits,
     Pose,

@@ -29,12 +29,12 @@ from winchkit.diagnosis.robot.variance_components import (
     noise_of,
     repeated_differences,
 )
-from winchkit.effects.bind import Term
 from winchkit.effects.bind_robot import robot_terms
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.placement import base_of
+from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from winchkit.effects.bind import Term
 from winchkit.effects.placement import base_of, line_of_effect
+from winchkit.effects.term import Term
 from winchkit.schema.profiles.robot import LineSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 

@@ -21,9 +21,8 @@ from winchkit.diagnosis.regression.time_series import Problem, Segment
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.equations import POSED, Equations
 from winchkit.diagnosis.robot.prior import Believed, believed_profile
-from winchkit.effects.bind import Term
-from winchkit.effects.bind_robot import robot_with_terms
 from winchkit.effects.placement import base_of, line_of_effect
+from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot
 from winchkit.model.stages import Stage
 from winchkit.schema.profiles.robot import RobotProfile

@@ -40,9 +40,9 @@ from winchkit.diagnosis.selection.starting_values import (
     placed,
     starting_values,
 )
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 
 __all__ = [
     "Inquiry",

@@ -14,8 +14,8 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.effects.bind import Term
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 
 __all__ = ["rests_on_states"]
 

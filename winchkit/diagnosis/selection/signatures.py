@@ -17,9 +17,9 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.selection.candidates import points
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 
 __all__ = ["Atom", "Signatures", "pieces", "redrawn", "signatures"]
 

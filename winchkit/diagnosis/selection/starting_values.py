@@ -12,9 +12,9 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.selection.scores import Score
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 
 __all__ = [
     "by_coefficients",

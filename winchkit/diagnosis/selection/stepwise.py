@@ -14,7 +14,7 @@ from winchkit.diagnosis.selection.engine import Inquiry, Trial
 from winchkit.diagnosis.selection.exchange import recoupled
 from winchkit.diagnosis.selection.scores import Score, chance_level
 from winchkit.diagnosis.selection.starting_values import elsewhere
-from winchkit.effects.bind import Term
+from winchkit.effects.term import Term
 
 __all__ = ["Found", "search", "with_a_pair", "without_term"]
 

@@ -16,9 +16,9 @@ from winchkit.diagnosis.selection.engine import Inquiry
 from winchkit.diagnosis.selection.exchange import Exchange
 from winchkit.diagnosis.selection.scores import Projected
 from winchkit.diagnosis.selection.signatures import Atom
-from winchkit.effects.bind import Term
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 
 __all__ = [
     "Confusion",

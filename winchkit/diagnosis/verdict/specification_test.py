@@ -17,8 +17,8 @@ from winchkit.diagnosis.selection.engine import Inquiry
 from winchkit.diagnosis.selection.stepwise import Found, with_a_pair, without_term
 from winchkit.diagnosis.verdict.decision import Judgement, judge, withheld
 from winchkit.diagnosis.verdict.spline_alternatives import Columns, curves
-from winchkit.effects.bind import Term
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 
 __all__ = [
     "Beside",

@@ -12,7 +12,7 @@ from winchkit.runs.layout import Layout, Samples
 from winchkit.runs.recording.log_file import begin_log, create
 from winchkit.runs.recording.rotation import Rotation, part_path
 
-__all__ = ["LogWriter", "Watch", "open_log"]
+__all__ = ["LogWriter", "Watch"]
 
 Watch = Callable[[int], None]
 """Is told the descriptor of every file that is written."""
@@ -96,29 +96,3 @@ class LogWriter(ABC):
     @abstractmethod
     def _size(self) -> int:
         """Bytes of the part so far."""
-
-
-def open_log(
-    path: Path,
-    layout: Layout,
-    metadata: Mapping[str, str],
-    rotation: Rotation | None = None,
-    watch: Watch = lambda _descriptor: None,
-    *,
-    replace: bool = False,
-) -> LogWriter:
-    """Start a log in the format of the file's name; its files are locked while they are written.
-
-    An earlier log of that name, its parts included, is removed with ``replace`` only. Raises
-    FileError where it cannot be written, UsageError for a suffix that is no format, for a file that
-    holds something, and, with ``replace`` as well, for one that is being written.
-    """
-    if path.suffix.lower() == ".mcap":
-        from winchkit.runs.recording.channels import ChannelLog
-
-        return ChannelLog(path, layout, metadata, rotation, watch, replace=replace)
-    from winchkit.runs.recording.rows import RowLog
-    from winchkit.runs.writer import kind_for
-
-    kind_for(path)
-    return RowLog(path, layout, metadata, rotation, watch, replace=replace)

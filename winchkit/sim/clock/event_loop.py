@@ -5,9 +5,7 @@ from __future__ import annotations
 import asyncio
 from asyncio import base_events
 from collections.abc import Callable
-from typing import Any
-
-from winchkit.sim.clock.simulated_clock import SimulatedClock
+from typing import Any, Protocol
 
 __all__ = ["SimulatedEventLoop"]
 
@@ -16,10 +14,34 @@ _LATENCY = 2e-4
 _FIRST_PORT = 20_000
 
 
+class _Clock(Protocol):
+    """What an event loop needs of a simulated clock."""
+
+    listeners: dict[tuple[str, int], Any]
+    """TCP servers by host and port."""
+    reply_filter: Callable[[bytes], bytes] | None
+
+    def now(self) -> float:
+        """Simulated time, s."""
+        ...
+
+    def call_at(self, time: float, callback: Callable[[], None]) -> None:
+        """Call a function at a time, s."""
+        ...
+
+    def event(self) -> Any:
+        """An event whose time-outs are in simulated time."""
+        ...
+
+    def thread(self, target: Callable[[], None], name: str) -> Any:
+        """A thread in simulated time."""
+        ...
+
+
 class _Selector:
     """Waits on the clock where an ordinary loop waits for its sockets."""
 
-    def __init__(self, clock: SimulatedClock) -> None:
+    def __init__(self, clock: _Clock) -> None:
         self.woken = clock.event()
 
     def select(self, timeout: float | None) -> list[Any]:
@@ -31,9 +53,9 @@ class _Selector:
 
 
 class SimulatedEventLoop(base_events.BaseEventLoop):
-    """Runs on a thread of a :class:`SimulatedClock`."""
+    """Runs on a thread of a :class:`~winchkit.sim.clock.simulated_clock.SimulatedClock`."""
 
-    def __init__(self, clock: SimulatedClock) -> None:
+    def __init__(self, clock: _Clock) -> None:
         super().__init__()
         self._simulated = clock
         self._selector = _Selector(clock)
@@ -108,7 +130,7 @@ class _Server(asyncio.AbstractServer):
     def __init__(
         self,
         loop: SimulatedEventLoop,
-        clock: SimulatedClock,
+        clock: _Clock,
         factory: Callable[[], Any],
         address: tuple[str, int],
     ) -> None:
@@ -146,7 +168,7 @@ class _Server(asyncio.AbstractServer):
 class _Transport(asyncio.Transport):
     """One end of a connection; bytes arrive at the other end in order."""
 
-    def __init__(self, loop: SimulatedEventLoop, clock: SimulatedClock, protocol: Any) -> None:
+    def __init__(self, loop: SimulatedEventLoop, clock: _Clock, protocol: Any) -> None:
         super().__init__()
         self.loop, self.protocol = loop, protocol
         self.peer: _Transport | None = None

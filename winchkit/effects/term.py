@@ -1,0 +1,96 @@
+"""Terms: effects with values, ready to act on a line or on a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from traceback import extract_tb
+from typing import Any
+
+import numpy as np
+
+from winchkit.effects.effect import Effect, Values
+from winchkit.effects.placement import HOME, line_of_effect
+from winchkit.errors import Fault, FileError, WinchkitError
+from winchkit.model.robot import Robot, robot_of
+from winchkit.model.stages import At, Modifier, Stage
+from winchkit.schema.profiles.robot import RobotProfile
+
+__all__ = ["Term", "act", "modifiers_of", "robot_with_terms"]
+
+
+def act(effect: Effect, values: Values, value: Any, at: At) -> Any:
+    """What an effect makes of the value of its stage.
+
+    Raises FileError with file and line where its function, perhaps a user's own, raises or does
+    not give as many numbers as it was given.
+    """
+    try:
+        after = effect.apply(value, at, values)
+    except WinchkitError:
+        raise
+    except Exception as error:
+        place = extract_tb(error.__traceback__)[-1]
+        message = f"effect '{effect.id}': its function fails: {error!r}; mend it there"
+        raise FileError(Fault(message, place.filename, place.lineno)) from error
+    if isinstance(value, np.ndarray) and np.shape(after) != value.shape:
+        code = getattr(effect.apply, "__code__", None)
+        gives = "nothing" if after is None else f"values of shape {np.shape(after)}"
+        message = (
+            f"effect '{effect.id}': its function gives {gives} for values of shape "
+            f"{value.shape}; return an array of the same shape, e.g. value + ..."
+        )
+        place_of = (code.co_filename, code.co_firstlineno) if code is not None else ("", None)
+        raise FileError(Fault(message, *place_of))
+    return after
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect with its values, as one profile or one hypothesis has it."""
+
+    effect: Effect
+    values: Mapping[str, float]
+
+    @property
+    def label(self) -> str:
+        """Its id, with the order where it has one."""
+        orders = [f"{self.values[p.name]:g}" for p in self.effect.parameters if p.whole]
+        return self.effect.id + (f"[{', '.join(orders)}]" if orders else "")
+
+    def modifier(self) -> Modifier:
+        """The term ready to act on a line."""
+        apply = partial(act, self.effect, self.values)
+        return Modifier(self.effect.stage, apply, self.effect.order)
+
+
+def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:
+    """Modifiers of several terms."""
+    return tuple(term.modifier() for term in terms)
+
+
+def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
+    """The robot with other effects than its own."""
+    lines: dict[str, list[Modifier]] = {line.name: [] for line in profile.line}
+    payload: list[Modifier] = []
+    for term in terms:
+        modifier, place = term.modifier(), line_of_effect(term.effect)
+        if term.effect.stage is Stage.PAYLOAD:
+            payload.append(modifier)
+            continue
+        for name in [place] if place else lines:
+            lines[name].append(modifier)
+            if offset := term.values.get(HOME + name):
+                lines[name].append(Modifier(Stage.HOME_LENGTH, _Longer(offset)))
+    return robot_of(profile, list(lines.values()), payload)
+
+
+class _Longer:
+    """A constant more of rope."""
+
+    def __init__(self, offset: float) -> None:
+        self.offset = offset
+
+    def __call__(self, length: float, at: object) -> float:
+        return length + self.offset
