@@ -190,14 +190,20 @@ class CanBus:
         return True
 
     def remote(self, identifier: int) -> None:
-        """Send a remote frame, to which a node answers with one byte; raises ConnectionLost."""
+        """Send a remote frame, to which a node answers with one byte; raises ConnectionLost.
+
+        A full queue is dealt with as in :meth:`send`.
+        """
         port = self._port
         try:
             with self.network.send_lock:
                 port.send_remote(identifier)
         except (can.CanError, OSError, ValueError) as error:
+            if self._queue_full(error):
+                return
             raise self._unsendable(port, error) from error
         self.sent += 1
+        self._full_since = None
 
     def sync(self) -> None:
         """Send SYNC."""
