@@ -162,3 +162,15 @@ def test_frames_of_two_benches_on_one_bus_are_those_of_their_own_drives(tmp_path
         rig.wait(0.1)
         (trip,) = bench.snapshot.tripped
         assert (trip.kind, trip.winch) == ("second master", "B")
+
+
+def test_a_heartbeat_with_an_unknown_state_is_a_trip_and_ends_no_loop(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        rig.wait(0.3)
+        rig.from_stranger(0x701, b"\x06")
+        rig.wait(0.02)
+        assert bench.loop.broken is None
+        (trip,) = bench.snapshot.tripped
+        assert trip.kind == "nmt"
+        assert "state 06h" in str(trip)

@@ -12,7 +12,7 @@ from winchkit.drivers.can.command import Command, Commander
 from winchkit.drivers.can.commission import Commissioned, WatchSpec, await_booted, commission
 from winchkit.drivers.can.emergency import EmergencyLog, error_text
 from winchkit.drivers.can.feedback import AxisFeedback, FeedbackHealth, Gathering, check_feedback
-from winchkit.drivers.can.heartbeat import NmtState
+from winchkit.drivers.can.heartbeat import NMT_STATES, NmtState
 from winchkit.drivers.can.host_loss.mechanism import Silence, Terms
 from winchkit.drivers.can.host_loss.watch import HostWatch
 from winchkit.drivers.can.mode_change import change_mode
@@ -164,7 +164,11 @@ class Cia402Axis:
     @property
     def nmt_text(self) -> str:
         """NMT state of its heartbeat in words."""
-        return "unknown" if self.heartbeat.state is None else str(NmtState(self.heartbeat.state))
+        state = self.heartbeat.state
+        if state is None:
+            return "unknown"
+        # The byte is the drive's own: one that the standard does not know must not end the loop.
+        return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
 
     @property
     def alarms(self) -> tuple[int, ...]:
