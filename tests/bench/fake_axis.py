@@ -61,6 +61,7 @@ class FakeAxis:
     hears_sdos: bool = True
     moves_alone: bool = False
     stops_on_nmt: bool = False
+    second_master: str = ""
     nmt_text: str = "operational"
     alarms: tuple[int, ...] = ()
     alarm_text: str = ""

@@ -75,6 +75,10 @@ class AxisPort(Protocol):
         """They in words."""
 
     @property
+    def second_master(self) -> str:
+        """The first command to it that was not sent here, in words; empty where none was."""
+
+    @property
     def stops_on_nmt(self) -> bool:
         """Whether commissioning saw it leave operation enabled on NMT stop."""
 

@@ -97,6 +97,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
         tension=sensors.get("cell"),
         nmt="" if operational else axis.nmt_text,
         uncommanded=controller.take_uncommanded(),
+        second_master=axis.second_master,
         disabled=controller.phase is Phase.DISABLED,
         follows=follows,
         target_speed=controller.target_speed if follows else math.nan,

@@ -125,6 +125,17 @@ def _rest_limit(own: Supervised) -> float:
 
 CONDITIONS: tuple[Condition, ...] = (
     Condition(
+        "second master",
+        "RPDOs, SDO writes and NMT commands to the drive that were not sent here",
+        "none",
+        lambda item, _own, _memory: bool(item.second_master),
+        lambda item, *_: (
+            f"somebody else commands the drive: {item.second_master} was not sent here; end the "
+            "other master or tool on the bus, then reset"
+        ),
+        latches=True,
+    ),
+    Condition(
         "boot-up",
         "boot-up messages since commissioning",
         "none",

@@ -74,6 +74,8 @@ class WinchInput(NamedTuple):
     """NMT state in words, where it is not operational."""
     uncommanded: str = ""
     """What the drive did to its power state that no control word asked for."""
+    second_master: str = ""
+    """A command to its drive that was not sent here; empty while there is none."""
     disabled: bool = False
     """Whether the winch is commanded to be disabled, and was at rest when that began."""
     follows: bool = False

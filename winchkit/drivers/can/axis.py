@@ -12,7 +12,7 @@ from winchkit.drivers.can.command import Command, Commander
 from winchkit.drivers.can.commission import Commissioned, WatchSpec, await_booted, commission
 from winchkit.drivers.can.emergency import EmergencyLog, error_text
 from winchkit.drivers.can.feedback import AxisFeedback, FeedbackHealth, Gathering, check_feedback
-from winchkit.drivers.can.heartbeat import NmtState
+from winchkit.drivers.can.heartbeat import NMT_STATES, NmtState
 from winchkit.drivers.can.host_loss.mechanism import Silence, Terms
 from winchkit.drivers.can.host_loss.watch import HostWatch
 from winchkit.drivers.can.mode_change import change_mode
@@ -22,6 +22,7 @@ from winchkit.drivers.can.node import SdoNode
 from winchkit.drivers.can.pdo_setup import cob_id
 from winchkit.drivers.can.profile import HomingSpec, set_homing, set_profile
 from winchkit.drivers.can.sdo_stop import SdoStop
+from winchkit.drivers.can.second_master import SecondMaster
 from winchkit.drivers.clock import Clock
 from winchkit.errors import Fault, FileError, NotPermitted, WinchkitError
 from winchkit.schema.device import DeviceSpec
@@ -68,6 +69,7 @@ class Cia402Axis:
         self._boot_ups = self._beats = 0
         self._previous = 0
         self._sdo_stop = SdoStop(bus, node)
+        self._others = SecondMaster(bus, node, [pdo.number for pdo in device.servo.rpdo])
         self._stop_frames: list[tuple[int, bytes]] = []
         bus.on(0x700 + node, self.heartbeat.receive)
         bus.on(0x080 + node, self.emergencies.receive)
@@ -85,6 +87,7 @@ class Cia402Axis:
     def _commission(self) -> Commissioned:
         self.heartbeat.forget()
         await_booted(self._node, self.servo.boot_time, self._clock, self.heartbeat)
+        self._others.hear_further_servers(self._node)
         # Only a boot-up after this one takes away what is set up now.
         self._boot_ups = self.heartbeat.boot_ups
         self._beats = self._bus.beats[self._watch.host]
@@ -161,7 +164,11 @@ class Cia402Axis:
     @property
     def nmt_text(self) -> str:
         """NMT state of its heartbeat in words."""
-        return "unknown" if self.heartbeat.state is None else str(NmtState(self.heartbeat.state))
+        state = self.heartbeat.state
+        if state is None:
+            return "unknown"
+        # The byte is the drive's own: one that the standard does not know must not end the loop.
+        return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
 
     @property
     def alarms(self) -> tuple[int, ...]:
@@ -176,6 +183,15 @@ class Cia402Axis:
     def forget_alarms(self) -> None:
         """A reset has dealt with them; those that still hold are sent again."""
         self.emergencies.in_force.clear()
+
+    @property
+    def second_master(self) -> str:
+        """The first command to it that was not sent here, in words; empty where none was."""
+        return self._others.heard
+
+    def forget_second_master(self) -> None:
+        """A reset begins; what somebody else commands from now on is told again."""
+        self._others.forget()
 
     def disarm(self) -> None:
         """Let the drive, at rest, stop watching the host; raises ConnectionLost."""
