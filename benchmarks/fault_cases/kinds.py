@@ -211,10 +211,9 @@ _LOST = ("feedback", "heartbeat", "state", "fault", "nmt", "slowing down", "devi
 _ROWS = (
     Kind("enable input open", _drive("enable input open"), ("state",), least=0.0),
     Kind("second master: 6040h = 00h", _write(0x6040, 2, 0x00), _MASTER, least=0.0),
-    # With 605Bh = 1 it begins a ramp that the next control word of the host ends again.
-    Kind("second master: 6040h = 06h", _write(0x6040, 2, 0x06), _MASTER, stops=False),
+    Kind("second master: 6040h = 06h", _write(0x6040, 2, 0x06), _MASTER, least=0.0),
     Kind("second master: 6040h = 02h", _write(0x6040, 2, 0x02), _MASTER, least=0.0),
-    Kind("second master: 6060h = 1", _write(0x6060, 1, 1), (*_MASTER, "mode"), stops=False),
+    Kind("second master: 6060h = 1", _write(0x6060, 1, 1), (*_MASTER, "mode"), least=0.0),
     Kind("stranger: NMT pre-operational", _nmt(0x80), ("second master", *_WIRES), least=0.0),
     Kind("stranger: NMT stopped", _nmt(0x02), ("second master", *_WIRES), least=0.0),
     Kind("stranger: NMT reset node", _nmt(0x81), ("second master", *_WIRES), least=0.0),
