@@ -13,7 +13,7 @@ from pathlib import Path
 from fault_cases.case import Case, Planned
 from fault_cases.kinds import KINDS
 from fault_cases.operator import Operator
-from fault_cases.world import Sample, World, opened_world
+from fault_cases.world import Sample, Strange, World, opened_world
 from winchkit.bench.snapshot import BenchSnapshot
 from winchkit.runs import read_run
 
@@ -33,6 +33,11 @@ class Record:
     case: Case
     begun: float = 0.0
     onsets: list[tuple[Planned, float]] = field(default_factory=list)
+    """Faults that came to be, and when, s."""
+    unheard: list[Planned] = field(default_factory=list)
+    """Frames of strangers that the drive did not hear: nothing happened to it."""
+    frames: list[tuple[tuple[Planned, float], Strange]] = field(default_factory=list)
+    """The stranger's frame of a fault that is one."""
     mended: float = 0.0
     reset: float = math.inf
     """When the first reset that succeeded began, or the last one, s."""
@@ -120,6 +125,10 @@ def _play(world: World, record: Record) -> None:
     except Exception as error:  # noqa: BLE001 - a full disk is told here
         record.log_error = str(error)
     world.sample()
+    for onset, frame in record.frames:
+        if frame.heard is False:
+            record.onsets.remove(onset)
+            record.unheard.append(onset[0])
     record.moved_again = any(
         abs(sample.velocity) > 0.5
         for samples in world.truth.values()
@@ -134,11 +143,14 @@ def _schedule(
     """Let the faults come at their times; the last of these, s."""
 
     def begin(fault: Planned) -> None:
-        record.onsets.append((fault, world.now))
+        onset = (fault, world.now)
+        record.onsets.append(onset)
         if fault.kind == "released":
             operator.holds = False
             return
+        sent = len(world.strange)
         end = KINDS[fault.kind].begin(world, fault.winch)
+        record.frames += [(onset, frame) for frame in world.strange[sent:]]
         if end is None:
             return
         if fault.span is None:

@@ -18,6 +18,7 @@ from fault_cases.independent_drive import IndependentDrive, replace_drives
 from winchkit.bench.bench import Bench, open_bench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.drive import SimDrive
+from winchkit.sim.drive_network import NmtState
 from winchkit.sim.drive_power import Order
 from winchkit.sim.drive_state import State as SimState
 from winchkit.sim.live import LiveBench
@@ -25,7 +26,7 @@ from winchkit.sim.pace import PacedClock
 from winchkit.sim.wire import Carried
 from winchkit.testing.declared import declared
 
-__all__ = ["HEARTBEAT", "LIMITS", "Sample", "World", "opened_world"]
+__all__ = ["HEARTBEAT", "LIMITS", "Sample", "Strange", "World", "opened_world"]
 
 HEARTBEAT = 0.05
 LIMITS = {"speed": 0.6, "acceleration": 1.5, "tension_high": 400.0, "tension_slack": 15.0}
@@ -52,6 +53,17 @@ class Sample:
 
 
 @dataclass
+class Strange:
+    """A frame of a stranger to one winch's drive."""
+
+    winch: str
+    identifier: int
+    data: bytes
+    heard: bool | None = None
+    """Whether the drive took it from the bus; None before it has come that far."""
+
+
+@dataclass
 class World:
     """An open bench, what is true of it, and what can be done to it from outside."""
 
@@ -61,6 +73,8 @@ class World:
     bench: Bench
     truth: dict[str, list[Sample]] = field(default_factory=dict)
     frames: list[Carried] = field(default_factory=list)
+    strange: list[Strange] = field(default_factory=list)
+    """Frames of strangers, in their order."""
     _later: list[tuple[float, int, Callable[[], None]]] = field(default_factory=list)
     _order: count[int] = field(default_factory=count)
     _stopping: threading.Event = field(default_factory=threading.Event)
@@ -83,8 +97,9 @@ class World:
         else:
             heappush(self._later, (moment, next(self._order), function))
 
-    def inject_frame(self, identifier: int, data: bytes) -> None:
-        """A stranger on the bus sends a frame."""
+    def inject_frame(self, winch: str, identifier: int, data: bytes) -> None:
+        """A stranger on the bus sends a frame to the drive of a winch."""
+        self.strange.append(Strange(winch, identifier, data))
         if self.simulated is not None:
             self.live._ports["can"].inject(identifier, data)  # type: ignore[union-attr]
             return
@@ -97,6 +112,7 @@ class World:
         """Note from now on what is true."""
         for wire in self.live.wire.values():
             wire.taps.append(self.frames.append)
+            wire.taps.append(self._note_heard)
         self.truth = {name: [] for name in self.live.winches}
         if self.simulated is not None:
             self._sample_and_go_on()
@@ -121,6 +137,15 @@ class World:
                     Sample(now, velocity, speed, plant.tension, enabled, follows)
                 )
 
+    def _note_heard(self, carried: Carried) -> None:
+        """A frame arrives: where it is a stranger's, note whether the drive takes it."""
+        for one in self.strange:
+            same = (one.identifier, one.data) == (carried.identifier, carried.data)
+            if one.heard is None and same and not carried.from_drive:
+                drive = self.live.winches[one.winch].drive
+                one.heard = not carried.lost and _hears(drive, carried)
+                return
+
     def _sample_and_go_on(self) -> None:
         if not self._stopping.is_set():
             self.sample()
@@ -132,6 +157,13 @@ class World:
             while self._later and self._later[0][0] <= self.now:
                 heappop(self._later)[2]()
             time.sleep(_SAMPLED)
+
+
+def _hears(drive: SimDrive | IndependentDrive, carried: Carried) -> bool:
+    """Whether a drive takes a frame: not off the bus, nor while it boots."""
+    if isinstance(drive, IndependentDrive):
+        return drive.hears(carried.identifier, carried.data)
+    return not drive._line.cut and drive.nmt is not NmtState.BOOTING
 
 
 def _seen(drive: SimDrive | IndependentDrive, velocity: float) -> tuple[bool, bool, float]:

@@ -67,6 +67,21 @@ def test_a_winch_that_goes_on_is_found() -> None:
     assert verdict.cause == "nothing was told"
 
 
+@pytest.mark.parametrize("independent", [True, False])
+def test_a_frame_that_no_drive_hears_is_no_fault(independent: bool) -> None:
+    """A drive that is off the bus for 20 ms (case 172/138) stays operational, and may go on."""
+    kind = "stranger: NMT pre-operational"
+    silence = Planned("drive silent", "A", 0.600, 0.02)
+    for after, unheard in ((0.005, True), (0.05, False)):
+        stranger = Planned(kind, "A", silence.at + after, None)
+        record = play(case(kind, faults=(silence, stranger), independent=independent))
+        assert (record.unheard == [stranger]) == unheard
+        assert bool(record.trips) != unheard, record.trips
+        assert judge(record).good, judge(record)
+        ends = [s.follows for s in record.truth["A"] if s.time < record.mended][-1]
+        assert ends == unheard, "the truth: only what was heard stops the drive"
+
+
 def test_the_same_seed_draws_the_same_cases() -> None:
     assert cases(50, 3) == cases(50, 3)
     assert cases(50, 3) != cases(50, 4)
