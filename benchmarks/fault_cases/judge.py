@@ -18,7 +18,7 @@ _MOVES = 0.004
 _SETTLES = 0.05
 """The brake and the drive's filters take this long beside v/a, s."""
 _DEAD_MAN = 0.2
-_FLUSH = 0.1
+_FLUSH = 0.05
 """What a closed log may lack at its end, s: the filter, conversion and poll of the load cell."""
 _NOISE = 15.0
 """Above the true tension at which the cell's noise may trip, and oscillations, N."""

@@ -14,8 +14,10 @@ from fault_cases.case import Case, Planned
 from fault_cases.kinds import KINDS
 from fault_cases.operator import Operator
 from fault_cases.world import Sample, Strange, World, opened_world
+from winchkit.bench.recorder import Recorder
 from winchkit.bench.snapshot import BenchSnapshot
 from winchkit.runs import read_run
+from winchkit.runs.log_rows import RowLog
 
 __all__ = ["Record", "play"]
 
@@ -53,6 +55,7 @@ class Record:
     early_reset: str = ""
     late_reset: str = ""
     logged_from: float = 0.0
+    """Moment of the log's first row, s."""
     log_end: float = 0.0
     """Time of the log's last row, s; NaN where it could not be read."""
     log_error: str = ""
@@ -77,6 +80,8 @@ def play(case: Case) -> Record:
             ) as world:
                 _play(world, record)
                 record.truth = world.truth
+        except KeyboardInterrupt:
+            raise
         except BaseException as error:  # noqa: BLE001 - a case that breaks is told as one
             known = record.failure is not None and error is record.failure
             record.error = "" if known else f"{type(error).__name__}: {error}"
@@ -87,7 +92,6 @@ def play(case: Case) -> Record:
 def _play(world: World, record: Record) -> None:
     case, clock, bench = record.case, world.clock, world.bench
     recorder = bench.log(world.folder / "case.csv")
-    record.logged_from = world.now
     bench.on_cycle(partial(_note_trip, record))
     clock.sleep(0.2)
     record.begun = world.now
@@ -120,6 +124,7 @@ def _play(world: World, record: Record) -> None:
     record.pressed = world.now
     _press(world, case)
     record.ended = world.now
+    record.logged_from = _first_row(recorder)
     try:
         recorder.close()
     except Exception as error:  # noqa: BLE001 - a full disk is told here
@@ -179,6 +184,13 @@ def _press(world: World, case: Case) -> None:
                 continue
         world.clock.sleep(0.05)
     world.clock.sleep(0.4)
+
+
+def _first_row(recorder: Recorder) -> float:
+    """When the first row of a log of rows was sampled, s: from there its time counts."""
+    log = recorder._log
+    assert isinstance(log, RowLog), "a case is logged as rows"
+    return math.nan if log._aligner.start is None else log._aligner.start
 
 
 def _trips(world: World) -> list[tuple[str, str]]:
