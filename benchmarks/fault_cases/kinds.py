@@ -73,7 +73,7 @@ def _node(world: World, winch: str) -> int:
 
 def _nmt(command: int) -> Begin:
     def begin(world: World, winch: str) -> None:
-        world.inject_frame(0x000, bytes((command, _node(world, winch))))
+        world.inject_frame(winch, 0x000, bytes((command, _node(world, winch))))
 
     return begin
 
@@ -84,7 +84,7 @@ def _write(index: int, size: int, value: int) -> Begin:
     def begin(world: World, winch: str) -> None:
         head = {1: 0x2F, 2: 0x2B}[size]
         data = bytes((head, index & 0xFF, index >> 8, 0)) + value.to_bytes(4, "little")
-        world.inject_frame(0x600 + _node(world, winch), data)
+        world.inject_frame(winch, 0x600 + _node(world, winch), data)
 
     return begin
 
