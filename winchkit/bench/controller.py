@@ -275,6 +275,8 @@ class Controller:
                 self._ordered = phase
 
     def _take_orders(self, now: float) -> None:
+        if self._ordered is None and self._wanted is None:
+            return  # as in most cycles; what is ordered meanwhile is taken in the next
         with self._lock:
             ordered, self._ordered = self._ordered, None
             wanted = self._wanted

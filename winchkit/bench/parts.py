@@ -140,15 +140,16 @@ def _instrumented(sensor: SensorPort, now: float, resumed: float) -> Instrumente
     problem = "" if trouble is None else str(trouble)
     if reading is None:
         return Instrumented(math.nan, math.inf, sensor.max_age, "", math.nan, problem)
+    received = reading.t_receive
     return Instrumented(
-        value=reading.value,
-        age=now - max(reading.t_receive, resumed),
-        received=reading.t_receive,
-        max_age=sensor.max_age,
-        quality=str(reading.quality),
-        time=reading.t_sample,
-        problem=problem,
-        gross=reading.gross,
+        reading.value,
+        now - (received if received > resumed else resumed),
+        sensor.max_age,
+        str(reading.quality),
+        reading.t_sample,
+        problem,
+        reading.gross,
+        received,
     )
 
 
