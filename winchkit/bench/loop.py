@@ -11,8 +11,8 @@ from typing import Protocol
 
 from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.observation import WinchInput
-from winchkit.bench.parts import WinchParts, known, picture
-from winchkit.bench.snapshot import BenchSnapshot, Direction, Phase, Trip
+from winchkit.bench.parts import WinchParts, captured, known, pictures
+from winchkit.bench.snapshot import BenchSnapshot, Direction, Phase, Trip, WinchSnapshots
 from winchkit.bench.supervisor import Supervisor
 from winchkit.drivers.can.cia402 import State
 from winchkit.drivers.can.heartbeat import HeartbeatProducer, NmtState
@@ -378,10 +378,11 @@ class ControlLoop:
     def _picture(
         self, now: float, inputs: Mapping[str, WinchInput], blocked: tuple[Trip, ...]
     ) -> BenchSnapshot:
+        taken = [captured(parts) for parts in self.winches.values()]
         return BenchSnapshot(
             time=now,
             cycle=self._count,
-            winch={name: picture(parts, inputs[name], now) for name, parts in self.winches.items()},
+            winch=WinchSnapshots(lambda: pictures(inputs, taken, now)),
             tripped=self.supervisor.tripped,
             blocked=blocked,
             overruns=self.overruns,

@@ -233,7 +233,8 @@ class Cia402Axis:
     @property
     def mode_kept(self) -> bool:
         """Whether the drive still shows the mode that it was given."""
-        shown = self.feedback.mode if self.feedback else None
+        feedback = self.feedback
+        shown = None if feedback is None else feedback.mode
         return shown is None or shown == MODES[self.mode].number
 
     @property
