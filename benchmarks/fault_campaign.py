@@ -4,8 +4,9 @@
 faults at random moments of jogs, moves and programmes, on one winch and on eight. Each case is
 judged from the truth: the speed, tension and drive state of the simulation, never from what
 winchkit says. With ``--realtime-share`` that share of the cases runs in real time. ``--case 1/17``
-plays one case again and tells it. One JSON object on stdout, failures on stderr; exit 1 where a
-case failed. See benchmarks/README.md.
+plays one case again and tells it. ``--jobs 2`` plays them in as many processes, with the same
+result. One JSON object on stdout, failures on stderr; exit 1 where a case failed, 130 after Ctrl-C.
+See benchmarks/README.md.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import multiprocessing
+import signal
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +30,8 @@ from fault_cases.judge import Verdict, judge
 from fault_cases.play import play
 
 _GOOD = ("stopped", "moved_after_trip", "over_tension", "cause", "log", "error")
+_LONGEST = 900.0
+"""A process that has not played a case after so long is lost, s."""
 
 
 def summary(played: list[tuple[Case, Verdict]], seconds: float) -> dict[str, Any]:
@@ -84,6 +90,26 @@ def chosen(arguments: argparse.Namespace) -> list[Case]:
     return [cases(int(number) + 1, int(seed), real_time_share=share)[-1]]
 
 
+def judged(case: Case) -> tuple[Case, Verdict, str]:
+    """Play a case; also what ``--case`` tells."""
+    record = play(case)
+    told = f"{case} {record.trips} {record.early_reset} {record.late_reset}"
+    return case, judge(record), told
+
+
+def each(found: Sequence[Case], jobs: int) -> Iterator[tuple[Case, Verdict, str]]:
+    """Play cases in ``jobs`` processes; they come in their order."""
+    if jobs == 1:
+        yield from map(judged, found)
+        return
+    # Ctrl-C is this process's affair: leaving the pool ends the others at once.
+    alone = multiprocessing.get_context("spawn")
+    with alone.Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        coming = pool.imap(judged, found)
+        for _ in found:
+            yield coming.next(_LONGEST)
+
+
 def main() -> int:
     """Exit 1 where a case failed."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -93,20 +119,27 @@ def main() -> int:
     parser.add_argument("--case", help="play one case, SEED/NUMBER, and tell it")
     parser.add_argument("--realtime-share", type=float, default=0.0)
     parser.add_argument("--limit", type=float, default=math.inf, help="end after so long, s")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     begin = time.perf_counter()
     played: list[tuple[Case, Verdict]] = []
-    for case in chosen(arguments):
-        if time.perf_counter() - begin > arguments.limit:
-            break
-        record = play(case)
-        verdict = judge(record)
-        played.append((case, verdict))
-        if arguments.case is not None:
-            print(case, record.trips, record.early_reset, record.late_reset, file=sys.stderr)
-        if not verdict.good or arguments.case is not None:
-            print(f"{case.seed} {[f.kind for f in case.faults]}: {verdict}", file=sys.stderr)
+    coming = each(chosen(arguments), arguments.jobs)
+    try:
+        for case, verdict, told in coming:
+            played.append((case, verdict))
+            if arguments.case is not None:
+                print(told, file=sys.stderr)
+            if not verdict.good or arguments.case is not None:
+                kinds = [fault.kind for fault in case.faults]
+                print(f"{case.seed} {kinds}: {verdict}", file=sys.stderr)
+            if time.perf_counter() - begin > arguments.limit:
+                break
+    except KeyboardInterrupt:
+        print(f"interrupted after {len(played)} cases", file=sys.stderr)
+        return 130
+    finally:
+        coming.close()
     found = summary(played, time.perf_counter() - begin)
     if arguments.json:
         print(json.dumps(found))

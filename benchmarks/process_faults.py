@@ -3,7 +3,10 @@
     python benchmarks/process_faults.py --times 25 --json
 
 The drive is the slave of tests/slave, which shares no code with winchkit, in a thread of this
-process; the bench is open in another process, which jogs. CAN between them is UDP multicast. Each
+process; the bench is open in another process, which jogs. CAN between them is UDP multicast.
+SIGTERM, SIGHUP and a closed terminal meet ``winchkit jog`` beside ``winchkit log``: ramp without
+quick stop, exit code, a log that is whole up to rest. A full disk (a tmpfs) stops nothing, is told
+in a warning, and leaves whole rows. Each
 case: the drive has left operation enabled (or ramps down) no later than the bound of its fault,
 and stands still a ramp later. ``lateness`` is by how much this process itself was late meanwhile.
 Exits 1 where one drive stopped too late.
@@ -21,9 +24,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from process_commands import COMMAND_FAULTS, Commands, NotMoving, log_problems
 
 TESTS = Path(__file__).parents[1] / "tests"
 sys.path.insert(0, str(TESTS))
@@ -46,7 +55,17 @@ PATIENCE = 30.0
 HEARTBEAT = "100 ms"
 ATTEMPTS = 5
 """A bench that stopped before the fault, since this computer stood still, is opened anew."""
-FAULTS = ("SIGKILL", "SIGSTOP", "loop hung", "key repeat stalled")
+DISK_FULL = "disk full"
+OWNER_FAULTS = ("SIGKILL", "SIGSTOP", "loop hung", "key repeat stalled", DISK_FULL)
+FAULTS = (*OWNER_FAULTS, *COMMAND_FAULTS)
+RAMPED = DEAD_MAN + SPEED / ACCELERATION + FIRST_STOP + SETTLING
+RAMP_ENDS = 15.0
+"""Of the motor, rad/s: a drive may be disabled while it creeps."""
+RAMP_RATE = ACCELERATION / 0.06 * 20.4
+"""Of the motor, rad/s^2: by so much its speed changes while this process is late."""
+MOVES_ON = 2.0
+"""Beside a full disk, s: longer than a log takes to find it."""
+DISK = "512k"
 
 
 class OwnerStopped(Exception):
@@ -61,15 +80,20 @@ class Stop:
     rest: float
     allowed: float
     lateness: float
+    problems: tuple[str, ...] = ()
+    """What was wrong besides the time: exit code, log, warning, way of stopping."""
 
     @property
     def in_time(self) -> bool:
         """Whether it stopped as it must."""
-        return self.rest <= self.allowed + self.lateness
+        return self.rest <= self.allowed + self.lateness and not self.problems
 
 
-def owner(bench_file: str) -> None:
-    """Jog until told otherwise: SIGUSR1 lets the control loop hang, SIGUSR2 ends the repeats."""
+def owner(bench_file: str, disk: str = "") -> None:
+    """Jog until told otherwise: SIGUSR1 lets the control loop hang, SIGUSR2 ends the repeats.
+
+    With a ``disk`` it logs there, SIGUSR1 fills the disk, and stdout gets the warnings.
+    """
     from winchkit import open_bench
     from winchkit.bench.control.snapshot import BenchSnapshot
     from winchkit.errors import WinchkitError
@@ -83,14 +107,119 @@ def owner(bench_file: str) -> None:
             time.sleep(1.0)
 
     with open_bench(bench_file) as bench:
-        bench.on_cycle(hang)
+        if disk:
+            bench.log(Path(disk) / "full.csv")
+        else:
+            bench.on_cycle(hang)
+        shown = 0
         while True:
-            if not told:
+            if disk and signal.SIGUSR1 in told and not (Path(disk) / "filler").exists():
+                fill(Path(disk) / "filler")
+            for warning in bench.snapshot.warnings[shown:]:
+                print(warning, flush=True)
+                shown += 1
+            if signal.SIGUSR2 not in told and (disk or not told):
                 try:
                     bench.winch["A"].jog(pay_out=SPEED)
                 except WinchkitError as error:
                     sys.exit(str(error))
             time.sleep(0.05)
+
+
+def fill(path: Path) -> None:
+    """Take all that is left of a file system."""
+    with suppress(OSError), path.open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+    with suppress(OSError), path.open("ab", buffering=0) as file:
+        while True:
+            file.write(b"0")
+
+
+def command_trial(running: SlavesOnBus, bench_file: Path, fault: str, moment: float) -> Stop:
+    """Commands of the command line, and their fault."""
+    slave = running.slaves[0]
+    with Commands(bench_file, bench_file.with_name("lift.csv"), fault, SPEED) as commands:
+        try:
+            commands.move(lambda: abs(slave.motor.velocity) > 60, moment)
+        except NotMoving as error:
+            raise OwnerStopped(str(error)) from error
+        running.worst_gap = 0.0
+        commands.inject()
+        rest, seen = until_rest(running)
+        problems = list(commands.problems(running.worst_gap))
+    late = RAMP_ENDS + RAMP_RATE * running.worst_gap
+    if seen.get(State.QUICK_STOP, 0.0) > late:
+        problems.append(f"quick stop at {seen[State.QUICK_STOP]:.1f} rad/s and not the ramp")
+    return Stop(fault, rest, RAMPED, running.worst_gap, tuple(problems))
+
+
+def until_rest(running: SlavesOnBus) -> tuple[float, dict[State, float]]:
+    """Time until the drive stands still and is not enabled, s; speed at which each state began."""
+    slave, start = running.slaves[0], time.monotonic()
+    seen: dict[State, float] = {}
+    while not (abs(slave.motor.velocity) < REST and slave.power.state is not State.ENABLED):
+        seen.setdefault(slave.power.state, abs(slave.motor.velocity))
+        if time.monotonic() - start > PATIENCE:
+            break
+        time.sleep(0.001)
+    return time.monotonic() - start, seen
+
+
+def disk_trial(running: SlavesOnBus, bench_file: Path, moment: float) -> Stop:
+    """A full disk disturbs no motion; the key is released afterwards."""
+    slave, disk = running.slaves[0], bench_file.with_name("disk")
+    disk.mkdir(exist_ok=True)
+    mount = f'mount -t tmpfs -o size={DISK} tmpfs {disk} || exit 99; exec "$0" "$@"'
+    process = subprocess.Popen(
+        [
+            *("unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mount),
+            *(sys.executable, __file__, "--owner", str(bench_file), "--disk", str(disk)),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        await_motion(running, process)
+        time.sleep(0.5 + moment)
+        running.worst_gap, slowest = 0.0, float("inf")
+        os.kill(process.pid, signal.SIGUSR1)
+        end = time.monotonic() + MOVES_ON
+        while time.monotonic() < end:
+            slowest = min(slowest, abs(slave.motor.velocity))
+            time.sleep(0.005)
+        os.kill(process.pid, signal.SIGUSR2)
+        rest, _ = until_rest(running)
+        log = bench_file.with_name("full.csv")
+        log.write_bytes(Path(f"/proc/{process.pid}/root{disk}/full.csv").read_bytes())
+    finally:
+        process.kill()
+        told, words = process.communicate()
+    problems = list(disk_problems(told, slowest, log, running.worst_gap))
+    if process.returncode != -signal.SIGKILL:
+        problems.append(f"it ended with {process.returncode}: {words}")
+    time.sleep(1.0)
+    return Stop(DISK_FULL, rest, RAMPED, running.worst_gap, tuple(problems))
+
+
+def disk_problems(told: str, slowest: float, log: Path, lateness: float) -> Iterator[str]:
+    """What a full disk did that it must not do."""
+    if slowest < 60:
+        yield f"the motor fell to {slowest:.1f} rad/s beside a full disk"
+    if "logging failed" not in told or "No space left" not in told:
+        yield f"no warning of the full disk: {told!r}"
+    yield from log_problems(log, None, lateness, to_rest=False)
+
+
+def await_motion(running: SlavesOnBus, process: subprocess.Popen[str]) -> None:
+    """Return when the motor turns; raises OwnerStopped."""
+    deadline = time.monotonic() + PATIENCE
+    while abs(running.slaves[0].motor.velocity) < 60:
+        if process.poll() is not None or time.monotonic() > deadline:
+            process.kill()
+            raise OwnerStopped(process.communicate()[1])
+        time.sleep(0.005)
 
 
 def trial(running: SlavesOnBus, bench_file: Path, fault: str, moment: float) -> Stop:
@@ -100,14 +229,10 @@ def trial(running: SlavesOnBus, bench_file: Path, fault: str, moment: float) -> 
         [sys.executable, __file__, "--owner", str(bench_file)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
+        text=True,
     )
     try:
-        deadline = time.monotonic() + PATIENCE
-        while abs(slave.motor.velocity) < 60:
-            if process.poll() is not None or time.monotonic() > deadline:
-                words = process.stderr.read().decode() if process.stderr else ""
-                raise OwnerStopped(words)
-            time.sleep(0.005)
+        await_motion(running, process)
         time.sleep(moment)
         with running.lock:
             consumer = (slave.objects.get(0x1016, 1) & 0xFFFF) * 1e-3
@@ -116,19 +241,12 @@ def trial(running: SlavesOnBus, bench_file: Path, fault: str, moment: float) -> 
         signals = {"SIGKILL": signal.SIGKILL, "SIGSTOP": signal.SIGSTOP}
         signals |= {"loop hung": signal.SIGUSR1, "key repeat stalled": signal.SIGUSR2}
         os.kill(process.pid, signals[fault])
-        start = time.monotonic()
-        while not (abs(slave.motor.velocity) < REST and slave.power.state is not State.ENABLED):
-            if time.monotonic() - start > PATIENCE:
-                break
-            time.sleep(0.001)
-        rest = time.monotonic() - start
+        rest, _ = until_rest(running)
     finally:
         process.send_signal(signal.SIGKILL)
         process.communicate()
-    if fault == "key repeat stalled":
-        allowed = DEAD_MAN + SPEED / ACCELERATION + FIRST_STOP + SETTLING
-    else:
-        allowed = consumer + speed / RAMP + SETTLING
+    silent = consumer + speed / RAMP + SETTLING
+    allowed = RAMPED if fault == "key repeat stalled" else silent
     time.sleep(1.0)
     return Stop(fault, rest, allowed, running.worst_gap)
 
@@ -143,6 +261,10 @@ def case(bench_file: Path, text: str, port: int, fault: str, moment: float) -> S
         slaves = [Slave.from_file(GENERIC, 1)]
         with SlavesOnBus(slaves, GROUP, "udp_multicast", port=port) as running:
             try:
+                if fault in COMMAND_FAULTS:
+                    return command_trial(running, bench_file, fault, moment)
+                if fault == DISK_FULL:
+                    return disk_trial(running, bench_file, moment)
                 return trial(running, bench_file, fault, moment)
             except OwnerStopped as error:
                 words = str(error)
@@ -153,13 +275,14 @@ def main() -> None:
     """Run the cases."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--owner", help=argparse.SUPPRESS)
+    parser.add_argument("--disk", default="", help=argparse.SUPPRESS)
     parser.add_argument("--times", type=int, default=25, help="cases of each fault")
     parser.add_argument("--faults", nargs="*", default=list(FAULTS), choices=FAULTS)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     if options.owner:
-        owner(options.owner)
+        owner(options.owner, options.disk)
         return
     chance = random.Random(options.seed)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -195,7 +318,7 @@ def report(stops: list[Stop], *, as_json: bool) -> None:
         print(json.dumps({"schema": 1, "faults": found}))
         return
     for fault, row in found.items():
-        print(f"{fault:20s} {row['stopped']} of {row['cases']} in time, worst {row['worst_s']} s")
+        print(f"{fault:28s} {row['stopped']} of {row['cases']} right, worst {row['worst_s']} s")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ __all__ = ["IndependentDrive", "replace_drives"]
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
 from slave import Declared, Slave
-from slave.frames import Frame
+from slave.frames import Frame, kind_from_host
 from slave.power import State
 
 _EDS = Path(__file__).parents[2] / "devices" / "generic-cia402" / "generic-cia402.eds"
@@ -63,6 +63,13 @@ class IndependentDrive:
     def velocity(self) -> float:
         """Of its motor, rad/s."""
         return float(self.slave.motor.velocity)
+
+    def hears(self, identifier: int, data: bytes) -> bool:
+        """Whether it takes a frame of the host's kind that reaches it now."""
+        slave = self.slave
+        rpdos = slave.pdos.identifiers(0x1400)
+        kind, number = kind_from_host(Frame(identifier, data), self.node, rpdos)
+        return not slave._loses("unheard", kind, number)
 
     def advance(self, now: float) -> None:
         """Let time pass until ``now``."""

@@ -18,8 +18,8 @@ _MOVES = 0.004
 _SETTLES = 0.05
 """The brake and the drive's filters take this long beside v/a, s."""
 _DEAD_MAN = 0.2
-_FLUSH = {"csv": 0.3}
-"""What a log may lack at its end, s: rows that wait for the next sample of every channel."""
+_FLUSH = 0.05
+"""What a closed log may lack at its end, s: the filter, conversion and poll of the load cell."""
 _NOISE = 15.0
 """Above the true tension at which the cell's noise may trip, and oscillations, N."""
 
@@ -205,6 +205,6 @@ def _judge_log(record: Record) -> str:
     if record.log_error and not full:
         return record.log_error
     end = min(full) if full else record.ended
-    if not record.log_end >= end - _FLUSH["csv"] - (1.0 if full else 0.0):
+    if not record.log_end >= end - _FLUSH - (1.0 if full else 0.0):
         return f"the log ends {end - record.log_end:.2f} s early {record.log_error}"
     return ""

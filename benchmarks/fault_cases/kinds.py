@@ -73,7 +73,7 @@ def _node(world: World, winch: str) -> int:
 
 def _nmt(command: int) -> Begin:
     def begin(world: World, winch: str) -> None:
-        world.inject_frame(0x000, bytes((command, _node(world, winch))))
+        world.inject_frame(winch, 0x000, bytes((command, _node(world, winch))))
 
     return begin
 
@@ -84,7 +84,7 @@ def _write(index: int, size: int, value: int) -> Begin:
     def begin(world: World, winch: str) -> None:
         head = {1: 0x2F, 2: 0x2B}[size]
         data = bytes((head, index & 0xFF, index >> 8, 0)) + value.to_bytes(4, "little")
-        world.inject_frame(0x600 + _node(world, winch), data)
+        world.inject_frame(winch, 0x600 + _node(world, winch), data)
 
     return begin
 
@@ -204,20 +204,20 @@ def _recorder(world: World, winch: str) -> None:
         recorder._log.write = full  # type: ignore[method-assign]
 
 
+_MASTER = ("second master", "state")
 _WIRES = ("nmt", "boot-up", "heartbeat", "feedback", "state", "fault", "deaf")
 _LOST = ("feedback", "heartbeat", "state", "fault", "nmt", "slowing down", "deviation", "deaf")
 
 _ROWS = (
     Kind("enable input open", _drive("enable input open"), ("state",), least=0.0),
-    Kind("second master: 6040h = 00h", _write(0x6040, 2, 0x00), ("state",), least=0.0),
-    # With 605Bh = 1 it begins a ramp that the next control word of the host ends again.
-    Kind("second master: 6040h = 06h", _write(0x6040, 2, 0x06), ("state",), stops=False),
-    Kind("second master: 6040h = 02h", _write(0x6040, 2, 0x02), ("state",), least=0.0),
-    Kind("second master: 6060h = 1", _write(0x6060, 1, 1), ("mode",), stops=False),
-    Kind("stranger: NMT pre-operational", _nmt(0x80), _WIRES, least=0.0),
-    Kind("stranger: NMT stopped", _nmt(0x02), _WIRES, least=0.0),
-    Kind("stranger: NMT reset node", _nmt(0x81), _WIRES, least=0.0),
-    Kind("stranger: NMT reset communication", _nmt(0x82), _WIRES, least=0.0),
+    Kind("second master: 6040h = 00h", _write(0x6040, 2, 0x00), _MASTER, least=0.0),
+    Kind("second master: 6040h = 06h", _write(0x6040, 2, 0x06), _MASTER, least=0.0),
+    Kind("second master: 6040h = 02h", _write(0x6040, 2, 0x02), _MASTER, least=0.0),
+    Kind("second master: 6060h = 1", _write(0x6060, 1, 1), (*_MASTER, "mode"), least=0.0),
+    Kind("stranger: NMT pre-operational", _nmt(0x80), ("second master", *_WIRES), least=0.0),
+    Kind("stranger: NMT stopped", _nmt(0x02), ("second master", *_WIRES), least=0.0),
+    Kind("stranger: NMT reset node", _nmt(0x81), ("second master", *_WIRES), least=0.0),
+    Kind("stranger: NMT reset communication", _nmt(0x82), ("second master", *_WIRES), least=0.0),
     Kind("reboot", _drive("reboot"), _WIRES, least=0.0),
     Kind("RPDO 1 lost", _lost(0x200), _LOST, stops=False),
     Kind("RPDOs lost", _lost(0x200, 0x300, 0x400, 0x500), _LOST, stops=False),

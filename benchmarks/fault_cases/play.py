@@ -13,9 +13,11 @@ from pathlib import Path
 from fault_cases.case import Case, Planned
 from fault_cases.kinds import KINDS
 from fault_cases.operator import Operator
-from fault_cases.world import Sample, World, opened_world
+from fault_cases.world import Sample, Strange, World, opened_world
 from winchkit.bench.control.snapshot import BenchSnapshot
+from winchkit.bench.recording.recorder import Recorder
 from winchkit.runs import read_run
+from winchkit.runs.recording.rows import RowLog
 
 __all__ = ["Record", "play"]
 
@@ -33,6 +35,11 @@ class Record:
     case: Case
     begun: float = 0.0
     onsets: list[tuple[Planned, float]] = field(default_factory=list)
+    """Faults that came to be, and when, s."""
+    unheard: list[Planned] = field(default_factory=list)
+    """Frames of strangers that the drive did not hear: nothing happened to it."""
+    frames: list[tuple[tuple[Planned, float], Strange]] = field(default_factory=list)
+    """The stranger's frame of a fault that is one."""
     mended: float = 0.0
     reset: float = math.inf
     """When the first reset that succeeded began, or the last one, s."""
@@ -48,6 +55,7 @@ class Record:
     early_reset: str = ""
     late_reset: str = ""
     logged_from: float = 0.0
+    """Moment of the log's first row, s."""
     log_end: float = 0.0
     """Time of the log's last row, s; NaN where it could not be read."""
     log_error: str = ""
@@ -72,6 +80,8 @@ def play(case: Case) -> Record:
             ) as world:
                 _play(world, record)
                 record.truth = world.truth
+        except KeyboardInterrupt:
+            raise
         except BaseException as error:  # noqa: BLE001 - a case that breaks is told as one
             known = record.failure is not None and error is record.failure
             record.error = "" if known else f"{type(error).__name__}: {error}"
@@ -82,7 +92,6 @@ def play(case: Case) -> Record:
 def _play(world: World, record: Record) -> None:
     case, clock, bench = record.case, world.clock, world.bench
     recorder = bench.log(world.folder / "case.csv")
-    record.logged_from = world.now
     bench.on_cycle(partial(_note_trip, record))
     clock.sleep(0.2)
     record.begun = world.now
@@ -115,11 +124,16 @@ def _play(world: World, record: Record) -> None:
     record.pressed = world.now
     _press(world, case)
     record.ended = world.now
+    record.logged_from = _first_row(recorder)
     try:
         recorder.close()
     except Exception as error:  # noqa: BLE001 - a full disk is told here
         record.log_error = str(error)
     world.sample()
+    for onset, frame in record.frames:
+        if frame.heard is False:
+            record.onsets.remove(onset)
+            record.unheard.append(onset[0])
     record.moved_again = any(
         abs(sample.velocity) > 0.5
         for samples in world.truth.values()
@@ -134,11 +148,14 @@ def _schedule(
     """Let the faults come at their times; the last of these, s."""
 
     def begin(fault: Planned) -> None:
-        record.onsets.append((fault, world.now))
+        onset = (fault, world.now)
+        record.onsets.append(onset)
         if fault.kind == "released":
             operator.holds = False
             return
+        sent = len(world.strange)
         end = KINDS[fault.kind].begin(world, fault.winch)
+        record.frames += [(onset, frame) for frame in world.strange[sent:]]
         if end is None:
             return
         if fault.span is None:
@@ -167,6 +184,13 @@ def _press(world: World, case: Case) -> None:
                 continue
         world.clock.sleep(0.05)
     world.clock.sleep(0.4)
+
+
+def _first_row(recorder: Recorder) -> float:
+    """When the first row of a log of rows was sampled, s: from there its time counts."""
+    log = recorder._log
+    assert isinstance(log, RowLog), "a case is logged as rows"
+    return math.nan if log._aligner.start is None else log._aligner.start
 
 
 def _trips(world: World) -> list[tuple[str, str]]:

@@ -8,16 +8,21 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from heapq import heappop, heappush
 from itertools import count
 from pathlib import Path
+from random import Random
+from unittest.mock import patch
 
 import can
 
 from fault_cases.independent_drive import IndependentDrive, replace_drives
 from winchkit.bench.bench import Bench, open_bench
+from winchkit.drivers.modbus import client
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.nmt import NmtState
 from winchkit.sim.drive.power import Order
 from winchkit.sim.drive.power import State as SimState
 from winchkit.sim.live.bench import LiveBench
@@ -25,7 +30,7 @@ from winchkit.sim.live.buses import Carried
 from winchkit.sim.live.paced_clock import PacedClock
 from winchkit.testing.declared import declared
 
-__all__ = ["HEARTBEAT", "LIMITS", "Sample", "World", "opened_world"]
+__all__ = ["HEARTBEAT", "LIMITS", "Sample", "Strange", "World", "opened_world"]
 
 HEARTBEAT = 0.05
 LIMITS = {"speed": 0.6, "acceleration": 1.5, "tension_high": 400.0, "tension_slack": 15.0}
@@ -52,6 +57,17 @@ class Sample:
 
 
 @dataclass
+class Strange:
+    """A frame of a stranger to one winch's drive."""
+
+    winch: str
+    identifier: int
+    data: bytes
+    heard: bool | None = None
+    """Whether the drive took it from the bus; None before it has come that far."""
+
+
+@dataclass
 class World:
     """An open bench, what is true of it, and what can be done to it from outside."""
 
@@ -60,7 +76,8 @@ class World:
     folder: Path
     bench: Bench
     truth: dict[str, list[Sample]] = field(default_factory=dict)
-    frames: list[Carried] = field(default_factory=list)
+    strange: list[Strange] = field(default_factory=list)
+    """Frames of strangers, in their order."""
     _later: list[tuple[float, int, Callable[[], None]]] = field(default_factory=list)
     _order: count[int] = field(default_factory=count)
     _stopping: threading.Event = field(default_factory=threading.Event)
@@ -83,8 +100,12 @@ class World:
         else:
             heappush(self._later, (moment, next(self._order), function))
 
-    def inject_frame(self, identifier: int, data: bytes) -> None:
-        """A stranger on the bus sends a frame."""
+    def inject_frame(self, winch: str, identifier: int, data: bytes) -> None:
+        """A stranger on the bus sends a frame to the drive of a winch."""
+        self.strange.append(Strange(winch, identifier, data))
+        wire = self.live.wire["can"]
+        if self._note_heard not in wire.taps:
+            wire.taps.append(self._note_heard)
         if self.simulated is not None:
             self.live._ports["can"].inject(identifier, data)  # type: ignore[union-attr]
             return
@@ -95,8 +116,6 @@ class World:
 
     def begin_sampling(self) -> None:
         """Note from now on what is true."""
-        for wire in self.live.wire.values():
-            wire.taps.append(self.frames.append)
         self.truth = {name: [] for name in self.live.winches}
         if self.simulated is not None:
             self._sample_and_go_on()
@@ -121,6 +140,15 @@ class World:
                     Sample(now, velocity, speed, plant.tension, enabled, follows)
                 )
 
+    def _note_heard(self, carried: Carried) -> None:
+        """A frame arrives: where it is a stranger's, note whether the drive takes it."""
+        for one in self.strange:
+            same = (one.identifier, one.data) == (carried.identifier, carried.data)
+            if one.heard is None and same and not carried.from_drive:
+                drive = self.live.winches[one.winch].drive
+                one.heard = not carried.lost and _hears(drive, carried)
+                return
+
     def _sample_and_go_on(self) -> None:
         if not self._stopping.is_set():
             self.sample()
@@ -134,12 +162,28 @@ class World:
             time.sleep(_SAMPLED)
 
 
+def _hears(drive: SimDrive | IndependentDrive, carried: Carried) -> bool:
+    """Whether a drive takes a frame: not off the bus, nor while it boots."""
+    if isinstance(drive, IndependentDrive):
+        return drive.hears(carried.identifier, carried.data)
+    return not drive._line.cut and drive.nmt is not NmtState.BOOTING
+
+
 def _seen(drive: SimDrive | IndependentDrive, velocity: float) -> tuple[bool, bool, float]:
     """Whether a drive is enabled, whether it follows set-points, and how fast its motor turns."""
     if isinstance(drive, IndependentDrive):
         return drive.enabled, drive.follows, drive.velocity
     enabled = drive.state is SimState.OPERATION_ENABLED
     return enabled, enabled and drive._power.order is Order.FOLLOW, velocity
+
+
+@contextmanager
+def _drawn_alike(seed: int) -> Iterator[None]:
+    """Modbus clients draw their first transaction from the seed: a chance likeness of a reply's
+    bytes to a transaction breaks a connection, and a case must be the same whenever it is played.
+    """
+    with patch.object(client, "Random", partial(Random, seed)):
+        yield
 
 
 @contextmanager
@@ -169,7 +213,7 @@ def opened_world(
         if isinstance(clock, PacedClock)
         else LiveBench(bench, seed=number, simulated_time=clock)
     )
-    with live:
+    with live, _drawn_alike(number):
         if independent:
             replace_drives(live)
         opened = open_bench(live.bench_spec, clock)

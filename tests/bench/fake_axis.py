@@ -61,6 +61,7 @@ class FakeAxis:
     hears_sdos: bool = True
     moves_alone: bool = False
     stops_on_nmt: bool = False
+    second_master: str = ""
     nmt_text: str = "operational"
     alarms: tuple[int, ...] = ()
     alarm_text: str = ""
@@ -68,7 +69,10 @@ class FakeAxis:
     sdo_state: State | None = None
     sdo_stops: int = 0
     torque: float = 0.0
+    lag: float = 0.0
+    """Time constant with which its speed follows, s."""
     feedback: AxisFeedback | None = None
+    _target: float = 0.0
     _sync: tuple[int, float] = (0, 0.0)
     _last: float | None = None
 
@@ -97,6 +101,8 @@ class FakeAxis:
                 self.state = State.SWITCH_ON_DISABLED
         elif self.state is not State.OPERATION_ENABLED:
             self.velocity = 0.0
+        elif self.lag:
+            self.velocity += (self._target - self.velocity) * -math.expm1(-step / self.lag)
         self.angle += self.velocity * step
         self.feedback = AxisFeedback(
             self._sync[1], self._sync[0], self.state, 0, self.angle, self.velocity, self.torque
@@ -125,7 +131,8 @@ class FakeAxis:
             self.state = State.QUICK_STOP_ACTIVE
         self.state = _NEXT.get((self.state, word), self.state)
         if self.state is State.OPERATION_ENABLED and word & 0x0F == 0x0F:
-            self.velocity = velocity
+            self._target = velocity
+            self.velocity = velocity if not self.lag else self.velocity
             if self.position_mode and angle is not None:
                 self.velocity = 25.0 * (angle - self.angle)
         return word

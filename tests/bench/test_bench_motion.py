@@ -60,6 +60,37 @@ def test_a_jog_slows_down_before_a_length_limit() -> None:
     assert not rig.supervisor.tripped
 
 
+@pytest.mark.parametrize("pays_out", [True, False])
+@pytest.mark.parametrize(
+    ("speed", "acceleration", "response", "lag"),
+    [
+        (0.45, 1.5, 0.06, 0.027),
+        (0.45, 1.5, 0.06, 0.001),
+        (0.1, 0.3, 0.06, 0.027),
+        (1.0, 3.0, 0.1, 0.045),
+        (1.0, 1.0, 0.2, 0.08),
+        (0.6, 2.0, 0.02, 0.009),
+    ],
+)
+def test_a_held_jog_stays_within_its_length_whatever_lag_is_declared(
+    speed: float, acceleration: float, response: float, lag: float, pays_out: bool
+) -> None:
+    """Cases 172/91 and 172/148: at 0.45 m/s a lag of 27 ms ran past the limit, and tripped."""
+    limits = LimitSpec(speed, acceleration, (3.0, 5.0), response_time=response)
+    rig = Rig(limits)
+    rig.axes["A"].lag = lag
+    source = jog(rig, -speed if pays_out else speed)
+    lengths = []
+    for _ in range(round((1.0 / speed + speed / acceleration + 1.0) / 0.1)):
+        source.refresh(-speed if pays_out else speed, rig.now + DEAD_MAN)
+        rig.run(0.1)
+        lengths.append(4.0 - 0.005 * rig.axes["A"].angle)
+    assert not rig.supervisor.tripped
+    assert min(lengths) >= 3.0 - 1e-3
+    assert max(lengths) <= 5.0 + 1e-3
+    assert abs(lengths[-1] - (5.0 if pays_out else 3.0)) < 0.015, "it goes as far as it may"
+
+
 @pytest.mark.parametrize("position_mode", [False, True])
 @pytest.mark.parametrize("target", [3.0, 4.8, 4.0])
 def test_a_move_arrives(target: float, position_mode: bool) -> None:

@@ -101,6 +101,18 @@ def test_a_cell_whose_noise_flips_the_last_digit_only_may_stand_still() -> None:
     assert not any(watch(edge + [1001.0] * 1000))
 
 
+@pytest.mark.parametrize("division", [0.01, 1.0, 10.0])
+def test_noise_is_judged_by_the_division_of_the_counts(division: float) -> None:
+    """Noise below the division may cease in the middle of a step; noise above it may not."""
+    random = Random(5)
+    edge = [division * random.choice((100, 101)) for _ in range(2000)]
+    assert not any(watch(edge + [101 * division] * 1000))
+    noisy = [division * round(random.gauss(1000, 3)) for _ in range(1000)]
+    told = watch(noisy + [noisy[-1]] * 100)
+    assert not any(told[:1000])
+    assert told[-1]
+
+
 def test_a_cell_that_was_quiet_before_is_not_frozen_when_quiet_again() -> None:
     random = Random(3)
     noisy = [float(round(random.gauss(1000, 3))) for _ in range(1000)]

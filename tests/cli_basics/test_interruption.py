@@ -74,3 +74,20 @@ def test_a_library_installs_no_handler() -> None:
         "assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL\n"
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_what_computes_in_threads_ends_with_the_code_of_its_signal(number: int, code: int) -> None:
+    done = run(
+        "import os, signal, time\n"
+        f"signal.signal({int(number)}, signal.default_int_handler if {int(number)} == 2 else "
+        "signal.SIG_DFL)\n"
+        "from winchkit.bench.remote.interruption import interrupted_by_signals\n"
+        "from winchkit.cli.core.outcome import threads_abandoned\n"
+        "with interrupted_by_signals(), threads_abandoned():\n"
+        f"    os.kill(os.getpid(), {int(number)})\n"
+        "    time.sleep(10)\n"
+    )
+    assert done.returncode == code, done.stderr

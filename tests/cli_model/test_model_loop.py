@@ -124,7 +124,7 @@ def errors(profile: Path, physics: str, load: float) -> tuple[float, float]:
                 advance(plant, rope, angle)
         seen = plant.measure()
         missed = max(missed, abs(plant.cable_length - target))
-        force = max(force, abs(rope.tension(seen.tension, float("nan")) - plant.load))
+        force = max(force, abs(seen.tension + rope.correction - plant.load))
     return missed, force
 
 

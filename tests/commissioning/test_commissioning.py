@@ -57,6 +57,8 @@ def test_motion_waits_for_the_record_and_ends_with_a_changed_drive(
         assert loss.stopped_after is not None
         assert 0.14 < loss.stopped_after < 0.25 + 0.01
         assert loss.stopped_moving_after is not None
+        direction = next(one for one in winch.confirmed if one.item == "direction")
+        assert direction.measured["commanded"] * direction.measured["moved"] > 0
         assert winch.stops_on_nmt
         assert {"brake", "host loss", "direction", "units", "limits"} <= winch.items
         assert any("did the motor make one turn" in line for line in said)
@@ -189,3 +191,52 @@ def test_check_and_monitor_say_which_item_is_missing(
         status = LocalStation(opened).status()
         assert "there is no commissioning record" in status["not_commissioned"]
         assert "there is no commissioning record" in str(status_table(status).caption)
+
+
+def test_a_brake_is_not_tried_on_a_drive_that_stays_enabled(tmp_path: Path) -> None:
+    """The drive that does not take up its disabling holds the load itself."""
+    path = write_bench(tmp_path)
+    with served(path) as bench:
+        power, take = bench.slave.power, bench.slave.power.take
+        bench.answers.write_text(
+            ANSWERS.replace('brake = "unloaded"', 'brake = "brake"\nbrake_held = "yes"')
+        )
+
+        stuck: list[float] = []
+
+        def obstinate(word: int) -> None:
+            if power.state is State.ENABLED and not word & 0x8:
+                stuck.append(bench.rig.time)
+            if not stuck or bench.rig.time > stuck[0] + 2.2:
+                take(word)
+
+        power.take = obstinate  # type: ignore[method-assign]
+        with pytest.raises(NotPermitted, match=r"is operation enabled; the brake cannot be tried"):
+            commissioned(bench)
+        assert not bench.record.exists()
+        assert bench.slave.power.state is State.SWITCH_ON_DISABLED
+
+
+def test_the_trial_in_motion_needs_room_for_its_whole_way(tmp_path: Path) -> None:
+    path = write_bench(tmp_path)
+    path.write_text(path.read_text().replace('["0.5 m", "4.7 m"]', '["3.98 m", "4.7 m"]'))
+    with served(path) as bench:
+        bench.answers.write_text(ANSWERS.replace('try_in_motion = "no"', 'try_in_motion = "yes"'))
+        before = bench.slave.motor.angle
+        with pytest.raises(NotPermitted, match=r"below the limit 3\.98 m; pay out first"):
+            commissioned(bench)
+        assert bench.slave.motor.angle == pytest.approx(before, abs=1e-3)
+        assert not bench.record.exists()
+
+
+def test_a_device_file_that_changes_meanwhile_ends_in_no_record(tmp_path: Path) -> None:
+    path = write_bench(tmp_path)
+    with served(path) as bench:
+
+        def edit(text: str) -> None:
+            if "limits" in text:
+                bench.device.write_text(bench.device.read_text() + "\n# edited\n")
+
+        with pytest.raises(NotPermitted, match=r"device\.toml changed meanwhile"):
+            commissioned(bench, edit)
+        assert not bench.record.exists()

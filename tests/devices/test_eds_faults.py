@@ -69,6 +69,8 @@ MENDED: list[tuple[str, str, str, str]] = [
     ("[6064]", "[DummyUsage]\nDummy0001=2\n[6064]", "Dummy0001", "neither 0 nor 1"),
     ("NrOfTXPDO=4", "NrOfTXPDO=4\nNrOfTXPDO=8", "NrOfTXPDO=8", "not used, the first counts"),
     ("2=0x1001", "2=0x1001\n2=0x1008", "2=0x1008", "has number 2 twice"),
+    ("2=0x1001", "²=0x1001\n²=0x1008", "²=0x1008", "has number ² twice"),
+    ("2=0x1001", f"{'9' * 5000}=0x1001\n{'9' * 5000}=2", "9" * 5000 + "=2", "twice, here"),
     ("[1000]", "[Comments]\nLines=1\n[Comments]\nLines=2\n[1000]", "[Comm", "a second time"),
 ]
 

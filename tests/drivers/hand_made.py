@@ -82,6 +82,10 @@ class Bus:
     def on(self, identifier: int, handler: Callable[[bytes, float], None]) -> None:
         self.handlers[identifier] = handler
 
+    def on_foreign(self, identifier: int, handler: Callable[[bytes, float], None]) -> None:
+        """Nothing that is sent comes back."""
+        self.on(identifier, handler)
+
     def send(self, identifier: int, data: bytes) -> None:
         self.sent.append((identifier, data))
 

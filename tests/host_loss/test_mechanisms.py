@@ -104,6 +104,29 @@ def test_with_6007h_or_a_fault_the_reaction_of_the_enabled_drive_is_known() -> N
         assert slave.power.state is State.SWITCH_ON_DISABLED
 
 
+def test_a_fault_that_stood_before_the_silence_proves_nothing() -> None:
+    """A drive in fault that does not watch its host stays in fault whoever falls silent."""
+    slave = drive()
+    with rig(slave) as bench:
+        slave.inject("monitoring fails")
+        slave.inject("drive fault")
+        slave.mend("drive fault")
+        assert slave.power.state is State.FAULT
+        with pytest.raises(NotPermitted, match="it was in fault before"):
+            bench.axis(generic()).commission()
+        assert slave.power.state is State.FAULT, "it is the operator's to reset"
+
+
+@pytest.mark.parametrize("silence", ["heartbeat", "rpdo"])
+def test_6007h_says_nothing_of_a_makers_watchdog(silence: str) -> None:
+    watchdog = VendorWatchdog(silence, (VendorObject("0x605E", value=2),))
+    with rig(drive()) as bench:
+        device = generic(host_loss="vendor:own", vendor_watchdog={"own": watchdog})
+        found = bench.axis(device).commission()
+        assert found.options["connection_lost"].value in (1, 2, 3)
+        assert not found.host_loss.certain
+
+
 def test_a_guarded_drive_sends_no_heartbeat_and_is_supervised_by_its_replies() -> None:
     slave = drive()
     with rig(slave) as bench:

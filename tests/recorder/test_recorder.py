@@ -68,6 +68,22 @@ def test_both_formats_hold_the_same_run(tmp_path: Path) -> None:
         assert runs[0][name][:shared] == pytest.approx(runs[1][name][:shared], abs=1e-6)
 
 
+@pytest.mark.parametrize("suffix", ["csv", "mcap"])
+def test_a_closed_log_goes_on_to_the_last_reading_of_its_load_cell(
+    tmp_path: Path, suffix: str
+) -> None:
+    """Whatever slower instruments had yet to say: the thermometer's next reading never comes."""
+    path = tmp_path / f"a.{suffix}"
+    with recording(path, "A") as (fed, recorder):
+        begin = fed.clock.time
+        fed.run(recorder, 2.09)
+    run = read_run(path)
+    last = run["motor_angle"][-1] / 3
+    assert last == pytest.approx(begin + 2.08 - DELAY, abs=1e-6)
+    assert np.isnan(run["temperature"][-1])
+    assert run.interval == pytest.approx(5 * CYCLE)
+
+
 def test_a_log_by_channels_loses_nothing(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with recording(path) as (fed, recorder):

@@ -136,3 +136,22 @@ def test_readings_out_of_order_make_no_rows() -> None:
     times = np.array([0.1, 0.3, 0.2, 0.3, math.nan, 0.35])
     aligner.add("/A/cell", times, np.column_stack([times, times]))
     assert aligner.rows(3.0)[:, 0] == pytest.approx([0.0, 0.2, 0.25])
+
+
+def test_the_end_of_a_log_waits_for_nothing_slower_than_its_rows() -> None:
+    slow = Source("/A/temperature", (Signal("temperature", "degC", "temperature"),), 1.0)
+    made = layout()
+    aligner = Aligner(Layout((*made.sources, slow), made.rule))
+    aligner.add("/A/drive", *samples(250, 0.0))
+    aligner.add("/A/cell", *samples(100, 0.0137, 2.99))
+    aligner.add("/A/temperature", np.arange(0.0, 2.9, 0.25), np.full((12, 1), 20.0))
+    before = aligner.rows(3.0)
+    assert before[-1, 0] + aligner.start <= 2.75, "a row that may still be complete waits"
+    rest = aligner.rows(3.0, ends=True)
+    times = rest[:, 0] + aligner.start
+    assert times[0] > 2.75
+    assert times[-1] == pytest.approx(2.9937), "every sample of the cell that the drive reaches"
+    assert np.diff(times) == pytest.approx(0.01)
+    assert rest[:, 1] == pytest.approx(10 * times)
+    assert np.isnan(rest[:, -1]).all(), "no temperature is invented"
+    assert not len(aligner.rows(3.0, ends=True))

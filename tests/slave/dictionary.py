@@ -5,7 +5,7 @@ from __future__ import annotations
 import configparser
 import re
 import struct
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -37,6 +37,8 @@ class Entry:
     value: bytes
     low: int | None = None
     high: int | None = None
+    _decoded: tuple[bytes, int] = field(default=(b"", 0), init=False, repr=False, compare=False)
+    """Value and number: the slave reads its objects in every step."""
 
     @property
     def size(self) -> int | None:
@@ -46,7 +48,11 @@ class Entry:
     @property
     def number(self) -> int:
         """The value of a whole number."""
-        return int.from_bytes(self.value, "little", signed=self.kind in SIGNED)
+        value, number = self._decoded
+        if value is not self.value:
+            number = int.from_bytes(self.value, "little", signed=self.kind in SIGNED)
+            self._decoded = (self.value, number)
+        return number
 
     @number.setter
     def number(self, value: int) -> None:

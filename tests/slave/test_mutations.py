@@ -120,6 +120,7 @@ _OUT = {"commanded": -0.1, "winding_speed": -0.1, "target_speed": math.nan}
 _OUT_UNMEASURED = {**_OUT, "length": math.nan}
 _STANDS = {"commanded": 0.0, "target_speed": math.nan}
 CASES = (
+    Case("second master", "", always(second_master="an SDO write of 6040h"), always()),
     Case("boot-up", "", always(boot_ups=2), always(boot_ups=1)),
     Case("heartbeat", "", always(heartbeat_lost=True), always()),
     Case("nmt", "", always(operational=False, nmt="pre-operational"), always()),

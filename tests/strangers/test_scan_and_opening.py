@@ -218,6 +218,28 @@ def test_a_full_queue_is_no_dead_bus_unless_it_stays_full(
         assert bus.fault
 
 
+def test_a_full_queue_leaves_a_guarding_poll_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    with opened(generic(1)) as (bus, _):
+        send = bus._port.send_remote
+
+        def full(_identifier: int) -> None:
+            raise OSError(errno.ENOBUFS, "no buffer space available")
+
+        monkeypatch.setattr(bus._port, "send_remote", full)
+        bus.remote(0x701)
+        assert (bus.unsent, bus.fault) == (1, None)
+        time.sleep(0.15)
+        monkeypatch.setattr(bus._port, "send_remote", send)
+        bus.remote(0x701)
+        monkeypatch.setattr(bus._port, "send_remote", full)
+        bus.remote(0x701)
+        assert bus.fault is None, "the queue was not full all the time"
+        time.sleep(0.15)
+        with pytest.raises(ConnectionLost):
+            bus.remote(0x701)
+        assert bus.fault
+
+
 def test_a_full_queue_delays_an_sdo_request(monkeypatch: pytest.MonkeyPatch) -> None:
     with opened(generic(1)) as (bus, _):
         axis = axis_on(bus)

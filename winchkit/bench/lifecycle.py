@@ -104,7 +104,17 @@ def clear_faults(loop: ControlLoop, clock: Clock) -> None:
         clock.sleep(_POLL)
 
 
-_UNHEARD = ("boot-up", "heartbeat", "nmt", "mode", "feedback", "deaf", "computer", "bus")
+_UNHEARD = (
+    "boot-up",
+    "heartbeat",
+    "nmt",
+    "mode",
+    "feedback",
+    "deaf",
+    "computer",
+    "bus",
+    "second master",
+)
 """Trips after which a drive may have lost its set-up."""
 
 
@@ -132,6 +142,9 @@ def _reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     assert loop.snapshot is not None, "an open bench has had a cycle"
     seen = loop.snapshot
     cleared = [str(trip) for trip in seen.tripped]
+    for axis in axes.values():
+        # What somebody else commands during the reset keeps it from succeeding.
+        axis.forget_second_master()
     troubled = {trip.winch for trip in (*seen.tripped, *seen.blocked) if trip.kind in _UNHEARD}
     if "" in troubled:
         troubled = {name for name in axes if axes[name].lost_set_up} | troubled - {""}

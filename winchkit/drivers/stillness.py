@@ -7,15 +7,19 @@ has never been so quiet before.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 __all__ = ["Stillness"]
 
 _BLOCK = 40
-"""Trials in a block. With a noise of one count a block alike throughout has a chance of 4e-16."""
+"""Trials in a block. With a noise of one step a block alike throughout has a chance of 4e-16."""
 _BLOCKS = 10
 _NOISE = 1.0
-"""Counts; below it a value in the middle of a step may stand for ever."""
+"""Steps of the counts; below it a value in the middle of a step may stand for ever.
+
+A step is the smallest change that was ever seen: of an indicator with a division of 10 it is 10.
+"""
 _MOVING, _UNKNOWN, _KNOWN = 200, 1000, 100
 """Trials alike that are too many while the winch moves: for a cell whose counts were seen to move
 then for at least so many trials, and for one of which nothing is known, perhaps a coarse one."""
@@ -34,11 +38,14 @@ class _State:
     """Trials alike that ended by themselves."""
     seen: float = 0.0
     """Trials in all that ended in a change."""
+    step: float = math.inf
+    """Smallest change of the counts."""
     squares: float = 0.0
     trials: float = 0.0
 
     def learn(self, change: float, run: float) -> None:
         """Take in a change of the counts after a run of ``run`` trials alike."""
+        self.step = min(self.step, abs(change))
         self.longest = max(self.longest, run)
         self.seen += run
         self.quiet |= run >= _BLOCK
@@ -46,7 +53,7 @@ class _State:
         self.trials += run
         if self.trials < _BLOCK:
             return
-        if self.squares < _NOISE**2 * self.trials:
+        if self.squares < (_NOISE * self.step) ** 2 * self.trials:
             self.quiet = True
         else:
             self.noisy += 1

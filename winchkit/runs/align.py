@@ -123,6 +123,8 @@ class Aligner:
             source.topic: Series(source.max_gap, len(_columns(source))) for source in layout.sources
         }
         self._used = {source.topic: _columns(source) for source in layout.sources}
+        gap = next(item.max_gap for item in layout.sources if item.topic == self._base)
+        self._slower = {item.topic for item in layout.sources if item.max_gap > gap}
         names = [name for name, _ in layout.columns()[1:]]
         self._needed = np.array([not name.endswith(_MAY_LACK) for name in names], dtype=bool)
         self._moments: Array = np.empty(0)
@@ -134,13 +136,19 @@ class Aligner:
         if topic == self._base:
             self._moments = np.concatenate([self._moments, self._picked.of(times)])
 
-    def rows(self, now: float) -> Array:
+    def rows(self, now: float, *, ends: bool = False) -> Array:
         """Rows that have become complete, time first, shape (n, columns).
 
-        A row waits for every source that has given something within the last half second.
+        A row waits for every source that has given something within the last half second; where
+        the log ``ends``, for none that is slower than the rows: it comes no more, and is NaN.
         The first row is the first that lacks nothing, or the first after half a second.
         """
-        awaited = [item.last for item in self._series.values() if item.reaches(now - PATIENCE)]
+        left = self._slower if ends else ()
+        awaited = [
+            item.last
+            for topic, item in self._series.items()
+            if topic not in left and item.reaches(now - PATIENCE)
+        ]
         ready = self._moments <= min(awaited, default=np.inf)
         moments, self._moments = self._moments[ready], self._moments[~ready]
         if not len(moments):

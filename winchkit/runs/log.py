@@ -59,7 +59,7 @@ def aligned(log: Log) -> Run:
     aligner = Aligner(log.layout)
     for topic, samples in log.samples.items():
         aligner.add(topic, samples.times, samples.values)
-    table = aligner.rows(log.span[1])
+    table = aligner.rows(log.span[1], ends=True)
     recording = Recording(
         log.path,
         log.layout.columns(),

@@ -10,7 +10,7 @@ from typing import Protocol
 from winchkit.bench.commissioning.record import hash_of
 from winchkit.errors import Fault, FileError, NotPermitted, UsageError
 
-__all__ = ["AnswerFile", "Dialogue", "TypedAnswers", "confirm"]
+__all__ = ["AnswerFile", "Dialogue", "TypedAnswers", "agreed", "confirm"]
 
 _YES = ("yes", "y")
 _NO = ("no", "n")
@@ -75,12 +75,16 @@ class AnswerFile:
         return answer
 
 
+def agreed(answer: str) -> bool:
+    """Whether an answer is yes; everything else is not."""
+    return answer.casefold() in _YES
+
+
 def confirm(dialogue: Dialogue, key: str, question: str) -> str:
     """An answer that is yes; raises NotPermitted for no, UsageError for anything else."""
     answer = dialogue.ask(key, f"{question} [yes/no]")
-    word = answer.casefold()
-    if word in _YES:
+    if agreed(answer):
         return answer
-    if word in _NO:
+    if answer.casefold() in _NO:
         raise NotPermitted(f"not confirmed: {key}; nothing was recorded")
     raise UsageError(f"'{answer}' is neither yes nor no ({key}); nothing was recorded")

@@ -16,11 +16,12 @@ from importlib.metadata import PackageNotFoundError, version
 from winchkit import __version__
 from winchkit.bench.bench import Bench
 from winchkit.bench.cells.instruments import device_of, eds_of
-from winchkit.bench.commissioning.dialogue import Dialogue, confirm
+from winchkit.bench.commissioning.dialogue import Dialogue, agreed, confirm
 from winchkit.bench.commissioning.motions import Motions
 from winchkit.bench.commissioning.record import (
     Confirmation,
     DriveRecord,
+    FileHash,
     HostLossRecord,
     Record,
     WinchRecord,
@@ -94,8 +95,10 @@ def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> Recor
         bench_file=hashed,
         winch={name: step.record() for name, step in steps.items()},
     )
-    if hash_of(spec.path) != hashed:
-        raise NotPermitted(f"{spec.path} was changed meanwhile; nothing was recorded")
+    changed = [spec.path] if hash_of(spec.path) != hashed else []
+    changed += [path for step in steps.values() for path in step.changed_files()]
+    if changed:
+        raise NotPermitted(f"{', '.join(changed)} changed meanwhile; nothing was recorded")
     write_record(record, spec.record_file)
     return record
 
@@ -106,6 +109,9 @@ class _Steps:
     def __init__(self, spec: BenchSpec, name: str, dialogue: Dialogue) -> None:
         self._spec, self._name, self._dialogue = spec, name, dialogue
         self._wiring: WinchWiring = spec.winch[name]
+        device = device_of(spec, self._wiring.servo)
+        self._files = device.path, eds_of(device)
+        self._hashes = self._hashed()
         self._confirmed: list[Confirmation] = []
         self._drive = DriveRecord()
         self._host_loss = HostLossRecord("", 0.0)
@@ -147,13 +153,26 @@ class _Steps:
             self._cell(motions)
         self._limits()
 
+    def changed_files(self) -> tuple[str, ...]:
+        """Device file and EDS that are not what they were when this winch was opened."""
+        now = self._hashed()
+        return tuple(
+            str(path)
+            for path, was, one in zip(self._files, self._hashes, now, strict=True)
+            if one != was
+        )
+
+    def _hashed(self) -> tuple[FileHash, FileHash]:
+        device, eds = self._files
+        return hash_of(device), hash_of(eds)
+
     def record(self) -> WinchRecord:
         """What stands in the record."""
-        device = device_of(self._spec, self._wiring.servo)
+        device, eds = self._hashes
         return WinchRecord(
             drive=self._drive,
-            device=hash_of(device.path),
-            eds=hash_of(eds_of(device)),
+            device=device,
+            eds=eds,
             host_loss=self._host_loss,
             stops_on_nmt=self._stops_on_nmt,
             confirmed=tuple(self._confirmed),
@@ -175,6 +194,12 @@ class _Steps:
                 "a brake"
             )
         seen = trials.brake(self._name)
+        if not seen.stopped:
+            raise NotPermitted(
+                f"winch {self._name}: {seen.after:g} s after it was disabled the drive is "
+                f"{seen.state}; the brake cannot be tried on a drive that holds the load. Nothing "
+                "was recorded"
+            )
         if abs(seen.travel) > _SLIP:
             raise NotPermitted(
                 f"winch {self._name}: the cable moved {seen.travel * 1e3:.1f} mm in "
@@ -211,7 +236,7 @@ class _Steps:
             f"{speed:g} m/s for 0.8 s ('yes' moves it, 'no' leaves it out)?"
         )
         answer = self._dialogue.ask(f"{self._name}.try_in_motion", question)
-        return self._host_silent(trials, speed) if answer.casefold() in ("yes", "y") else None
+        return self._host_silent(trials, speed) if agreed(answer) else None
 
     def _nmt(self, trials: Trials) -> None:
         seen = trials.nmt_stopped(self._name)
@@ -227,10 +252,11 @@ class _Steps:
         verb = "pay out" if pays_out else "wind in"
         go = f"winch {self._name}: it will {verb} {_mm(step)} of cable. Begin?"
         confirm(self._dialogue, f"{self._name}.direction_go", go)
-        moved = motions.go(step if pays_out else -step)
+        change = step if pays_out else -step
+        moved = motions.go(change)
         question = f"winch {self._name}: did it {verb} cable?"
         answer = confirm(self._dialogue, f"{self._name}.direction", question)
-        self._note("direction", question, answer, commanded=step, moved=moved.cable)
+        self._note("direction", question, answer, commanded=change, moved=moved.cable)
 
     def _units(self, motions: Motions) -> None:
         turn = motions.turn

@@ -43,6 +43,8 @@ _NMT_TIME = 0.15
 _BRAKE_TIME = 2.0
 _REST_TIME = 3.0
 _POLL = 0.002
+_REPLY_TIME = 0.1
+"""Within which a drive has answered an SDO request that needs no ramp, s."""
 _PRE_OPERATIONAL = 0x80
 _HALF = 1 << 31
 
@@ -98,6 +100,8 @@ class Trials:
         axis = self.axes[name]
         with self._ended(axis):
             self._enable(axis)
+            if speed:
+                self._require_room(name, axis, speed)
             self._run(axis, speed, _MOVE_TIME if speed else _SETTLE_TIME, name)
             start, angle = self._clock.now(), _angle(axis)
             nothing = axis.host.mechanism.silence is Silence.NOTHING
@@ -106,7 +110,7 @@ class Trials:
             # Where any frame is a life sign the drive is not asked before its time is over.
             blind = limit + _PATIENCE / 2 if axis.host.mechanism.silence is Silence.ALL else 0.0
             state, after = self._left(axis, start, blind, patience)
-            stopped = state is not State.OPERATION_ENABLED
+            stopped = _has_left(state)
             if stopped:
                 self._await_rest(axis)
             travel = self._travel(name, axis, angle)
@@ -125,7 +129,7 @@ class Trials:
             axis.objects.bus.nmt(_PRE_OPERATIONAL, axis.objects.node)
             state = state_of(axis.objects.read(0x6041))
             after = self._clock.now() - start
-        return Trial(state is not State.OPERATION_ENABLED, after, str(state))
+        return Trial(_has_left(state), after, str(state))
 
     def brake(self, name: str) -> Trial:
         """Enable the drive at rest, disable it, and see whether the cable moves after that."""
@@ -137,8 +141,8 @@ class Trials:
             while self._clock.now() - start < _BRAKE_TIME:
                 self._cycle(axis, Wish.DISABLE)
             travel = self._travel(name, axis, angle)
-            state = axis.state
-        return Trial(state is not State.OPERATION_ENABLED, _BRAKE_TIME, str(state), travel)
+            state = _asked(axis)
+        return Trial(_has_left(state), _BRAKE_TIME, str(state), travel)
 
     @contextmanager
     def _ended(self, axis: Cia402Axis) -> Iterator[None]:
@@ -149,7 +153,9 @@ class Trials:
             with _frames_lost():
                 axis.emergency_stop(sdo=True)
                 self._wired_syncs()
-                axis.end_stop()
+            # The reply to the stop by SDO is not for the confirmed client.
+            self._clock.sleep(_REPLY_TIME)
+            axis.end_stop()
             self._recover(axis)
             raise
         self._recover(axis)
@@ -196,6 +202,28 @@ class Trials:
             angle += velocity * dt
             self._cycle(axis, Wish.ENABLE, velocity, angle)
 
+    def _require_room(self, name: str, axis: Cia402Axis, speed: float) -> None:
+        """Raise NotPermitted where winding in at ``speed`` may pass the lower length limit.
+
+        The way: the move, the drive's time limit without a host (for hardware that stops it the
+        patience of the trial), and the ramp v²/(2a).
+        """
+        limits = self.spec.winch[name].limits
+        if limits.length is None:
+            return
+        mechanism = axis.host.mechanism
+        nothing = mechanism.silence is Silence.NOTHING
+        reaction = _HARDWARE_PATIENCE if nothing else mechanism.limit + _PATIENCE
+        way = speed * (_MOVE_TIME + reaction) + speed**2 / (2 * limits.acceleration)
+        rope: RopeMap = self._wired.loop.winches[name].rope
+        length, low = rope.cable_length(self._hold), limits.length[0]
+        if not length - way >= low:
+            raise NotPermitted(
+                f"winch {name}: cable length {length:.3f} m: winding in at {speed:g} m/s until the "
+                f"drive stops by itself may take {way:.3f} m, below the limit {low:g} m; pay "
+                "out first, or answer 'no' to the trial in motion"
+            )
+
     def _cycle(
         self, axis: Cia402Axis, wish: Wish, velocity: float = 0.0, angle: float | None = None
     ) -> None:
@@ -217,12 +245,12 @@ class Trials:
     def _left(
         self, axis: Cia402Axis, start: float, blind: float, patience: float
     ) -> tuple[State, float]:
-        """The first state other than operation enabled, and when; or that one, at the end."""
+        """The first state that is known and not operation enabled, and when; or the last one."""
         self._clock.sleep(blind)
         while True:
             state = _asked(axis)
             after = self._clock.now() - start
-            if state is not State.OPERATION_ENABLED or after > patience:
+            if _has_left(state) or after > patience:
                 return state, after
             self._clock.sleep(_POLL)
 
@@ -249,6 +277,11 @@ class Trials:
         counts = axis.objects.read(0x6064) - round(feedback.angle / unit)
         now = feedback.angle + ((counts + _HALF) % (2 * _HALF) - _HALF) * unit
         return rope.cable_length(now) - rope.cable_length(angle)
+
+
+def _has_left(state: State) -> bool:
+    """Whether a drive is known not to be in operation enabled; an unknown state proves nothing."""
+    return state not in (State.OPERATION_ENABLED, State.UNKNOWN)
 
 
 def _asked(axis: Cia402Axis) -> State:

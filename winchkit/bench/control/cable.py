@@ -15,6 +15,8 @@ _FAR = 5e-3
 _SOON = 0.02
 """After which tension and memory are asked anew, s."""
 
+_NEVER = (nan, (nan, nan))
+
 
 class LineModel(Protocol):
     """The part of ``winchkit.model.line.Line`` that moving a winch needs."""
@@ -58,6 +60,9 @@ class RopeMap:
     def __init__(self, line: LineModel, now: RopeNow | None = None) -> None:
         self._line, self._now = line, now
         self._here = _Here()
+        self._asked = _NEVER
+        """The motor angle that :meth:`at` was asked for last, and its answer: several ask for the
+        same in a cycle."""
         self._felt = _Felt()
         self.failure: FileError | None = None
         """Why an effect of the profile, perhaps a user's own, could not be used any more."""
@@ -103,13 +108,22 @@ class RopeMap:
             sample.time, sample.motor_angle, state.length, state.tension, state.correction
         )
         self._here = _Here(sample.motor_angle, state.length, arm)
+        self._asked = _NEVER
 
-    def tension(self, cell: float, load: float) -> float:
-        """At the platform end: the ``load`` where measured, else by the ``cell``, N."""
-        return load if isfinite(load) else cell + self._felt.correction
+    @property
+    def correction(self) -> float:
+        """To be added to the cell's reading for the tension at the platform end, N."""
+        return self._felt.correction
 
     def at(self, motor_angle: float) -> tuple[float, float]:
         """Cable length (m) and arm (m/rad) at a motor angle (rad)."""
+        asked, answer = self._asked
+        if motor_angle != asked:
+            answer = self._at(motor_angle)
+            self._asked = (motor_angle, answer)
+        return answer
+
+    def _at(self, motor_angle: float) -> tuple[float, float]:
         here = self._here
         change = (motor_angle - here.angle) * here.arm
         if self._now is None and not abs(change) < _FAR:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from winchkit.bench.control.observation import Instrumented, Memory, Supervised, WinchInput
 from winchkit.bench.control.snapshot import Direction
 
-__all__ = ["BENCH_CONDITIONS", "CONDITIONS", "BenchCondition", "Condition"]
+__all__ = ["BENCH_CONDITIONS", "CONDITIONS", "BenchCondition", "Condition", "Test"]
 
 _MISSED_SYNCS = 5
 """A late cycle of the host makes feedback old; a drive that is silent also misses SYNCs."""
@@ -59,6 +59,8 @@ class Condition:
     """Latched although nothing moved. What forbids a motion under way is latched in any case."""
     debounce: float = 0.0
     """How long it has to hold, s."""
+    by_facts: bool = False
+    """Whether it looks at nothing but ``observation.FACTS``, and at boot-ups dealt with."""
     needs: str = ""
     """The key of ``[winch.A.limits]`` or the instrument without which it is not tested."""
 
@@ -68,31 +70,30 @@ def _cell(item: WinchInput) -> Instrumented:
     return item.tension
 
 
-def _fresh(item: WinchInput) -> bool:
-    """Whether the cell's newest reading is a number that counts."""
-    cell = _cell(item)
-    return cell.age <= cell.max_age and not math.isnan(cell.value)
-
-
-def _gross(item: WinchInput) -> float:
-    """Tension of the cable: a tare neither hides an overload nor makes it slack."""
-    cell = _cell(item)
-    return cell.gross if math.isfinite(cell.gross) else cell.value
-
-
-def _high(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
+def _high(_item: WinchInput, own: Supervised, memory: Memory) -> bool:
     limit = own.limits.tension_high
-    return limit is not None and _fresh(item) and _gross(item) > limit
+    return limit is not None and memory.gross > limit
 
 
-def _slack(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
+def _slack(_item: WinchInput, own: Supervised, memory: Memory) -> bool:
     limit = own.limits.tension_slack
-    return limit is not None and _fresh(item) and _gross(item) < limit
+    return limit is not None and memory.gross < limit
 
 
-def _rate(item: WinchInput, own: Supervised, memory: Memory) -> bool:
+def _rate(_item: WinchInput, own: Supervised, memory: Memory) -> bool:
     limit = own.limits.tension_rate
-    return limit is not None and _fresh(item) and abs(memory.tension_rate) > limit
+    fresh = not math.isnan(memory.gross)
+    return limit is not None and fresh and abs(memory.tension_rate) > limit
+
+
+def _unreadable(item: WinchInput, _own: Supervised, _memory: Memory) -> bool:
+    cell = _cell(item)
+    return math.isnan(cell.value) and cell.age <= cell.max_age
+
+
+def _stale(item: WinchInput, _own: Supervised, _memory: Memory) -> bool:
+    cell = _cell(item)
+    return cell.age > cell.max_age
 
 
 def _short(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
@@ -119,11 +120,18 @@ def _stale_words(item: WinchInput, _own: Supervised, _memory: Memory) -> str:
     return f"no load cell reading {since} (limit {cell.max_age:.2f} s){reason}"
 
 
-def _rest_limit(own: Supervised) -> float:
-    return max(3 * own.resolution, 0.01 * own.limits.speed)
-
-
 CONDITIONS: tuple[Condition, ...] = (
+    Condition(
+        "second master",
+        "RPDOs, SDO writes and NMT commands to the drive that were not sent here",
+        "none",
+        lambda item, _own, _memory: bool(item.second_master),
+        lambda item, *_: (
+            f"somebody else commands the drive: {item.second_master} was not sent here; end the "
+            "other master or tool on the bus, then reset"
+        ),
+        latches=True,
+    ),
     Condition(
         "boot-up",
         "boot-up messages since commissioning",
@@ -131,6 +139,7 @@ CONDITIONS: tuple[Condition, ...] = (
         lambda item, _own, memory: item.boot_ups > memory.boot_ups,
         lambda *_: "the drive has restarted and lost its PDO mapping; look why, then reset",
         latches=True,
+        by_facts=True,
     ),
     Condition(
         "heartbeat",
@@ -139,6 +148,7 @@ CONDITIONS: tuple[Condition, ...] = (
         lambda item, _own, _memory: item.heartbeat_lost,
         lambda *_: "the drive's heartbeat is gone; check its power and the bus, then reset",
         latches=True,
+        by_facts=True,
     ),
     Condition(
         "nmt",
@@ -150,6 +160,7 @@ CONDITIONS: tuple[Condition, ...] = (
             "its own monitoring; look why, then reset"
         ),
         latches=True,
+        by_facts=True,
     ),
     Condition(
         "feedback",
@@ -169,6 +180,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "no fault",
         lambda item, _own, _memory: bool(item.fault),
         lambda item, *_: f"drive fault: {item.fault}; clear the cause, then reset",
+        by_facts=True,
     ),
     Condition(
         "mode",
@@ -176,6 +188,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "the mode that it was given",
         lambda item, _own, _memory: not item.mode_kept,
         lambda *_: "the drive has changed its mode of operation; reset",
+        by_facts=True,
     ),
     Condition(
         "state",
@@ -184,15 +197,16 @@ CONDITIONS: tuple[Condition, ...] = (
         lambda item, _own, _memory: bool(item.uncommanded),
         lambda item, *_: f"{item.uncommanded}; find out what did it, then reset",
         latches=True,
+        by_facts=True,
     ),
     Condition(
         "motion at rest",
         "cable speed by the motor while the drive is commanded to be disabled",
         "3 steps of 606Ch, at least 1 % of limits.speed",
-        lambda item, own, _memory: item.disabled and abs(item.winding_speed) > _rest_limit(own),
+        lambda item, own, _memory: item.disabled and abs(item.winding_speed) > own.rest_speed,
         lambda item, own, _memory: (
             f"the motor turns although rest is commanded: {item.winding_speed:.3f} m/s of "
-            f"cable (limit {_rest_limit(own):.3f} m/s); check the brake and who turns it, reset"
+            f"cable (limit {own.rest_speed:.3f} m/s); check the brake and who turns it, reset"
         ),
         latches=True,
         debounce=_REST_TIME,
@@ -315,7 +329,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "cell stale",
         "age of the load cell's newest reading",
         "the device file's longest age",
-        lambda item, _own, _memory: _cell(item).age > _cell(item).max_age,
+        _stale,
         _stale_words,
         needs="cell",
     ),
@@ -323,9 +337,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "cell",
         "flags of the load cell's reading",
         "a number",
-        lambda item, _own, _memory: (
-            _cell(item).age <= _cell(item).max_age and math.isnan(_cell(item).value)
-        ),
+        _unreadable,
         lambda item, *_: f"the load cell reads no number ({_cell(item).quality}); check it",
         needs="cell",
     ),
@@ -336,6 +348,7 @@ CONDITIONS: tuple[Condition, ...] = (
         lambda item, _own, _memory: bool(item.frozen),
         lambda item, *_: item.frozen,
         needs="cell",
+        by_facts=True,
     ),
     Condition(
         "cell unstable",
@@ -345,14 +358,15 @@ CONDITIONS: tuple[Condition, ...] = (
         lambda item, *_: f"the load cell is unstable: {item.unstable}",
         blocks=Direction.NONE,
         needs="cell",
+        by_facts=True,
     ),
     Condition(
         "tension high",
         "gross reading of the load cell",
         "limits.tension_high",
         _high,
-        lambda item, own, _memory: (
-            f"tension {_gross(item):.1f} N is above tension_high {own.limits.tension_high:g} N; "
+        lambda _item, own, memory: (
+            f"tension {memory.gross:.1f} N is above tension_high {own.limits.tension_high:g} N; "
             "only paying out is allowed until it falls"
         ),
         blocks=Direction.WIND_IN,
@@ -363,8 +377,8 @@ CONDITIONS: tuple[Condition, ...] = (
         "gross reading of the load cell",
         "limits.tension_slack",
         _slack,
-        lambda item, own, _memory: (
-            f"tension {_gross(item):.1f} N is below tension_slack {own.limits.tension_slack:g} N; "
+        lambda _item, own, memory: (
+            f"tension {memory.gross:.1f} N is below tension_slack {own.limits.tension_slack:g} N; "
             "only winding in is allowed until it rises"
         ),
         blocks=Direction.PAY_OUT,
@@ -390,6 +404,7 @@ CONDITIONS: tuple[Condition, ...] = (
         lambda item, *_: f"the drive sent {item.emergency_text}; clear the cause, then reset",
         latches=True,
         needs="emergency_trips",
+        by_facts=True,
     ),
     Condition(
         "emergency",
@@ -398,6 +413,7 @@ CONDITIONS: tuple[Condition, ...] = (
         lambda item, _own, _memory: bool(item.emergencies),
         lambda item, *_: f"the drive sent {item.emergency_text}",
         blocks=Direction.NONE,
+        by_facts=True,
     ),
     Condition(
         "turns",
@@ -409,6 +425,7 @@ CONDITIONS: tuple[Condition, ...] = (
             "heard; home the winch"
         ),
         blocks=Direction.NONE,
+        by_facts=True,
     ),
 )
 """Tested in this order, on each winch that has what a row needs."""

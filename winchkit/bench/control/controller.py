@@ -74,6 +74,10 @@ class AxisPort(Protocol):
         """They in words."""
 
     @property
+    def second_master(self) -> str:
+        """The first command to it that was not sent here, in words; empty where none was."""
+
+    @property
     def stops_on_nmt(self) -> bool:
         """Whether commissioning saw it leave operation enabled on NMT stop."""
 
@@ -217,27 +221,16 @@ class Controller:
         """Whether the drive is to follow the commanded speed in this cycle."""
         return self.phase in (Phase.MOVING, Phase.RUN_DOWN) and not self.axis.moves_alone
 
-    @property
-    def target_speed(self) -> float:
-        """Winding speed of the velocity target sent last, m/s; NaN where the drive has none.
+    def tracking(self, angle: float, arm: float) -> tuple[float, float]:
+        """What the drive, at a motor angle (rad), is compared with while it :attr:`follows`.
 
-        Position targets that are lost leave the drive at the last of them.
+        The winding speed of the velocity target sent last (m/s, NaN where the drive has none:
+        position targets that are lost leave it at the last of them), and target less measured
+        position in cable (m, zero unless it is position-controlled); ``arm`` in m/rad.
         """
-        feedback = self.axis.feedback
-        if feedback is None or not self.follows or self.axis.position_mode:
-            return math.nan
-        return self._velocity * self.rope.at(feedback.angle)[1]
-
-    @property
-    def following_error(self) -> float:
-        """Target less measured position in cable, m; zero unless it is position-controlled.
-
-        It counts only while the drive :attr:`follows`.
-        """
-        feedback = self.axis.feedback
-        if feedback is None or not self.axis.position_mode:
-            return 0.0
-        return (self._angle - feedback.angle) * self.rope.at(feedback.angle)[1]
+        if self.axis.position_mode:
+            return math.nan, (self._angle - angle) * arm
+        return self._velocity * arm, 0.0
 
     def take_uncommanded(self) -> str:
         """What the drive did unasked, told once."""
@@ -285,6 +278,8 @@ class Controller:
                 self._ordered = phase
 
     def _take_orders(self, now: float) -> None:
+        if self._ordered is None and self._wanted is None:
+            return  # as in most cycles; what is ordered meanwhile is taken in the next
         with self._lock:
             ordered, self._ordered = self._ordered, None
             wanted = self._wanted

@@ -11,9 +11,9 @@ from typing import Protocol
 
 from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.observation import WinchInput
-from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Phase, Trip
+from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Phase, Trip, WinchSnapshots
 from winchkit.bench.control.supervisor import Supervisor
-from winchkit.bench.control.winch_state import WinchParts, known, picture
+from winchkit.bench.control.winch_state import WinchParts, captured, known, pictures
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.drivers.clock import Clock
@@ -378,10 +378,11 @@ class ControlLoop:
     def _picture(
         self, now: float, inputs: Mapping[str, WinchInput], blocked: tuple[Trip, ...]
     ) -> BenchSnapshot:
+        taken = [captured(parts) for parts in self.winches.values()]
         return BenchSnapshot(
             time=now,
             cycle=self._count,
-            winch={name: picture(parts, inputs[name], now) for name, parts in self.winches.items()},
+            winch=WinchSnapshots(lambda: pictures(inputs, taken, now)),
             tripped=self.supervisor.tripped,
             blocked=blocked,
             overruns=self.overruns,

@@ -181,12 +181,16 @@ class Jog:
         return Target(velocity, self._angle, speed, done=not live and speed == 0.0)
 
     def _within(self, wish: float, length: float) -> float:
-        """The wish, no faster than what can still be braked before a length limit."""
+        """The wish, no faster than what can still be braked before a length limit.
+
+        The drive's speed lags behind by up to the response time, in which the cable runs on.
+        """
         if self._limits.length is None:
             return wish
         low, high = self._limits.length
-        room = length - low if wish > 0 else high - length
-        fastest = math.sqrt(2 * self._limits.acceleration * max(0.0, room - _MARGIN))
+        room = max(0.0, (length - low if wish > 0 else high - length) - _MARGIN)
+        lag = self._limits.acceleration * self._limits.response_time
+        fastest = math.sqrt(lag * lag + 2 * self._limits.acceleration * room) - lag
         return math.copysign(min(abs(wish), fastest), wish)
 
 

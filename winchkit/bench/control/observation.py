@@ -6,12 +6,14 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from operator import itemgetter
 from types import MappingProxyType
 from typing import NamedTuple
 
 from winchkit.schema.bench import LimitSpec
 
-__all__ = ["Instrumented", "Memory", "Supervised", "WinchInput"]
+__all__ = ["FACTS", "Instrumented", "Memory", "Supervised", "WinchInput", "facts_of"]
 
 _RATE_TIME = 0.05
 """Shortest span over which a change of tension counts, s."""
@@ -21,8 +23,8 @@ _RIPPLE = 0.01
 """Share of limits.speed: within the ripple of a velocity loop."""
 _OVERSHOOT = 0.05
 """Share of the commanded speed: of a velocity loop after an acceleration."""
-_STEPS = 4
-"""Resolution steps of 606Ch below which a difference is noise."""
+_STEPS, _REST_STEPS = 4, 3
+"""Resolution steps of 606Ch below which a difference, or a speed at rest, is noise."""
 
 
 class Instrumented(NamedTuple):
@@ -74,6 +76,8 @@ class WinchInput(NamedTuple):
     """NMT state in words, where it is not operational."""
     uncommanded: str = ""
     """What the drive did to its power state that no control word asked for."""
+    second_master: str = ""
+    """A command to its drive that was not sent here; empty while there is none."""
     disabled: bool = False
     """Whether the winch is commanded to be disabled, and was at rest when that began."""
     follows: bool = False
@@ -97,6 +101,22 @@ class WinchInput(NamedTuple):
     """Newest reading of each instrument by its role; ``tension`` is that of the cell."""
 
 
+FACTS = (
+    "heartbeat_lost",
+    "boot_ups",
+    "operational",
+    "mode_kept",
+    "fault",
+    "uncommanded",
+    "emergencies",
+    "unstable",
+    "frozen",
+    "turns_known",
+)
+"""What of a :class:`WinchInput` is no measured number and seldom changes."""
+facts_of = itemgetter(*map(WinchInput._fields.index, FACTS))
+
+
 @dataclass(frozen=True)
 class Supervised:
     """What one winch is held to."""
@@ -111,15 +131,30 @@ class Supervised:
     safe_length: float = math.inf
     """Cable length at which the last two dead wraps are left on the drum, m."""
 
-    @property
+    @cached_property
     def shortest(self) -> float:
         """Lower length limit, m."""
         return -math.inf if self.limits.length is None else self.limits.length[0]
 
-    @property
+    @cached_property
     def longest(self) -> float:
         """Upper length limit, m."""
         return math.inf if self.limits.length is None else self.limits.length[1]
+
+    @cached_property
+    def rest_speed(self) -> float:
+        """Cable speed above which a motor does not rest, m/s."""
+        return max(_REST_STEPS * self.resolution, _RIPPLE * self.limits.speed)
+
+    @cached_property
+    def ripple(self) -> float:
+        """Cable speed within which a velocity loop follows at the least, m/s."""
+        return max(_STEPS * self.resolution, _RIPPLE * self.limits.speed)
+
+    @cached_property
+    def response_cycles(self) -> int:
+        """Cycles within which the measured speed follows."""
+        return max(_LEAST_CYCLES, round(self.limits.response_time / self.cycle))
 
     def trips_on(self, code: int) -> bool:
         """Whether the bench file declares that this emergency code trips."""
@@ -137,6 +172,10 @@ class Memory:
     """Dealt with so far; unknown before the first observation."""
     since: dict[str, float] = field(default_factory=dict)
     """When a condition that is debounced began to hold, s."""
+    gross: float = math.nan
+    """Tension of the cable, N; NaN where the cell's newest reading is no number that counts.
+
+    A tare neither hides an overload nor makes the cable slack."""
     tension_rate: float = 0.0
     """N/s, over at least 50 ms."""
     deaf: bool = False
@@ -145,6 +184,8 @@ class Memory:
     """Change of the length sensor less that by the motor since the motion began, m."""
     moved: float = 0.0
     """Cable that ran since then, m."""
+    quiet: object = None
+    """The facts under which no condition on facts held when they were tested last."""
     _tension: tuple[float, float] | None = None
     _track: deque[float] = field(default_factory=deque)
     _began: tuple[float, float] | None = None
@@ -155,8 +196,14 @@ class Memory:
         if math.isnan(self.boot_ups):
             self.boot_ups = item.boot_ups
         cell = item.tension
-        if cell is not None and cell.time == cell.time:
-            self._follow_tension(cell)
+        if cell is None:
+            self.gross = math.nan
+        else:
+            value, gross = cell.value, cell.gross
+            counts = cell.age <= cell.max_age and not math.isnan(value)
+            self.gross = (gross if math.isfinite(gross) else value) if counts else math.nan
+            if cell.time == cell.time:
+                self._follow_tension(cell)
         self._follow_slowing(item)
         if item.length == item.length:
             self._follow_length(item)
@@ -179,22 +226,25 @@ class Memory:
         whose targets do not reach it keeps its speed, and soon is.
         """
         self.deaf = False
-        if math.isnan(item.target_speed):
-            if self._track:
-                self._track.clear()
+        target, track, own = item.target_speed, self._track, self.own
+        if math.isnan(target):
+            if track:
+                track.clear()
             return
-        track, own = self._track, self.own
-        track.append(item.target_speed)
-        window = max(_LEAST_CYCLES, round(own.limits.response_time / own.cycle))
-        if len(track) <= window:
+        track.append(target)
+        if len(track) <= own.response_cycles:
             return
         track.popleft()
-        sign = math.copysign(1.0, item.winding_speed)
+        speed = item.winding_speed
+        excess = speed - target if speed > 0 else target - speed
+        if excess <= own.ripple:
+            return  # not faster than commanded now, and so not than any of the window
+        sign = math.copysign(1.0, speed)
         fastest = max(track) if sign > 0 else -min(track)
-        if sign * item.target_speed >= fastest:
+        if sign * target >= fastest:
             return
-        margin = max(_STEPS * own.resolution, _RIPPLE * own.limits.speed, _OVERSHOOT * fastest)
-        self.deaf = sign * item.winding_speed > max(0.0, fastest) + margin
+        margin = max(own.ripple, _OVERSHOOT * fastest)
+        self.deaf = sign * speed > max(0.0, fastest) + margin
 
     def _follow_length(self, item: WinchInput) -> None:
         if not item.moving or self._began is None:

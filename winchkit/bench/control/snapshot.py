@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, ItemsView, Iterator, Mapping, ValuesView
 from dataclasses import dataclass
 from enum import Enum, Flag
 from typing import Any, NamedTuple
 
-__all__ = ["BenchSnapshot", "Direction", "Phase", "Trip", "WinchSnapshot", "to_dict"]
+__all__ = [
+    "BenchSnapshot",
+    "Direction",
+    "Phase",
+    "Trip",
+    "WinchSnapshot",
+    "WinchSnapshots",
+    "to_dict",
+]
 
 
 class Direction(Flag):
@@ -75,6 +83,45 @@ class WinchSnapshot(NamedTuple):
     """Whether the motor angle counts every turn; if not, the cable length is NaN until homed."""
     commander: str = ""
     """Who commands it, by name; empty for nobody."""
+
+
+class WinchSnapshots(Mapping[str, WinchSnapshot]):
+    """The winches of a cycle by name, made when somebody looks first: in most cycles nobody does.
+
+    ``make`` has what the cycle knew; it gives the same whenever and however often it is called.
+    """
+
+    __slots__ = ("_made", "_make")
+
+    def __init__(self, make: Callable[[], dict[str, WinchSnapshot]]) -> None:
+        self._make = make
+        self._made: dict[str, WinchSnapshot] | None = None
+
+    def _all(self) -> dict[str, WinchSnapshot]:
+        made = self._made
+        if made is None:
+            made = self._made = self._make()
+        return made
+
+    def __getitem__(self, name: str) -> WinchSnapshot:
+        return self._all()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all())
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def __repr__(self) -> str:
+        return repr(self._all())
+
+    def items(self) -> ItemsView[str, WinchSnapshot]:
+        """Names and snapshots."""
+        return self._all().items()
+
+    def values(self) -> ValuesView[WinchSnapshot]:
+        """The snapshots."""
+        return self._all().values()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from winchkit.bench.control.conditions import CONDITIONS, Condition
-from winchkit.bench.control.observation import Memory, Supervised, WinchInput
+from winchkit.bench.control.conditions import CONDITIONS, Condition, Test
+from winchkit.bench.control.observation import Memory, Supervised, WinchInput, facts_of
 from winchkit.bench.control.snapshot import Direction, Trip
 
 __all__ = ["Supervisor", "direction_of"]
 
 _BY_CELL = ("cell", "tension_high", "tension_slack", "tension_rate")
 """Needs of conditions that are tested only where there is a load cell."""
+_Rows = tuple[tuple[Test, Condition], ...]
 
 
 class Supervisor:
@@ -31,13 +32,13 @@ class Supervisor:
         self.warnings: tuple[Trip, ...] = ()
         """Conditions that hold and forbid nothing."""
         self._memory = {name: Memory(own) for name, own in winches.items()}
-        self._rows = {
-            name: tuple((row.holds, row) for row in conditions if _applies(row, own))
-            for name, own in winches.items()
+        applying = {
+            name: [row for row in conditions if _applies(row, own)] for name, own in winches.items()
         }
+        self._rows = {name: _split(rows) for name, rows in applying.items()}
         self._without = {
-            name: tuple((holds, row) for holds, row in rows if row.needs not in _BY_CELL)
-            for name, rows in self._rows.items()
+            name: _split([row for row in rows if row.needs not in _BY_CELL])
+            for name, rows in applying.items()
         }
         """The same for a winch whose load cell is not there."""
 
@@ -47,8 +48,14 @@ class Supervisor:
         for name, item in inputs.items():
             memory = self._memory[name]
             memory.observe(item)
-            own, rows = memory.own, self._rows if item.tension is not None else self._without
-            held = [row for holds, row in rows[name] if holds(item, own, memory)]
+            own, cell = memory.own, item.tension is not None
+            every, by_numbers = self._rows[name] if cell else self._without[name]
+            # Under the same facts a condition on facts holds no more than before.
+            facts = (cell, facts_of(item))
+            rows = by_numbers if facts == memory.quiet else every
+            held = [row for holds, row in rows if holds(item, own, memory)]
+            if rows is every:
+                memory.quiet = None if any(row.by_facts for row in held) else facts
             if held or memory.since:
                 for row in _debounced(held, memory.since, now):
                     words = row.words(item, own, memory)
@@ -99,6 +106,12 @@ def _debounced(
     for row in held:
         if not row.debounce or now - since.setdefault(row.kind, now) >= row.debounce:
             yield row
+
+
+def _split(rows: Sequence[Condition]) -> tuple[_Rows, _Rows]:
+    """All of the conditions with their tests, and those on more than facts."""
+    every = tuple((row.holds, row) for row in rows)
+    return every, tuple((holds, row) for holds, row in every if not row.by_facts)
 
 
 def _applies(row: Condition, own: Supervised) -> bool:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from winchkit.bench.control.cable import RopeMap
 from winchkit.bench.control.controller import AxisPort, Controller
@@ -18,7 +18,7 @@ from winchkit.drivers.reading import Reading
 from winchkit.errors import ConnectionLost
 from winchkit.estimation.cable_state import Sample
 
-__all__ = ["SensorPort", "WinchParts", "known", "picture"]
+__all__ = ["Captured", "SensorPort", "WinchParts", "captured", "known", "pictures"]
 
 _IDLE = (Phase.DISABLED, Phase.RESETTING)
 _ANSWERED = 2
@@ -66,7 +66,8 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     Silence counts from ``resumed`` (s) on at the earliest: before, this computer stood still.
     """
     axis, feedback, controller = parts.axis, parts.axis.feedback, parts.controller
-    length = speed = math.nan
+    phase = controller.phase
+    length = speed = arm = math.nan
     fault = False
     if feedback is not None:
         if parts.rope.bends:
@@ -76,50 +77,56 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
         fault = feedback.state in _FAULTS
         if not feedback.turns_known:
             length = math.nan
-    sensors = {role: _instrumented(sensor, now, resumed) for role, sensor in parts.sensors.items()}
-    operational = axis.operational
+    sensors = {}
+    for role, sensor in parts.sensors.items():
+        sensors[role] = _instrumented(sensor, now, resumed)
+    heartbeat, operational = axis.heartbeat, axis.operational
     alarms = () if fault else axis.alarms
     missed = sync if feedback is None else sync - 1 - feedback.sync
     # What a silent drive said last must not be compared with what it is told now.
     follows = controller.follows and missed <= _ANSWERED
+    target_speed, following_error = math.nan, 0.0
+    if follows and feedback is not None:
+        target_speed, following_error = controller.tracking(feedback.angle, arm)
     return WinchInput(
         feedback_age=math.inf if feedback is None else now - max(feedback.time, resumed),
         missed_syncs=missed,
-        heartbeat_lost=axis.heartbeat.lost(now, resumed),
-        boot_ups=axis.heartbeat.boot_ups,
+        heartbeat_lost=heartbeat.lost(now, resumed),
+        boot_ups=heartbeat.boot_ups,
         operational=operational,
         mode_kept=axis.mode_kept,
         fault=axis.fault_text if fault else "",
         winding_speed=speed,
         commanded=controller.commanded,
         cable_length=length,
-        moving=controller.phase not in _IDLE,
+        moving=phase not in _IDLE,
         tension=sensors.get("cell"),
         nmt="" if operational else axis.nmt_text,
         uncommanded=controller.take_uncommanded(),
-        disabled=controller.phase is Phase.DISABLED,
+        second_master=axis.second_master,
+        disabled=phase is Phase.DISABLED,
         follows=follows,
-        target_speed=controller.target_speed if follows else math.nan,
-        following_error=controller.following_error if follows else 0.0,
+        target_speed=target_speed,
+        following_error=following_error,
         length=_fresh(sensors["length"], now) if "length" in sensors else math.nan,
         emergencies=alarms,
         emergency_text=axis.alarm_text if alarms else "",
-        frozen=_frozen(parts, now, speed),
+        frozen="" if parts.frozen is None else _frozen(parts, parts.frozen, now, speed),
         turns_known=feedback is None or feedback.turns_known,
         unstable="" if parts.frozen is None else parts.frozen.unstable,
         sensors=sensors,
     )
 
 
-def _frozen(parts: WinchParts, now: float, speed: float) -> str:
+def _frozen(parts: WinchParts, test: FrozenCell, now: float, speed: float) -> str:
     """What shows that the load cell is frozen."""
     cell = parts.sensors.get("cell")
-    if parts.frozen is None or cell is None:
+    if cell is None:
         return ""
     controller = parts.controller
     predicted = parts.load.tension(now, controller.commanded, speed)
     moving = controller.phase not in _IDLE
-    finding = parts.frozen.update(cell.latest, now, predicted, moving=moving)
+    finding = test.update(cell.latest, now, predicted, moving=moving)
     return "" if finding is None else str(finding)
 
 
@@ -134,15 +141,16 @@ def _instrumented(sensor: SensorPort, now: float, resumed: float) -> Instrumente
     problem = "" if trouble is None else str(trouble)
     if reading is None:
         return Instrumented(math.nan, math.inf, sensor.max_age, "", math.nan, problem)
+    received = reading.t_receive
     return Instrumented(
-        value=reading.value,
-        age=now - max(reading.t_receive, resumed),
-        received=reading.t_receive,
-        max_age=sensor.max_age,
-        quality=str(reading.quality),
-        time=reading.t_sample,
-        problem=problem,
-        gross=reading.gross,
+        reading.value,
+        now - (received if received > resumed else resumed),
+        sensor.max_age,
+        str(reading.quality),
+        reading.t_sample,
+        problem,
+        reading.gross,
+        received,
     )
 
 
@@ -163,13 +171,39 @@ def _sample(parts: WinchParts, feedback: AxisFeedback, now: float) -> Sample:
     )
 
 
-def picture(parts: WinchParts, seen: WinchInput, now: float) -> WinchSnapshot:
-    """The winch in this cycle, as others get to see it."""
-    feedback = parts.axis.feedback or _NOTHING
+class Captured(NamedTuple):
+    """What a winch is shown by, beside what the supervisor saw of it, as it was in a cycle."""
+
+    feedback: AxisFeedback | None
+    phase: Phase
+    correction: float
+    """Of the cell's reading for the tension at the platform end, N."""
+    commander: str
+
+
+def captured(parts: WinchParts) -> Captured:
+    """The same, now."""
+    return Captured(
+        parts.axis.feedback, parts.controller.phase, parts.rope.correction, parts.commander
+    )
+
+
+def pictures(
+    inputs: Mapping[str, WinchInput], taken: Sequence[Captured], now: float
+) -> dict[str, WinchSnapshot]:
+    """The winches in the cycle at ``now`` (s), as others get to see them."""
+    return {
+        name: _picture(seen, one, now)
+        for (name, seen), one in zip(inputs.items(), taken, strict=True)
+    }
+
+
+def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
+    feedback = taken.feedback or _NOTHING
     fresh = {role: _fresh(item, now) for role, item in seen.sensors.items()}
     cell, load = fresh.get("cell", math.nan), fresh.get("load", math.nan)
     return WinchSnapshot(
-        phase=parts.controller.phase,
+        phase=taken.phase,
         state=str(feedback.state),
         time=feedback.time,
         motor_angle=feedback.angle,
@@ -179,7 +213,7 @@ def picture(parts: WinchParts, seen: WinchInput, now: float) -> WinchSnapshot:
         cable_speed=0.0 - seen.winding_speed,
         tension=cell,
         load=load,
-        rope_tension=parts.rope.tension(cell, load),
+        rope_tension=load if math.isfinite(load) else cell + taken.correction,
         length=fresh.get("length", math.nan),
         temperature=fresh.get("temperature", math.nan),
         quality={
@@ -187,5 +221,5 @@ def picture(parts: WinchParts, seen: WinchInput, now: float) -> WinchSnapshot:
             for role, item in seen.sensors.items()
         },
         turns_known=feedback.turns_known,
-        commander=parts.commander,
+        commander=taken.commander,
     )

@@ -24,6 +24,16 @@ _SIGNAL_EXIT = 128
 class Terminated(KeyboardInterrupt):
     """SIGTERM, SIGHUP or a closed terminal; what ends at Ctrl-C ends at it in the same way."""
 
+    def __init__(self, number: int = getattr(signal, "SIGHUP", signal.SIGTERM)) -> None:
+        super().__init__()
+        self.number = int(number)
+        """Of the signal; a terminal that was closed counts as SIGHUP."""
+
+    @property
+    def exit_code(self) -> int:
+        """128 + the signal's number."""
+        return _SIGNAL_EXIT + self.number
+
 
 class Interruption:
     """The first signal that asked this process to end."""
@@ -36,7 +46,7 @@ class Interruption:
     def note(self, error: BaseException | None) -> bool:
         """Whether an error, or a signal before it, means the end; a closed terminal is SIGHUP."""
         if isinstance(error, Terminated) and not self.number:
-            self.number = getattr(signal, "SIGHUP", signal.SIGTERM)
+            self.number = error.number
         return bool(self.number) or isinstance(error, KeyboardInterrupt)
 
     @property
@@ -57,7 +67,7 @@ class Interruption:
         if self.number and now - self._since < _ENDING:
             return
         self.number, self._since = number, now
-        raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+        raise KeyboardInterrupt if number == signal.SIGINT else Terminated(number)
 
 
 @contextmanager

@@ -68,6 +68,7 @@ class StationServer:
         self.digest = digest_of(bench.spec)
         """Of what the bench file says, for clients that read it again."""
         self._bench = bench
+        self._closing = False
         self._socket, self._path = listen(bench.spec)
         self._seats: set[_Seat] = set()
         self._lock = threading.Lock()
@@ -88,7 +89,8 @@ class StationServer:
             return True
 
     def close(self) -> None:
-        """Turn everybody out."""
+        """Turn everybody out; the bench stops the winches, then finishes the logs."""
+        self._closing = True
         self._path.unlink(missing_ok=True)
         for item in (self._socket, *(seat.connection for seat in tuple(self._seats))):
             _shut(item)
@@ -117,7 +119,7 @@ class StationServer:
         except OSError:
             pass
         finally:
-            if not left:
+            if not left and not self._closing:
                 with suppress(WinchkitError):
                     _end(seat.station)
             self._seats.discard(seat)

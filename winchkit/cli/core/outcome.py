@@ -18,7 +18,6 @@ __all__ = ["INTERNAL", "INTERRUPTED", "finish", "threads_abandoned"]
 
 INTERRUPTED = 130
 INTERNAL = 70
-_TERMINATED = 143
 _DEBUG = "WINCHKIT_DEBUG"
 
 
@@ -84,7 +83,7 @@ def threads_abandoned() -> Iterator[None]:
         with suppress(OSError):
             sys.stdout.flush()
             sys.stderr.flush()
-        os._exit(_TERMINATED if isinstance(error, Terminated) else INTERRUPTED)
+        os._exit(error.exit_code if isinstance(error, Terminated) else INTERRUPTED)
 
 
 def _tell(message: str) -> None:

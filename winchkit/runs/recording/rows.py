@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from winchkit.runs.align import Aligner
 from winchkit.runs.layout import Layout, Samples
 from winchkit.runs.recording.writer import LogWriter
@@ -22,7 +25,7 @@ class RowLog(LogWriter):
     _writer: RunWriter
 
     def __init__(self, path: Path, layout: Layout, *others: Any, replace: bool) -> None:
-        self._aligner = Aligner(layout)
+        self._aligner, self._newest = Aligner(layout), layout.rule.opened
         super().__init__(path, layout, *others, replace=replace)
 
     def _open_part(self, path: Path, stream: BinaryIO, about: Mapping[str, str]) -> None:
@@ -34,11 +37,21 @@ class RowLog(LogWriter):
     def _put(self, pieces: Mapping[str, Samples], now: float) -> None:
         for topic, samples in pieces.items():
             self._aligner.add(topic, samples.times, samples.values)
-        rows = self._aligner.rows(now)
+        self._newest = now
+        self._append(self._aligner.rows(now))
+
+    def _append(self, rows: NDArray[np.float64]) -> None:
         for row in rows.tolist():
             self._writer.append_values(row)
         self._writer.flush()
         self.rows += len(rows)
+
+    def close(self, end: Mapping[str, str]) -> None:
+        """Write the rows that waited for a source, and finish the file."""
+        try:
+            self._append(self._aligner.rows(self._newest, ends=True))
+        finally:
+            super().close(end)
 
     def _close_part(self, end: Mapping[str, str]) -> None:
         self._writer.close()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 from winchkit.errors import Fault, FileError
@@ -135,7 +136,7 @@ def _append(section: Section, value: str, line: int) -> None:
     """Add an entry to a list of objects under a number that is free."""
     if value in (text for key, text in section.values.items() if key.isdigit()):
         return
-    free = str(1 + max((int(key) for key in section.values if key.isdigit()), default=0))
+    free = next(key for number in count(1) if (key := str(number)) not in section.values)
     section.values[free], section.lines[free] = value, line
 
 

@@ -16,11 +16,13 @@ from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
 from winchkit.drivers.can.bus.interface import (
     Frame,
     Interface,
+    hands_back,
     open_interface,
     queue_full,
     sends_remote,
     simulated_interface,
 )
+from winchkit.drivers.can.bus.own_frames import OwnFrames
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import event_of, thread_of
 from winchkit.errors import ConnectionLost
@@ -120,8 +122,10 @@ class CanBus:
         """Whether the interface sends remote frames, as far as that is known."""
         self.sync_held = self.heartbeat_held = False
         """Whether :meth:`sync` or :meth:`heartbeat` send nothing, while a drive is to miss them."""
-        self.network = canopen.Network()
+        self._own = OwnFrames() if hands_back(spec) else None
+        self.network = _Network(self._own)
         self._spec = spec
+        self._foreign: dict[int, list[Handler]] = {}
         self._handlers: dict[int, Handler] = {}
         self._errors = ErrorTally()
         self._heard: set[int] = set()
@@ -189,8 +193,7 @@ class CanBus:
     @property
     def foreign_syncs(self) -> int:
         """SYNC frames on the bus that were not sent here."""
-        # Over UDP multicast what is sent comes back.
-        own = self._syncs_sent if self._spec.interface == "udp_multicast" else 0
+        own = 0 if self._own is None else self._syncs_sent
         return max(0, self._syncs_heard - own)
 
     @property
@@ -213,6 +216,25 @@ class CanBus:
         """Call ``handler`` for every frame with this identifier."""
         self._handlers[identifier] = handler
 
+    def on_foreign(self, identifier: int, handler: Handler) -> None:
+        """Call ``handler`` too for every frame with this identifier that was not sent here.
+
+        To be called before anything is sent with it: what is sent from then on is noted where the
+        interface hands it back. Other frames of the bus cost nothing by it.
+        """
+        handlers, own = self._foreign.setdefault(identifier, []), self._own
+        if handler not in handlers:
+            handlers.append(handler)
+        if own is not None:
+            own.watch(identifier)
+
+        def receive(data: bytes, now: float) -> None:
+            if own is None or not own.take(identifier, data):
+                for each in handlers:
+                    each(data, now)
+
+        self.on(identifier, receive)
+
     def off(self, identifier: int) -> None:
         """Let frames with this identifier pass again."""
         self._handlers.pop(identifier, None)
@@ -228,6 +250,8 @@ class CanBus:
         returned), and only a queue that stays full is a fault.
         """
         port = self._port
+        if self._own is not None:
+            self._own.note(identifier, data)
         try:
             with self.network.send_lock:
                 port.send(identifier, data)
@@ -241,14 +265,20 @@ class CanBus:
         return True
 
     def remote(self, identifier: int) -> None:
-        """Send a remote frame, to which a node answers with one byte; raises ConnectionLost."""
+        """Send a remote frame, to which a node answers with one byte; raises ConnectionLost.
+
+        A full queue is dealt with as in :meth:`send`.
+        """
         port = self._port
         try:
             with self.network.send_lock:
                 port.send_remote(identifier)
         except (can.CanError, OSError, ValueError) as error:
+            if self._queue_full(error):
+                return
             raise self._unsendable(port, error) from error
         self.sent += 1
+        self._full_since = None
 
     def sync(self) -> None:
         """Send SYNC."""
@@ -338,3 +368,16 @@ class CanBus:
         state = self._errors.state
         if state is BusState.OFF and before is not BusState.OFF:
             self.fault = "the controller is bus off; check termination, bit rate and wiring"
+
+
+class _Network(canopen.Network):
+    """The canopen library's network; what its SDO clients send is noted as sent here."""
+
+    def __init__(self, own: OwnFrames | None) -> None:
+        super().__init__()
+        self._own = own
+
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
+        if self._own is not None and not remote:
+            self._own.note(can_id, bytes(data))
+        super().send_message(can_id, data, remote)

@@ -23,6 +23,7 @@ from winchkit.schema.bench import BusSpec
 __all__ = [
     "Frame",
     "Interface",
+    "hands_back",
     "open_interface",
     "parse_socketcan",
     "queue_full",
@@ -33,6 +34,8 @@ __all__ = [
 _STAMPED = {"pcan", "kvaser", "ixxat", "vector", "neovi", "nican"}
 """Interfaces whose time stamps are the hardware's or its driver's."""
 _NO_BITRATE = ("virtual", "udp_multicast")
+_HAND_BACK = ("udp_multicast",)
+"""Interfaces that hand back what is sent through them, like frames of others."""
 _NO_REMOTE = ("socketcand", "neousys")
 """Interfaces for which python-can sends a remote frame as a data frame, or not at all."""
 
@@ -43,6 +46,8 @@ _INTERVAL = struct.Struct("@ll")
 _DROPS = struct.Struct("=I")
 _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 35, 40
 _ANCILLARY = 128
+_CONFIRM = 0x800
+"""Flag of a frame that this very socket has sent (MSG_CONFIRM of Linux)."""
 _QUEUE = 1 << 20
 """Bytes of the socket's queue; the usual one keeps 278 frames."""
 
@@ -75,7 +80,10 @@ class Interface(Protocol):
     """Frames that its queue had no room for."""
 
     def receive(self, timeout: float) -> Frame | None:
-        """Take the next frame; raises can.CanError or OSError."""
+        """Take the next frame; raises can.CanError or OSError.
+
+        A confirmation of what was sent here, where the interface marks it as one, is no frame.
+        """
 
     def send(self, identifier: int, data: bytes) -> None:
         """Send a data frame of 11 bits; raises can.CanError or OSError."""
@@ -101,7 +109,7 @@ class _Library:
 
     def receive(self, timeout: float) -> Frame | None:
         message = self.library.recv(timeout)
-        if message is None or message.is_remote_frame:
+        if message is None or message.is_remote_frame or not message.is_rx:
             return None
         if message.is_extended_id and not message.is_error_frame:
             return None
@@ -139,13 +147,13 @@ class _SocketCan:
         if timeout != self._timeout:
             self._set_timeout(timeout)
         try:
-            data, ancillary, _, _ = self._socket.recvmsg(_FRAME.size, _ANCILLARY)
+            data, ancillary, flags, _ = self._socket.recvmsg(_FRAME.size, _ANCILLARY)
         except BlockingIOError:
             return None
         frame, drops = parse_socketcan(data, ancillary)
         if drops is not None:
             self.dropped = drops
-        return frame
+        return None if flags & _CONFIRM else frame
 
     def send(self, identifier: int, data: bytes) -> None:
         self._socket.send(_FRAME.pack(identifier, len(data), data))
@@ -232,6 +240,11 @@ def queue_full(error: BaseException) -> bool:
 def sends_remote(spec: BusSpec) -> bool:
     """Whether remote frames can be sent through this interface, as far as that is known."""
     return spec.interface not in _NO_REMOTE
+
+
+def hands_back(spec: BusSpec) -> bool:
+    """Whether what is sent through this interface comes back, unmarked."""
+    return spec.interface in _HAND_BACK
 
 
 def simulated_interface(spec: BusSpec, clock: Clock) -> Interface | None:

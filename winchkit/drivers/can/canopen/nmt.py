@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = ["HeartbeatProducer", "HeartbeatWatch", "NmtState"]
+__all__ = ["NMT_STATES", "HeartbeatProducer", "HeartbeatWatch", "NmtState"]
 
 
 class NmtState(IntEnum):
@@ -19,6 +19,10 @@ class NmtState(IntEnum):
 
     def __str__(self) -> str:
         return self.name.lower().replace("_", "-")
+
+
+NMT_STATES = frozenset(int(state) for state in NmtState)
+"""State bytes that the standard knows."""
 
 
 @dataclass

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
-from winchkit.drivers.can.canopen.nmt import NmtState
+from winchkit.drivers.can.canopen.nmt import NMT_STATES, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.command import Command, Commander
@@ -24,6 +24,7 @@ from winchkit.drivers.can.cia402.modes import MODES, Homing, Target, homing_stat
 from winchkit.drivers.can.cia402.motor_position import MotorPosition
 from winchkit.drivers.can.cia402.profile_parameters import HomingSpec, set_homing, set_profile
 from winchkit.drivers.can.cia402.sdo_stop import SdoStop
+from winchkit.drivers.can.cia402.second_master import SecondMaster
 from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, Wish, control_word
 from winchkit.drivers.can.host_loss.mechanism import Silence, Terms
 from winchkit.drivers.can.host_loss.watch import HostWatch
@@ -73,6 +74,7 @@ class Cia402Axis:
         self._boot_ups = self._beats = 0
         self._previous = 0
         self._sdo_stop = SdoStop(bus, node)
+        self._others = SecondMaster(bus, node, [pdo.number for pdo in device.servo.rpdo])
         self._stop_frames: list[tuple[int, bytes]] = []
         bus.on(0x700 + node, self.heartbeat.receive)
         bus.on(0x080 + node, self.emergencies.receive)
@@ -90,6 +92,7 @@ class Cia402Axis:
     def _commission(self) -> Commissioned:
         self.heartbeat.forget()
         await_booted(self._node, self.servo.boot_time, self._clock, self.heartbeat)
+        self._others.hear_further_servers(self._node)
         # Only a boot-up after this one takes away what is set up now.
         self._boot_ups = self.heartbeat.boot_ups
         self._beats = self._bus.beats[self._watch.host]
@@ -166,7 +169,11 @@ class Cia402Axis:
     @property
     def nmt_text(self) -> str:
         """NMT state of its heartbeat in words."""
-        return "unknown" if self.heartbeat.state is None else str(NmtState(self.heartbeat.state))
+        state = self.heartbeat.state
+        if state is None:
+            return "unknown"
+        # The byte is the drive's own: one that the standard does not know must not end the loop.
+        return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
 
     @property
     def alarms(self) -> tuple[int, ...]:
@@ -181,6 +188,15 @@ class Cia402Axis:
     def forget_alarms(self) -> None:
         """A reset has dealt with them; those that still hold are sent again."""
         self.emergencies.in_force.clear()
+
+    @property
+    def second_master(self) -> str:
+        """The first command to it that was not sent here, in words; empty where none was."""
+        return self._others.heard
+
+    def forget_second_master(self) -> None:
+        """A reset begins; what somebody else commands from now on is told again."""
+        self._others.forget()
 
     def disarm(self) -> None:
         """Let the drive, at rest, stop watching the host; raises ConnectionLost."""
@@ -222,7 +238,8 @@ class Cia402Axis:
     @property
     def mode_kept(self) -> bool:
         """Whether the drive still shows the mode that it was given."""
-        shown = self.feedback.mode if self.feedback else None
+        feedback = self.feedback
+        shown = None if feedback is None else feedback.mode
         return shown is None or shown == MODES[self.mode].number
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable, Iterator
 from enum import Enum
 from typing import NamedTuple
 
@@ -109,6 +110,7 @@ class Commander:
         )
         self._objects = [key for _, codec in self._codecs for key in codec.position]
         """Of all RPDOs in their order; the values of a cycle stand in the same order."""
+        self._slices = tuple(_slices(len(codec.objects) for _, codec in self._codecs))
         self._zeros = [self._mode.number if key == _MODE else 0 for key in self._objects]
         kind, feeds = self._mode.kind, (_VELOCITY_OFFSET,)
         self._controls = self._places(_CONTROL)
@@ -160,13 +162,12 @@ class Commander:
 
     def _packed(self, values: list[int]) -> list[tuple[int, bytes]]:
         """The RPDOs with these values."""
-        frames, end = [], 0
-        for identifier, codec in self._codecs:
-            start, end = end, end + len(codec.objects)
+        frames = []
+        for (identifier, codec), own in zip(self._codecs, self._slices, strict=True):
             try:
-                frames.append((identifier, codec.encode(values[start:end])))
+                frames.append((identifier, codec.encode(values[own])))
             except struct.error:
-                said = zip(codec.position, values[start:end], strict=True)
+                said = zip(codec.position, values[own], strict=True)
                 words = ", ".join(f"{_text(key)} = {value}" for key, value in said)
                 raise NotPermitted(
                     f"{self._name}: a target does not fit into RPDO {codec.spec.number} ({words}); "
@@ -195,6 +196,14 @@ class Commander:
         """Bit 4 in modes without a handshake: follow (IP), start a homing (HM)."""
         name = self._mode.name
         return START if name == "IP" or (name == "HM" and command.start) else 0
+
+
+def _slices(sizes: Iterable[int]) -> Iterator[slice]:
+    """Where each of several pieces stands in what they make together."""
+    end = 0
+    for size in sizes:
+        start, end = end, end + size
+        yield slice(start, end)
 
 
 def _check(name: str, drive: Commissioned, mode: str, target: Key | None) -> None:

@@ -8,7 +8,7 @@ from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import OptionSpec
 
-__all__ = ["OPTIONS", "OptionCode", "merged", "read_options", "set_options"]
+__all__ = ["BY_6007", "OPTIONS", "OptionCode", "merged", "read_options", "set_options"]
 
 _RAMPS = {
     1: "slow down on the deceleration ramp",
@@ -57,7 +57,7 @@ OPTIONS: dict[str, _Row] = {
 """By the keys of a device file."""
 
 _LOST = "connection_lost"
-_BY_6007 = ("heartbeat", "guarding")
+BY_6007 = ("heartbeat", "guarding")
 """Mechanisms by which a drive notices a dead host and then does what 6007h says."""
 _UNKNOWN = "the maker's own: see the drive's manual"
 
@@ -89,7 +89,7 @@ def set_options(
         if value is not None and node.read_if_there(row.index) != value:
             node.write_verified(row.index, 0, value)
     options = read_options(node)
-    if host_loss in _BY_6007:
+    if host_loss in BY_6007:
         _check_lost(node, options[_LOST])
     _check_quick_stop(node, options["quick_stop"])
     if not brake:

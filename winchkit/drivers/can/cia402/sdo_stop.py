@@ -48,7 +48,7 @@ class SdoStop:
     def end(self) -> None:
         """Leave the node's replies to the confirmed client again."""
         if self._active:
-            self._active = False
+            self._active = self.refused = False
             self.state = None
             self._bus.off(_REPLY + self._node)
 

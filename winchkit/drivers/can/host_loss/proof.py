@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from winchkit.drivers.can.canopen.emergency import Emergency
 from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
-from winchkit.drivers.can.cia402.option_codes import OptionCode
+from winchkit.drivers.can.cia402.option_codes import BY_6007, OptionCode
 from winchkit.drivers.can.cia402.state_machine import DISABLE_VOLTAGE, FAULT_RESET, State, state_of
 from winchkit.drivers.can.host_loss.guarding import Guarding
 from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
@@ -74,23 +74,26 @@ def prove(
     NotPermitted where it does not notice though it should, NoReply, DeviceRefused.
     """
     node = mechanism.node
-    # A fault that stood before is the operator's to look at and to reset.
-    clears = state_of(node.read(0x6041)) is not State.FAULT
+    # A fault that stood before is no evidence, and the operator's to look at and to reset.
+    faultless = state_of(node.read(0x6041)) not in _FAULTS
     try:
         limit = mechanism.withhold()
         start = mechanism.clock.now()
-        proof = _await_complaint(mechanism, watch, emergencies, start, limit)
+        proof = _await_complaint(mechanism, watch, emergencies, start, limit, faultless=faultless)
     finally:
         mechanism.release()
         # A drive that stopped (1029h:1 = 2) answers SDO only once it is pre-operational.
         node.bus.nmt(_PRE_OPERATIONAL, node.node)
         mechanism.restore()
     state = state_of(node.read(0x6041))
-    if clears and state in _FAULTS:
+    if faultless and state in _FAULTS:
         proof = replace(proof, fault=True, noticed=True)
-    bring_back(node, mechanism.clock, clears=clears)
+    bring_back(node, mechanism.clock, clears=faultless)
     if not proof.noticed and mechanism.noticed_disabled:
-        raise NotPermitted(_unnoticed(mechanism, proof))
+        words = _unnoticed(mechanism, proof)
+        if not faultless:
+            words += "; it was in fault before: clear that (power it off and on) and try again"
+        raise NotPermitted(words)
     return proof
 
 
@@ -105,7 +108,7 @@ def reaction(
     """What is known of an enabled drive: by its fault, by 6007h, or because it was seen."""
     lost = options.get("connection_lost")
     code = None if lost is None else lost.value
-    by_option = mechanism.silence in (Silence.HEARTBEAT, Silence.GUARDING) and code in _STOPPING
+    by_option = mechanism.name in BY_6007 and code in _STOPPING
     if seen:
         certain, words = True, "seen to stop the moving winch at commissioning"
     elif proof is not None and proof.fault:
@@ -140,7 +143,10 @@ def _await_complaint(
     emergencies: Collection[Emergency],
     start: float,
     limit: float,
+    *,
+    faultless: bool,
 ) -> Proof:
+    """What the drive shows; a fault counts where it was ``faultless`` before the silence."""
     clock, asked = mechanism.clock, False
     while (delay := clock.now() - start) <= limit + _PATIENCE:
         new = [e for e in tuple(emergencies) if e.time >= start and _fits(mechanism, e)]
@@ -152,7 +158,7 @@ def _await_complaint(
             asked = True
             mechanism.poll()
         clock.sleep(_POLL)
-    fault = _shows_fault(mechanism.node)
+    fault = faultless and _shows_fault(mechanism.node)
     return Proof(None, NmtState.OPERATIONAL, delay, limit, fault, noticed=fault)
 
 

@@ -1,0 +1,148 @@
+"""No frame of this bench is taken for somebody else's, whatever an interface hands back."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections import Counter
+from types import SimpleNamespace
+from typing import Any
+
+import can
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.bus.interface import _Library, _SocketCan
+from winchkit.drivers.can.bus.own_frames import OwnFrames
+from winchkit.drivers.clock import MonotonicClock
+from winchkit.schema.bench import BusSpec
+
+_GROUP = "239.74.163.2"
+_RPDO, _SDO, _NMT = 0x201, 0x601, 0x000
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 3), st.integers(0, 63), st.booleans()), max_size=300),
+    st.lists(st.integers(0, 300), max_size=10),
+)
+def test_own_frames_are_known_in_whatever_order_they_come_back(
+    frames: list[tuple[int, int, bool]], moments: list[int]
+) -> None:
+    """Some are lost, some overtake up to 63 others; few contents, so that many are alike."""
+    own, returning = OwnFrames(), []
+    own.watch(_RPDO)
+    for number, (content, delay, lost) in enumerate(frames):
+        data = bytes((content,))
+        own.note(_RPDO, data)
+        if not lost:
+            returning.append((number + delay, number, data))
+    strangers = Counter(moments)
+    for moment, (_, _, data) in enumerate(sorted(returning)):
+        for _ in range(strangers[moment]):
+            assert not own.take(_RPDO, b"stranger")
+        assert own.take(_RPDO, data)
+
+
+def test_one_frame_more_than_was_sent_is_somebody_elses() -> None:
+    own = OwnFrames()
+    own.watch(_RPDO)
+    for _ in range(3):
+        own.note(_RPDO, b"alike")
+    assert [own.take(_RPDO, b"alike") for _ in range(4)] == [True, True, True, False]
+
+
+def test_what_never_came_back_hides_nothing_for_long() -> None:
+    own = OwnFrames()
+    own.watch(_RPDO)
+    own.note(_RPDO, b"lost")
+    for number in range(70):
+        own.note(_RPDO, bytes((number,)))
+    for number in range(70):
+        assert own.take(_RPDO, bytes((number,)))
+    assert not own.take(_RPDO, b"lost")
+
+
+@pytest.fixture
+def group() -> BusSpec:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        port = probe.getsockname()[1]
+        try:
+            probe.sendto(b"", (_GROUP, port))
+        except OSError as error:
+            pytest.skip(f"no route for multicast here: {error}")
+    return BusSpec("can", interface="udp_multicast", channel=_GROUP, port=port)
+
+
+def test_over_multicast_only_the_stranger_is_heard(group: BusSpec) -> None:
+    """Frames of the loop, of the SDO client and NMT from three threads, and one of a stranger."""
+    bus, heard, seen = CanBus(group, "can", MonotonicClock()), list[bytes](), list[int]()
+    stranger = can.Bus(interface="udp_multicast", channel=_GROUP, port=group.port)
+    try:
+        for identifier in (_RPDO, _SDO, _NMT):
+            bus.on_foreign(identifier, lambda data, _now: heard.append(data))
+            bus.on_foreign(identifier, lambda _data, _now: None)
+        bus.on(0x702, lambda _data, _now: seen.append(1))
+        sends = (
+            lambda number: bus.send(_RPDO, bytes((number % 7, 0x0F))),
+            lambda number: bus.network.send_message(_SDO, bytearray((0x2B, number % 3))),
+            lambda number: bus.nmt(number % 2, 1),
+        )
+
+        def run(send: Any) -> None:
+            for number in range(300):
+                send(number)
+                time.sleep(0.001)
+
+        threads = [threading.Thread(target=run, args=(send,)) for send in sends]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        stranger.send(can.Message(arbitration_id=_RPDO, data=b"\x06\0", is_extended_id=False))
+        stranger.send(can.Message(arbitration_id=0x702, data=b"\x05", is_extended_id=False))
+        deadline = time.monotonic() + 5.0
+        while not seen:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        assert bus.received > 600, "what was sent comes back"
+        assert heard == [b"\x06\0"]
+    finally:
+        stranger.shutdown()
+        bus.close()
+
+
+def test_a_confirmation_of_what_was_sent_is_no_frame() -> None:
+    """As of gs_usb, and of any interface whose receive_own_messages somebody has configured."""
+    channel = f"confirmed {time.monotonic()}"
+    port = _Library(
+        can.Bus(interface="virtual", channel=channel, receive_own_messages=True), stamped=False
+    )
+    other = can.Bus(interface="virtual", channel=channel)
+    try:
+        port.send(_RPDO, b"ours")
+        other.send(can.Message(arbitration_id=_RPDO, data=b"theirs", is_extended_id=False))
+        frames = [frame for frame in (port.receive(0.1), port.receive(0.1)) if frame is not None]
+        assert [frame.data for frame in frames] == [b"theirs"]
+    finally:
+        other.shutdown()
+        port.close()
+
+
+@pytest.mark.parametrize(("flags", "ours"), [(0x800, True), (0x4, False), (0x0, False)])
+def test_a_frame_that_this_socket_has_sent_is_marked_by_linux(flags: int, ours: bool) -> None:
+    """MSG_CONFIRM: of this socket; MSG_DONTROUTE: of another one of this computer."""
+    raw = b"\x01\x02\0\0\x02\0\0\0\x06\0\0\0\0\0\0\0"
+
+    class Socket:
+        def setsockopt(self, *_: Any) -> None: ...
+        def setblocking(self, _: bool) -> None: ...
+        def recvmsg(self, *_: int) -> tuple[bytes, list[Any], int, None]:
+            return raw, [], flags, None
+
+    frame = _SocketCan(SimpleNamespace(socket=Socket())).receive(0.05)
+    assert (frame is None) is ours
+    assert ours or (frame is not None and (frame.identifier, frame.data) == (_RPDO, b"\x06\0"))

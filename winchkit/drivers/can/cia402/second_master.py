@@ -1,0 +1,81 @@
+"""Hears commands to one drive that were not sent here: RPDOs, SDO writes, NMT commands.
+
+Reading by SDO changes nothing and does not count. Every SDO write does, whatever its object: a
+maker's own object may command a motion, and one of the communication area end the supervision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+
+__all__ = ["SecondMaster"]
+
+_NMT, _SDO_REQUEST = 0x000, 0x600
+_FURTHER_SERVERS = range(0x1201, 0x1280)
+_INVALID, _IDENTIFIER = 1 << 31, 0x7FF
+_DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6
+"""Command specifiers of requests (CiA 301); a block download begins where bit 0 is 0."""
+_HEAD = 4
+_COMMANDS = {
+    0x01: "start",
+    0x02: "stop",
+    0x80: "enter pre-operational",
+    0x81: "reset node",
+    0x82: "reset communication",
+}
+
+
+class SecondMaster:
+    """What somebody else commanded one drive to do, on the bus of a bench.
+
+    It listens from the beginning on, before anything is sent to the drive from here, so that no
+    frame of this bench comes back without having been noted (:mod:`.own_frames`).
+    """
+
+    def __init__(self, bus: CanBus, node: int, rpdos: Iterable[int]) -> None:
+        """Listen to the commands to ``node``; ``rpdos`` are the numbers of its RPDOs in use."""
+        self.heard = ""
+        """The first command that was not sent here, in words; empty where there was none."""
+        self._bus, self._node = bus, node
+        for number in rpdos:
+            bus.on_foreign(cob_id("rpdo", number, node), partial(self._take_rpdo, number))
+        bus.on_foreign(_SDO_REQUEST + node, self._take_sdo)
+        bus.on_foreign(_NMT, self._take_nmt)
+
+    def hear_further_servers(self, node: SdoNode) -> None:
+        """Listen to the drive's further SDO servers too; raises NoReply, DeviceRefused."""
+        for record in _FURTHER_SERVERS:
+            if record in node.dictionary:
+                identifier = node.read_if_there(record, 1)
+                if identifier is not None and not identifier & _INVALID:
+                    self._bus.on_foreign(identifier & _IDENTIFIER, self._take_sdo)
+
+    def forget(self) -> None:
+        """A reset has shown it."""
+        self.heard = ""
+
+    def _take_rpdo(self, number: int, data: bytes, _now: float) -> None:
+        self._note(f"RPDO {number} to node {self._node} ({data.hex(' ')})")
+
+    def _take_sdo(self, data: bytes, _now: float) -> None:
+        if len(data) < _HEAD:
+            return
+        specifier = data[0] >> 5
+        if specifier == _DOWNLOAD or (specifier == _BLOCK_DOWNLOAD and not data[0] & 1):
+            index = int.from_bytes(data[1:3], "little")
+            sub = f":{data[3]}" if data[3] else ""
+            self._note(f"SDO write of {index:04X}h{sub} of node {self._node} ({data.hex(' ')})")
+
+    def _take_nmt(self, data: bytes, _now: float) -> None:
+        if len(data) > 1 and data[1] in (0, self._node):
+            to = f"node {self._node}" if data[1] else "all nodes"
+            self._note(f"NMT command {_COMMANDS.get(data[0], f'{data[0]:02X}h')} to {to}")
+
+    def _note(self, words: str) -> None:
+        if not self.heard:
+            self.heard = words
