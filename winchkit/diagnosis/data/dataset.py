@@ -231,7 +231,7 @@ def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
     if motion.load is not None and "load" in run:
         good &= np.isfinite(run["load"])
     if output != "cable_length":
-        # Accelerations at the ends of a run are not known.
+        # No acceleration at the ends of a run: finite differences reach beyond them.
         edge = 1 + motion.clock.reach
         good[:edge] = good[-edge:] = False
     good = _away_from_gaps(good, band.rate, band.cut_off)

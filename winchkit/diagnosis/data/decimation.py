@@ -132,7 +132,7 @@ class Thinning:
             if len(own) < 2:
                 out.append(own)
                 continue
-            # Turned about its ends, so that a ramp goes on as a ramp.
+            # Odd reflection about the ends, so that a ramp continues as a ramp.
             padded = np.pad(own, reach, mode="reflect", reflect_type="odd")
             whole = upfirdn(taps, padded, down=self.factor)
             out.append(whole[_TAPS : _TAPS + count])
@@ -183,7 +183,7 @@ def _quickest(values: Array, rate: float) -> float:
         return 0.0
     index = np.arange(len(values))
     bridged = values if known.all() else np.interp(index, index[known], values[known])
-    # A ramp of many turns would leak over all frequencies through a common window.
+    # A ramp over many turns leaks over all frequencies through a Hann window.
     window = ("general_cosine", (3 / 8, 1 / 2, 1 / 8))
     frequency, power = welch(bridged, fs=rate, window=window, nperseg=length, detrend=_levelled)
     noise = float(np.median(power[frequency > rate / 4]))

@@ -113,7 +113,7 @@ def _gained(full: Array, power: Array, noise: Array) -> Array:
         )
         total = float(np.sum(power[inside]))
         share = 1 - float(np.sum(noise[inside])) / total if total > 0 else 0.0
-        # A ratio of two sums of n squares varies by 2/√n: below two of that, nothing is there.
+        # A ratio of two sums of n squares has a standard deviation of 2/√n: two of them are noise.
         deviation = 2 / np.sqrt(inside.stop - inside.start)
         gain[inside] = share if share > min(2 * deviation, 0.9) else 0.0
     gain[0] = 1.0

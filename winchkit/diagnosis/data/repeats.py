@@ -92,7 +92,7 @@ def _best_lag(a: Array, b: Array) -> int:
     apart = (squares - 2 * correlate(b, a, mode="full")) / (stop - start)
     enough = stop - start >= _OVERLAP * min(len(a), len(b))
     apart = np.where(enough, apart, np.inf)
-    # A motion that repeats within itself fits at several lags: then the one with most in common.
+    # A periodic motion fits at several lags: take the one of largest overlap.
     fits = apart <= apart.min() + _AS_GOOD * float(np.mean(a**2))
     return int(lags[fits][np.argmax((stop - start)[fits])])
 

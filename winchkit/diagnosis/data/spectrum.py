@@ -169,7 +169,7 @@ def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
     level = np.log(power)
     eta = np.linalg.solve(weight + stiff, weight @ level)
     for _ in range(_ITERATIONS):
-        # A band far below its neighbours may pull the logarithm down by one step only.
+        # Bounded working residual, so that a band far below its neighbours does not diverge.
         working = eta + np.clip(power / np.exp(eta) - 1, -1.0, 3.0)
         eta = np.linalg.solve(weight + stiff, weight @ working)
     covariance = np.linalg.inv(weight + stiff)
