@@ -135,7 +135,7 @@ def _unexplained(inquiry: Inquiry, found: Found) -> float:
 
 
 def _folds(inquiry: Inquiry, found: Found) -> Folds:
-    """Groups of runs while lack of fit remains, since imitations fail there; else the fit's folds."""
+    """Groups of runs while lack of fit remains, where imitations fail; else folds of the fit."""
     return inquiry.groups if found.still else inquiry.folds(found.final, found.noise)
 
 

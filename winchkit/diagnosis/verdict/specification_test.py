@@ -130,7 +130,7 @@ def _inner_products(beside: Beside, columns: Columns, count: int) -> _Hats:
 
 
 _SLIGHT = 1e-3
-"""Margin as a share of the named effects' decrease of χ²: real physics may differ from a formula."""
+"""Margin, share of the named effects' decrease of χ²: physics may differ from a formula."""
 _SLIGHT_OF_MORE = 2e-4
 """The same where lack of fit remains."""
 
