@@ -134,10 +134,23 @@ class ElongationCorrection:
         reference: Pose | None = None,
         kernels: RobotKernels = PLAIN,
     ) -> ElongationCorrection:
-        """Linear ropes from the winches' ``cable.axial_stiffness``, weight balanced at home.
+        """Correction for linear elasticity, from the ``cable.axial_stiffness`` of every line.
 
-        The forces at the reference pose (home unless told) are those closest to ``middle_force``
-        (N) that balance the platform's weight. Raises UsageError where a stiffness is missing.
+        Parameters
+        ----------
+        robot
+            Kinematic model.
+        middle_force
+            Forces at the reference are those closest to this that balance the platform's weight, N.
+        reference
+            Reference pose; None for the home pose.
+        kernels
+            Compiled or plain loops.
+
+        Raises
+        ------
+        UsageError
+            Where a stiffness is missing.
         """
         laws = []
         for line, winch in zip(robot.profile.line, robot.winches, strict=True):

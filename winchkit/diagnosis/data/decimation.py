@@ -29,9 +29,9 @@ from winchkit.runs.run import Run
 __all__ = ["Thinning", "thinning_for"]
 
 _MANY = 200_000
-"""Samples of all runs from which thinning begins."""
+"""Samples of all runs from which decimation begins."""
 _WANTED = 90_000
-"""Samples to which it thins, where the signals allow."""
+"""Samples that decimation aims at."""
 _PASSED = 0.25
 """Cut-off over the new sampling rate: below it aliases come from three times the cut-off."""
 _SLOWEST = 20.0
@@ -39,7 +39,7 @@ _SLOWEST = 20.0
 _LOST = 0.01
 """Share of a channel's power beyond its noise that may lie above the cut-off."""
 _BLOCK = 16.0
-"""Length of the blocks whose spectra are averaged, s, at most."""
+"""Longest block of a Welch spectrum, s."""
 _BLOCKS = 8
 """Least number of blocks of a Welch spectrum, overlapping by half."""
 _CLEAR = 2.0
