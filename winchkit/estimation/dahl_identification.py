@@ -72,6 +72,13 @@ def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> 
 def correlation_time(residuals: Array, lengths: Sequence[int]) -> float:
     """Integrated correlation time in samples, at least 1.
 
+    Parameters
+    ----------
+    residuals : (n,) array
+        Of all runs, one after the other.
+    lengths
+        Samples of each run.
+
     Notes
     -----
     1 + 2 Σ ρ_k up to the first lag with ρ_k <= 0, from the autocovariances of all runs.
@@ -127,6 +134,13 @@ class Identified:
 def record_of(run: Run, profile: WinchProfile) -> Record:
     """Both tensions and the nominal motion of a run of one winch.
 
+    Parameters
+    ----------
+    run
+        With ``tension``, and ``load`` or a ``load_mass`` in the metadata.
+    profile
+        Winch profile.
+
     Returns
     -------
     Record
@@ -135,7 +149,7 @@ def record_of(run: Run, profile: WinchProfile) -> Record:
     Raises
     ------
     RunError
-        Without a cell (``tension``) or the tension at the platform (``load``, ``load_mass``).
+        Without a cell or without the tension at the platform.
     """
     load = run["load"] if "load" in run.channels else None
     if load is None and run.load_mass is None:

@@ -73,9 +73,12 @@ def write_text(path: str | Path, text: str) -> Path:
 def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
     """Read points of a calibration from a CSV file.
 
-    Columns ``load [kg]`` or ``load [N]`` and ``indicated [N]``; optional ``std [N]``, ``going``
-    (up, down) and ``series`` (1, 2, …). Without ``going`` the direction follows from the order of
-    the loads.
+    Parameters
+    ----------
+    path
+        File with the columns ``load [kg]`` or ``load [N]`` and ``indicated [N]``; optional ``std
+        [N]``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the direction
+        follows from the order of the loads.
 
     Raises
     ------

@@ -266,7 +266,7 @@ def _with_remarks(health: Health, duration: float) -> Health:
 
 
 def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> Samples:
-    """Samples from rows of time, raw, value, usable, saturated."""
+    """Samples from rows of time, raw counts, value, usable, saturated."""
     time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
     return Samples(
         time.astype(float),

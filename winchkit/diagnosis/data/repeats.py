@@ -35,7 +35,18 @@ class Repeats:
 
 
 def find_repeats(signals: list[Signals]) -> list[Repeats]:
-    """Partition all runs into sets of repeats; a run without repeats is a set of its own."""
+    """Partition all runs into sets of repeats.
+
+    Parameters
+    ----------
+    signals
+        Measured inputs, one per run.
+
+    Returns
+    -------
+    list of Repeats
+        A run without repeats is a set of its own.
+    """
     sets: list[tuple[list[int], list[float]]] = []
     for index, run in enumerate(signals):
         for members, shifts in sets:

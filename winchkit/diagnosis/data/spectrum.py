@@ -39,7 +39,7 @@ WHOLE_FILTER = 3.0
 
 
 def torque_band(rate: float) -> float:
-    """Cut-off of the torque's low-pass: 20 Hz or a tenth of the sampling rate, Hz."""
+    """Default cut-off of the torque's low-pass, Hz: 20 Hz or a tenth of the sampling rate."""
     return min(_TORQUE_BAND, rate / 10)
 
 
@@ -105,7 +105,21 @@ def to_time(coefficients: Array, band: Band) -> Array:
 
 
 def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
-    """Zero-phase 4th-order Butterworth low-pass of a signal without gaps, (n,)."""
+    """Zero-phase 4th-order Butterworth low-pass.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        Without gaps.
+    rate
+        Samples per second.
+    cut_off
+        Frequency at which half of the amplitude is left, Hz.
+
+    Returns
+    -------
+    (n,) array
+    """
     full = np.asarray(dct(signal, type=2, norm="ortho"))
     frequency = np.arange(len(signal)) * rate / (2 * len(signal))
     gain = 1 / (1 + (frequency / cut_off) ** (2 * _BUTTERWORTH_ORDER))

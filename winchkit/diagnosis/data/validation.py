@@ -27,6 +27,13 @@ _ENOUGH = 20_000
 def admit(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     """Validate runs against a profile.
 
+    Parameters
+    ----------
+    runs
+        Measured runs.
+    profile
+        Winch profile that they are to be compared with.
+
     Returns
     -------
     list of str

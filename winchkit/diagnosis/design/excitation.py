@@ -21,7 +21,18 @@ _PLATEAU = 0.75
 
 
 def what_runs_cannot_show(problem: Problem) -> list[str]:
-    """Notes on missing repeats, loads, directions, reversals, speeds and temperatures."""
+    """Notes on missing repeats, loads, directions, reversals, speeds and temperatures.
+
+    Parameters
+    ----------
+    problem
+        Regression problem of the runs.
+
+    Returns
+    -------
+    list of str
+        One sentence each, with what to record.
+    """
     dataset = problem.dataset
     notes = []
     if not dataset.repeated:

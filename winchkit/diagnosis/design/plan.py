@@ -143,7 +143,21 @@ def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list
 def programme_of(dataset: Dataset, kind: Kind, name: str, room: Room | None = None) -> Programme:
     """Motion programme of a kind for ``winchkit run``, repeated twice.
 
-    It begins and ends at the shortest length, so that its repeats are equal.
+    Parameters
+    ----------
+    dataset
+        Runs so far.
+    kind
+        Candidate programme.
+    name
+        Of the motion programme.
+    room
+        Operating range; None for that of the runs so far.
+
+    Returns
+    -------
+    Programme
+        It begins and ends at the shortest length, so that its repeats are equal.
     """
     room = room or seen(dataset)
     steps: list[Step] = []

@@ -126,7 +126,20 @@ def ranked(found: Iterable[_S]) -> list[_S]:
 
 
 def harmonics(problem: Problem, residual: Array) -> list[Followed]:
-    """Per output and angle the order whose sine explains most of the residual variance."""
+    """Per output and angle the order whose sine explains most of the residual variance.
+
+    Parameters
+    ----------
+    problem
+        Regression problem.
+    residual : (rows,) array
+        Measured less predicted.
+
+    Returns
+    -------
+    list of Followed
+        Orders 1 to 40 with a share above 2 %, largest share first.
+    """
     times = problem.in_time(residual)
     out = []
     for output in problem.dataset.outputs:
