@@ -28,6 +28,7 @@ GONE = {
     r"hats?": "basis function, linear B-spline",
     r"carded": "listed as confusable",
     r"kindred": "of the same family",
+    r"skirts?": "transition band, stop-band leakage",
     r"smears?": "length of a filter's response",
     r"numbers of a law": "parameters",
     r"(forgets?|remembers) itself": "loses its state, is autocorrelated",
@@ -68,7 +69,6 @@ PENDING = {
     r"strangers?": "unknown device",
     r"thin(s|ned)": "decimate",
     r"drawn anew|sought": "recomputed, searched",
-    r"skirts?": "transition band, stop-band leakage",
 }
 """The same of words that are still to be replaced."""
 CLEAN = (
