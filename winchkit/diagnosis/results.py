@@ -1,4 +1,4 @@
-"""What a comparison and a diagnosis say, as frozen dataclasses and as JSON (DESIGN's promises)."""
+"""Results of a comparison and of a diagnosis, as frozen dataclasses and as JSON."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Verdict = Literal["adequate", "explained", "partly", "unknown"]
 
 @dataclass(frozen=True)
 class OutputError:
-    """How far one output is from its prediction, SI."""
+    """Error of one output against its prediction, SI."""
 
     unit: str
     samples: int
@@ -44,12 +44,12 @@ class OutputError:
     noise_rms: float | None
     """From differences of repeats; None without any."""
     follows: tuple[tuple[str, float], ...]
-    """Variables and the share of the error that each explains."""
+    """Variables and the share of the error variance (η²) that each explains."""
     orders: tuple[tuple[str, int, float], ...] = ()
-    """Angles, how often per turn the error repeats over them, and the share of that sine."""
+    """Angles, periods per turn, and the share of the error variance that this sine explains."""
 
     def to_json(self) -> dict[str, Any]:
-        """As the command prints it."""
+        """Dictionary that the command prints."""
         plain = {k: v for k, v in vars(self).items() if k not in {"follows", "orders"}}
         follows = [{"variable": name, "share": share} for name, share in self.follows]
         orders = [{"variable": v, "order": order, "share": s} for v, order, s in self.orders]
@@ -58,17 +58,17 @@ class OutputError:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A profile against measured runs, only the length offset fitted."""
+    """Errors of a profile on measured runs, with only the length offset fitted."""
 
     outputs: Mapping[str, OutputError]
     offset: float | None
     """Fitted offset of the length instrument, m."""
     notes: tuple[str, ...] = ()
     maps: tuple[ResidualMap, ...] = field(default=(), compare=False)
-    """What the errors do over two variables; per output the most telling first."""
+    """Mean errors over two variables; per output the largest share first."""
 
     def to_json(self) -> dict[str, Any]:
-        """As ``winchkit compare --json`` prints it."""
+        """Dictionary that ``winchkit compare --json`` prints."""
         outputs = {name: error.to_json() for name, error in self.outputs.items()}
         return {
             "schema": 1,
@@ -87,12 +87,12 @@ class Estimate:
     std: float
     unit: str
     interval: tuple[float, float] | None = None
-    """That holds the truth in 95 of 100 cases; None where it was not worked out."""
+    """95 % confidence interval, pointwise, not conditional on selection; None if not computed."""
 
 
 @dataclass(frozen=True)
 class OutputFit:
-    """One output before and after, SI."""
+    """Errors of one output before and after, SI."""
 
     unit: str
     band: float | None
@@ -107,18 +107,18 @@ class OutputFit:
 
 @dataclass(frozen=True)
 class Step:
-    """One addition to the model: the effects that the data cannot tell apart there."""
+    """One addition to the model, with the effects that these runs cannot distinguish from it."""
 
     effects: tuple[str, ...]
     parameters: Mapping[str, Mapping[str, Estimate]]
     heldout_gain: float
     angles: Mapping[str, float] = field(default_factory=dict)
-    """Between the first effect's signature and the others', rad."""
+    """Angle between the signatures of the first effect and of the others, rad."""
     whole: bool = False
-    """All of the effects at once, as a robot's whole geometry; not one of them."""
+    """Whether all effects apply together, as for a robot's geometry, instead of one of them."""
 
     def to_json(self) -> dict[str, Any]:
-        """As the command prints it."""
+        """Dictionary that the command prints."""
         parameters = {
             effect: {name: vars(estimate) for name, estimate in values.items()}
             for effect, values in self.parameters.items()
@@ -133,28 +133,28 @@ class Step:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect of the catalogue, scored beside the model that the runs were compared with."""
+    """A candidate effect with its score beside the initial model."""
 
     effect: str
     score: float
     heldout_rms: Mapping[str, float]
-    """With it added; empty where its score did not earn a fit."""
+    """Held-out error with it added; empty where it was not fitted."""
 
 
 @dataclass(frozen=True)
 class Detectable:
-    """The smallest size of an effect that these runs could have shown."""
+    """Smallest size of an effect that these runs detect with 90 % power."""
 
     effect: str
     parameter: str
     smallest: float
-    """NaN where no size within the parameter's bounds would have been seen."""
+    """NaN where no size within the parameter's bounds is detected."""
     unit: str
 
 
 @dataclass(frozen=True)
 class Where:
-    """Where an unexplained rest lives."""
+    """One line of the residual attribution."""
 
     output: str
     variable: str
@@ -162,16 +162,16 @@ class Where:
     order: int | None = None
     frequency: float | None = None
     line: str | None = None
-    """Of a robot, or axis of its platform's position, where one alone has most of it."""
+    """Line of a robot, or axis of its platform, that has most of the share."""
 
     def to_json(self) -> dict[str, Any]:
-        """As the command prints it: order, frequency or line only where it has one."""
+        """Dictionary that the command prints: order, frequency and line only where present."""
         return {key: value for key, value in vars(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
 class NextRun:
-    """A motion programme that would tell two effects apart."""
+    """A motion programme that separates two effects, with its power."""
 
     separates: tuple[str, str]
     programme: str
@@ -180,10 +180,10 @@ class NextRun:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The answer: what is missing, how sure that is, and what these runs cannot show."""
+    """Result of a diagnosis: verdict, named effects, uncertainty and limits."""
 
     data: ClassVar[str] = "runs"
-    """What it was made from, in a word."""
+    """Kind of data that it was made from."""
 
     verdict: Verdict
     outputs: Mapping[str, OutputFit]
@@ -197,12 +197,12 @@ class Diagnosis:
 
     @property
     def empirical(self) -> tuple[str, ...]:
-        """Empirical effects that would take up the rest where it lives, most of it first."""
+        """Empirical effects that would describe the unexplained residual, largest share first."""
         seen = [empirical_id(w.output, w.variable) for w in self.where if w.frequency is None]
         return tuple(dict.fromkeys(seen))
 
     def to_json(self) -> dict[str, Any]:
-        """As ``winchkit diagnose --json`` prints it."""
+        """Dictionary that ``winchkit diagnose --json`` prints."""
         return {
             "schema": 1,
             "verdict": self.verdict,
@@ -224,20 +224,19 @@ class Diagnosis:
 
 @dataclass(frozen=True)
 class RobotDiagnosis(Diagnosis):
-    """As a winch's; ids of effects at a place are ``EFFECT/LINE`` inside."""
+    """Result for a robot; ids of effects at a place are ``EFFECT/LINE`` inside."""
 
     data: ClassVar[str] = "poses"
     geometry: str = "file"
-    """``file`` where the numbers of the profile were taken as they are, ``refitted`` where the
-    geometry was let go."""
+    """``file`` where the geometry of the profile was kept, ``refitted`` where it was fitted."""
 
     @property
     def empirical(self) -> tuple[str, ...]:
-        """None: a curve over a pose has no effect of its own."""
+        """None: a curve over a pose has no empirical effect."""
         return ()
 
     def to_json(self) -> dict[str, Any]:
-        """As ``winchkit diagnose --json`` prints it for a robot."""
+        """Dictionary that ``winchkit diagnose --json`` prints for a robot."""
         out = super().to_json()
         out["geometry"] = self.geometry
         out["steps"] = [_step(step) for step in self.steps]
@@ -249,13 +248,13 @@ class RobotDiagnosis(Diagnosis):
 
 
 def apart(placed: str) -> tuple[str, str | None]:
-    """An effect's id and the line it was placed on, None for all lines or the platform."""
+    """Id of an effect and the line of its place, None for all lines or the platform."""
     effect, _, line = placed.partition("/")
     return effect, line or None
 
 
 def plain_step(step: Step) -> Step:
-    """A step without the home lengths that a rope's law brings along."""
+    """A step without the home lengths that a cable law brings along."""
     parameters = {
         effect: {n: e for n, e in values.items() if not n.startswith(HOME)}
         for effect, values in step.parameters.items()
@@ -264,7 +263,7 @@ def plain_step(step: Step) -> Step:
 
 
 def _step(step: Step) -> dict[str, Any]:
-    """One step; ``lines`` has, for each name of ``effects``, the lines that it may be on."""
+    """One step; ``lines`` has, for each of ``effects``, the lines that it may be on."""
     lines: dict[str, list[str | None]] = {}
     for placed in step.effects:
         effect, line = apart(placed)
@@ -291,7 +290,7 @@ def _placed(candidate: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _detectable(items: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Per effect and parameter the line on which it would have to be largest to be seen."""
+    """Per effect and parameter the line with the largest detectable size."""
     out: dict[tuple[str, str], dict[str, Any]] = {}
     for item in items:
         effect, line = apart(item["effect"])

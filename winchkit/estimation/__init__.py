@@ -1,4 +1,4 @@
-"""Online estimators for control: what a measured signal says about one that is not measured."""
+"""Online estimators for control: tension and elongation from signals that do not measure them."""
 
 from winchkit.estimation.dahl import DahlEstimator, PlatformTension
 from winchkit.estimation.groups import PulleyGroup

@@ -1,8 +1,8 @@
-"""The rope sample by sample: true length and tension from what a winch measures, for control.
+"""State of the cable sample by sample: true length and tension from a winch's signals, for control.
 
-The effects of a profile are functions of whole runs. Here each is handed two samples, the last and
-the new one; what has a memory begins in the state that the sample before left (``Effect.carry``).
-So every formula stands once, and the two agree.
+The effects of a profile are functions of whole runs. Here each is evaluated on two samples, the
+previous and the new one; an effect with memory starts in the state at the end of the previous
+sample (``Effect.carry``). Each formula is written once, and both evaluations agree.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = ["RopeNow", "RopeState", "Sample"]
 
 _CALMING = 0.2
-"""Of the tension on its way to strains and friction, s: well below a load's swing on its rope."""
+"""Time constant of the low-pass of the tension, s: well below the period of a swinging load."""
 _HELD = 3e-3
-"""Share of the tension that must change before it counts: a loop of friction forgets in noise."""
+"""Dead band of the tension as a share of it: friction with hysteresis is erased by noise."""
 _SHORTEST = 1e-4
-"""Of a step in time, s."""
+"""Least step in time, s."""
 _JUMP = 1.0
-"""Motor angle that its speed does not explain: a new zero and no motion, rad."""
+"""Change of the motor angle that its rate does not explain: a new zero instead of motion, rad."""
 _USUAL = 20.0
-"""Temperature where none is measured, at which every thermal effect vanishes, degrees Celsius."""
+"""Temperature where none is measured, at which every thermal effect is zero, °C."""
 _GOOD = 1e-3
-"""Of the cell's reading, to which the tension is solved, N."""
+"""Tolerance of the cell's reading when solving for the tension, N."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What a winch measures at one moment; SI, NaN where it has no instrument."""
+    """Signals of a winch at one time; SI, NaN where there is no instrument."""
 
     time: float
     motor_angle: float
@@ -49,19 +49,19 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class RopeState:
-    """What follows from it."""
+    """Estimated state of the cable."""
 
     length: float
     """True cable length, m."""
     tension: float
-    """In the rope at the platform end, calmed; where nothing measures it the last known, N."""
+    """At the platform end, low-passed, N; the last known one where nothing measures it."""
     correction: float
-    """Of the cell: tension at the platform end less its reading, N; 0 where that is not used."""
+    """Tension at the platform end less the cell's reading, N; 0 where the cell is not corrected."""
 
 
 @dataclass
 class _Carried:
-    """A term and the state of its memory, by pulley."""
+    """A term with the state of its memory, by pulley."""
 
     term: Term
     start: dict[int, float] = field(default_factory=dict)
@@ -81,7 +81,7 @@ class _Carried:
         return after
 
     def go_on(self) -> None:
-        """What it ended in is what follows begins with."""
+        """Make the state at the end of this sample that at the start of the next."""
         self.start.update(self.end)
 
 
@@ -90,12 +90,22 @@ def _on_length(term: Term) -> bool:
 
 
 class RopeNow:
-    """The line of a profile, one sample after the other."""
+    """State of the cable of one winch, updated sample by sample."""
 
     def __init__(
         self, profile: WinchProfile, terms: Iterable[Term], weight: float | None = None
     ) -> None:
-        """Take the terms of a profile; ``weight`` (N) hangs where no instrument tells."""
+        """Take a profile and its effects.
+
+        Parameters
+        ----------
+        profile
+            Winch profile.
+        terms
+            Effects with their values.
+        weight
+            Load where no instrument measures one, N.
+        """
         used = [term for term in terms if not term.effect.not_in_control]
         self.at_rest = Line(profile, modifiers_of(t for t in used if not t.effect.memory))
         """Without what has a memory, for planning."""
@@ -114,7 +124,18 @@ class RopeNow:
         self._tension = nan
 
     def update(self, sample: Sample) -> RopeState:
-        """Take the next sample; those with a motor angle that is not finite are not for here."""
+        """Update with one sample.
+
+        Parameters
+        ----------
+        sample
+            With a finite motor angle.
+
+        Returns
+        -------
+        RopeState
+            True length, tension and correction of the cell.
+        """
         before = self._before(sample)
         step = max(sample.time - before.time, _SHORTEST)
         measured = sample.load if isfinite(sample.load) else sample.cell
@@ -136,7 +157,7 @@ class RopeNow:
         return RopeState(length, tension, correction)
 
     def _before(self, sample: Sample) -> Sample:
-        """The sample before; where the motor angle jumped without motion, a new beginning."""
+        """Previous sample; a restart where the motor angle jumped without motion."""
         last = self._last
         if last is None:
             return sample
@@ -147,7 +168,7 @@ class RopeNow:
         return Sample(last.time, sample.motor_angle, sample.motor_rate)
 
     def _calmed(self, measured: float, step: float) -> float:
-        """The reading without its noise, which stays where it is until it really changes."""
+        """Low-passed reading with a dead band."""
         if not isfinite(measured):
             return self._reading
         if isnan(self._calm):
@@ -158,7 +179,7 @@ class RopeNow:
         return self._calm if moved or isnan(self._reading) else self._reading
 
     def _at_platform(self, at: At, reading: float) -> float:
-        """Tension at the platform end under which the cell shows ``reading``, by two secants."""
+        """Tension at the platform end for which the cell shows ``reading``, by two secant steps."""
         begun = isfinite(self._tension) and isfinite(self._reading)
         guess = self._tension + reading - self._reading if begun else reading
         shown = self._shown(at, guess)

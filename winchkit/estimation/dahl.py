@@ -1,4 +1,9 @@
-"""The tension at the platform, sample by sample, from the cell's reading and the rope's motion."""
+"""Tension at the platform, sample by sample, from the cell's reading and the motion of the cable.
+
+References
+----------
+Dahl, P. R. (1968). A solid friction model. Aerospace Corporation, TOR-0158(3107-18)-1.
+"""
 
 from __future__ import annotations
 
@@ -16,21 +21,23 @@ _UNIFORM = 3.0**-0.5
 
 
 class PlatformTension(NamedTuple):
-    """Tension at the platform end of the rope."""
+    """Tension at the platform end of the cable."""
 
     value: float
-    """N; NaN before the first sample that can be used and for a sample that cannot."""
+    """N; NaN before the first usable sample and for one that is not."""
     std: float
-    """Standard deviation, N: of the cell, of the parameters, of the friction at the start."""
+    """Standard deviation, N: of the cell, the parameters, and the friction at the start."""
 
 
 class DahlEstimator:
-    """Takes the friction of the pulleys off the cell's reading, with presliding (Eq. 25, 27).
+    """Removes pulley friction with presliding from a load cell's reading (Eq. 25, 27).
 
-    The friction of every pulley follows the rope by the exact Dahl step under the limit μ N of the
-    tensions on its two sides. How far it is built up at the first sample is unknown; the standard
-    deviation says so until the rope has moved.
+    The friction of every pulley follows the cable by the exact step of the Dahl model, with the
+    limit μ N from the tensions on both sides. Its value at the first sample is not known; the
+    standard deviation contains that until the cable has moved.
 
+    Examples
+    --------
         estimator = DahlEstimator([PulleyGroup(wraps=(1.57, 3.14), friction=0.02, stiffness=2e3)])
         tension, std = estimator.update(cell, wound_in)
     """
@@ -56,11 +63,24 @@ class DahlEstimator:
         dead_band: float = 0.0,
         kernels: Kernels = PLAIN,
     ) -> None:
-        """Take pulleys from the drum to the platform; standard deviations in N.
+        """Take pulleys in order from the drum to the platform.
 
-        ``dead_band`` (m) is the motion that counts as standstill, several times the encoder's
-        noise: friction of this kind would forget itself in a position that trembles. ``kernels``
-        come from :func:`winchkit.estimation.compiled`, else plain Python is used.
+        Parameters
+        ----------
+        groups
+            Pulleys with their friction.
+        cell_std, model_std
+            Standard deviations of the cell and of the model, N.
+        dead_band
+            Motion that counts as standstill, m; several times the noise of the encoder, since a
+            Dahl friction loses its state in a position that trembles.
+        kernels
+            From :func:`winchkit.estimation.compiled`, else plain Python.
+
+        Raises
+        ------
+        UsageError
+            Without a group, or for negative or infinite numbers.
         """
         if not groups:
             raise UsageError("a DahlEstimator needs at least one pulley group")
@@ -83,21 +103,30 @@ class DahlEstimator:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the friction, as after a rope that moved unseen."""
+        """Restart with unknown friction, as after motion that was not measured."""
         count = len(self._pulleys) // PULLEY_SLOTS
         self._state = self._kernels.array([0.0] * (STATE_SLOTS * count))
         self._position = nan
 
     @property
     def forces(self) -> tuple[float, ...]:
-        """Friction of every pulley, positive where the rope last ran to the platform, N."""
+        """Friction of every pulley, positive where the cable last ran towards the platform, N."""
         return tuple(float(force) for force in self._state[::STATE_SLOTS])
 
     def update(self, tension: float, position: float) -> PlatformTension:
-        """Take one sample: the cell's ``tension`` (N) and the rope wound in (m, any origin).
+        """Update with one sample.
 
-        A sample that is not finite is answered by NaN and changes nothing: what the rope moved
-        meanwhile counts with the next good one.
+        Parameters
+        ----------
+        tension
+            Reading of the cell, N.
+        position
+            Cable wound in, any origin, m.
+
+        Returns
+        -------
+        PlatformTension
+            NaN for a sample that is not finite; its motion counts with the next finite one.
         """
         moved = self._position - position
         if not (isfinite(position) and isfinite(tension)):
@@ -114,7 +143,7 @@ class DahlEstimator:
         return PlatformTension(value, sqrt(variance + self._floor))
 
     def _begin(self, tension: float, position: float) -> PlatformTension:
-        """The first sample: no friction is assumed, anything up to the limit is possible."""
+        """First sample: zero friction, its standard deviation that of a uniform distribution."""
         self._position = position
         pulleys = self._pulleys
         for j in range(len(self._state) // STATE_SLOTS):

@@ -1,4 +1,4 @@
-"""Dahl friction along a whole recording at once."""
+"""Dahl friction along a whole recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from winchkit.model.friction import dahl, dahl_constant
 __all__ = ["dahl_batch"]
 
 _FEW = 0.02
-"""Reversals a sample up to which whole pieces are quicker than samples."""
+"""Reversals per sample up to which whole strokes are quicker than single samples."""
 
 
 def dahl_batch(
@@ -25,12 +25,38 @@ def dahl_batch(
     *,
     kernels: Kernels = PLAIN,
 ) -> Array:
-    """Friction along ``position`` (m) under a ``limit`` F_c (N), a number or an array; (n,), N.
+    """Dahl friction along a path.
 
-    ``stiffness`` σ in N/m, ``shape`` β, ``start`` the force at the first sample as a share of
-    the limit, −1 to 1. A constant limit with few reversals is followed from one to the next, all
-    else sample by sample with compiled ``kernels``, or in numpy by a scan (β = 1) and else in a
-    loop. Raises UsageError for shapes that do not fit.
+    Parameters
+    ----------
+    position : (n,) array
+        m.
+    limit : float or (n,) array
+        F_c, N.
+    stiffness
+        σ, N/m.
+    shape
+        β.
+    start
+        Force at the first sample as a share of the limit, -1 to 1.
+    kernels
+        Compiled loops, or plain Python.
+
+    Returns
+    -------
+    (n,) array
+        N.
+
+    Raises
+    ------
+    UsageError
+        For shapes that do not fit.
+
+    Notes
+    -----
+    dF/dx = σ sgn(1 - F/F_c sgn v) |1 - F/F_c sgn v|^β. A constant limit with few reversals is
+    computed stroke by stroke; all else sample by sample with compiled kernels, in numpy by a scan
+    (β = 1), or in a loop.
     """
     way = np.asarray(position, dtype=float)
     most = np.asarray(limit, dtype=float)

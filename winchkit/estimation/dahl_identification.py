@@ -1,7 +1,8 @@
-"""Friction, presliding stiffness and shape of pulley groups, with uncertainties, from runs.
+"""Identification of friction, presliding stiffness and shape of pulley groups, with uncertainties.
 
-The runs hold both ends of the rope: the cell at the drum, and a cell or a known weight at the
-platform. What the estimator would have said about the platform is held against what was there.
+The runs hold both ends of the cable: the cell at the drum, and a cell or a known weight at the
+platform. The estimator's output at the platform is fitted to the measurement by nonlinear least
+squares.
 """
 
 from __future__ import annotations
@@ -34,11 +35,23 @@ _SINGULAR = 1e-10
 
 
 def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> Array:
-    """Covariance of least squares values, shape (p, p); residuals (n,), jacobian (n, p).
+    """Covariance of least-squares estimates under correlated residuals.
 
-    The variance is that of the residuals times the time over which they stay alike, in samples,
-    within each run of ``lengths``. NaN for values without any influence, and for those that only
-    a direction shared with others moves.
+    Parameters
+    ----------
+    residuals : (n,) array
+    jacobian : (n, p) array
+    lengths
+        Samples of each run.
+
+    Returns
+    -------
+    (p, p) array
+        NaN for parameters without influence, and for those that are not identifiable.
+
+    Notes
+    -----
+    s² τ (JᵀJ)⁻¹ with the residual variance s² and the integrated correlation time τ in samples.
     """
     rows, columns = jacobian.shape
     scale = np.sqrt(np.sum(jacobian**2, axis=0))
@@ -57,7 +70,19 @@ def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> 
 
 
 def correlation_time(residuals: Array, lengths: Sequence[int]) -> float:
-    """1 + 2 Σ ρ_k up to the first lag that is not positive, in samples, at least 1."""
+    """Integrated correlation time in samples, at least 1.
+
+    Parameters
+    ----------
+    residuals : (n,) array
+        Of all runs, one after the other.
+    lengths
+        Samples of each run.
+
+    Notes
+    -----
+    1 + 2 Σ ρ_k up to the first lag with ρ_k <= 0, from the autocovariances of all runs.
+    """
     parts = np.split(residuals, np.cumsum(lengths)[:-1])
     size = max(len(part) for part in parts)
     padded = 2 ** int(np.ceil(np.log2(2 * size)))
@@ -72,44 +97,59 @@ def correlation_time(residuals: Array, lengths: Sequence[int]) -> float:
 
 _LEAST_SAMPLES = 20
 _BOUNDS = ((1e-5, 0.5), (1.0, 1e8), (0.05, 4.0))
-"""Of μ, σ (N/m) and β."""
+"""Bounds of μ, σ (N/m) and β."""
 _BEGINNINGS = 3
-"""To fit from for every group after the first."""
+"""Starting points for every group after the first."""
 _LENGTHS = (3e-4, 3e-3, 0.02, 0.1)
-"""Distances of presliding to begin with, as shares of the stroke."""
+"""Presliding distances of the starting points, as shares of the stroke."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """Both tensions of one run and the rope's motion; arrays (n,), finite."""
+    """Both tensions of one run and the motion of the cable; arrays (n,), finite."""
 
     cell: Array
     """At the drum, N."""
     platform: Array
-    """At the other end, N."""
+    """At the platform end, N."""
     wound: Array
-    """Rope wound in, any origin, m."""
+    """Cable wound in, any origin, m."""
 
 
 @dataclass(frozen=True)
 class Identified:
-    """Pulley groups as identified, ready for a :class:`~winchkit.estimation.DahlEstimator`."""
+    """Identified pulley groups, for a :class:`~winchkit.estimation.DahlEstimator`."""
 
     groups: tuple[PulleyGroup, ...]
-    """With the covariance of μ, σ and β; NaN where the runs do not tell them."""
+    """With the covariance of μ, σ and β; NaN where not identifiable from these runs."""
     residual_std: float
-    """What is left between estimate and measurement, N."""
+    """Rms of estimate less measurement, N."""
     starts: tuple[float, ...]
-    """Friction at the start of each run as a share of its limit, −1 to 1."""
+    """Friction at the start of each run as a share of its limit, -1 to 1."""
     samples: int
     at_bound: tuple[str, ...] = ()
-    """Parameters that ended at a bound of what is searched; their std means little."""
+    """Parameters that ended at a bound; their standard deviations mean little."""
 
 
 def record_of(run: Run, profile: WinchProfile) -> Record:
-    """Both tensions and the nominal line's motion of a run of one winch; rows with gaps left out.
+    """Both tensions and the nominal motion of a run of one winch.
 
-    Raises RunError without a cell (``tension``) or the platform's end (``load``, ``load_mass``).
+    Parameters
+    ----------
+    run
+        With ``tension``, and ``load`` or a ``load_mass`` in the metadata.
+    profile
+        Winch profile.
+
+    Returns
+    -------
+    Record
+        Without rows in which a signal is NaN.
+
+    Raises
+    ------
+    RunError
+        Without a cell or without the tension at the platform.
     """
     load = run["load"] if "load" in run.channels else None
     if load is None and run.load_mass is None:
@@ -133,11 +173,33 @@ def identify_dahl(
     shape: float | None = None,
     kernels: Kernels = PLAIN,
 ) -> Identified:
-    """Fit μ, σ and β of every pulley group; ``wraps`` of each group from the drum on, rad.
+    """Fit μ, σ and β of every pulley group.
 
-    ``shape`` holds β at a value instead of fitting it. Least squares with analytic derivatives,
-    from the best of a few distances of presliding; how far friction was built up at the start of
-    a run is fitted beside. Raises UsageError without enough samples.
+    Parameters
+    ----------
+    records
+        Runs with both tensions.
+    wraps
+        Wrap angles of each group from the drum on, rad.
+    shape
+        Value at which β is held; None to fit it.
+    kernels
+        Compiled loops, or plain Python.
+
+    Returns
+    -------
+    Identified
+        Of least residual sum of squares over several starting points.
+
+    Raises
+    ------
+    UsageError
+        Without enough samples, or without a group.
+
+    Notes
+    -----
+    Nonlinear least squares with analytic derivatives; the friction at the start of each run is a
+    nuisance parameter.
     """
     from scipy.optimize import least_squares
 
@@ -148,7 +210,7 @@ def identify_dahl(
             f"least {_LEAST_SAMPLES} samples and one group"
         )
     problem = _Problem(tuple(records), tuple(tuple(group) for group in wraps), shape, kernels)
-    # Two groups of pulleys that swap their parts look nearly alike: one beginning is not enough.
+    # Groups with exchanged parameters fit nearly as well: several starting points.
     begins = sorted(problem.beginnings(), key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
     fits = [
         least_squares(
@@ -171,7 +233,7 @@ class _Problem:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Lowest and highest values."""
+        """Lower and upper bounds."""
         ends = []
         for end, share in ((0, -1.0), (1, 1.0)):
             group = [np.log(_BOUNDS[0][end]), np.log(_BOUNDS[1][end]), _BOUNDS[2][end]]
@@ -179,7 +241,7 @@ class _Problem:
         return ends[0], ends[1]
 
     def groups(self, x: Array) -> list[PulleyGroup]:
-        """Pulley groups at values."""
+        """Pulley groups at a parameter vector."""
         out = []
         for wraps, part in zip(self.wraps, x[: 3 * len(self.wraps)].reshape(-1, 3), strict=True):
             shape = float(part[2]) if self.shape is None else self.shape
@@ -187,7 +249,7 @@ class _Problem:
         return out
 
     def beginnings(self) -> list[Array]:
-        """Values to begin with: friction from the spread of the ratio, several distances."""
+        """Starting points: friction from the spread of the tension ratio, several distances."""
         ratio = np.concatenate([r.cell / r.platform for r in self.records])
         force = float(np.median(np.concatenate([r.platform for r in self.records])))
         stroke = max(float(np.ptp(record.wound)) for record in self.records)
@@ -247,7 +309,7 @@ class _Problem:
         return out - record.platform, self._chain(slopes, index, x)
 
     def _chain(self, slopes: Array, index: int, x: Array) -> Array:
-        """Derivatives by the fitted values from those by the physical ones."""
+        """Derivatives by the fitted parameters from those by the physical ones (chain rule)."""
         full = np.zeros((len(slopes), len(x)))
         width = 3 * len(self.wraps)
         scale = np.ones(width)
@@ -260,7 +322,7 @@ class _Problem:
         return full
 
     def answer(self, x: Array) -> Identified:
-        """Groups with their covariances at the values found."""
+        """Groups with their covariances at a parameter vector."""
         residuals, jacobian = self.both(x)
         spread = covariance_of(residuals, jacobian, [len(r.cell) for r in self.records])
         groups = []

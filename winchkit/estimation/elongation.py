@@ -1,9 +1,9 @@
-"""Elongation of a cable robot's ropes, corrected beside kinematics that stay as they are.
+"""Correction of a cable robot's kinematics for the elongation of its cables.
 
-The scheme of the IPAnema paper's Fig. 1: from the pose the rope forces are estimated (Eq. 8, its
-sign put right), from these the strain (Eq. 4, 5 or 6), and the rope that is paid out is made
-shorter by what the rope is longer. All is relative to a reference pose, where motors and platform
-were brought together, so that the correction is zero there.
+Scheme of Fig. 1 of the IPAnema paper: cable forces are estimated from the pose (Eq. 8, with its
+sign corrected), strains from the forces (Eq. 4, 5 or 6), and the commanded cable length is reduced
+by the elongation. All is relative to a reference pose, at which motors and platform were
+referenced, so that the correction is zero there.
 
     correction = ElongationCorrection.of(robot, middle_force=500.0)
     stretch = correction.update(pose)                  # twelve floats, at 1 kHz
@@ -39,22 +39,22 @@ __all__ = ["ElongationCorrection", "Stretch"]
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """How much longer the ropes are than at the reference, and why."""
+    """Elongation of the cables relative to the reference pose, with its causes."""
 
     strain: Any
-    """(n,), of rope and dead length, relative to the reference."""
+    """Of cable and dead length, relative to the reference, (n,)."""
     length: Any
     """δl, (n,), m."""
     forces: Any
-    """(n,), N, as Eq. 8 estimates them."""
+    """As Eq. 8 estimates them, (n,), N."""
     good: bool
-    """False where the pose gave no forces or no strain: then all is that of the last good one."""
+    """False where the pose gives no forces or no strain: all values are then the last good ones."""
     slack: bool
-    """Whether a force is below zero, which Eq. 8 does not exclude and a rope cannot bear."""
+    """Whether a force is negative, which Eq. 8 does not exclude and a cable cannot carry."""
 
 
 class ElongationCorrection:
-    """Strain and elongation of every rope at a pose, from a pose and nothing else."""
+    """Strain and elongation of every cable from a pose."""
 
     __slots__ = (
         "_array",
@@ -80,10 +80,27 @@ class ElongationCorrection:
         wrench: Sequence[float] | Array | None = None,
         kernels: RobotKernels = PLAIN,
     ) -> None:
-        """Take a law per line, and the forces ``initial`` (n,), N, at the reference pose.
+        """Take the elongation laws and the state at the reference pose.
 
-        ``wrench`` on the platform (6,) is constant; the platform's weight at the reference unless
-        told. Raises UsageError where a law has no strain for a force at the reference.
+        Parameters
+        ----------
+        robot
+            Kinematic model.
+        laws
+            One per line.
+        reference
+            Reference pose.
+        initial : (n,) sequence
+            Cable forces there, N.
+        wrench : (6,) sequence
+            Constant wrench on the platform, N and N m; None for its weight at the reference.
+        kernels
+            Compiled or plain loops.
+
+        Raises
+        ------
+        UsageError
+            For fewer than six lines, or where a law has no strain for a force at the reference.
         """
         count = len(robot.names)
         if count < 6:
@@ -117,10 +134,23 @@ class ElongationCorrection:
         reference: Pose | None = None,
         kernels: RobotKernels = PLAIN,
     ) -> ElongationCorrection:
-        """Linear ropes from the winches' ``cable.axial_stiffness``, weight balanced at home.
+        """Correction for linear elasticity, from the ``cable.axial_stiffness`` of every line.
 
-        The forces at the reference pose (home unless told) are those closest to ``middle_force``
-        (N) that balance the platform's weight. Raises UsageError where a stiffness is missing.
+        Parameters
+        ----------
+        robot
+            Kinematic model.
+        middle_force
+            Forces at the reference are those closest to this that balance the platform's weight, N.
+        reference
+            Reference pose; None for the home pose.
+        kernels
+            Compiled or plain loops.
+
+        Raises
+        ------
+        UsageError
+            Where a stiffness is missing.
         """
         laws = []
         for line, winch in zip(robot.profile.line, robot.winches, strict=True):
@@ -138,7 +168,7 @@ class ElongationCorrection:
     def update(self, pose: Any) -> Stretch:
         """Elongation at a pose of twelve floats (position, rotation by rows).
 
-        Where it cannot be found, the last good one stays, so that a command never jumps.
+        Where it cannot be computed, the last good one is returned, so that a command never jumps.
         """
         found = self._stretch(pose)
         if found is None:
@@ -166,7 +196,7 @@ class ElongationCorrection:
         return Stretch(make(strains), make(lengths), make(forces), True, min(forces) < 0.0)
 
     def _strains(self, robot: Robot, reference: Pose, kernels: RobotKernels) -> list[float]:
-        """Strains at the reference, which all others are counted from."""
+        """Strains at the reference pose, to which all others are relative."""
         pose = kernels.array(flat_pose(reference))
         if not self._estimate(
             self._lines, pose, self._initial, self._wrench, self._room, self._forces

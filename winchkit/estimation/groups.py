@@ -1,4 +1,4 @@
-"""Pulley groups: pulleys of one make, which share their friction, and how well it is known."""
+"""Pulley groups: pulleys of one type, which share friction parameters, with their covariance."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = [
 ]
 
 PULLEY_SLOTS = 5
-"""Of each pulley: cosine of the wrap, μ, σ, β, index of its group."""
+"""Per pulley: cosine of the wrap, μ, σ, β, index of its group."""
 COVARIANCE_SLOTS = 6
-"""Of each group: variances of μ, σ, β, covariances μσ, μβ, σβ."""
+"""Per group: variances of μ, σ, β, covariances μσ, μβ, σβ."""
 
 
 @dataclass(frozen=True)
 class PulleyGroup:
-    """Pulleys in order from the drum to the platform, with Dahl friction of one kind."""
+    """Pulleys in order from the drum to the platform, with the same Dahl friction."""
 
     wraps: tuple[float, ...]
     """Wrap angles, rad."""
@@ -35,7 +35,7 @@ class PulleyGroup:
     shape: float = 1.0
     """β."""
     covariance: tuple[tuple[float, float, float], ...] = ((0.0,) * 3,) * 3
-    """Of μ, σ and β; zero where they are taken as known."""
+    """Of μ, σ and β; zero where they are taken as exact."""
 
     @property
     def std(self) -> tuple[float, float, float]:
@@ -44,7 +44,7 @@ class PulleyGroup:
         return first, second, third
 
     def check(self) -> None:
-        """Raise UsageError for numbers that no pulley has."""
+        """Raise UsageError for values outside of what a pulley can have."""
         for name, value, low, high in (
             ("friction", self.friction, 0.0, 1.0),
             ("stiffness", self.stiffness, 0.0, float("inf")),
@@ -60,7 +60,7 @@ class PulleyGroup:
 
 
 def flat_pulleys(groups: Sequence[PulleyGroup]) -> list[float]:
-    """Constants of every pulley in a row, as the kernels read them."""
+    """Constants of all pulleys in one list, as the kernels read them."""
     flat: list[float] = []
     for index, group in enumerate(groups):
         for wrap in group.wraps:
@@ -69,7 +69,7 @@ def flat_pulleys(groups: Sequence[PulleyGroup]) -> list[float]:
 
 
 def flat_covariances(groups: Sequence[PulleyGroup]) -> list[float]:
-    """Covariances of every group in a row, as the kernels read them."""
+    """Covariances of all groups in one list, as the kernels read them."""
     flat: list[float] = []
     for group in groups:
         c = group.covariance

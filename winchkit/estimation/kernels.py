@@ -1,10 +1,10 @@
-"""The inner loops of the Dahl estimator, once in plain Python and, from the same lines, compiled.
+"""Inner loops of the Dahl estimator, in plain Python and compiled by numba from the same source.
 
-The factories below build functions of floats and flat sequences: lists for plain Python, float64
-arrays for numba. Which is faster is only a matter of what they are built with.
+The factories build functions of floats and flat sequences: lists for plain Python, float64 arrays
+for numba.
 
-A pulley's state is its force F, the derivatives of F by μ, σ and β, and the standard deviation of
-F that an unknown start still leaves.
+The state of a pulley is its force F, the derivatives of F by μ, σ and β, and the standard deviation
+of F due to the unknown start.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Kernels:
-    """The inner loops as they were built."""
+    """Inner loops of one build."""
 
     name: str
     """``plain`` or ``numba``."""
     advance: Function
-    """One sample: tension at the cell, way towards the platform, state → tension, variance."""
+    """One sample: tension at the cell, path towards the platform, state -> tension, variance."""
     follow: Function
-    """Many samples: fills tension, derivatives by every group's parameters and by the start."""
+    """Many samples: fills tension, and derivatives by every group's parameters and by the start."""
     forces: Function
-    """Dahl friction along a way with a limit that changes: fills the force."""
+    """Dahl friction along a path with a varying limit: fills the force."""
     array: Callable[[list[float]], Any]
-    """A flat sequence of the kind that these loops want."""
+    """Makes a flat sequence of the type that these loops take."""
 
 
 def _slopes(force: float, new: float, limit: float, reach: float, shape: float) -> Any:
-    """Derivatives of the exact step's result by F, by F_c, by q and by β, for motion forward.
+    """Derivatives of the exact step's result by F, by F_c, by q and by β, for forward motion.
 
-    ``reach`` q = σ|dx|/F_c; forces are counted along the motion, so that u = 1 − F/F_c.
+    ``reach`` q = σ|dx|/F_c; forces are positive along the motion, so that u = 1 − F/F_c.
     """
     u, w = 1.0 - force / limit, 1.0 - new / limit
     near, far = abs(u), abs(w)
@@ -64,7 +64,7 @@ def _slopes(force: float, new: float, limit: float, reach: float, shape: float) 
 
 
 def _pulley(step: Function, slopes: Function) -> Function:
-    """Moves one pulley's state on; returns the tension behind it."""
+    """Build the update of one pulley's state, which returns the tension behind it."""
 
     def pulley(tension: float, moved: float, state: Any, s: int, pulleys: Any, p: int) -> float:  # noqa: PLR0917 - numba takes no keywords
         friction, stiffness, shape = pulleys[p + 1], pulleys[p + 2], pulleys[p + 3]
@@ -90,7 +90,7 @@ def _pulley(step: Function, slopes: Function) -> Function:
 
 
 def _advance(pulley: Function, slots: int, constants: int, variances: int) -> Function:
-    """One sample of the estimator."""
+    """Build the loop over one sample."""
 
     def advance(  # noqa: PLR0917 - numba takes no keywords
         tension: float, moved: float, state: Any, pulleys: Any, covariances: Any, sums: Any
@@ -123,7 +123,7 @@ def _advance(pulley: Function, slots: int, constants: int, variances: int) -> Fu
 
 
 def _follow(advance: Function, slots: int) -> Function:
-    """Many samples of the estimator, with the derivatives that an identification needs."""
+    """Build the loop over many samples with derivatives, for identification."""
 
     def follow(  # noqa: PLR0917 - numba takes no keywords
         tension: Any,
@@ -149,7 +149,7 @@ def _follow(advance: Function, slots: int) -> Function:
 
 
 def _forces(step: Function) -> Function:
-    """Dahl friction along a way whose limit changes."""
+    """Build the loop of Dahl friction along a path with a varying limit."""
 
     def forces(  # noqa: PLR0917 - numba takes no keywords
         moved: Any, limit: Any, stiffness: float, shape: float, start: float, out: Any
@@ -163,7 +163,7 @@ def _forces(step: Function) -> Function:
 
 
 def _build(name: str, jit: Function, array: Callable[[list[float]], Any]) -> Kernels:
-    """All loops, each through ``jit``."""
+    """Build all loops, each through ``jit``."""
     dahl = jit(dahl_step)
     pulley = jit(_pulley(jit(presliding_step(dahl)), jit(_slopes)))
     advance = jit(_advance(pulley, STATE_SLOTS, PULLEY_SLOTS, COVARIANCE_SLOTS))
@@ -171,13 +171,22 @@ def _build(name: str, jit: Function, array: Callable[[list[float]], Any]) -> Ker
 
 
 PLAIN = _build("plain", lambda function: function, list)
-"""Plain Python: always there."""
+"""Plain Python, always available."""
 
 
 def compiled() -> Kernels:
-    """Compile the loops with numba and run each once: seconds, to be spent before motion.
+    """Compile the loops with numba and run each once.
 
-    Raises UsageError where numba is not installed (``pip install 'winchkit[fast]'``).
+    Takes seconds: call it before motion.
+
+    Returns
+    -------
+    Kernels
+
+    Raises
+    ------
+    UsageError
+        Where numba is not installed (``pip install 'winchkit[fast]'``).
     """
     try:
         from numba import njit

@@ -1,4 +1,4 @@
-"""What the winding-device paper judges a tension by (Eq. 28 and 29)."""
+"""Figures of merit of a tension control in the winding-device paper (Eq. 28 and 29)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,24 @@ __all__ = ["mean_relative_error", "overshoot"]
 
 
 def overshoot(force: ArrayLike, target: float) -> float:
-    """(max F − F_o)/F_o, a share: the highest departure above a constant target (Eq. 28).
+    """Overshoot over a constant target, (max F − F_o)/F_o (Eq. 28).
 
-    ``force`` of shape (n,) and ``target`` in N. NaN without a finite sample. Raises UsageError
-    for a target that is not positive.
+    Parameters
+    ----------
+    force : (n,) array
+        N.
+    target
+        F_o, N.
+
+    Returns
+    -------
+    float
+        A share; NaN without a finite sample.
+
+    Raises
+    ------
+    UsageError
+        For a target that is not positive.
     """
     if not target > 0:
         raise UsageError(f"overshoot is relative to a target of {target:g} N; it must be above 0")
@@ -24,10 +38,24 @@ def overshoot(force: ArrayLike, target: float) -> float:
 
 
 def mean_relative_error(force: ArrayLike, target: ArrayLike) -> float:
-    """Mean of |F − F_o|/F_o over all samples, a share (Eq. 29).
+    """Mean of |F − F_o|/F_o (Eq. 29).
 
-    ``force`` (n,) in N, ``target`` a number or (n,), N. Samples that are not finite are left out;
-    NaN where none is left. Raises UsageError for a target that is not positive.
+    Parameters
+    ----------
+    force : (n,) array
+        N.
+    target : float or (n,) array
+        F_o, N.
+
+    Returns
+    -------
+    float
+        A share, over the finite samples; NaN without any.
+
+    Raises
+    ------
+    UsageError
+        For a target that is not positive.
     """
     values, wanted = np.broadcast_arrays(
         np.asarray(force, dtype=float), np.asarray(target, dtype=float)

@@ -1,4 +1,4 @@
-"""Calibrations and tares of load cells as files, and points that were measured elsewhere."""
+"""Files of load cell calibrations and tares, and tables of points that were measured elsewhere."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from winchkit.units import convert, format_quantity, suggest
 __all__ = ["GRAVITY", "calibration_toml", "read_points", "tares_toml", "write_text"]
 
 GRAVITY = 9.80665
-"""m/s^2; weights are hung, so a mass may stand for a force."""
+"""m/s²; a mass stands for the force of a hanging weight."""
 _DIGITS = 9
 _COLUMNS = ("load", "indicated", "std", "going", "series")
 
 
 def calibration_toml(calibration: CellCalibration) -> str:
-    """The file of a calibration."""
+    """Text of a calibration file."""
     lines = [
         "schema = 1",
         'kind = "calibration"',
@@ -55,7 +55,7 @@ def calibration_toml(calibration: CellCalibration) -> str:
 
 
 def tares_toml(book: TareBook) -> str:
-    """The file of a bench's tares."""
+    """Text of a bench's tare file."""
     lines = ["schema = 1", 'kind = "tares"', f"name = {json.dumps(book.name)}"]
     for name, tare in book.tare.items():
         unit = "m" if name.endswith(".length") else "N"
@@ -64,17 +64,26 @@ def tares_toml(book: TareBook) -> str:
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a file whole or not at all; raises FileError."""
+    """Write a file atomically; raises FileError."""
     target = Path(path)
     write_whole(target, text.encode())
     return target
 
 
 def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
-    """Points of a CSV file with the columns ``load [kg]`` or ``[N]``, ``indicated [N]``.
+    """Read points of a calibration from a CSV file.
 
-    Optional are ``std [N]``, ``going`` (up, down) and ``series`` (1, 2, …); without them the
-    direction follows from the order of the loads. Raises FileError with every fault.
+    Parameters
+    ----------
+    path
+        File with the columns ``load [kg]`` or ``load [N]`` and ``indicated [N]``; optional ``std
+        [N]``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the direction
+        follows from the order of the loads.
+
+    Raises
+    ------
+    FileError
+        With every fault and its line.
     """
     try:
         with open(path, newline="", encoding="utf-8-sig", opener=regular) as file:
@@ -98,7 +107,7 @@ def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
 
 
 def _columns(header: list[str], path: str) -> dict[str, tuple[int, str]]:
-    """Place and unit of each column."""
+    """Index and unit of each column."""
     found: dict[str, tuple[int, str]] = {}
     for place, title in enumerate(header):
         name, _, unit = title.strip().partition("[")

@@ -1,10 +1,10 @@
-"""Fits the calibration of a load cell to known loads, with what an expert asks of it.
+"""Calibration of a load cell from known loads, with its figures of merit.
 
-The true force is a line or a parabola of the indicated one, fitted to every point, up and down, by
-least squares. Definitions as in ISO 376 and OIML R 60, shares of the span that was covered:
+The true force is a line or a parabola of the indicated one, fitted to all points, increasing and
+decreasing, by least squares. Figures of merit follow ISO 376 and OIML R 60, as shares of the span:
 
-- non-linearity: largest departure of a load's mean from the straight line through all points;
-- hysteresis: largest difference between down and up at the same load;
+- non-linearity: largest deviation of a load's mean from the straight line through all points;
+- hysteresis: largest difference between decreasing and increasing at the same load;
 - repeatability: standard deviation at the same load and direction between series.
 """
 
@@ -25,16 +25,16 @@ __all__ = ["CellFit", "Figure", "fit_cell"]
 
 _FEWEST_LOADS = 5
 _FOLLOWS = 5.0
-"""Standard deviations of the slope."""
+"""Least slope in its standard deviations."""
 _FAR = 3.0
-"""Standard deviations."""
+"""Residual of an outlying point in standard deviations."""
 _SAME_LOAD = 1e-3
-"""Loads that differ by less than this share of the span are the same weights hung again."""
+"""Loads that differ by less than this share of the span are the same load."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of merit with its standard uncertainty, shares of the span; NaN where unknown."""
+    """A figure of merit with its standard uncertainty, shares of the span; NaN where not known."""
 
     value: float
     std: float
@@ -45,12 +45,12 @@ class CellFit:
     """A fitted calibration."""
 
     coefficients: tuple[float, ...]
-    """c0 in N, c1, and for a parabola c2 in 1/N: true force of the indicated one."""
+    """c0 in N, c1, and for a parabola c2 in 1/N, of the true force over the indicated one."""
     covariance: tuple[tuple[float, ...], ...]
     residuals: tuple[float, ...]
     """True less fitted, N, in the order of the points."""
     residual_std: float
-    """N, with the degrees of freedom taken into account."""
+    """N, with n − p degrees of freedom."""
     span: float
     """N."""
     nonlinearity: Figure
@@ -67,7 +67,21 @@ class CellFit:
 def fit_cell(
     points: Sequence[CalibrationPoint], order: Literal["linear", "quadratic"] = "linear"
 ) -> CellFit:
-    """Fit a calibration; raises RunError where the points cannot carry it."""
+    """Fit a calibration.
+
+    Parameters
+    ----------
+    points
+        Known loads with indicated forces.
+    order
+        Line or parabola.
+
+    Raises
+    ------
+    RunError
+        Where the points do not determine the coefficients: too few loads, a constant or an inverted
+        reading.
+    """
     degree = 1 if order == "linear" else 2
     load = np.array([point.load for point in points])
     indicated = np.array([point.indicated for point in points])
@@ -104,7 +118,7 @@ def _refuse(load: Array, indicated: Array, degree: int) -> None:
 
 
 def _refuse_slope(slope: float, std: float) -> None:
-    """A cell must follow its loads, and in their direction."""
+    """Raise where the reading does not follow the loads, or decreases with them."""
     if abs(slope) < _FOLLOWS * std:
         raise RunError(
             f"what the cell indicates does not follow the loads (slope {slope:.3g} ± {std:.2g}); "
@@ -118,7 +132,12 @@ def _refuse_slope(slope: float, std: float) -> None:
 
 
 def _least_squares(x: Array, y: Array, degree: int) -> tuple[Array, Array, Array, float]:
-    """Coefficients with covariance, residuals and their standard deviation."""
+    """Coefficients with covariance, residuals and their standard deviation.
+
+    Notes
+    -----
+    Ordinary least squares on columns scaled by the largest indicated force; covariance s² (XᵀX)⁻¹.
+    """
     scale = float(np.max(np.abs(x)))
     matrix = np.vander(x / scale, degree + 1, increasing=True)
     inverse = np.linalg.pinv(matrix.T @ matrix)
@@ -131,7 +150,7 @@ def _least_squares(x: Array, y: Array, degree: int) -> tuple[Array, Array, Array
 
 
 def _groups(load: Array, span: float) -> list[Array]:
-    """Indices of the points at the same load, in ascending load."""
+    """Indices of the points at the same load, by increasing load."""
     order = np.argsort(load, kind="stable")
     breaks = np.flatnonzero(np.diff(load[order]) > _SAME_LOAD * span) + 1
     return list(np.split(order, breaks))
@@ -147,7 +166,7 @@ def _nonlinearity(from_line: Array, groups: list[Array], span: float) -> Figure:
 def _hysteresis(
     points: Sequence[CalibrationPoint], from_line: Array, groups: list[Array], span: float
 ) -> Figure:
-    """Down less up at the same load, the largest of all loads."""
+    """Decreasing less increasing at the same load, largest over all loads."""
     differences = []
     for group in groups:
         up = [from_line[k] for k in group if points[k].going == "up"]
@@ -171,7 +190,7 @@ def _repeatability(
 
 
 def _split(points: Sequence[CalibrationPoint], groups: list[Array]) -> list[Array]:
-    """The groups, parted by direction."""
+    """The groups, divided by direction."""
     return [
         np.array(part)
         for group in groups
@@ -181,7 +200,7 @@ def _split(points: Sequence[CalibrationPoint], groups: list[Array]) -> list[Arra
 
 
 def _pooled(residuals: Array, groups: list[Array]) -> float:
-    """Standard deviation within groups; NaN where no load was hung twice."""
+    """Pooled standard deviation within groups; NaN where no load was repeated."""
     free = sum(len(group) - 1 for group in groups)
     if free <= 0:
         return math.nan
@@ -195,7 +214,7 @@ def _warnings(
     residuals: Array,
     std: float,
 ) -> list[str]:
-    """What is to be said in words."""
+    """Warnings on missing loads, directions, series, and on outlying points."""
     found = []
     if len(groups) < _FEWEST_LOADS:
         found.append(f"only {len(groups)} loads; at least {_FEWEST_LOADS} are usual")

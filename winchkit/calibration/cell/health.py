@@ -1,7 +1,7 @@
-"""What a few seconds of readings say about a load cell, in the manner of Klipper's diagnostic.
+"""Health of a load cell from a few seconds of readings, as in Klipper's load cell diagnostic.
 
-Everything is computed from the raw counts or the values at their estimated sampling times; nothing
-is filled in where readings are missing.
+All figures are computed from raw counts or values at their estimated sampling times; missing
+readings are not interpolated.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ __all__ = ["Creep", "Health", "Hum", "Samples", "examine", "samples_of"]
 _MAINS = (50.0, 60.0)
 _FEWEST = 20
 _SIGNIFICANT = 4.0
-"""Standard errors."""
+"""In standard errors."""
 _SETTLED = 0.5
-"""After a change of load only what comes later than this is creep, s."""
+"""Time after a change of load before which creep is not evaluated, s."""
 _LONG_ENOUGH = 5.0
-"""A shorter look takes slow noise for a drift, s."""
+"""A shorter recording cannot separate drift from slow noise, s."""
 _STEP = 20.0
-"""A change of load is larger than this many standard deviations of the noise."""
+"""Change of load in standard deviations of the noise."""
 _THIRTY_MINUTES = 1800.0
 _ONE_MINUTE = 60.0
 _FADED = 0.05
 _ALIASED = 0.02
-"""Nearer to zero or half the rate than this share of it a tone cannot be told from the rest."""
+"""Distance of a tone from zero and from half the rate, as a share of the rate, to be separable."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Readings as arrays of one length; values in SI, NaN where unusable."""
+    """Readings as arrays of one length; values in SI, NaN where not usable."""
 
     time: Array
     raw: Array
@@ -48,48 +48,48 @@ class Samples:
 
 @dataclass(frozen=True)
 class Hum:
-    """A tone of the mains in the readings."""
+    """Mains hum in the readings."""
 
     frequency: float
     """Of the mains, Hz."""
     amplitude: float
-    """SI; NaN where it cannot be told at this rate."""
+    """SI; NaN where it is not identifiable at this rate."""
     std: float
 
     @property
     def there(self) -> bool:
-        """Whether it stands out of the noise."""
+        """Whether the amplitude exceeds four standard errors."""
         return self.amplitude > _SIGNIFICANT * self.std
 
 
 @dataclass(frozen=True)
 class Creep:
-    """What follows a change of load."""
+    """Creep after a change of load."""
 
     step: float
-    """The change, SI."""
+    """Change of load, SI."""
     since: float
-    """How long the readings go on after it, s."""
+    """Duration of the readings after it, s."""
     change: float
-    """Change of the value between 1 and 30 minutes, from its slope over the logarithm of time."""
+    """Change of the value between 1 and 30 minutes, extrapolated by the logarithm of time."""
     std: float
 
 
 @dataclass(frozen=True)
 class Health:
-    """The findings."""
+    """Figures of a load cell's health."""
 
     readings: int
     usable: int
     saturated: int
     rate: float
-    """Readings a second."""
+    """Readings per second."""
     longest_gap: float
     """s."""
     unique: int
-    """Different raw counts."""
+    """Distinct raw counts."""
     duplicates: float
-    """Share of readings that repeat the count before."""
+    """Share of readings equal to the one before."""
     longest_still: float
     """Longest time without a change of the raw counts, s."""
     mean: float
@@ -107,7 +107,18 @@ class Health:
 
 
 def examine(samples: Samples) -> Health:
-    """Look at a stretch of readings; raises RunError where there are too few."""
+    """Health of a load cell.
+
+    Parameters
+    ----------
+    samples
+        A few seconds of readings.
+
+    Raises
+    ------
+    RunError
+        For fewer than 20 usable readings.
+    """
     good = samples.usable & np.isfinite(samples.value)
     if int(good.sum()) < _FEWEST:
         raise RunError(
@@ -149,7 +160,7 @@ def examine(samples: Samples) -> Health:
 
 
 def _step_at(value: Array) -> int | None:
-    """The largest change between neighbours, where it is a change of load; its first index."""
+    """Index before the largest change between neighbours, if it is a change of load."""
     if len(value) < 2 * _FEWEST:
         return None
     changes = np.diff(value)
@@ -164,7 +175,7 @@ def _step_at(value: Array) -> int | None:
 
 
 def _creep(time: Array, value: Array, at: int) -> Creep | None:
-    """Slope over the logarithm of the time since the step, as change from 1 to 30 minutes."""
+    """Creep between 1 and 30 minutes from the slope over the logarithm of time since the change."""
     since = time - (time[at] + time[at + 1]) / 2
     late = since > _SETTLED
     if int(late.sum()) < _FEWEST:
@@ -176,7 +187,7 @@ def _creep(time: Array, value: Array, at: int) -> Creep | None:
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, Array]:
-    """Slope with its standard error, in which slow noise counts, and the rest."""
+    """Slope, its standard error under correlated residuals, and the residuals of the line."""
     centred = x - x.mean()
     spread = float(centred @ centred)
     slope = float(centred @ y) / spread
@@ -186,7 +197,7 @@ def _line(x: Array, y: Array) -> tuple[float, float, Array]:
 
 
 def _memory(rest: Array) -> float:
-    """How many readings say as little as one alone, for noise that remembers itself."""
+    """Variance inflation by autocorrelation: 1 + 2 Σ ρ_k up to the lag where ρ falls below 5 %."""
     if not rest.any():
         return 1.0
     power = np.abs(np.fft.rfft(rest, 2 * len(rest))) ** 2
@@ -198,7 +209,7 @@ def _memory(rest: Array) -> float:
 
 
 def _hum(time: Array, rest: Array, frequency: float) -> Hum:
-    """Amplitude of a tone by least squares at the true times of the readings."""
+    """Amplitude of a tone by least squares at the sampling times."""
     rate = (len(time) - 1) / float(np.ptp(time))
     apparent = abs(frequency - rate * round(frequency / rate))
     if apparent < _ALIASED * rate or apparent > (0.5 - _ALIASED) * rate:
@@ -217,13 +228,13 @@ def _longest_still(time: Array, raw: Array) -> float:
 
 
 def _scale(raw: Array, value: Array) -> float:
-    """SI of one count, where raw and value go together."""
+    """SI per count."""
     spread = float(np.ptp(raw))
     return float(np.ptp(value)) / spread if spread > 0 else math.nan
 
 
 def _with_remarks(health: Health, duration: float) -> Health:
-    """The findings in words, worst first."""
+    """The figures with remarks, worst first."""
     remarks: list[str] = []
     lost = health.readings - health.usable
     if health.saturated:
@@ -255,7 +266,7 @@ def _with_remarks(health: Health, duration: float) -> Health:
 
 
 def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> Samples:
-    """Samples from rows of time, raw, value, usable, saturated."""
+    """Samples from rows of time, raw counts, value, usable, saturated."""
     time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
     return Samples(
         time.astype(float),

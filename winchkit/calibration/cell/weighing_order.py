@@ -1,4 +1,4 @@
-"""The order in which known weights are hung: up and down, several times."""
+"""Loading sequence of a calibration: increasing and decreasing, several series."""
 
 from __future__ import annotations
 
@@ -16,9 +16,24 @@ _WEIGHTS = re.compile(r"([\d.,;\s]+?)\s*([a-zA-Z]+)")
 
 
 def plan(weights: str, series: int) -> tuple[CalibrationPoint, ...]:
-    """Points to measure for ``"0 2 5 10 kg"``: up, then down without repeating the top.
+    """Points to measure for weights such as ``"0 2 5 10 kg"``.
 
-    Raises UsageError for weights that cannot be meant.
+    Parameters
+    ----------
+    weights
+        Increasing numbers and a unit of mass or force.
+    series
+        Number of series.
+
+    Returns
+    -------
+    tuple of CalibrationPoint
+        Increasing, then decreasing without repeating the largest load.
+
+    Raises
+    ------
+    UsageError
+        For weights that are not a list of increasing numbers with a unit.
     """
     found = _WEIGHTS.fullmatch(weights.strip())
     if found is None:

@@ -1,7 +1,7 @@
-"""Runs made ready for comparison: bridged inputs, marked outputs, repeats, nominal predictions.
+"""Data set of a diagnosis: runs with masks, bands, repeats and nominal predictions.
 
-Samples that are NaN take no part in any figure; inputs are bridged over them only so that
-derivatives and memories stay defined, and the bridged samples are not compared.
+Samples that are NaN take no part in any figure. Inputs are interpolated over them so that
+derivatives and effects with memory stay defined; the interpolated samples are not compared.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Filtering:
-    """How outputs are filtered before they are compared."""
+    """Filter settings of the outputs before they are compared."""
 
     band: float | None = None
-    """Low-pass of the torque, Hz; None for the usual one."""
+    """Cut-off of the torque's low-pass, Hz; None for the default."""
     skirt: float = 1.0
-    """How far beyond a cut-off is kept."""
+    """Coefficients are kept up to this many cut-offs."""
     thinning: Thinning | None = None
-    """How long runs are thinned out, if they are."""
+    """Decimation of long runs; None for none."""
 
 
 _GAP = 2.5
@@ -48,33 +48,33 @@ _SHAKEN = 0.25
 
 @dataclass(frozen=True)
 class Recording:
-    """One run, ready: what was measured, and the nominal line along it."""
+    """One run with masks, and the nominal model's prediction along it."""
 
     name: str
     signals: Signals
     measured: Mapping[str, Array]
-    """Outputs, bridged where NaN; (n,)."""
+    """Outputs, interpolated where NaN, (n,) each."""
     valid: Mapping[str, Mask]
-    """Where an output may be compared."""
+    """Where an output is compared, (n,) each."""
     bands: Mapping[str, Band]
     zeroed: bool
-    """The length instrument was zeroed: no offset to fit."""
+    """Whether the length instrument was zeroed: no offset is fitted."""
     raw: Motion
     smooth: Motion
-    """The same with the noise of its inputs taken out, to evaluate changes on."""
+    """The same motion with denoised inputs, on which changes by effects are evaluated."""
     nominal: Mapping[str, Array]
-    """Prediction of the bare profile on ``raw``."""
+    """Prediction of the profile without effects on ``raw``."""
     nominal_smooth: Mapping[str, Array]
     programme: str = ""
     path: str = ""
     """File that it was read from."""
     thinned: bool = False
-    """Its derivatives were taken at a higher rate than its samples have now."""
+    """Whether the run was decimated, so that its derivatives were taken at a higher rate."""
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """Recordings of one winch with its profile, and which of them repeat each other."""
+    """Recordings of one winch with its profile and the partition into repeats."""
 
     profile: WinchProfile
     recordings: tuple[Recording, ...]
@@ -88,12 +88,12 @@ class Dataset:
 
     @property
     def motions(self) -> tuple[At, ...]:
-        """What every recording's profile makes of its motion."""
+        """Nominal motion of every recording."""
         return tuple(recording.raw.at for recording in self.recordings)
 
     @property
     def repeated(self) -> tuple[Repeats, ...]:
-        """Sets with at least two runs."""
+        """Sets of at least two repeats."""
         return tuple(group for group in self.repeats if len(group.runs) > 1)
 
 
@@ -105,11 +105,28 @@ def prepare(
     *,
     thin: bool = False,
 ) -> Dataset:
-    """Build a dataset of one winch's runs. Raises RunError with every fault of every run.
+    """Validate runs and build their data set.
 
-    ``band`` overrides the torque's low-pass, Hz; ``skirt`` is how far beyond it is kept: what
-    the filter all but removes tells nothing and is left out of fits, but belongs to an rms.
-    ``thin`` lets long runs be thinned out as far as their signals allow.
+    Parameters
+    ----------
+    runs
+        Measured runs of one winch.
+    profile
+        Winch profile.
+    band
+        Cut-off of the torque's low-pass, Hz; None for 20 Hz or a tenth of the sampling rate.
+    skirt
+        Coefficients are kept up to this many cut-offs: 1 for fits, more for the rms of a filtered
+        signal, to which the transition band contributes.
+    thin
+        Whether long runs are decimated as far as their signals allow.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run.
+    UsageError
+        If ``band`` is not a positive frequency.
     """
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
@@ -124,7 +141,7 @@ def prepare(
 def assemble(
     runs: Sequence[Run], profile: WinchProfile, filtering: Filtering | None = None
 ) -> Dataset:
-    """Build a dataset of runs that are known to fit the profile."""
+    """Build the data set of runs that were validated before."""
     line, filtering = Line(profile), filtering or Filtering()
     fastest = max((_fastest(run) for run in runs), default=0.0)
     raw = [line.motion(_signals(run, fastest)) for run in runs]
@@ -143,7 +160,7 @@ def assemble(
 
 
 def _bridged(values: Array) -> Array:
-    """Values with NaN bridged linearly."""
+    """Linear interpolation over NaN."""
     good = np.isfinite(values)
     if good.all():
         return values
@@ -208,13 +225,13 @@ def _band(run: Run, output: str, filtering: Filtering) -> Band:
 
 
 def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
-    """Samples of an output that may be compared: measured, with known inputs."""
+    """Samples of an output that are compared: measured, with known inputs, away from transients."""
     good = np.isfinite(run[output]) & np.isfinite(run["motor_angle"])
     good &= _away_from_time_gaps(run.time)
     if motion.load is not None and "load" in run:
         good &= np.isfinite(run["load"])
     if output != "cable_length":
-        # Accelerations at the ends of a run are not known.
+        # No acceleration at the ends of a run: finite differences reach beyond them.
         edge = 1 + motion.clock.reach
         good[:edge] = good[-edge:] = False
     good = _away_from_gaps(good, band.rate, band.cut_off)
@@ -224,7 +241,7 @@ def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
 
 
 def _away_from_time_gaps(time: Array) -> Mask:
-    """Samples whose motion is known: what happened in a gap, and shook on after it, is not."""
+    """Samples away from gaps in time, within which the motion is not known."""
     steps = np.diff(time)
     out = np.ones(len(time), dtype=bool)
     for index in np.flatnonzero(steps > _GAP * np.median(steps)):
@@ -233,7 +250,7 @@ def _away_from_time_gaps(time: Array) -> Mask:
 
 
 def _away_from_gaps(good: Mask, rate: float, cut_off: float | None) -> Mask:
-    """Samples to compare: away from bridged ones by what the low-pass smears."""
+    """Samples away from interpolated ones, by the length of the low-pass's response."""
     reach = 1 if cut_off is None else max(1, round(rate / cut_off))
     if good.all():
         return good

@@ -1,8 +1,13 @@
-"""Long runs thinned out for a diagnosis: low-passed, then every k-th sample.
+"""Decimation of long runs: zero-phase low-pass, then every k-th sample.
 
-An hour at 1 kHz holds millions of samples of motions that take seconds. The model's own signals
-(speeds, directions, accelerations) are taken at the full rate and thinned like the measured ones:
-a friction that changes its sign within a millisecond is then low-passed on both sides alike.
+An hour at 1 kHz holds millions of samples of motions that take seconds. The signals of the model
+(speed, direction, acceleration) are computed at the full rate and decimated like the measured
+ones, so that a friction force that changes its sign within a millisecond is low-passed alike in
+the measurement and in the prediction. The factor follows from Welch spectra of the channels.
+
+References
+----------
+Welch, P. D. (1967). IEEE Trans. Audio Electroacoust. 15, 70-73.
 """
 
 from __future__ import annotations
@@ -24,39 +29,39 @@ from winchkit.runs.run import Run
 __all__ = ["Thinning", "thinning_for"]
 
 _MANY = 200_000
-"""Samples of all runs from which thinning begins."""
+"""Samples of all runs from which decimation begins."""
 _WANTED = 90_000
-"""Samples to which it thins, where the signals allow."""
+"""Samples that decimation aims at."""
 _PASSED = 0.25
-"""Cut-off over the new sampling rate: what folds back below it comes from three times as high."""
+"""Cut-off over the new sampling rate: below it aliases come from three times the cut-off."""
 _SLOWEST = 20.0
-"""Least sampling rate that is left, Hz: reversals and lags live within a tenth of a second."""
+"""Least sampling rate that is left, Hz: reversals and lags last about a tenth of a second."""
 _LOST = 0.01
-"""Of what a channel does beyond its noise, the share that may lie above the cut-off."""
+"""Share of a channel's power beyond its noise that may lie above the cut-off."""
 _BLOCK = 16.0
-"""Length of the blocks whose spectra are averaged, s, at most."""
+"""Longest block of a Welch spectrum, s."""
 _BLOCKS = 8
-"""How many there are at least, overlapping by half."""
+"""Least number of blocks of a Welch spectrum, overlapping by half."""
 _CLEAR = 2.0
-"""Times the noise's power that a band must hold to be more than noise."""
+"""Ratio to the noise power from which a frequency holds signal."""
 _GAP = 2.5
 _TAPS = 10
 _BETA = 7.857
-"""Kaiser window, 80 dB."""
+"""Shape of the Kaiser window for 80 dB stop-band attenuation."""
 _CHANNELS = ("motor_angle", "motor_torque", "tension", "load", "cable_length")
 
 
 @dataclass(frozen=True)
 class Thinning:
-    """Every ``factor``-th sample of a low-passed run, whole below a cut-off."""
+    """Low-pass and decimation by one factor."""
 
     factor: int
     cut_off: float
-    """Hz; below it all stays, at twice it half of the amplitude is left, at three times nothing."""
+    """Hz; unchanged below, half of the amplitude at twice this, nothing from three times this."""
 
     @property
     def words(self) -> str:
-        """For the notes of a diagnosis."""
+        """Sentence for the notes of a diagnosis."""
         return (
             f"every {_ordinal(self.factor)} sample of the runs, whole up to {self.cut_off:.3g} Hz "
             f"and low-passed beyond, is compared: beyond lies less than {_LOST:.0%} of what any "
@@ -64,7 +69,14 @@ class Thinning:
         )
 
     def run(self, run: Run) -> Run:
-        """A thinned run; a sample is NaN where most of what it stands for is."""
+        """Decimate a measured run.
+
+        Returns
+        -------
+        Run
+            Channels low-passed and decimated; NaN where more than half of the low-pass window is
+            NaN.
+        """
         pieces = _pieces(run.time)
         channels = {
             name: replace(channel, values=self._measured(channel.values, pieces))
@@ -74,7 +86,7 @@ class Thinning:
         return replace(run, time=self._every(run.time, pieces), channels=channels)
 
     def motion(self, motion: Motion) -> Motion:
-        """A motion along the thinned run, each of its signals low-passed by itself."""
+        """Decimate a motion, each of its signals low-passed by itself."""
         pieces = _pieces(motion.at.time)
         at: dict[str, Any] = {
             field.name: self._passed(value, pieces)
@@ -110,7 +122,7 @@ class Thinning:
         return np.where(share > 0.5, self._passed(bridged, pieces), np.nan)
 
     def _passed(self, values: Array, pieces: Sequence[slice]) -> Array:
-        """Low-passed without delay and thinned, each piece by itself."""
+        """Zero-phase low-pass and decimation, each piece between gaps by itself."""
         reach = _TAPS // 2 * self.factor
         taps = firwin(2 * reach + 1, 1.0 / self.factor, window=("kaiser", _BETA))
         out = []
@@ -120,7 +132,7 @@ class Thinning:
             if len(own) < 2:
                 out.append(own)
                 continue
-            # Turned about its ends, so that a ramp goes on as a ramp.
+            # Odd reflection about the ends, so that a ramp continues as a ramp.
             padded = np.pad(own, reach, mode="reflect", reflect_type="odd")
             whole = upfirdn(taps, padded, down=self.factor)
             out.append(whole[_TAPS : _TAPS + count])
@@ -133,7 +145,23 @@ def _ordinal(number: int) -> str:
 
 
 def thinning_for(runs: Sequence[Run]) -> Thinning | None:
-    """How far runs may be thinned, all by one factor; None where they are short enough."""
+    """Decimation that the signals of all runs allow, by one factor.
+
+    Parameters
+    ----------
+    runs
+        Measured runs of one winch.
+
+    Returns
+    -------
+    Thinning or None
+        None where the runs together are short enough, or the signals too fast.
+
+    Notes
+    -----
+    The factor is the least of: what brings all runs to about 90,000 samples, what keeps 99 % of
+    every channel's power above its white noise below the cut-off, and what leaves 20 Hz.
+    """
     total, rate = sum(map(len, runs)), 1 / max(run.interval for run in runs)
     if total < _MANY:
         return None
@@ -148,14 +176,14 @@ def thinning_for(runs: Sequence[Run]) -> Thinning | None:
 
 
 def _quickest(values: Array, rate: float) -> float:
-    """Frequency above which nearly nothing of a signal lies beyond its white noise, Hz."""
+    """Frequency above which less than 1 % of a signal's power beyond its white noise lies, Hz."""
     known = np.isfinite(values)
     length = min(len(values) // _BLOCKS, round(_BLOCK * rate))
     if not known.any() or length < 2:
         return 0.0
     index = np.arange(len(values))
     bridged = values if known.all() else np.interp(index, index[known], values[known])
-    # A ramp of many turns would leak over all frequencies through a common window.
+    # A ramp over many turns leaks over all frequencies through a Hann window.
     window = ("general_cosine", (3 / 8, 1 / 2, 1 / 8))
     frequency, power = welch(bridged, fs=rate, window=window, nperseg=length, detrend=_levelled)
     noise = float(np.median(power[frequency > rate / 4]))
@@ -165,14 +193,14 @@ def _quickest(values: Array, rate: float) -> float:
 
 
 def _levelled(values: Array) -> Array:
-    """Without mean and slope along the last axis."""
+    """Remove mean and slope along the last axis."""
     x = np.arange(values.shape[-1]) - (values.shape[-1] - 1) / 2
     slope = (values @ x / (x @ x))[..., None]
     return np.asarray(values - values.mean(axis=-1, keepdims=True) - slope * x)
 
 
 def _pieces(time: Array) -> list[slice]:
-    """Stretches between gaps in time."""
+    """Slices between gaps in time."""
     steps = np.diff(time)
     ends = np.flatnonzero(steps > _GAP * np.median(steps)) + 1
     edges = [0, *ends.tolist(), len(time)]

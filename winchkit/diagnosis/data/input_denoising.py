@@ -1,4 +1,13 @@
-"""Motions with the noise of their inputs taken out, to evaluate effects' changes on."""
+"""Denoising of measured inputs (errors in variables), on which changes by effects are evaluated.
+
+A measured load or temperature carries noise of its own. What an effect changes is evaluated on the
+part of it that repeats share, by a Wiener filter per frequency band; without repeats on the part
+above the white noise floor. Otherwise that noise acts like a lag or a hysteresis.
+
+References
+----------
+Fuller, W. A. (1987). Measurement Error Models. Wiley.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +36,19 @@ _FLOOR_SHARE = 1 / 3
 
 
 def contrasts(aligned: Array) -> tuple[Array, Array]:
-    """Mean part and differences of repeats, each with the variance of one run's noise.
+    """Mean part and Helmert contrasts of repeats, each with the variance of one run's noise.
 
-    ``aligned`` (m, n) → (n,) the sum over √m, and (m − 1, n) Helmert contrasts, orthogonal to it
-    and to each other.
+    Parameters
+    ----------
+    aligned : (m, n) array
+        The same n samples of m repeats.
+
+    Returns
+    -------
+    mean : (n,) array
+        Sum over the repeats divided by √m.
+    differences : (m - 1, n) array
+        Orthonormal contrasts, orthogonal to the mean.
     """
     m = len(aligned)
     mean = aligned.sum(axis=0) / np.sqrt(m)
@@ -41,7 +59,7 @@ def contrasts(aligned: Array) -> tuple[Array, Array]:
 
 
 def quiet(signal: Array) -> Array:
-    """A signal without white noise: Wiener gain per band over the floor of its top third."""
+    """Remove white noise by a Wiener gain per band, the noise floor from the highest third."""
     full = np.asarray(dct(signal, type=2, norm="ortho"))
     power = full**2
     top = power[int(len(power) * (1 - _FLOOR_SHARE)) :]
@@ -50,10 +68,24 @@ def quiet(signal: Array) -> Array:
 
 
 def agreed(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
-    """What its repeats know of each signal, on its own samples; zero where they do not overlap.
+    """Part of each signal that its repeats share, on its own samples.
 
-    A signal's own noise takes no part: it is in what the signal predicts as well, and what is
-    left of it would be taken for a lag or a loop that denoises it.
+    Parameters
+    ----------
+    signals
+        One array per repeat.
+    rows
+        Per repeat the indices of the samples that correspond, all of one length.
+
+    Returns
+    -------
+    list of arrays
+        Zero where the repeats do not overlap.
+
+    Notes
+    -----
+    A signal's own noise takes no part: only the mean of the *other* repeats is used. The same noise
+    is in the prediction, and a remainder of it would be taken for a lag or a hysteresis.
     """
     if len(signals) < 2:
         return [quiet(signal) for signal in signals]
@@ -81,7 +113,7 @@ def _gained(full: Array, power: Array, noise: Array) -> Array:
         )
         total = float(np.sum(power[inside]))
         share = 1 - float(np.sum(noise[inside])) / total if total > 0 else 0.0
-        # A ratio of two sums of n squares varies by 2/√n: below two of that, nothing is there.
+        # A ratio of two sums of n squares has a standard deviation of 2/√n: two of them are noise.
         deviation = 2 / np.sqrt(inside.stop - inside.start)
         gain[inside] = share if share > min(2 * deviation, 0.9) else 0.0
     gain[0] = 1.0
@@ -91,12 +123,23 @@ def _gained(full: Array, power: Array, noise: Array) -> Array:
 def calm_motions(
     line: Line, signals: Sequence[Signals], motions: Sequence[Motion], repeats: Sequence[Repeats]
 ) -> list[Motion]:
-    """Motions whose rope force and temperature carry no noise, one per run.
+    """Motions with denoised cable force and temperature, one per run.
 
-    The acceleration of the rope is what repeats agree on; a measured force is what follows it
-    and, of the rest, what repeats agree on; a known weight's force follows it alone. How far
-    differences have rounded the acceleration a measured force tells as well; for a known weight
-    it is an unknown of the fit.
+    Parameters
+    ----------
+    line
+        Nominal model.
+    signals, motions
+        Measured inputs and the motion computed from them, one each per run.
+    repeats
+        Partition of the runs.
+
+    Notes
+    -----
+    The acceleration of the cable is the part that repeats share. A measured force is its regression
+    on that acceleration plus the part of the remainder that repeats share; the force of a known
+    weight follows the acceleration alone. The error of finite differences in the acceleration is
+    estimated from a measured force; with a known weight it is a nuisance parameter of the fit.
     """
     out = list(motions)
     for group in repeats:
@@ -111,7 +154,7 @@ def calm_motions(
 
 
 def _unit_weight(line: Line, signals: Signals) -> tuple[Array, Array]:
-    """What one kilogram would pull, m/s², and how far differences may have rounded that."""
+    """Force of one kilogram, m/s², and its correction for finite differences."""
     motion = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
     assert motion.load is not None
     assert motion.rounding is not None
@@ -119,7 +162,7 @@ def _unit_weight(line: Line, signals: Signals) -> tuple[Array, Array]:
 
 
 def _shared(values: Sequence[Array], group: Repeats) -> list[Array]:
-    """What repeats agree on, and the mean; where a run has no repeat, its own without noise."""
+    """Part that repeats share plus the mean; outside of the overlap the run's own, denoised."""
     about = [value - value.mean() for value in values]
     out = []
     for value, own, shared, rows in zip(
@@ -136,9 +179,9 @@ def _shared(values: Sequence[Array], group: Repeats) -> list[Array]:
 def _forces(
     signals: Sequence[Signals], moved: Sequence[Array], group: Repeats
 ) -> list[Array | None]:
-    """Rope force of every run of a group; None where none is known.
+    """Denoised cable force of every run of a group; None where it is not known.
 
-    ``moved`` (n, 2) of each run is what a unit weight pulls, and its rounding.
+    ``moved`` (n, 2) holds the force of a unit weight and its correction for finite differences.
     """
     measured = [s.load if s.load is not None else s.tension for s in signals]
     known = [s.load_mass if s.load is None else None for s in signals]
@@ -154,7 +197,7 @@ def _forces(
 
 
 def _followed(force: Array, moved: Array) -> Array:
-    """The part of a force that is constant or follows the rope's acceleration."""
+    """Regression of a force on a constant and on the acceleration of the cable."""
     columns = np.column_stack([np.ones_like(force), moved - moved.mean(axis=0)])
     return np.asarray(columns @ np.linalg.lstsq(columns, force, rcond=None)[0])
 
@@ -162,7 +205,7 @@ def _followed(force: Array, moved: Array) -> Array:
 def _with(
     motion: Motion, force: Array | None, rounding: Array, temperature: Array | None
 ) -> Motion:
-    """A motion with a calm rope force and temperature; ``rounding`` is that of a unit weight."""
+    """A motion with denoised cable force and temperature; ``rounding`` is that of a unit weight."""
     at = motion.at
     if temperature is not None:
         at = replace(at, temperature=quiet(temperature))

@@ -1,6 +1,7 @@
-"""Recognises runs that repeat each other, and lines up their clocks.
+"""Detection of repeats (replicate runs) and alignment of their clocks.
 
-Two runs are repeats when their aligned motor angles agree and their mean loads agree within 2 %.
+Two runs are repeats when their aligned motor angles agree to 2 % of their standard deviation and
+their mean loads agree to 2 %. Clocks are aligned by the lag of least mean-square difference.
 """
 
 from __future__ import annotations
@@ -26,15 +27,26 @@ _SAME_RATE = 0.05
 
 @dataclass(frozen=True)
 class Repeats:
-    """Runs of one programme and load: their indices and the samples that belong together."""
+    """Runs of one motion programme and load, with the samples that correspond."""
 
     runs: tuple[int, ...]
     rows: tuple[NDArray[np.intp], ...]
-    """Per run the sample indices that line up, all of equal length."""
+    """Per run the indices of the samples that correspond, all of one length."""
 
 
 def find_repeats(signals: list[Signals]) -> list[Repeats]:
-    """Partition of all runs into sets of repeats; a run without any is a set of its own."""
+    """Partition all runs into sets of repeats.
+
+    Parameters
+    ----------
+    signals
+        Measured inputs, one per run.
+
+    Returns
+    -------
+    list of Repeats
+        A run without repeats is a set of its own.
+    """
     sets: list[tuple[list[int], list[float]]] = []
     for index, run in enumerate(signals):
         for members, shifts in sets:
@@ -58,7 +70,7 @@ def mean_load(run: Signals) -> float | None:
 
 
 def _shift(first: Signals, other: Signals) -> float | None:
-    """Seconds by which ``other``'s clock is ahead of ``first``'s, or None where it is no repeat."""
+    """Time by which the clock of ``other`` is ahead, s; None where it is not a repeat."""
     if not _equally_loaded(first, other):
         return None
     step = float(np.median(np.diff(first.time)))
@@ -78,9 +90,9 @@ def _shift(first: Signals, other: Signals) -> float | None:
 
 
 def _best_lag(a: Array, b: Array) -> int:
-    """Samples by which b is behind a where their mean square difference is least.
+    """Lag of least mean-square difference, in samples by which ``b`` is behind ``a``.
 
-    Not where they correlate most: that is another lag where a log begins or ends in motion.
+    Not the lag of largest correlation, which is wrong where a log begins or ends in motion.
     """
     lags = np.arange(1 - len(a), len(b))
     start, stop = np.maximum(0, -lags), np.minimum(len(a), len(b) - lags)
@@ -91,7 +103,7 @@ def _best_lag(a: Array, b: Array) -> int:
     apart = (squares - 2 * correlate(b, a, mode="full")) / (stop - start)
     enough = stop - start >= _OVERLAP * min(len(a), len(b))
     apart = np.where(enough, apart, np.inf)
-    # A motion that repeats within itself fits at several lags: then the one with most in common.
+    # A periodic motion fits at several lags: take the one of largest overlap.
     fits = apart <= apart.min() + _AS_GOOD * float(np.mean(a**2))
     return int(lags[fits][np.argmax((stop - start)[fits])])
 
@@ -104,13 +116,13 @@ def _equally_loaded(first: Signals, other: Signals) -> bool:
 
 
 def _evenly(run: Signals, step: float) -> Array:
-    """Motor angle on an even grid: logs of a live bench have gaps and jitter."""
+    """Motor angle on an even grid: logs of a real bench have gaps and jitter."""
     grid = np.arange(run.time[0], run.time[-1], step)
     return np.interp(grid, run.time, run.motor_angle)
 
 
 def _lined_up(members: list[int], shifts: list[float], signals: list[Signals]) -> Repeats:
-    """Samples of all members that stand nearest to the first one's, where all of them run."""
+    """Nearest samples of all members on the clock of the first, over their common time."""
     clocks = [signals[m].time - shift for m, shift in zip(members, shifts, strict=True)]
     low, high = max(c[0] for c in clocks), min(c[-1] for c in clocks)
     half = float(np.median(np.diff(clocks[0]))) / 2

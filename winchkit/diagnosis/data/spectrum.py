@@ -1,7 +1,8 @@
-"""Signals in frequency: an orthonormal cosine transform, the torque's low-pass, noise bands.
+"""Spectral representation: orthonormal DCT-II, zero-phase low-pass, frequency bands, smoothing.
 
-The cosine transform (DCT-II) extends a run evenly at its ends, so a trend makes no jump there;
-for stationary noise its coefficients are independent, with the noise's spectrum as variance.
+The cosine transform extends a run evenly at its ends, so that a trend makes no jump there; for
+stationary noise its coefficients are nearly uncorrelated, with the spectrum of the noise as
+their variance.
 """
 
 from __future__ import annotations
@@ -34,17 +35,17 @@ _BEND = 0.25
 _ITERATIONS = 25
 _FEWEST = 8
 WHOLE_FILTER = 3.0
-"""Beyond this many times its cut-off the low-pass leaves a 10⁻⁴: nothing worth counting."""
+"""In units of the cut-off: beyond it the low-pass passes about 10⁻⁴ of the amplitude."""
 
 
 def torque_band(rate: float) -> float:
-    """Cut-off of the torque's low-pass: 20 Hz or a tenth of the sampling rate, Hz (DESIGN)."""
+    """Default cut-off of the torque's low-pass, Hz: 20 Hz or a tenth of the sampling rate."""
     return min(_TORQUE_BAND, rate / 10)
 
 
 @dataclass(frozen=True)
 class Band:
-    """What of one output of one run is kept in frequency."""
+    """The coefficients that are kept of one output of one run."""
 
     count: int
     """Samples of the run."""
@@ -53,11 +54,11 @@ class Band:
     cut_off: float | None = None
     """Low-pass, Hz; None keeps all."""
     skirt: float = 1.0
-    """How far beyond the cut-off coefficients are kept, in units of it."""
+    """Coefficients are kept up to this many cut-offs."""
 
     @cached_property
     def frequency(self) -> Array:
-        """Of every kept coefficient, Hz, shape (kept,)."""
+        """Frequency of every kept coefficient, Hz, (kept,)."""
         frequency = np.arange(self.count) * self.rate / (2 * self.count)
         if self.cut_off is None:
             return frequency
@@ -65,7 +66,12 @@ class Band:
 
     @cached_property
     def gain(self) -> Array:
-        """Of a Butterworth filter run forward and backward, shape (kept,)."""
+        """Gain of a Butterworth filter run forward and backward, (kept,).
+
+        Notes
+        -----
+        1 / (1 + (f/fc)^2N) with N = 4: the squared magnitude of one pass.
+        """
         frequency = self.frequency
         if self.cut_off is None:
             return np.ones_like(frequency)
@@ -73,7 +79,19 @@ class Band:
 
 
 def to_frequency(signal: Array, band: Band) -> Array:
-    """Coefficients of a signal within its band, shape (kept,); of several, (many, kept)."""
+    """Coefficients of a signal within its band.
+
+    Parameters
+    ----------
+    signal : (n,) or (many, n) array
+    band
+        Of n samples.
+
+    Returns
+    -------
+    (kept,) or (many, kept) array
+        Orthonormal DCT-II, low-passed.
+    """
     full: Array = np.asarray(dct(signal, type=2, norm="ortho"))
     gain = band.gain
     return full[..., : len(gain)] * gain
@@ -87,7 +105,21 @@ def to_time(coefficients: Array, band: Band) -> Array:
 
 
 def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
-    """Zero-phase 4th-order Butterworth low-pass of a signal without gaps, shape (n,)."""
+    """Zero-phase 4th-order Butterworth low-pass.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        Without gaps.
+    rate
+        Samples per second.
+    cut_off
+        Frequency at which half of the amplitude is left, Hz.
+
+    Returns
+    -------
+    (n,) array
+    """
     full = np.asarray(dct(signal, type=2, norm="ortho"))
     frequency = np.arange(len(signal)) * rate / (2 * len(signal))
     gain = 1 / (1 + (frequency / cut_off) ** (2 * _BUTTERWORTH_ORDER))
@@ -95,9 +127,17 @@ def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
 
 
 def narrow_edges(frequency: Array) -> Array:
-    """Edges of narrow logarithmic bands, none without a coefficient of ``frequency`` (Hz, sorted).
+    """Edges of 24 logarithmic bands, merged where one holds no coefficient.
 
-    Returns shape (bands + 1,), open ends.
+    Parameters
+    ----------
+    frequency : (n,) array
+        Of the coefficients, sorted, Hz.
+
+    Returns
+    -------
+    (bands + 1,) array
+        From minus to plus infinity.
     """
     positive = frequency[frequency > 0]
     if len(positive) < 2:
@@ -109,11 +149,30 @@ def narrow_edges(frequency: Array) -> Array:
 
 
 def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
-    """A spectrum whose logarithm bends slowly from band to band, and its degrees of freedom.
+    """Smooth the logarithm of a spectrum over its bands; with the degrees of freedom of the result.
 
-    Low bands hold few coefficients, and the noise of instruments has no lines there: penalised
-    maximum likelihood of gamma-distributed powers (Whittle), by iterated least squares. A band
-    with many coefficients keeps what it shows.
+    Parameters
+    ----------
+    power : (bands,) array
+        Mean square per band.
+    freedom : (bands,) array
+        Degrees of freedom of each.
+
+    Returns
+    -------
+    power, freedom : (bands,) arrays
+        Smoothed power, and 2 / Var(ln power).
+
+    Notes
+    -----
+    Penalised Whittle likelihood: ν power / σ² is χ²(ν), ln σ² has second differences of zero mean
+    and standard deviation 0.25. Maximised by Fisher scoring with working weights ν/2. A band of
+    many coefficients keeps its own value.
+
+    References
+    ----------
+    Whittle, P. (1953). Ark. Mat. 2, 423-434.
+    Pawitan, Y., O'Sullivan, F. (1994). J. Am. Stat. Assoc. 89, 600-610.
     """
     count = len(power)
     if count < 3:
@@ -124,7 +183,7 @@ def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
     level = np.log(power)
     eta = np.linalg.solve(weight + stiff, weight @ level)
     for _ in range(_ITERATIONS):
-        # A band far below its neighbours may pull the logarithm down by one step only.
+        # Bounded working residual, so that a band far below its neighbours does not diverge.
         working = eta + np.clip(power / np.exp(eta) - 1, -1.0, 3.0)
         eta = np.linalg.solve(weight + stiff, weight @ working)
     covariance = np.linalg.inv(weight + stiff)
@@ -132,9 +191,19 @@ def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
 
 
 def band_edges(frequency: Array, copies: int) -> Array:
-    """Edges of about 14 logarithmic bands that each hold enough of ``frequency`` (Hz, sorted).
+    """Edges of about 14 logarithmic bands that each hold at least eight coefficients.
 
-    ``copies`` is how many independent spectra are pooled. Returns shape (bands + 1,), open ends.
+    Parameters
+    ----------
+    frequency : (n,) array
+        Of the coefficients, sorted, Hz.
+    copies
+        Number of independent spectra that are pooled.
+
+    Returns
+    -------
+    (bands + 1,) array
+        From minus to plus infinity.
     """
     positive = frequency[frequency > 0]
     if len(positive) < 2 * _FEWEST:

@@ -1,7 +1,8 @@
-"""Where a hanging weight is jerked by the step from one layer of a spiral drum to the next.
+"""Masks of transients where a hanging weight meets the next layer of a spiral drum.
 
-The radius jumps there, and with it the rope's speed: how hard that pulls depends on what gives
-way, which the nominal line does not know. Its accelerations are differences across the jump.
+The winding radius jumps there, and with it the speed of the cable. How large the force of that
+transient is depends on compliances that the nominal model does not have, and its accelerations
+are finite differences across the jump.
 """
 
 from __future__ import annotations
@@ -18,19 +19,31 @@ __all__ = ["around", "jerked"]
 
 Mask = NDArray[np.bool_]
 _BESIDE = 2
-"""Samples to either side of a jerk, and as many as accelerations reach."""
+"""Samples to either side of a transient, besides the reach of the finite differences."""
 _MOVING = 0.9
 _HEARD = 2.0
-"""Of the noise: a smaller jerk tells by its moment where a layer begins, and spoils nothing."""
+"""In units of the white noise; a smaller transient only marks where a layer begins."""
 _NORMAL = 1.4826
-"""Standard deviation of normal noise by its median absolute deviation."""
+"""Standard deviation of normal noise over its median absolute deviation."""
 
 
 def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
-    """Samples of ``tension`` or ``motor_torque`` that a step from layer to layer may shake.
+    """Samples of an output near a change of layer whose transient exceeds the noise.
 
-    Only steps count whose jerk stands out of the instrument's own noise. Where the rope rests on
-    a step nothing jerks, though the encoder's noise may step to and fro.
+    Parameters
+    ----------
+    time, measured : (n,) arrays
+        s, and N or N m.
+    output
+        ``tension`` or ``motor_torque``.
+    motion
+        Nominal motion along the run.
+
+    Returns
+    -------
+    (n,) array of bool
+        All false without a known weight or without layers. A step that the encoder's noise crosses
+        while the cable rests does not count.
     """
     drum = drum_of(motion.at.profile)
     none = np.zeros(len(time), dtype=bool)
@@ -49,12 +62,12 @@ def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
 
 
 def around(jerked: Mask, time: Array) -> Mask:
-    """Jerked samples with those beside them that their accelerations are differences across."""
+    """Extend a mask by the samples whose finite differences reach across a marked one."""
     reach = _BESIDE + Clock(time).reach
     return np.asarray(np.convolve(jerked, np.ones(2 * reach + 1), mode="same") > 0)
 
 
 def _white(measured: Array) -> float:
-    """White noise of a signal, from second differences: what moves slowly takes no part."""
+    """Standard deviation of white noise, from second differences by their median absolute value."""
     bends = np.diff(measured, 2)
     return float(_NORMAL * np.median(np.abs(bends)) / np.sqrt(6))

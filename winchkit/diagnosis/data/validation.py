@@ -1,4 +1,7 @@
-"""Whether runs can be compared with a profile at all; every fault with its file and column."""
+"""Input validation: whether runs can be compared with a profile.
+
+Every fault is reported with its file and column.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +21,30 @@ _FEWEST = 50
 _SLOPE = 0.75, 1.3333
 _PARTIAL = 0.5
 _ENOUGH = 20_000
-"""Samples that tell another winch."""
+"""Samples on which the slope of the measured over the predicted length is fitted."""
 
 
 def admit(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
-    """Notes on what is missing but no fault; raises RunError with every fault of every run."""
+    """Validate runs against a profile.
+
+    Parameters
+    ----------
+    runs
+        Measured runs.
+    profile
+        Winch profile that they are to be compared with.
+
+    Returns
+    -------
+    list of str
+        Notes on what is missing without being a fault.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run: missing columns, constant or mostly missing channels, the
+        same run twice, a run of another winch.
+    """
     if not runs:
         raise RunError("no run given")
     faults = [fault for run in runs for fault in _faults(run)] + _twice(runs)
@@ -69,7 +91,7 @@ def _faults(run: Run) -> list[Fault]:
 
 
 def _twice(runs: Sequence[Run]) -> list[Fault]:
-    """Runs given twice: as repeats of themselves they would show no noise at all."""
+    """Faults of runs that were given twice: as repeats of themselves they would have no noise."""
     faults = []
     for index, run in enumerate(runs):
         for other in runs[:index]:
@@ -82,7 +104,7 @@ def _twice(runs: Sequence[Run]) -> list[Fault]:
 
 
 def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
-    """Whether the run was plainly recorded on another winch than the profile's."""
+    """Faults of a run whose length changes by another factor than the profile predicts."""
     where = run.path or run.name
     if "cable_length" not in run:
         named = run.metadata.get("profile", profile.name)

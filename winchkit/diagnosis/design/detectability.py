@@ -1,4 +1,4 @@
-"""What these runs can show: the smallest size of every effect that would have been seen."""
+"""Detectable sizes: the smallest size of each effect that these runs detect with 90 % power."""
 
 from __future__ import annotations
 
@@ -18,26 +18,42 @@ _POWER_QUANTILE = 1.2816
 
 @dataclass(frozen=True)
 class Bar:
-    """What an effect must bring to be named."""
+    """Detection threshold of a candidate effect, in decrease of χ²."""
 
     price: float
-    """Whitened squares that one degree of freedom must save."""
+    """Penalty per parameter, ln n."""
     threshold: float
-    """What noise alone may score beyond that."""
+    """1 % level of the largest score under noise alone."""
 
     def squares(self, freedom: int) -> float:
-        """Whitened squares that an effect of so many unknowns must take."""
+        """Decrease of χ² that an effect of ``freedom`` parameters must reach."""
         return max(self.threshold, 0.0) + self.price * freedom
 
     def power(self, strength: float, freedom: int) -> float:
-        """Chance that an effect of noncentrality λ takes as much."""
+        """Probability that an effect of noncentrality λ reaches it."""
         return power_of(strength, self.squares(freedom))
 
 
 def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
-    """Smallest main parameter per effect, found with 90 % power against what noise alone scores.
+    """Smallest size of the main parameter of every effect that is detected with 90 % power.
 
-    NaN where no size within the parameter's bounds would be found.
+    Parameters
+    ----------
+    scores
+        Of all candidates beside the initial model.
+    bar
+        Detection threshold.
+
+    Returns
+    -------
+    tuple of Detectable
+        Sorted by effect; NaN where no size within the parameter's bounds is detected.
+
+    Notes
+    -----
+    √λ = √required + Φ⁻¹(0.9), where λ is the noncentrality of the projected signature: the normal
+    approximation of a noncentral χ² with one degree of freedom, also for effects with more
+    parameters, for which it is conservative.
     """
     out = []
     for item in scores:

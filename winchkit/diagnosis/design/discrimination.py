@@ -1,8 +1,11 @@
-"""Which run would tell two effects apart: programmes tried on the model before they are run.
+"""Discrimination of two effects by a further run, on candidate programmes that are simulated.
 
-For each of a few kinds of programme the line is predicted with one effect; what no size of the
-other can imitate there and in the runs so far, in units of the noise, is the noncentrality λ
-(Hunter and Reiner, 1965).
+For each candidate programme one effect is simulated; the noncentrality λ is the squared length, in
+units of the noise, that no size of the other effect can imitate there and in the runs so far.
+
+References
+----------
+Hunter, W. G., Reiner, A. M. (1965). Technometrics 7, 307-323.
 """
 
 from __future__ import annotations
@@ -24,19 +27,19 @@ from winchkit.effects.term import Term
 __all__ = ["APART", "SoFar", "next_runs", "power_of", "separation", "so_far"]
 
 APART = 3.841
-"""Squares that a difference of two effects must bring: the 5 % level of chance."""
+"""95 % quantile of χ² with one degree of freedom."""
 _OFFERED = 2
 _WORTHWHILE = 0.2
 
 
 @dataclass(frozen=True)
 class SoFar:
-    """What the runs so far know of two effects, in as few rows as say the same."""
+    """Information of the runs so far on two effects, as a triangular factor."""
 
     shared: Array
-    """Columns of what runs to come share with them: offset and the second effect's numbers."""
+    """Columns that later runs share: offset and parameters of the second effect."""
     shown: Array
-    """The first effect there."""
+    """Column of the first effect."""
     left: float
     """λ of the runs so far alone."""
 
@@ -44,7 +47,23 @@ class SoFar:
 def next_runs(
     problem: Problem, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
 ) -> tuple[NextRun, ...]:
-    """The programmes that separate each pair best per minute, with the power they would have."""
+    """Programmes that separate each pair best per minute, with their power.
+
+    Parameters
+    ----------
+    problem
+        Regression problem of the runs so far.
+    pairs
+        Effects to be separated, at their fitted values.
+    noise
+        Rms per output, SI.
+
+    Returns
+    -------
+    tuple of NextRun
+        At most two per pair; where no programme helps, what the card of the effect says, with NaN
+        power.
+    """
     if not pairs:
         return ()
     out: list[NextRun] = []
@@ -55,19 +74,32 @@ def next_runs(
             minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
             strength = separation(programme, first, second, noise, known=known)
             offers.append((strength / minutes, power_of(strength), kind.name))
-        # Any programme sure to separate them will do: of those the quickest per minute.
+        # Among programmes of equal power, the one with most noncentrality per minute.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
         useful = [offer for offer in offers if offer[1] >= _WORTHWHILE][:_OFFERED]
         out += [NextRun(names, name, power) for _, power, name in useful]
         if not useful:
-            # No motion separates them: what does is on the card, and its power is not known.
+            # No motion separates them: the card says what does; its power is not known.
             out.append(NextRun(names, told_apart(first.effect, second.effect), float("nan")))
     return tuple(out)
 
 
 def power_of(strength: float, needed: float = APART) -> float:
-    """Chance that a difference of noncentrality λ brings the squares that are needed."""
+    """Power of a χ² test with one degree of freedom.
+
+    Parameters
+    ----------
+    strength
+        Noncentrality λ.
+    needed
+        χ² that is required.
+
+    Returns
+    -------
+    float
+        P(χ²'(1, λ) > needed).
+    """
     return float(ncx2.sf(needed, 1, max(strength, 0.0)))
 
 
@@ -80,11 +112,21 @@ def separation(
     known: SoFar | None = None,
     repeats: int = 1,
 ) -> float:
-    """Noncentrality λ of the first effect where the second may take any size.
+    """Noncentrality λ of the first effect where the second may have any size.
 
-    Without a second one, of the first beside the nuisances alone. Where it is ``known`` what runs
-    so far say, by how much λ grows: the second must be one size there and here, so that a run
-    which shows nothing of it tells as much as one that does.
+    Parameters
+    ----------
+    problem
+        Regression problem of the simulated programme.
+    first, second
+        Effects; without a second one the first beside nuisance parameters alone.
+    noise
+        Rms per output, SI.
+    known
+        Information of the runs so far; then the increase of λ by the programme: the second effect
+        has one size there and here.
+    repeats
+        How often the programme is run.
     """
     rows = _rows(problem, first, second, noise)
     if rows is None:
@@ -100,7 +142,7 @@ def separation(
 def so_far(
     problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> SoFar | None:
-    """What the runs of a problem know of two effects; None where that is no number."""
+    """Information of a problem's runs on two effects; None where a prediction is not finite."""
     rows = _rows(problem, first, second, noise)
     if rows is None:
         return None
@@ -113,9 +155,9 @@ def so_far(
 def _rows(
     problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> tuple[Array, Array, Array] | None:
-    """Columns that are a run's own (states), those that all runs share, and the first effect.
+    """Columns of a run's own states, columns shared by all runs, and the first effect, whitened.
 
-    All in units of the noise; None where an effect is no number somewhere.
+    None where a prediction is not finite.
     """
     weight = np.empty(problem.rows)
     for segment in problem.segments:
@@ -137,6 +179,6 @@ def _rows(
 
 
 def _left(columns: Array, shown: Array) -> float:
-    """Squares that columns leave of what is shown."""
+    """Sum of squares of ``shown`` after regression on ``columns``."""
     left = shown - columns @ np.linalg.lstsq(columns, shown, rcond=1e-10)[0]
     return float(left @ left)

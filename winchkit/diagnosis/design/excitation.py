@@ -1,4 +1,4 @@
-"""What a set of runs cannot show, said before anything is concluded from it."""
+"""Excitation: effects that a set of runs cannot show, as notes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,18 @@ _PLATEAU = 0.75
 
 
 def what_runs_cannot_show(problem: Problem) -> list[str]:
-    """Sentences on missing repeats, loads, directions, reversals, speeds and temperatures."""
+    """Notes on missing repeats, loads, directions, reversals, speeds and temperatures.
+
+    Parameters
+    ----------
+    problem
+        Regression problem of the runs.
+
+    Returns
+    -------
+    list of str
+        One sentence each, with what to record.
+    """
     dataset = problem.dataset
     notes = []
     if not dataset.repeated:
@@ -55,7 +66,7 @@ def what_runs_cannot_show(problem: Problem) -> list[str]:
 
 
 def _motions(speeds: Sequence[Array]) -> list[str]:
-    """Sentences on directions, reversals and speeds; ``speeds`` in m/s, one array per run."""
+    """Notes on directions, reversals and speeds; ``speeds`` in m/s, one array per run."""
     moving = [speed[np.abs(speed) > _MOVES] for speed in speeds]
     every = np.concatenate(moving)
     notes = []

@@ -1,4 +1,4 @@
-"""What to run next, as a programme: what it separates and what it would show for the first time."""
+"""Choice of the next run: which pairs it separates, and which effects become detectable."""
 
 from __future__ import annotations
 
@@ -28,31 +28,31 @@ __all__ = ["Offer", "hopeless", "offers", "programme_of"]
 
 _SURE = 0.9
 _FAINT = 0.2
-"""A power that is not worth a run."""
+"""Power below which a programme is not worth a run."""
 _HANGING, _WARMING = 1 / 3, 20.0
-"""What an operator needs to hang a load and to warm a machine through, minutes."""
+"""Time of an operator to change a load, and to warm the machine, minutes."""
 _REPEATS = 2
 _HANGS = 0.5
 
 
 @dataclass(frozen=True)
 class Offer:
-    """One kind of programme and what it would bring."""
+    """A candidate programme with its time and power."""
 
     kind: Kind
     minutes: float
-    """Of motion and of the operator's work, both repeats."""
+    """Motion and the operator's work, both repeats."""
     powers: tuple[float, ...]
-    """Chance of telling each pair apart."""
+    """Power to separate each pair."""
     shows: tuple[str, ...]
-    """Effects of a usual size that it shows and the runs so far do not."""
+    """Effects of usual size that become detectable."""
 
     @property
     def worth(self) -> tuple[float, ...]:
-        """To be compared in this order: more is better.
+        """Sort key, larger is better.
 
-        First what it tells apart for sure, then with a fair chance, then a minute's worth of it;
-        where there is nothing to tell apart, what it shows a minute.
+        Pairs separated with at least 90 % power, then the sum of powers, then per minute; where
+        nothing is to be separated, effects that become detectable per minute.
         """
         sure = sum(power >= _SURE for power in self.powers)
         told = round(sum(power for power in self.powers if power >= _FAINT), 1)
@@ -60,7 +60,7 @@ class Offer:
         return (sure, told, quick, shown) if told else (0.0, 0.0, shown, quick)
 
     def to_json(self, pairs: Sequence[tuple[Term, Term]]) -> dict[str, Any]:
-        """As ``winchkit plan --json`` prints it."""
+        """Dictionary that ``winchkit plan --json`` prints."""
         separates = [
             {"effects": [a.effect.id, b.effect.id], "power": power}
             for (a, b), power in zip(pairs, self.powers, strict=True)
@@ -82,9 +82,22 @@ def offers(
     bar: Bar,
     room: Room | None = None,
 ) -> list[Offer]:
-    """Every kind of programme within a room, else within what was seen; the most telling first.
+    """Candidate programmes within an operating range, best first.
 
-    An effect shows where it takes what a diagnosis wants for its name, the ``bar``.
+    Parameters
+    ----------
+    problem
+        Regression problem of the runs so far.
+    pairs
+        Effects to be separated.
+    noise
+        Rms per output, SI.
+    effects
+        Effects whose detection is of interest.
+    bar
+        Detection threshold.
+    room
+        Operating range; None for that of the runs so far.
     """
     dataset = problem.dataset
     room = room or seen(dataset)
@@ -114,12 +127,12 @@ def offers(
 
 
 def _sees(bar: Bar, term: Term, strength: float) -> bool:
-    """Whether an effect of noncentrality λ would most probably be named."""
+    """Whether an effect of noncentrality λ is detected with at least 90 % power."""
     return bar.power(strength, Coordinates(term.effect).freedom) >= _SURE
 
 
 def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list[tuple[Term, Term]]:
-    """Pairs that none of these programmes tells apart."""
+    """Pairs that none of these programmes separates."""
     return [
         pair
         for index, pair in enumerate(pairs)
@@ -128,9 +141,23 @@ def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list
 
 
 def programme_of(dataset: Dataset, kind: Kind, name: str, room: Room | None = None) -> Programme:
-    """A kind as a programme for ``winchkit run``: within a room, else what was seen; twice.
+    """Motion programme of a kind for ``winchkit run``, repeated twice.
 
-    It begins and ends at the shortest length, so that its repeats are equal.
+    Parameters
+    ----------
+    dataset
+        Runs so far.
+    kind
+        Candidate programme.
+    name
+        Of the motion programme.
+    room
+        Operating range; None for that of the runs so far.
+
+    Returns
+    -------
+    Programme
+        It begins and ends at the shortest length, so that its repeats are equal.
     """
     room = room or seen(dataset)
     steps: list[Step] = []
@@ -147,7 +174,7 @@ def programme_of(dataset: Dataset, kind: Kind, name: str, room: Room | None = No
 
 
 def _bring(dataset: Dataset, warmed: float) -> list[Step]:
-    """Ask for a temperature, in whole degrees."""
+    """Step that asks for a temperature, in whole degrees Celsius."""
     usual = usual_temperature(dataset)
     if usual is None:
         return []
@@ -157,7 +184,7 @@ def _bring(dataset: Dataset, warmed: float) -> list[Step]:
 
 
 def _hang(mass: float | None) -> list[Step]:
-    """Ask for a load, rounded to what a bench has at hand."""
+    """Step that asks for a load, rounded to usual weights."""
     if mass is None:
         return []
     wanted = max(_HANGS, round(mass / _HANGS) * _HANGS)
@@ -165,7 +192,7 @@ def _hang(mass: float | None) -> list[Step]:
 
 
 def _work(kind: Kind, dataset: Dataset) -> float:
-    """What the operator has to do in one repeat, minutes."""
+    """Time of the operator's work in one repeat, minutes."""
     warmings = len(kind.warmed) - 1 if _warm(dataset) else 0
     hangs = len(kind.loads) if len(kind.loads) > 1 else 0
     return warmings * _WARMING + hangs * _HANGING
@@ -180,7 +207,7 @@ def _warm(dataset: Dataset) -> bool:
 
 
 def _usual(effects: Sequence[Effect], problem: Problem) -> list[Term]:
-    """Every effect that could be seen here, in a usual size."""
+    """Every effect that these channels can show, at its usual size."""
     out = []
     for effect in effects:
         if missing_needs(effect, problem):

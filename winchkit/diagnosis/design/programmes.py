@@ -1,4 +1,4 @@
-"""Kinds of programmes, tried on the model before anyone runs them."""
+"""Candidate motion programmes, simulated on the nominal model."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ __all__ = ["KINDS", "Kind", "Room", "allowed", "imagined", "seen", "usual_temper
 
 _RATE = 20.0
 _MARGIN = 0.05
-"""Share of a bench's stroke that is kept off each end."""
+"""Share of a bench's stroke that is kept free at each end."""
 _RESERVE = 1.5
-"""Between a bench's limits of speed and tension and what is proposed."""
+"""Ratio of a bench's limits of speed and tension to what is proposed."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of programme: moves within the stroke seen so far, loads, temperatures."""
+    """A candidate programme: moves within the stroke, loads, temperatures."""
 
     name: str
     moves: tuple[tuple[float, float], ...]
-    """Where to (share of the stroke) and how fast (share of the highest speed)."""
+    """Target (share of the stroke) and speed (share of the highest speed) of each move."""
     loads: tuple[float, ...] = (1.0,)
     """In units of the mean load so far; one run each."""
     warmed: tuple[float, ...] = (0.0,)
-    """Kelvin above the temperature so far; one run each."""
+    """Above the mean temperature so far, K; one run each."""
     hold: float = 0.5
-    """After each move, s."""
+    """Rest after each move, s."""
 
 
 _THERE_AND_BACK = ((1.0, 1.0), (0.0, 1.0))
@@ -63,19 +63,19 @@ KINDS = (
 
 @dataclass(frozen=True)
 class Room:
-    """What a programme stays within."""
+    """Operating range of a programme."""
 
     low: float
     """Shortest free length, m."""
     high: float
     fastest: float
-    """Highest speed of the rope, m/s."""
+    """Highest speed of the cable, m/s."""
     mass: float | None
-    """Mean load so far as a mass, kg; None where none is known."""
+    """Mean load so far as a mass, kg; None where it is not known."""
     lightest: float = 0.0
-    """Load that keeps the rope from going slack, kg."""
+    """Load below which the cable may go slack, kg."""
     heaviest: float = np.inf
-    """Load that the bench's tension limit leaves room for, kg."""
+    """Load at which the tension limit of the bench is reached with its reserve, kg."""
 
     def at(self, share: float) -> float:
         """Length at a share of the stroke, m."""
@@ -89,7 +89,7 @@ class Room:
 
 
 def seen(dataset: Dataset) -> Room:
-    """Stroke, speed and load of a dataset: the room that runs have shown to be there."""
+    """Operating range of the runs so far: stroke, speed and load."""
     recordings = dataset.recordings
     lengths = np.concatenate([r.raw.at.free_length for r in recordings])
     fastest = max(float(np.max(np.abs(r.raw.at.speed))) for r in recordings)
@@ -99,7 +99,7 @@ def seen(dataset: Dataset) -> Room:
 
 
 def allowed(dataset: Dataset, limits: LimitSpec) -> Room:
-    """The room that a bench's limits leave, with a margin; what they do not say, as it was seen."""
+    """Operating range within a bench's limits, with a margin; else that of the runs."""
     room = seen(dataset)
     if limits.length is not None:
         margin = _MARGIN * (limits.length[1] - limits.length[0])
@@ -112,7 +112,7 @@ def allowed(dataset: Dataset, limits: LimitSpec) -> Room:
 
 
 def usual_temperature(dataset: Dataset) -> float | None:
-    """Mean temperature of the runs, degC; None where one of them does not know it."""
+    """Mean temperature of the runs, °C; None where a run has none."""
     known = [r.signals.temperature for r in dataset.recordings]
     if any(t is None for t in known):
         return None
@@ -120,7 +120,7 @@ def usual_temperature(dataset: Dataset) -> float | None:
 
 
 def imagined(dataset: Dataset, kind: Kind, room: Room | None = None) -> Problem:
-    """A problem whose runs follow a kind of programme and measure what the nominal line says."""
+    """Regression problem of simulated runs of a kind of programme, on the nominal model."""
     usual = usual_temperature(dataset)
     room = room or seen(dataset)
     runs = []
@@ -151,7 +151,7 @@ def _run(dataset: Dataset, kind: Kind, room: Room, mass: float | None, warm: flo
 def _as_run(
     dataset: Dataset, time: Array, angle: Array, mass: float | None, temperature: Array | None
 ) -> Run:
-    """A run on which every output that the dataset measures shows what the nominal line says."""
+    """Run in which every output of the data set has the value that the nominal model predicts."""
     line = Line(dataset.profile)
     predicted = line.predict(line.motion(Signals(time, angle, load_mass=mass)))
     channels = {"motor_angle": Channel(angle, "rad")}

@@ -1,9 +1,12 @@
-"""What the errors of several winches follow: alike in all of them, or each in its own way.
+"""Analysis of variance of the errors of several winches.
 
-An analysis of variance: the means over the bins of a variable, the same bins for every winch, first
-of all winches together, then of each by itself. What the first explain is common; what only the
-second explain is not, and the winch that is furthest from the common means is named. The variable
-``winch`` has one bin a winch: a level of its own.
+Means over the bins of a variable, the same bins for all winches: first common to all winches, then
+for each by itself. The share of the former is common; the winch that contributes most of the
+difference is named. The variable ``winch`` has one bin per winch.
+
+References
+----------
+Box, G. E. P., Hunter, J. S., Hunter, W. G. (2005). Statistics for Experimenters, 2nd ed. Wiley.
 """
 
 from __future__ import annotations
@@ -29,57 +32,57 @@ from winchkit.diagnosis.residuals.attribution import (
 __all__ = ["SharedError", "SharedFollowed", "WinchErrors", "errors_of", "shared_errors"]
 
 _MOST = 50_000
-"""Samples of a winch that are looked at: shares do not get better with millions."""
+"""Samples per winch; shares do not become more exact with more."""
 _APART = 0.5
-"""Part of the difference between winches that makes one of them the one."""
+"""Share of the difference between winches above which one winch is named."""
 
 
 @dataclass(frozen=True)
 class WinchErrors:
-    """Errors of one output of one winch along its runs, every so many samples of them."""
+    """Errors of one output of one winch, decimated."""
 
     unit: str
     mean_square: float
     error: Array
     """(n,)."""
     variables: Mapping[str, Array]
-    """What they may follow, (n,) each."""
+    """Variables that may explain them, (n,) each."""
     kept: int
-    """Independent values among them."""
+    """Number of independent values among them."""
 
 
 @dataclass(frozen=True)
 class SharedFollowed:
-    """A variable and the shares of the error's power that its means explain."""
+    """A variable and the shares of the error variance that its bins explain."""
 
     variable: str
     share: float
-    """Each winch with means of its own."""
+    """With means of its own for each winch."""
     common: float
-    """One set of means for all winches: what of ``share`` is alike in all."""
+    """With the same means for all winches."""
     apart: tuple[str, ...]
-    """The winch that makes most of the difference; none where no single one does."""
+    """Outlying winch, which contributes most of the difference; empty where there is none."""
 
 
 @dataclass(frozen=True)
 class SharedError:
-    """One output over all winches, SI."""
+    """Errors of one output over all winches, SI."""
 
     unit: str
     rms: float
     winches: Mapping[str, float]
-    """Share of the squared error that each winch has."""
+    """Share of the squared error per winch."""
     follows: tuple[SharedFollowed, ...]
-    """What explains most first."""
+    """Largest share first."""
 
     def to_json(self) -> dict[str, Any]:
-        """As the command prints it."""
+        """Dictionary that the command prints."""
         follows = [{**vars(f), "apart": list(f.apart)} for f in self.follows]
         return {**vars(self), "winches": dict(self.winches), "follows": follows}
 
 
 def errors_of(compared: Compared) -> dict[str, WinchErrors]:
-    """Errors per output of one winch, as few as its shares need."""
+    """Errors per output of one winch, decimated to at most about 50,000 samples."""
     problem, out = compared.problem, {}
     times = problem.in_time(compared.residual)
     for output, told in compared.comparison.outputs.items():
@@ -102,12 +105,18 @@ def errors_of(compared: Compared) -> dict[str, WinchErrors]:
 
 
 def _few(runs: list[Array], valid: list[NDArray[np.bool_]], step: int) -> Array:
-    """Every so many of the compared samples of all runs."""
+    """Every ``step``-th compared sample of all runs."""
     return np.concatenate([run[v] for run, v in zip(runs, valid, strict=True)])[::step]
 
 
 def shared_errors(winches: Mapping[str, Mapping[str, WinchErrors]]) -> dict[str, SharedError]:
-    """Per output what the winches (name to :func:`errors_of`) have in common and what not."""
+    """Per output the common and the individual part of the errors of several winches.
+
+    Parameters
+    ----------
+    winches
+        Name to the errors of :func:`errors_of`.
+    """
     outputs = dict.fromkeys(output for errors in winches.values() for output in errors)
     out = {}
     for output in outputs:
@@ -125,7 +134,7 @@ def _follows(own: Mapping[str, WinchErrors]) -> tuple[SharedFollowed, ...]:
     errors = np.concatenate([e.error for e in own.values()])
     if len(own) < 2 or not np.any(errors):
         return ()
-    # A winch by itself is one bin over nothing: a level of its own.
+    # The winch itself: one bin each, that is, a level of its own.
     over = {"winch": np.zeros(len(errors), dtype=np.intp)}
     for name in next(iter(own.values())).variables:
         if all(name in e.variables for e in own.values()):
@@ -140,7 +149,7 @@ def _follows(own: Mapping[str, WinchErrors]) -> tuple[SharedFollowed, ...]:
 def _followed(
     variable: str, bins: NDArray[np.intp], errors: Array, own: Mapping[str, WinchErrors]
 ) -> SharedFollowed:
-    """What the means over bins explain, less the part that chance gives to each."""
+    """Shares that bins explain, less their expectation under independence."""
     winch = np.repeat(np.arange(len(own)), [len(e.error) for e in own.values()])
     shape = len(own), int(bins.max()) + 1
     cells, total, kept = winch * shape[1] + bins, float(errors @ errors), _kept(own)
@@ -162,5 +171,5 @@ def _followed(
 
 
 def _kept(own: Mapping[str, WinchErrors]) -> int:
-    """Independent values of all winches together."""
+    """Number of independent values of all winches together."""
     return sum(e.kept for e in own.values())

@@ -1,4 +1,4 @@
-"""A diagnosis of every winch of a recording by itself."""
+"""Diagnosis of every winch of a recording by itself."""
 
 from __future__ import annotations
 
@@ -26,10 +26,27 @@ def diagnose_each(
     thin: bool = True,
     told: Told = silent,
 ) -> Iterator[tuple[str, Answer]]:
-    """Name and answer of every winch, in order, all against one profile.
+    """Name and answer of every winch, in order, all compared with one profile.
 
-    Two are worked on at a time: on long arrays numpy leaves a second core to the other. An answer
-    holds hundreds of megabytes after long runs, so let go of one before taking the next.
+    Parameters
+    ----------
+    winches
+        Name to its runs.
+    profile
+        Winch profile of all of them.
+    catalogue
+        Effects; None for the shipped ones.
+    band
+        Cut-off of the torque's low-pass, Hz; None for the default.
+    thin
+        Whether long runs are decimated.
+    told
+        Progress callback: text and share of the work done.
+
+    Notes
+    -----
+    Two winches are computed at a time. An answer holds hundreds of megabytes after long runs:
+    release one before taking the next.
     """
     catalogue = catalogue or load_catalogue()
     shares = dict.fromkeys(winches, 0.0)
@@ -53,23 +70,22 @@ def diagnose_each(
 
 
 def _taken(begun: deque[tuple[str, Future[Answer]]]) -> tuple[str, Answer]:
-    """The oldest, waited for; nothing here keeps its answer."""
+    """Wait for the oldest answer; no reference to it is kept here."""
     name, future = begun.popleft()
     return name, future.result()
 
 
 def _begun(work: Callable[[str], Answer], name: str) -> Future[Answer]:
-    """An answer being worked on.
+    """Start the computation of an answer in a thread.
 
-    Whoever is interrupted while waiting gets away at once; a pool would first wait for its
-    threads, for seconds.
+    A thread pool would wait for its threads, for seconds, when the caller is interrupted.
     """
     future: Future[Answer] = Future()
 
     def run() -> None:
         try:
             future.set_result(work(name))
-        except BaseException as error:  # noqa: BLE001 - handed to whoever waits for the answer
+        except BaseException as error:  # noqa: BLE001 - raised where the answer is awaited
             future.set_exception(error)
 
     Thread(target=run, name=f"diagnose {name}").start()

@@ -1,10 +1,13 @@
-"""What the winches of a recording have in common, and what one of them has alone.
+"""Meta-analysis over several winches: which effects they share, and whether of one size.
 
-Every winch is diagnosed by itself; here their answers are held beside each other. Whether all have
-the same size of an effect is Cochran's test: if they have, the squares of their distances from the
-common mean, in standard deviations, are chi-square distributed (Biometrics 10, 1954, 101). The mean
-of winches that differ bears by how much they do (DerSimonian and Laird, Controlled Clinical Trials
-7, 1986, 177).
+Every winch is diagnosed by itself. Homogeneity of a parameter is tested by Cochran's Q, which is
+χ²(winches − 1) under one common value; means of heterogeneous winches take a variance between
+winches by the moment estimate of DerSimonian and Laird.
+
+References
+----------
+Cochran, W. G. (1954). Biometrics 10, 101-129.
+DerSimonian, R., Laird, N. (1986). Controlled Clinical Trials 7, 177-188.
 """
 
 from __future__ import annotations
@@ -25,57 +28,57 @@ from winchkit.effects.effect import Effect, Parameter
 __all__ = ["Pooled", "SharedEffect", "alarms", "pooled", "shared_effects"]
 
 _ALIKE = 0.01
-"""Winches of one size seem to differ in one case of a hundred."""
+"""Level of the homogeneity test."""
 _FEWEST = 3
-"""Of two that differ neither is the odd one."""
+"""Winches from which one may be outlying: of two that differ neither is."""
 _PART = 4
-"""Of so many winches one may be odd: of more, some few agree by chance."""
+"""At most one in this many winches may be outlying: of more, a few agree by chance."""
 Member = tuple[str, tuple[float, ...]]
-"""An effect and its orders: cogging of two orders is two effects."""
+"""An effect with its orders: cogging of two orders counts as two effects."""
 
 
 @dataclass(frozen=True)
 class Pooled:
-    """One parameter of an effect over the winches that have it, SI."""
+    """Meta-analysis of one parameter of an effect, SI."""
 
     value: float
-    """Mean over the winches that agree; over all where most do not."""
+    """Mean over the homogeneous winches; over all where most are heterogeneous."""
     std: float
-    """Of that mean."""
+    """Standard deviation of the mean."""
     unit: str
     spread: float
-    """Standard deviation by which winches of that mean differ beyond their own uncertainties."""
+    """Standard deviation between these winches (DerSimonian and Laird)."""
     chi_square: float
-    """Of all winches about their mean."""
+    """Cochran's Q of all winches."""
     degrees_of_freedom: int
     p_value: float
-    """That winches of one size differ so much; NaN with fewer than two."""
+    """P-value of homogeneity; NaN with fewer than two winches."""
     apart: tuple[str, ...] = ()
-    """The one or few winches that differ from all others, which agree."""
+    """Outlying winches, without which the others are homogeneous."""
 
     @property
     def alike(self) -> bool:
-        """Whether nothing speaks against one size in all winches."""
+        """Whether homogeneity is not rejected at 1 %."""
         return not self.p_value < _ALIKE
 
 
 @dataclass(frozen=True)
 class SharedEffect:
-    """An effect that some winches have: which, and what of it they have in common."""
+    """An effect of some winches, and its parameters over them."""
 
     effects: tuple[str, ...]
-    """What no winch's runs exclude, as in a step of a diagnosis; the parsimonious one first."""
+    """Effects that remain possible for all of these winches, fewest parameters first."""
     winches: tuple[str, ...]
     """Winches in which it was found."""
     without: tuple[str, ...]
-    """Winches that would have shown it at this size and do not have it."""
+    """Winches whose runs would have detected this size and did not."""
     unsure: tuple[str, ...]
-    """Winches of which neither can be said."""
+    """Winches about which neither can be said."""
     parameters: Mapping[str, Pooled]
     """Of the first effect."""
 
     def to_json(self) -> dict[str, Any]:
-        """As the command prints it."""
+        """Dictionary that the command prints."""
         parameters = {
             name: {**vars(p), "apart": list(p.apart)} for name, p in self.parameters.items()
         }
@@ -98,10 +101,19 @@ def shared_effects(
 
 
 def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict[str, float]:
-    """How likely noise makes one of so many winches alarm as much as each that has no name.
+    """Probability that noise alone makes at least one of all winches alarm (Šidák).
 
-    ``chances`` is how likely it makes that one winch (NaN where no repeat tells): of eight winches
-    of which nothing is missing, one alarms eight times as often as one alone.
+    Parameters
+    ----------
+    found
+        Name to diagnosis.
+    chances
+        P-value of lack of fit per winch; NaN without repeats.
+
+    Returns
+    -------
+    dict
+        1 − (1 − p)^winches of each winch with an alarm and without a named effect.
     """
     return {
         winch: 1 - (1 - min(chances[winch], 1.0)) ** len(found)
@@ -111,9 +123,16 @@ def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict
 
 
 def pooled(values: Mapping[str, tuple[float, float]], unit: str, *, reciprocal: bool) -> Pooled:
-    """A mean over winches (name to value and standard deviation) and whether they agree.
+    """Mean over winches with homogeneity test and outlying winches.
 
-    A ``reciprocal`` value is pooled as 1/value, in which its uncertainty is even.
+    Parameters
+    ----------
+    values
+        Name to value and standard deviation.
+    unit
+        Of the values.
+    reciprocal
+        Whether 1/value is pooled, in which the uncertainty is symmetric.
     """
     names = list(values)
     x, s = np.array(list(values.values())).T
@@ -129,7 +148,7 @@ def pooled(values: Mapping[str, tuple[float, float]], unit: str, *, reciprocal: 
 
 
 def _together(named: list[tuple[str, Step]]) -> Iterator[tuple[list[Member], dict[str, Step]]]:
-    """Steps of several winches that may be one effect, and the effects that they all allow."""
+    """Steps of several winches that may be one effect, and the effects that all of them allow."""
     left = list(named)
     while left:
         in_winches: dict[Member, set[str]] = {}
@@ -167,7 +186,7 @@ def _shared(
     effect = catalogue[members[0][0]]
     parameters = {}
     for parameter in effect.parameters:
-        # A phase counts from each winch's own zero.
+        # A phase refers to the zero of each winch and is not pooled.
         if not effect.polar or parameter.name != effect.polar[1]:
             told = _told(steps, effect.id, parameter.name)
             if told:
@@ -186,13 +205,13 @@ def _shared(
 
 
 def _told(steps: Mapping[str, Step], effect: str, name: str) -> dict[str, tuple[float, float]]:
-    """Winches that know a value, with it and its standard deviation."""
+    """Winches with a known value: name to value and standard deviation."""
     known = {w: s.parameters.get(effect, {}).get(name) for w, s in steps.items()}
     return {w: (e.value, e.std) for w, e in known.items() if e is not None and np.isfinite(e.std)}
 
 
 def _would_show(diagnosis: Diagnosis, effect: Effect, size: Mapping[str, Pooled]) -> bool:
-    """Whether a winch that was not found to have an effect of this size would have shown it."""
+    """Whether the runs of a winch would have detected an effect of this size."""
     if diagnosis.verdict in {"partly", "unknown"}:
         return False
     for shown in diagnosis.detectable:
@@ -204,7 +223,7 @@ def _would_show(diagnosis: Diagnosis, effect: Effect, size: Mapping[str, Pooled]
 
 
 def _kin(diagnosis: Diagnosis, effect: Effect, catalogue: Catalogue) -> bool:
-    """Whether something was found that may be this effect by another law or name."""
+    """Whether a found effect may be this one under another law or name."""
     named = [catalogue[name] for step in diagnosis.steps for name in step.effects]
     return any(
         (effect.family and other.family == effect.family)
@@ -219,7 +238,7 @@ def _from_null(value: float, parameter: Parameter) -> float:
 
 
 def _cochran(x: Array, s: Array) -> tuple[float, float]:
-    """Chi-square of values about their weighted mean, and how likely it is by chance."""
+    """Cochran's Q and its p-value."""
     if len(x) < 2 or not np.all(s > 0):
         return 0.0, float("nan")
     weight = 1 / s**2
@@ -228,7 +247,7 @@ def _cochran(x: Array, s: Array) -> tuple[float, float]:
 
 
 def _majority(x: Array, s: Array) -> NDArray[np.bool_]:
-    """Winches left when one, or a quarter, is taken away so that the rest agree; else all."""
+    """Homogeneous winches after removal of one, or a quarter; all where that fails."""
     kept = np.ones(len(x), dtype=bool)
     while _cochran(x[kept], s[kept])[1] < _ALIKE:
         if len(x) < _FEWEST or (~kept).sum() >= max(1, len(x) // _PART):
@@ -238,7 +257,7 @@ def _majority(x: Array, s: Array) -> NDArray[np.bool_]:
 
 
 def _worst(x: Array, s: Array, kept: NDArray[np.bool_]) -> int:
-    """The winch whose absence brings the others nearest to agreement."""
+    """Winch whose removal decreases Q most."""
     squares = {}
     for index in np.flatnonzero(kept):
         without = kept.copy()
@@ -248,7 +267,7 @@ def _worst(x: Array, s: Array, kept: NDArray[np.bool_]) -> int:
 
 
 def _mean(x: Array, s: Array) -> tuple[float, float, float]:
-    """Mean, its standard deviation, and the spread between winches beyond their uncertainties."""
+    """Mean, its standard deviation, and the standard deviation between winches."""
     if len(x) == 1 or not np.all(s > 0):
         return float(x[0]), float(s[0]), 0.0
     weight = 1 / s**2

@@ -1,4 +1,12 @@
-"""What a residual follows: the share of it that each variable's bins explain."""
+"""Residual attribution: share of the residual variance that each variable explains.
+
+Correlation ratio η² over bins of equal counts, less its expectation under independence, and the
+share of a sine per order of an angle.
+
+References
+----------
+Pearson, K. (1905). On the general theory of skew correlation and non-linear regression. Dulau.
+"""
 
 from __future__ import annotations
 
@@ -28,25 +36,25 @@ __all__ = [
 ]
 
 BINS = 16
-"""Over a variable."""
+"""Bins per variable."""
 _ORDERS = 40
 _WORTH = 0.02
 _CLEARLY = 0.05
-"""Share that two variables at once must tell beyond either of them."""
+"""Share that two variables together must explain beyond either of them."""
 
 
 @dataclass(frozen=True)
 class Followed:
-    """One variable and the share of an output's residual power that it explains."""
+    """A variable and the share of an output's residual variance that it explains."""
 
     output: str
     variable: str
     share: float
     order: int | None = None
-    """Periods per turn of the variable, where it is an angle."""
+    """Periods per turn, where the variable is an angle."""
     frequency: float | None = None
     line: str | None = None
-    """Of a robot, or the axis of its platform's position, where one alone has most of it."""
+    """Line of a robot, or axis of its platform, that has most of the share."""
 
 
 class _Shared(Protocol):
@@ -60,7 +68,7 @@ _S = TypeVar("_S", bound=_Shared)
 
 
 def variables_of(recording: Recording) -> dict[str, Array]:
-    """The variables that a residual may follow along one run, (n,) each."""
+    """Variables that may explain a residual along one run, (n,) each."""
     known = [name for name in VARIABLES if name not in ("load", "tension", "temperature")]
     out = {name: VARIABLES[name](recording.raw.at) for name in known}
     if recording.raw.load is not None:
@@ -73,7 +81,20 @@ def variables_of(recording: Recording) -> dict[str, Array]:
 
 
 def follows(problem: Problem, residual: Array) -> list[Followed]:
-    """Per output the variables that its residual follows, largest share first."""
+    """Per output the variables that explain its residual, largest share first.
+
+    Parameters
+    ----------
+    problem
+        Regression problem.
+    residual : (rows,) array
+        Measured less predicted.
+
+    Returns
+    -------
+    list of Followed
+        Those whose share exceeds 2 % and three standard deviations of its null distribution.
+    """
     times = problem.in_time(residual)
     out: list[Followed] = []
     known = [variables_of(recording) for recording in problem.dataset.recordings]
@@ -94,7 +115,7 @@ def follows(problem: Problem, residual: Array) -> list[Followed]:
 
 
 def ranked(found: Iterable[_S]) -> list[_S]:
-    """Largest share first; two variables at once only where they tell clearly more than either."""
+    """Largest share first; products of two variables only where they explain clearly more."""
     shares = {item.variable: item.share for item in found}
 
     def needless(item: _S) -> bool:
@@ -105,7 +126,20 @@ def ranked(found: Iterable[_S]) -> list[_S]:
 
 
 def harmonics(problem: Problem, residual: Array) -> list[Followed]:
-    """Per output and angle the order whose sine takes most of the residual."""
+    """Per output and angle the order whose sine explains most of the residual variance.
+
+    Parameters
+    ----------
+    problem
+        Regression problem.
+    residual : (rows,) array
+        Measured less predicted.
+
+    Returns
+    -------
+    list of Followed
+        Orders 1 to 40 with a share above 2 %, largest share first.
+    """
     times = problem.in_time(residual)
     out = []
     for output in problem.dataset.outputs:
@@ -123,19 +157,27 @@ def harmonics(problem: Problem, residual: Array) -> list[Followed]:
 
 
 def kept_rows(problem: Problem, output: str) -> int:
-    """Independent values of an output: what its low-pass keeps, fewer than its samples."""
+    """Number of independent values of an output: coefficients that its low-pass keeps."""
     return sum(s.rows.stop - s.rows.start for s in problem.segments if s.output == output)
 
 
 def by_chance(bins: int, kept: int) -> float:
-    """Share that chance hardly reaches: three standard deviations of a chi-square of the bins."""
+    """Share that independent residuals hardly reach: 3 √(2 bins) / rows, at least 2 %."""
     return max(_WORTH, 3 * float(np.sqrt(2 * bins)) / kept)
 
 
 def binned_share(variable: Array, error: Array, kept: int) -> float:
-    """Share of the error's power in its means over bins of the variable, less what chance gives.
+    """Correlation ratio η² of a residual over bins of a variable, less its expectation.
 
-    Chance gives one part in ``kept`` per bin, whatever the number of samples.
+    Parameters
+    ----------
+    variable, error : (n,) arrays
+    kept
+        Number of independent values among them.
+
+    Notes
+    -----
+    η² = Σ nᵦ mᵦ² / Σ e² over bins of mean m, less (number of bins) / kept.
     """
     total = float(error @ error)
     if total == 0.0 or np.ptp(variable) == 0.0:
@@ -150,15 +192,15 @@ def binned_share(variable: Array, error: Array, kept: int) -> float:
 
 
 def quantile_bins(variable: Array) -> NDArray[np.intp]:
-    """The bin of every sample, each of as many samples as repeated values allow."""
+    """Bin of every sample; bins hold equal counts as far as ties allow."""
     edges = np.unique(np.quantile(variable, np.linspace(0, 1, BINS + 1)[1:-1]))
     return np.searchsorted(edges, variable, side="right")
 
 
 def _harmonic_shares(angle: Array, error: Array) -> Array:
-    """Share of the error's power that a sine of each order takes, (orders,).
+    """Share of the residual variance that a sine of each order explains, (orders,).
 
-    Sines of one order are powers of those of the first, and their products sines of twice it.
+    Sines of an order are powers of those of the first order, and their products sines of twice it.
     """
     total = float(error @ error)
     if total == 0.0:
@@ -175,7 +217,7 @@ def _harmonic_shares(angle: Array, error: Array) -> Array:
     normal = np.empty((_ORDERS, 2, 2))
     normal[:, 0, 0], normal[:, 1, 1] = (count + twice.real) / 2, (count - twice.real) / 2
     normal[:, 0, 1] = normal[:, 1, 0] = twice.imag / 2
-    # An angle that hardly moves has no orders.
+    # No orders of an angle that hardly changes.
     turned = np.linalg.cond(normal) <= 1e6
     toward = np.stack([gradient.real, gradient.imag], axis=1)[turned]
     out = np.zeros(_ORDERS)

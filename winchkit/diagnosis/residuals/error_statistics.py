@@ -1,6 +1,7 @@
-"""What the torque's low-pass lets through above its cut-off.
+"""Residual and noise power in the transition band of the low-pass.
 
-It tells next to nothing and is left out of fits, but it is there in any rms of filtered signals.
+These coefficients are left out of fits, since the filter nearly removes them; the rms of a filtered
+signal contains them.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ __all__ = ["Skirt"]
 
 
 class Skirt:
-    """Mean squares above the cut-off, per output and in SI."""
+    """Mean squares above the cut-off, per output, SI."""
 
     def __init__(self, dataset: Dataset) -> None:
-        """Of a dataset whose fits leave them out."""
+        """Take a data set whose fits leave these coefficients out."""
         self._dataset = dataset
         self._filtered = {
             output
@@ -34,7 +35,7 @@ class Skirt:
         }
 
     def residual(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """Of what a hypothesis leaves unexplained."""
+        """Mean square of the residual of a hypothesis."""
         if not self._filtered:
             return {}
         beyond = self._beyond(hypothesis)
@@ -46,7 +47,7 @@ class Skirt:
         return out
 
     def noise(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """Of how repeats differ; without repeats of what is left unexplained."""
+        """Mean square of the differences of repeats; without repeats that of the residual."""
         if not self._filtered:
             return {}
         apart = repeat_noise(self._problem, self._beyond(hypothesis))
@@ -61,7 +62,7 @@ class Skirt:
         return Problem(replace(self._dataset, recordings=recordings))
 
     def _beyond(self, hypothesis: Hypothesis) -> Array:
-        """Residual with everything up to the cut-off taken out, rows."""
+        """Residual without the coefficients up to the cut-off, (rows,)."""
         rows = self._problem.residual(hypothesis)
         for segment in self._problem.segments:
             band = segment.band

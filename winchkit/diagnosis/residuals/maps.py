@@ -1,8 +1,8 @@
-"""Residual maps: the mean of a residual over two variables at once.
+"""Residual maps: the mean residual over two variables.
 
-One variable shows what an error follows, two show how: an elastic rope's error grows with the load
-times the length, a frame's with the load alone. The pairs are those in which the effects of the
-catalogue differ; an angle stands for where in its turn it is.
+One variable shows where an error occurs, two show its law: the error of an elastic cable grows with
+load times length, that of a frame with the load alone. The pairs are those in which the effects of
+the catalogue differ; an angle is taken modulo one turn.
 """
 
 from __future__ import annotations
@@ -29,39 +29,39 @@ PAIRS = (
     ("reversal_distance", "load"),
     ("motor_angle", "load"),
 )
-"""Across and up; ``load`` is the tension where no load is known."""
+"""First and second variable; ``load`` is the tension where no load is known."""
 _ACROSS, _UP = 16, 10
 _FEWEST = 3
 _TAILS = 0.002
 _DIGITS = 5
 _LEAST_CHANGE = {"temperature": 1.0}
-"""What less is noise of the instrument rather than a change, K."""
+"""A smaller range is noise of the instrument, K."""
 
 
 @dataclass(frozen=True)
 class ResidualMap:
-    """The mean residual of one output over two variables, SI."""
+    """Mean residual of one output over two variables, SI."""
 
     output: str
     over: tuple[str, str]
-    """Variables across and up; an angle within its turn, a reversal distance as log10 of m."""
+    """Both variables; an angle within its turn, a reversal distance as log10 of m."""
     edges: tuple[Array, Array]
-    """Of the cells, (across + 1,) and (up + 1,); the outermost hold what lies beyond."""
+    """Edges of the cells, (across + 1,) and (up + 1,); the outermost cells are open."""
     mean: Array
-    """Measured less predicted, (across, up); NaN where fewer than three samples lie."""
+    """Measured less predicted, (across, up); NaN where a cell has fewer than three samples."""
     count: NDArray[np.intp]
-    """Samples of every cell, (across, up)."""
+    """Samples per cell, (across, up)."""
     share: float
-    """Of the residual's power that the means take, less what chance gives."""
+    """Correlation ratio η² of the cells, less its expectation under independence."""
 
     @property
     def largest(self) -> tuple[int, int]:
-        """The cell of the largest mean."""
+        """Cell of the largest absolute mean."""
         across, up = np.unravel_index(int(np.nanargmax(np.abs(self.mean))), self.mean.shape)
         return int(across), int(up)
 
     def to_json(self) -> dict[str, Any]:
-        """As the commands print it; null where hardly a sample lies."""
+        """Dictionary that the commands print; null for cells with too few samples."""
         return {
             "output": self.output,
             "over": list(self.over),
@@ -73,7 +73,15 @@ class ResidualMap:
 
 
 def residual_maps(problem: Problem, residual: Array) -> list[ResidualMap]:
-    """Maps that take a share of a residual, (rows,), worth telling; per output the best first."""
+    """Maps whose cells explain more of a residual than chance, per output the largest share first.
+
+    Parameters
+    ----------
+    problem
+        Regression problem.
+    residual : (rows,) array
+        Measured less predicted.
+    """
     known = [variables_of(recording) for recording in problem.dataset.recordings]
     out: list[ResidualMap] = []
     for output in problem.dataset.outputs:
@@ -90,7 +98,7 @@ def residual_maps(problem: Problem, residual: Array) -> list[ResidualMap]:
 
 
 def same_cells(problem: Problem, residual: Array, like: ResidualMap) -> ResidualMap | None:
-    """The map of another residual of the same problem in the cells of one that is drawn."""
+    """Map of another residual of the same problem over the cells of ``like``."""
     known = [variables_of(recording) for recording in problem.dataset.recordings]
     places = _places(problem, known, like.output, like.over)
     error = _errors(problem, residual, like.output)
@@ -132,7 +140,7 @@ def _within_turn(name: str, values: Array) -> Array:
 
 
 def _errors(problem: Problem, residual: Array, output: str) -> Array:
-    """Residual of an output at its compared samples, all runs one after another."""
+    """Residual of an output at its compared samples, runs in sequence."""
     times = problem.in_time(residual)
     recordings = problem.dataset.recordings
     return np.concatenate(
@@ -145,7 +153,7 @@ def _errors(problem: Problem, residual: Array, output: str) -> Array:
 
 
 def _map_of(output: str, places: _Places, error: Array, kept: int) -> ResidualMap | None:
-    """The map, or None where a variable hardly changes or nothing is left."""
+    """A map; None where a variable hardly changes or the residual is zero."""
     names, (x, y) = places
     edges = (_edges(names[0], x, _ACROSS), _edges(names[1], y, _UP))
     total = float(error @ error)
@@ -168,7 +176,7 @@ def _map_of(output: str, places: _Places, error: Array, kept: int) -> ResidualMa
 
 
 def _edges(name: str, values: Array, cells: int) -> Array:
-    """Even cells over all but the tails, or over the turn of an angle."""
+    """Equal cells over all but the tails, or over one turn of an angle."""
     if name in ANGLES:
         return np.linspace(0.0, 2 * np.pi, cells + 1)
     low, high = np.quantile(values, [_TAILS, 1 - _TAILS])
@@ -180,5 +188,5 @@ def _index(values: Array, edges: Array) -> NDArray[np.intp]:
 
 
 def _rounded(values: Array) -> list[float | None]:
-    """Numbers of a drawing, to five digits."""
+    """Numbers to five significant digits, None for NaN."""
     return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in values]

@@ -1,4 +1,4 @@
-"""The verdict: what may be named, what is left, and how every output stands before and after."""
+"""Decision rule: from the unexplained share to a verdict, and the errors per output."""
 
 from __future__ import annotations
 
@@ -33,22 +33,39 @@ _NEAR_NOISE = 1.25
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a search came to."""
+    """Verdict on the result of a search."""
 
     verdict: Verdict
     share: float
-    """Of the excess over the noise, what is left unexplained."""
+    """Share of the excess over the noise that the final model leaves unexplained."""
     outputs: Mapping[str, OutputFit]
     shown: Found
-    """What was found, without the additions that may not be named."""
+    """Result of the search, without the effects that are not named."""
     notes: tuple[str, ...]
 
 
 def judge(inquiry: Inquiry, found: Found) -> Judgement:
-    """Decide the verdict; while more than a trace is unexplained no addition is named.
+    """Verdict on the result of a search.
 
-    A name would be a guess then: something outside the catalogue is often imitated by an effect
-    inside it. The candidates stay, and a note says what came closest.
+    Parameters
+    ----------
+    inquiry
+        Data, candidates and folds of the search.
+    found
+        Its result.
+
+    Returns
+    -------
+    Judgement
+        Effects are named where the verdict is ``explained``, or where repeats show that less than
+        1/40 of the excess is unexplained. Otherwise they are withheld, and a note lists them: an
+        effect outside the catalogue is often imitated by one inside it.
+
+    Notes
+    -----
+    The unexplained share is the ratio, final over initial model, of the mean squares beyond the
+    noise (held out) and, with repeats, of the lack of fit in the rejected bands; the larger of the
+    two.
     """
     share = _unexplained(inquiry, found)
     folds = _folds(inquiry, found)
@@ -57,7 +74,7 @@ def judge(inquiry: Inquiry, found: Found) -> Judgement:
     )
     verdict = _verdict(found, outputs, share)
     added = found.final.labels[inquiry.given :]
-    # Nothing but the effect itself explains nearly all of what is far above the noise.
+    # Only the true effect explains nearly all of an excess that is far above the noise.
     nearly = share < _TRACE and found.noise.from_repeats
     if verdict == "explained" or nearly or not added:
         return Judgement(verdict, share, outputs, found, ())
@@ -66,7 +83,7 @@ def judge(inquiry: Inquiry, found: Found) -> Judgement:
 
 
 def withheld(inquiry: Inquiry, found: Found, share: float, note: str) -> Judgement:
-    """The judgement that names nothing, though something was found; with the reason in words."""
+    """Verdict that names no effect, with the reason as a note."""
     verdict: Verdict = "unknown" if share > _HALF else "partly"
     shown = replace(found, final=found.begin, noise=found.begin_noise)
     before = (found.begin, found.begin_noise)
@@ -74,7 +91,7 @@ def withheld(inquiry: Inquiry, found: Found, share: float, note: str) -> Judgeme
 
 
 def by_best_weights(inquiry: Inquiry, judgement: Judgement) -> Judgement:
-    """The same judgement with values by the weights that predict best."""
+    """The same verdict with parameters from the weights of least held-out error."""
     shown = judgement.shown
     best = weighed(inquiry, shown.final, shown.noise)
     if best.fit is shown.final:
@@ -90,7 +107,7 @@ def by_best_weights(inquiry: Inquiry, judgement: Judgement) -> Judgement:
 
 
 def _unexplained(inquiry: Inquiry, found: Found) -> float:
-    """Share of the excess over the noise that the final model leaves, in sample or held out."""
+    """Share of the excess over the noise that the final model leaves, larger of two estimates."""
     if not found.alarmed:
         return 0.0
     folds = _folds(inquiry, found)
@@ -98,7 +115,7 @@ def _unexplained(inquiry: Inquiry, found: Found) -> float:
         held_out_rms(inquiry.problem, fitted, found.noise, folds)
         for fitted in (found.begin, found.final)
     ]
-    # Where the bands hold nothing more, what an output is over its noise may be chance.
+    # Without lack of fit in any band, the excess of an output may be chance.
     chance = {} if found.still else found.noise.uncertainty(inquiry.problem)
     squares = [
         sum(
@@ -109,7 +126,7 @@ def _unexplained(inquiry: Inquiry, found: Found) -> float:
     ]
     left = squares[1] / squares[0] if squares[0] > 0 else 0.0
     if found.noise.from_repeats:
-        # Both in units of the final noise, so that a re-estimated noise does not shift the share.
+        # Both in units of the final noise, so that its re-estimation does not change the share.
         scale = found.begin_noise.power / found.noise.power
         before = float(np.sum(np.maximum(found.begin_presence.excess * scale, 0.0)))
         after = float(np.sum(np.maximum(found.presence.excess, 0.0)[found.presence.rejected]))
@@ -118,7 +135,7 @@ def _unexplained(inquiry: Inquiry, found: Found) -> float:
 
 
 def _folds(inquiry: Inquiry, found: Found) -> Folds:
-    """Whole groups while something is left: an imitation fails there. Else what tells."""
+    """Groups of runs while lack of fit remains, where imitations fail; else folds of the fit."""
     return inquiry.groups if found.still else inquiry.folds(found.final, found.noise)
 
 
@@ -130,12 +147,12 @@ def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Ve
         return "unknown"
     if not found.still or not found.noise.from_repeats:
         return "explained" if share < _GENERALISES else "partly"
-    # A trace below the noise, such as a load that bounces on its rope, is told but changes nothing.
+    # A remainder below the noise, such as a load that swings on its cable, is accepted.
     over = max(
         fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
         for fitted in outputs.values()
     )
-    # What imitates something unknown leaves as much; where the trace is certain it must be small.
+    # An imitation of an unknown effect leaves as much: a significant remainder must be small.
     trace = _DOUBTFUL_TRACE if found.presence.p_value > _DOUBTFUL else _TRACE
     allowed = trace if over < _AT_NOISE else _NEGLIGIBLE if over < _NEAR_NOISE else 0.0
     return "explained" if share < allowed else "partly"
@@ -147,7 +164,22 @@ def output_fits(
     final: tuple[Fit, Noise],
     folds: Folds | None = None,
 ) -> dict[str, OutputFit]:
-    """Every output before and after, in sample and held out, beside its noise."""
+    """Errors of every output before and after, in sample and held out, with its noise.
+
+    Parameters
+    ----------
+    inquiry
+        Data, candidates and folds of the search.
+    begin, final
+        Fit and noise of the initial and of the final model.
+    folds
+        Folds of the held-out errors; None for those that suit the final fit.
+
+    Returns
+    -------
+    dict
+        By output; rms in SI.
+    """
     problem, folds = inquiry.problem, folds or inquiry.folds(*final)
     before, after = _rms(problem, begin[0]), _rms(problem, final[0])
     held_before = held_out_rms(problem, *begin, folds)
@@ -173,7 +205,7 @@ def output_fits(
 
 
 def _with(rms: float, beyond: float | None) -> float:
-    """An rms with the mean square above the low-pass's cut-off."""
+    """An rms with the mean square above the low-pass's cut-off added."""
     return float(np.hypot(rms, np.sqrt(beyond or 0.0)))
 
 

@@ -1,4 +1,16 @@
-"""Which effects the data cannot tell apart from the ones found."""
+"""Equivalence sets: effects that these runs cannot distinguish from the named ones.
+
+Each rival is refitted in the place of the named effect. It joins the set if Δχ² < 9, or if its
+held-out losses per block are not significantly larger by a sign-flip test at 5 %; a law with more
+parameters if a likelihood-ratio test is significant although BIC prefers the simpler one, or if its
+curvature is not detectable.
+
+References
+----------
+Pitman, E. J. G. (1937). J. R. Statist. Soc. Suppl. 4, 119-130.
+Wilks, S. S. (1938). Ann. Math. Statist. 9, 60-62.
+Hansen, P. R., Lunde, A., Nason, J. M. (2011). Econometrica 79, 453-497.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +40,17 @@ __all__ = [
 ]
 
 _VISIBLE = 1.0
-"""Noncentrality below which a difference is told from noise in one case of six."""
+"""Noncentrality below which a difference is significant at 5 % in at most one case of six."""
 _MATTERS = 0.02
-"""Share of the effect, rms: a bend that is less makes no difference to anyone."""
+"""Rms difference over the effect below which it is negligible."""
 
 
 def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Effect) -> bool:
-    """Whether a richer ``rival`` of the term at ``index``, in its usual shape and as large as
-    that, would differ from it, though by less than the noise."""
+    """Whether a richer ``rival`` differs from the term at ``index``, though not detectably.
+
+    The rival has its usual shape and the size of the term. It differs by more than 2 % rms, and the
+    noncentrality of the difference, fitted unknowns projected out, is below 1.
+    """
     atom = _usual(inquiry, rival)
     if atom is None:
         return False
@@ -61,7 +76,7 @@ def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Eff
 
 
 def _usual(inquiry: Inquiry, effect: Effect) -> Atom | None:
-    """The candidate's point of its grid that is nearest to its usual shape."""
+    """Candidate at the grid point nearest to its usual shape."""
     atoms = [a for a in inquiry.signatures.atoms if a.effect.id == effect.id]
     usual = {p.name: p.typical for p in Coordinates(effect).shapes}
 
@@ -75,7 +90,7 @@ def _usual(inquiry: Inquiry, effect: Effect) -> Atom | None:
 _RIVALS = 6
 _NEAR = 40.0
 _ALIKE = 9.0
-"""Squares by which what is true may be worse than what is not: by chance in one case of 700."""
+"""Δχ² = 9: the true effect fits worse by this much with probability at most 1/740."""
 _SHARE = 0.5
 _NEARLY = 0.75
 _LEVEL = 0.05
@@ -84,7 +99,7 @@ _FLIPS = 2000
 
 @dataclass(frozen=True)
 class Confusion:
-    """One step: the set of effects that explain the data alike, the parsimonious one first."""
+    """Equivalence set of one addition, the effect with the fewest parameters first."""
 
     term: Term
     effects: tuple[str, ...]
@@ -95,7 +110,27 @@ class Confusion:
 
 
 def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Confusion:
-    """Refit the final model with each rival in place of one term, and compare block by block."""
+    """Equivalence set of one term of the final model.
+
+    Parameters
+    ----------
+    inquiry
+        Data, candidates and folds of the search.
+    final, noise
+        Final fit and its noise.
+    index
+        Of the term in the hypothesis.
+
+    Returns
+    -------
+    Confusion
+        Members ordered by number of parameters, then by χ².
+
+    Notes
+    -----
+    Every rival is compared with the named effect at 5 % by itself; there is no correction for the
+    number of rivals. A rival must reach half of the named effect's decrease of χ².
+    """
     place = Exchange(inquiry, final, noise, index)
     own, base, scores = place.own, place.base, place.scores
     mine = next((s.gain for s in scores if s.atom.effect.id == own.effect.id), 0.0)
@@ -136,11 +171,10 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
 
 
 def _richer(inquiry: Inquiry, final: Fit, noise: Noise, index: int, fitted: Fit) -> bool | None:
-    """Whether a rival with more numbers counts; None where it has no more, or is kindred.
+    """Whether a rival with more parameters joins the set; None where other rules apply.
 
-    A carded one that explains as much counts: creep beside a drift with temperature, a guide whose
-    detour is as straight as a wrong ratio. Only the prior belief in few numbers would tell them
-    apart, and no run yet.
+    A rival that is listed as confusable joins where it explains as much: creep beside a drift with
+    temperature, a cable guide beside a wrong ratio. Only the penalty separates the two.
     """
     own, rival = final.hypothesis.terms[index].effect, fitted.hypothesis.terms[-1].effect
     more = Coordinates(rival).freedom - Coordinates(own).freedom
@@ -155,10 +189,10 @@ def _richer(inquiry: Inquiry, final: Fit, noise: Noise, index: int, fitted: Fit)
 
 
 def _stands_for(inquiry: Inquiry, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:
-    """Whether a simpler law of the family is what the runs show, as far as they get.
+    """Whether a simpler law of the family explains the same within the range of these runs.
 
-    A Stribeck curve whose extra never falls within the runs is a dry friction that is not quite
-    constant: for which of many reasons they do not tell.
+    Within the speeds of a run that never reach the falling part of a Stribeck curve, it is a
+    Coulomb friction that is not quite constant.
     """
     own, rival = final.hypothesis.terms[index], fitted.hypothesis.terms[-1].effect
     shown = own.effect.visible
@@ -170,34 +204,41 @@ def _stands_for(inquiry: Inquiry, fitted: Fit, final: Fit, base: Fit, index: int
 
 
 def _kindred(rival: Effect, own: Effect) -> bool:
-    """Whether one law of a family may stand for the other, neither being a case of the other."""
+    """Whether two laws are of one family, neither containing the other."""
     return bool(own.family) and rival.family == own.family and not rival.nested_with(own)
 
 
 def _carded(rival: Effect, own: Effect) -> bool:
-    """Whether the cards say that one is easily taken for the other."""
+    """Whether the catalogue lists the two as confusable."""
     return rival.id in own.confused_with or own.id in rival.confused_with
 
 
 def _leant_to(simple: Fit, rich: Fit, more: int) -> bool:
-    """Whether the data lean to a law with more unknowns, though not enough to ask for it.
-
-    Such a law is worth its price only far beyond chance. Between the two the simple name alone
-    would claim what the data rather deny.
-    """
+    """Likelihood-ratio test significant at 5 %, for a law that BIC does not prefer."""
     states = [sum(len(start) for start in f.hypothesis.starts) for f in (simple, rich)]
     unknowns = max(1, more + states[1] - states[0])
     return bool(chi2.sf(simple.cost - rich.cost, unknowns) < _LEVEL)
 
 
 def _drifts_alike(rival: Effect, own: Effect) -> bool:
-    """Whether a rival that creeps is, by the cards, easily taken for this effect."""
+    """Whether a rival with a time constant is listed as confusable with this effect."""
     creeps = rival.memory and any(p.role == "shape" and p.unit == "s" for p in rival.parameters)
     return creeps and _carded(rival, own)
 
 
 def _flip_chance(worse: Array) -> float:
-    """Chance that a rival's blocks are worse by this much on average, by flipping signs."""
+    """P-value of larger losses per block by random signs, one-sided.
+
+    Parameters
+    ----------
+    worse : (blocks,) array
+        Held-out χ² of the rival less that of the named effect.
+
+    Notes
+    -----
+    Share of 2000 random assignments of signs whose sum reaches the observed one. Exact level under
+    differences that are symmetric about zero and independent.
+    """
     random = np.random.default_rng(1)
     signs = random.choice([-1.0, 1.0], size=(_FLIPS, len(worse)))
     return float(np.mean(signs @ worse >= worse.sum()))
@@ -225,5 +266,5 @@ def _cosine(inner: Array, a: slice, b: slice) -> float:
 
 
 def pairs_of(sets: Sequence[Confusion]) -> list[tuple[Term, Term]]:
-    """The effects that runs so far cannot tell apart, two by two."""
+    """Pairs of effects that these runs cannot distinguish."""
     return [(c.term, rival) for c in sets for rival in c.terms if rival is not c.term]

@@ -1,4 +1,13 @@
-"""Doubt in what was found: names that a curve without any name beats are not given."""
+"""Specification test: an effect keeps its name only if no free curve explains clearly more.
+
+Every named effect is compared with curves over one variable (polynomials, linear splines, kinks,
+powers), each penalised by ln n per parameter. Where the best curve explains more than the named
+effects by a margin, the names are withdrawn.
+
+References
+----------
+Hart, J. D. (1997). Nonparametric Smoothing and Lack-of-Fit Tests. Springer.
+"""
 
 from __future__ import annotations
 
@@ -34,20 +43,20 @@ _NOTHING = 1e-300
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve over one variable, and what it would save."""
+    """A curve over one variable and the net decrease of χ² by it."""
 
     place: str
-    """Output that it is added to, or ``rope force`` or ``winding``, which show in several."""
+    """Output that it is added to, or ``rope force`` or ``winding``, which act on several."""
     variable: str
     pays: float
-    """Whitened squares that it takes, less the price of its numbers."""
+    """Decrease of χ² less the penalty of its parameters."""
 
 
 class Beside:
-    """A whitened residual beside which curves are tried, and what explains a part of it."""
+    """Whitened residual with the fitted unknowns projected out, to which curves are fitted."""
 
     def __init__(self, residual: Array, jacobian: Array, weight: Array) -> None:
-        """``residual`` (rows,) with unknowns of derivative ``jacobian`` (rows, k) still free."""
+        """Whiten ``residual`` (rows,) and project out the columns of ``jacobian`` (rows, k)."""
         self.weight = weight
         self.explained = orthonormal(jacobian * weight[:, None])
         whitened = residual * weight
@@ -55,16 +64,30 @@ class Beside:
 
     @property
     def cost(self) -> float:
-        """Whitened squares that are left."""
+        """χ² that is left."""
         return float(self.residual @ self.residual)
 
 
 def best_curve(
     problem: Problem, beside: Beside, outputs: Sequence[str], price: float
 ) -> Curve | None:
-    """The curve that pays best, among those that show in one of ``outputs``.
+    """Curve of the largest net decrease of χ², among those that act on one of ``outputs``.
 
-    ``price`` is what each of its numbers must save.
+    Parameters
+    ----------
+    problem
+        Regression problem.
+    beside
+        Residual to which curves are fitted.
+    outputs
+        Outputs of which a curve must change one.
+    price
+        Penalty per parameter, ln n.
+
+    Returns
+    -------
+    Curve or None
+        None where no variable changes.
     """
     best: Curve | None = None
     for place, variable, laws, columns in curves(problem, outputs):
@@ -77,25 +100,25 @@ def best_curve(
 
 @dataclass(frozen=True)
 class _Hats:
-    """Inner products of whitened hats, and of what is left of them beside a fit."""
+    """Gram matrices of whitened basis functions, before and after projection."""
 
     plain: Array
-    """(hats, hats)."""
+    """Before projection, (knots, knots)."""
     inner: Array
-    """(hats, hats), without what the fit's unknowns explain."""
+    """After projection, (knots, knots)."""
     products: Array
-    """With the residual, (hats,)."""
+    """Inner products with the residual, (knots,)."""
 
     def gain(self, law: Array) -> float:
-        """Whitened squares that a law of hats, (hats, k), takes."""
+        """Decrease of χ² by the curves ``law`` (knots, k)."""
         size = np.sqrt(np.maximum(np.diag(law.T @ self.plain @ law), _NOTHING))
         inner = law.T @ self.inner @ law / np.outer(size, size)
-        # Measured by what they were: of what a fit explains whole only rounding is left.
+        # Scaled by their length before projection: a column that is explained leaves rounding.
         return gain(inner, (law.T @ self.products) / size, _UNIDENTIFIABLE)
 
 
 def _inner_products(beside: Beside, columns: Columns, count: int) -> _Hats:
-    """Of so many hats, piece by piece."""
+    """Gram matrices of ``count`` basis functions, summed over segments."""
     plain, products = np.zeros((count, count)), np.zeros(count)
     through = np.zeros((count, beside.explained.shape[1]))
     for rows, signal in columns:
@@ -107,17 +130,19 @@ def _inner_products(beside: Beside, columns: Columns, count: int) -> _Hats:
 
 
 _SLIGHT = 1e-3
-"""Share of what a name explains by which the physics of a real part may differ from its formula."""
+"""Margin, share of the named effects' decrease of χ²: physics may differ from a formula."""
 _SLIGHT_OF_MORE = 2e-4
-"""The same where more is certainly missing."""
+"""The same where lack of fit remains."""
 
 
 def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
-    """The judgement of what was found, less the names that a nameless curve beats.
+    """Verdict after the specification test.
 
-    All additions are doubted together, then each beside the others. One that is beaten is
-    dropped, or gives way to a pair; where too much is then left, nothing is named. Without
-    repeats something unknown is always left, and a doubt of one addition is told only.
+    Notes
+    -----
+    All additions are tested together, then each beside the others. One that a curve outperforms is
+    dropped or exchanged for a pair; where too much is left without it, no effect is named. Without
+    repeats an outperformed single effect only gets a note.
     """
     judgement = judge(inquiry, found)
     doubt = Doubt(inquiry, found)
@@ -140,7 +165,7 @@ def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
 
 
 def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
-    """The judgement without a beaten addition, or without any name where it is needed."""
+    """Verdict without an outperformed effect, or without any name where that effect is needed."""
     inquiry, found = doubt.inquiry, doubt.found
     doubted = found.final.hypothesis.terms[index : index + 1]
     without = judge_and_doubt(inquiry, without_term(inquiry, found, index))
@@ -151,7 +176,7 @@ def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
 
 
 class Doubt:
-    """What a search found, and what is left of the data without some of it."""
+    """Residuals of a search's result without some of its effects."""
 
     def __init__(self, inquiry: Inquiry, found: Found) -> None:
         self.inquiry = inquiry
@@ -164,10 +189,10 @@ class Doubt:
         return rounded(self.inquiry.problem, self.found.final.hypothesis)[:, None]
 
     def beside(self, indices: Sequence[int], *, rounding: bool = True) -> Beside:
-        """What is left without some terms, the others free about where they are.
+        """Residual without some terms, all other unknowns free in linear approximation.
 
-        Not fitted anew: a lag that stands in for a lost friction is far from where both are right.
-        With ``rounding`` what sampling may have rounded is free as well.
+        The others are not refitted: a lag that replaces a removed friction lies far from where both
+        are right. With ``rounding`` the discretisation error is a free column as well.
         """
         problem, final = self.inquiry.problem, self.found.final
         hypothesis = final.hypothesis
@@ -181,14 +206,14 @@ class Doubt:
         return Beside(final.residual + lost, free, self.found.noise.weight(problem))
 
     def taken(self, indices: Sequence[int]) -> float:
-        """Whitened squares that terms take beside the others."""
+        """Decrease of χ² by terms, given the others."""
         return self.beside(indices).cost - self.beside(()).cost
 
     def beaten(self, indices: Sequence[int]) -> Curve | None:
-        """A curve that pays better than terms do, if there is one."""
+        """A curve that outperforms terms by the margin; None where there is none."""
         if not self._beaten(indices, rounding=False):
             return None
-        # What sampling may have rounded is not held against a name; it takes a while to know.
+        # Discretisation error does not count against a name; it is costly, so computed last.
         return self._beaten(indices, rounding=True)
 
     def _beaten(self, indices: Sequence[int], *, rounding: bool) -> Curve | None:
@@ -196,18 +221,18 @@ class Doubt:
         effects = [hypothesis.terms[index].effect for index in indices]
         beside = self.beside(indices, rounding=rounding)
         taken = beside.cost - self.beside((), rounding=rounding).cost
-        # The states in which runs begin are no numbers of a law, and cost it nothing here.
+        # Initial states are nuisance parameters and are not penalised here.
         pays = taken - inquiry.price * sum(Coordinates(effect).freedom for effect in effects)
         outputs = sorted({output for effect in effects for output in effect.outputs})
         curve = best_curve(inquiry.problem, beside, outputs, inquiry.price)
-        # What is certainly there is no chance deviation of the right formula.
+        # With lack of fit left, a small deviation is not the approximation of a right formula.
         slight = _SLIGHT_OF_MORE if self.found.still else _SLIGHT
         margin = inquiry.price + slight * taken
         return curve if curve and curve.pays > pays + margin else None
 
 
 def _words(terms: Sequence[Term], doubted: Sequence[Term], curve: Curve) -> str:
-    """Why names are not given."""
+    """Note with the reason for withheld names."""
     than = "" if len(doubted) == len(terms) else f" than {_names(doubted)}"
     return f"closest, but not named: {_names(terms)}; {_over(curve)} explains more{than}"
 

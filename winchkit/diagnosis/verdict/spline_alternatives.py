@@ -1,7 +1,11 @@
-"""Curves over one variable, drawn with hats, and what they change in the outputs.
+"""Curves over one variable (linear B-splines), and the change of every output by them.
 
-A hat is one at its knot and falls to zero at its neighbours: every curve is a sum of them, so that
-their inner products serve all laws over one variable at one place.
+A basis function is one at its knot and falls to zero at the neighbouring knots. Every curve is a
+sum of them, so that their Gram matrix serves all curves over one variable at one place.
+
+References
+----------
+de Boor, C. (1978). A Practical Guide to Splines. Springer.
 """
 
 from __future__ import annotations
@@ -25,19 +29,19 @@ _DEGREES = (1, 2, 3, 4)
 _COARSE = (6, 12)
 _POWERS = (1.5, 2.0, 3.0)
 _TAKEN = (*ANGLES, *COMPOUND, "direction")
-"""Variables of which any curve has a name already, or is tried as a product."""
+"""Variables over which the catalogue has every curve already, or that are tried in a product."""
 _WARMER = 1.0
-"""Less is noise of the thermometer rather than a change, K."""
+"""A smaller range is noise of the thermometer, K."""
 Law = tuple[Array, int]
-"""Values of a curve at the knots, (hats, k) for k numbers, and what choosing it costs."""
+"""Values of a curve at the knots, (knots, k) for k parameters, and the number that is penalised."""
 Columns = Iterable[tuple[slice, Array]]
-"""Some rows, and what the hats change in them, (hats, rows)."""
+"""Some rows, and the change of them by the basis functions, (knots, rows)."""
 
 
 def curves(
     problem: Problem, outputs: Sequence[str]
 ) -> Iterator[tuple[str, str, list[Law], Columns]]:
-    """Place, variable, laws, and what their hats change, where that shows in ``outputs``."""
+    """Place, variable, curves and basis columns, where ``outputs`` are changed."""
     recordings = problem.dataset.recordings
     known = [
         variables_of(recording) | {"direction": recording.smooth.at.direction}
@@ -61,9 +65,9 @@ def curves(
 
 
 def _products(names: Sequence[str]) -> list[tuple[str, str]]:
-    """What is worth trying times a curve over what: frictions by place and load, soft ropes.
+    """Products of a factor and a curve: friction by length or load, compliant cables.
 
-    The direction is the model's own: how sharply a friction turns is nobody's name.
+    The direction is the smooth sign of the model: how steep it is, is not tested.
     """
     force = "load" if "load" in names else "tension"
     pairs = (
@@ -83,7 +87,17 @@ def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
 
 
 def hats_over(values: Array, knots: Array) -> Array:
-    """Triangles over the knots that add up to one, (knots, n)."""
+    """Linear B-splines over equidistant knots, which add up to one.
+
+    Parameters
+    ----------
+    values : (n,) array
+    knots : (k,) array
+
+    Returns
+    -------
+    (k, n) array
+    """
     at = np.clip((values - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
     cell = np.minimum(at.astype(np.intp), len(knots) - 2)
     out, sample = np.zeros((len(knots), len(values))), np.arange(len(values))
@@ -93,9 +107,10 @@ def hats_over(values: Array, knots: Array) -> Array:
 
 
 def laws_over(knots: Array, name: str, *, level: bool) -> list[Law]:
-    """What a curve may be, in values at the knots, with what each costs to choose.
+    """Curves over a variable in values at the knots, with the number of parameters of each.
 
-    With its ``level`` where it is a factor; else that is an offset, and there are effects for it.
+    A curve has a level of its own only as a factor (``level``); otherwise a level is an offset, for
+    which the catalogue has effects.
     """
     z = np.linspace(-1.0, 1.0, len(knots))
     out: list[Law] = []
@@ -118,7 +133,7 @@ _Shown = Callable[[Recording, Array, Array], Array]
 def columns_of(
     problem: Problem, shown: Mapping[str, _Shown], hats: Sequence[Array], knots: Array
 ) -> Columns:
-    """What the hats change in every output of every run."""
+    """Change of every output of every run by the basis functions."""
     for segment in problem.segments:
         if segment.output in shown:
             recording = problem.dataset.recordings[segment.run]
@@ -127,19 +142,19 @@ def columns_of(
 
 
 def _plainly(recording: Recording, hats: Array, knots: Array) -> Array:
-    """An instrument's own curve."""
+    """A curve of the instrument itself."""
     return hats
 
 
 def _by_the_arm(recording: Recording, hats: Array, knots: Array) -> Array:
-    """Motor torque of a curve of the rope's force."""
+    """Change of the motor torque by a curve of the cable force."""
     force = recording.smooth.at.tension
     heavy = np.maximum(np.abs(force), 1e-9)
     return np.asarray(hats * recording.nominal_smooth["motor_torque"] * np.sign(force) / heavy)
 
 
 def _by_virtual_work(recording: Recording, hats: Array, knots: Array) -> Array:
-    """Motor torque of a curve of the winding: what the rope moves per turn more, it pulls more."""
+    """Change of the motor torque by a curve of the winding, by the principle of virtual work."""
     step = knots[1] - knots[0]
     cell = np.floor((recording.smooth.at.free_length - knots[0]) / step)
     cell = np.clip(cell, 0, len(knots) - 2)
@@ -155,4 +170,4 @@ PLACES: Mapping[str, Mapping[str, _Shown]] = {
     "rope force": {"tension": _plainly, "motor_torque": _by_the_arm},
     "winding": {"cable_length": _plainly, "motor_torque": _by_virtual_work},
 }
-"""Where a curve may act, and how each output shows it."""
+"""Where a curve may act, and the change of each output by it."""

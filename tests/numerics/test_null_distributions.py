@@ -1,0 +1,223 @@
+"""Tests of the diagnosis against ``scipy.stats``, and their levels on simulated null cases.
+
+Every simulation is seeded. A count of N cases at level α is held within the central 99.9 % of the
+binomial distribution B(N, α); distributions are compared by Kolmogorov and Smirnov at 0.1 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from math import pi
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.fft import dct
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.design.discrimination import APART, power_of
+from winchkit.diagnosis.fleet.meta_analysis import pooled
+from winchkit.diagnosis.regression.cross_validation import confidence
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, presence
+from winchkit.diagnosis.regression.projection import gain
+from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.selection.scores import Projected, chance_level, score
+from winchkit.diagnosis.selection.signatures import signatures
+from winchkit.diagnosis.verdict.equivalence import _flip_chance
+from winchkit.effects import load_catalogue
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
+
+PROFILE = WinchProfile(
+    name="grooved",
+    drum=DrumSpec("grooved", 0.06, groove_pitch=0.005),
+    gearbox=GearboxSpec(20.0),
+    reference=ReferenceSpec(0.0, 4.0, 4.0),
+)
+REPEATS, SAMPLES = 3, 256
+
+
+def within(count: int, cases: int, level: float) -> bool:
+    low, high = stats.binom.interval(0.999, cases, level)
+    return bool(low <= count <= high)
+
+
+def no_more_than(count: int, cases: int, level: float) -> bool:
+    return bool(count <= stats.binom.ppf(0.9995, cases, level))
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    """Lengths of three repeats of one motion, white noise in every kept coefficient."""
+    time = np.arange(SAMPLES) / 50.0
+    angle = 100.0 * (1 - np.cos(2 * pi * time / time[-1]))
+    random = np.random.default_rng(1)
+    runs = []
+    for index in range(REPEATS):
+        length = 4.0 - 0.003 * angle + 1e-4 * random.standard_normal(SAMPLES)
+        channels = {"motor_angle": Channel(angle, "rad"), "cable_length": Channel(length, "m")}
+        runs.append(Run(f"run-{index}", time, channels, {"load_mass": "10 kg"}))
+    return Problem(prepare(runs, PROFILE))
+
+
+def residuals(problem: Problem, cases: int, seed: int) -> Iterator[Array]:
+    random = np.random.default_rng(seed)
+    for _ in range(cases):
+        yield random.standard_normal(problem.rows)
+
+
+def known_noise(problem: Problem, freedom: float) -> Noise:
+    count = len(problem.bands)
+    outputs = dict.fromkeys(problem.dataset.outputs, 1.0)
+    return Noise(np.ones(count), np.full(count, freedom), outputs, from_repeats=True)
+
+
+class TestLackOfFit:
+    def test_the_p_value_is_that_of_an_f_test_of_the_mean_of_repeats(
+        self, problem: Problem
+    ) -> None:
+        noise, jacobian = known_noise(problem, 30.0), problem.nuisance_columns
+        for residual in residuals(problem, 5, 2):
+            times = np.array(problem.in_time(residual))
+            mean = np.asarray(dct(times.sum(axis=0) / np.sqrt(REPEATS), type=2, norm="ortho"))
+            band: NDArray[np.intp] = problem.band_of_row[problem.segments[0].rows]
+            count = len(problem.bands)
+            squares = np.bincount(band, mean**2, count)
+            leverage = np.linalg.qr(jacobian)[0] ** 2
+            taken = np.bincount(problem.band_of_row, leverage.sum(axis=1), count)
+            freedom = np.maximum(np.bincount(band, minlength=count) - taken, 1.0)
+            p = stats.f.sf(squares / freedom, freedom, 30.0)
+            found = presence(problem, residual, jacobian, noise)
+            assert found.p_value == pytest.approx(min(1.0, count * p.min()), rel=1e-9)
+            np.testing.assert_array_equal(found.rejected, count * p < 0.05)
+
+    def test_noise_alone_is_rejected_no_more_often_than_the_level(self, problem: Problem) -> None:
+        cases, none = 500, np.zeros((problem.rows, 0))
+        p_values = []
+        for residual in residuals(problem, cases, 3):
+            noise = noise_from_repeats(problem, residual, none)
+            p_values.append(presence(problem, residual, none, noise).p_value)
+        for level in (0.02, 0.05, 0.2):
+            assert no_more_than(int(np.count_nonzero(np.array(p_values) < level)), cases, level)
+
+
+class TestSignedRanks:
+    def test_the_p_value_is_that_of_all_assignments_of_signs(self) -> None:
+        random = np.random.default_rng(4)
+        for _ in range(5):
+            change = random.standard_normal(10) + 0.4
+            ranks = stats.rankdata(np.abs(change))
+            reached = ranks[change > 0].sum()
+            sums = [ranks[np.array(signs)].sum() for signs in product([True, False], repeat=10)]
+            exact = float(np.mean(np.array(sums) >= reached))
+            before = np.full(10, 100.0)
+            assert confidence(before, before - change) == pytest.approx(exact, rel=1e-9)
+
+    def test_it_is_scipys_test_of_the_blocks_that_change(self) -> None:
+        random = np.random.default_rng(5)
+        change = np.concatenate([random.standard_normal(20), 1e-4 * random.standard_normal(28)])
+        before = np.full(48, 100.0)
+        wanted = stats.wilcoxon(change[:20], alternative="greater").pvalue
+        size = np.abs(change[:20])
+        assert size.min() > 0.02 * size.max()
+        assert confidence(before, before - change) == pytest.approx(wanted, rel=1e-6)
+
+    def test_changes_about_zero_are_accepted_as_often_as_the_level(self) -> None:
+        random, cases = np.random.default_rng(6), 1500
+        before, p_values = np.full(48, 1000.0), []
+        for _ in range(cases):
+            p_values.append(confidence(before, before - random.standard_t(3, 48)))
+        for level in (0.02, 0.1, 0.5):
+            assert within(int(np.count_nonzero(np.array(p_values) <= level)), cases, level)
+
+
+class TestSignFlips:
+    def test_the_p_value_is_the_share_of_all_assignments_of_signs(self) -> None:
+        random, flips = np.random.default_rng(7), 2000
+        for _ in range(5):
+            worse = random.standard_normal(10) + 0.3
+            sums = [np.array(signs) @ worse for signs in product([-1.0, 1.0], repeat=10)]
+            exact = float(np.mean(np.array(sums) >= worse.sum() - 1e-12))
+            assert within(round(_flip_chance(worse) * flips), flips, exact)
+
+    def test_losses_about_zero_are_significant_as_often_as_the_level(self) -> None:
+        random, cases = np.random.default_rng(8), 1000
+        count = sum(_flip_chance(random.standard_t(3, 48)) <= 0.05 for _ in range(cases))
+        assert within(count, cases, 0.05)
+
+
+class TestChiSquare:
+    @pytest.mark.parametrize("unknowns", [1, 3])
+    def test_squares_explained_by_chance_are_chi_square(self, unknowns: int) -> None:
+        random = np.random.default_rng(9)
+        columns = random.standard_normal((200, unknowns))
+        columns /= np.linalg.norm(columns, axis=0)
+        inner = columns.T @ columns
+        explained = [
+            gain(inner, columns.T @ random.standard_normal(200), 1e-7) for _ in range(1000)
+        ]
+        assert stats.kstest(explained, stats.chi2(unknowns).cdf).pvalue > 0.001
+
+    def test_the_level_of_a_separation_is_five_percent(self) -> None:
+        assert stats.chi2.sf(APART, 1) == pytest.approx(0.05, abs=1e-4)
+
+    @pytest.mark.parametrize("strength", [0.0, 1.0, 6.0, 10.5])
+    def test_power_is_that_of_simulated_differences(self, strength: float) -> None:
+        random, cases = np.random.default_rng(10), 4000
+        squares = (random.standard_normal(cases) + np.sqrt(strength)) ** 2
+        count = int(np.count_nonzero(squares > APART))
+        assert within(count, cases, power_of(strength))
+
+    def test_power_of_one_degree_of_freedom_is_a_lower_bound_of_more(self) -> None:
+        for strength in (5.0, 20.0):
+            for needed in (10.0, 20.0):
+                assert power_of(strength, needed) <= stats.ncx2.sf(needed, 3, strength)
+
+
+class TestLargestScore:
+    def test_simulated_scores_are_those_of_noise(self, problem: Problem) -> None:
+        """The largest of all candidates, beside the nuisance parameters, of known noise."""
+        effects = [effect for effect in load_catalogue() if not effect.memory]
+        found = signatures(problem, Hypothesis(), effects)
+        assert len(found.atoms) > 5
+        projected = Projected(problem, found, problem.nuisance_columns, known_noise(problem, 1e9))
+        simulated = chance_level(projected, problem.rows)
+        drawn = []
+        for residual in residuals(problem, len(simulated), 11):
+            drawn.append(max(item.value for item in score(projected, residual, problem.rows)))
+        assert stats.ks_2samp(simulated, drawn).pvalue > 0.001
+
+
+class TestSeveralWinches:
+    def test_homogeneity_is_cochrans_test(self) -> None:
+        random, winches = np.random.default_rng(12), 6
+        std = random.uniform(0.5, 2.0, winches)
+        p_values = []
+        for _ in range(500):
+            values = 7.0 + std * random.standard_normal(winches)
+            named = {str(i): (float(values[i]), float(std[i])) for i in range(winches)}
+            found = pooled(named, "m", reciprocal=False)
+            weight = 1 / std**2
+            q = float(np.sum(weight * (values - np.average(values, weights=weight)) ** 2))
+            assert found.chi_square == pytest.approx(q, rel=1e-9)
+            assert found.p_value == pytest.approx(stats.chi2.sf(q, winches - 1), rel=1e-9)
+            p_values.append(found.p_value)
+        assert stats.kstest(p_values, "uniform").pvalue > 0.001
+
+    def test_the_spread_between_winches_is_dersimonians_and_lairds(self) -> None:
+        values, std = np.array([1.0, 2.0, 4.0, 7.0]), np.array([1.0, 1.5, 1.0, 2.0])
+        weight = 1 / std**2
+        mean = np.average(values, weights=weight)
+        q = float(np.sum(weight * (values - mean) ** 2))
+        between = (q - 3) / (weight.sum() - np.sum(weight**2) / weight.sum())
+        weight = 1 / (std**2 + between)
+        named = {str(i): (float(values[i]), float(std[i])) for i in range(4)}
+        found = pooled(named, "m", reciprocal=False)
+        assert found.p_value > 0.01
+        assert found.spread == pytest.approx(np.sqrt(between), rel=1e-9)
+        assert found.value == pytest.approx(np.average(values, weights=weight), rel=1e-9)
+        assert found.std == pytest.approx(1 / np.sqrt(weight.sum()), rel=1e-9)
