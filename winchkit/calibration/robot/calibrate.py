@@ -17,7 +17,7 @@ from time import perf_counter
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.calibration.robot.cable_forces import RopeForces
+from winchkit.calibration.robot.cable_forces import CableForces
 from winchkit.calibration.robot.candidate_effects import Candidate, candidates
 from winchkit.calibration.robot.equations import Equations, State
 from winchkit.calibration.robot.identifiability import (
@@ -36,7 +36,7 @@ from winchkit.calibration.robot.parameters import (
     parameters_of,
 )
 from winchkit.calibration.robot.prediction import PoseErrors, errors_at, start_of
-from winchkit.calibration.robot.variance_components import NOISE, re_estimated
+from winchkit.calibration.robot.variance_components import NOISE, re_estimated_weights
 from winchkit.errors import UsageError
 from winchkit.model.robot import Robot
 from winchkit.runs.poses import Measured
@@ -182,8 +182,8 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
     return Equations(robot, parameters, measured, _forces(measured, options))
 
 
-def _forces(measured: Measured, options: Options) -> RopeForces:
-    return RopeForces(measured.tension, options.middle_force)
+def _forces(measured: Measured, options: Options) -> CableForces:
+    return CableForces(measured.tension, options.middle_force)
 
 
 def _start(equations: Equations, options: Options) -> tuple[Equations, State]:
@@ -213,7 +213,7 @@ def _fit(
     weights = Weights(_sigma(equations, options))
     solution = solve(equations, state, weights, _teller(tell, "fit"))
     for _ in range(_NOISE_ROUNDS):
-        found = replace(re_estimated(solution, weights, given), loss=options.loss)
+        found = replace(re_estimated_weights(solution, weights, given), loss=options.loss)
         if found.loss == weights.loss and _settled(found.sigma, weights.sigma):
             break
         weights = found

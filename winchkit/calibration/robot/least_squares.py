@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations, State
 from winchkit.model.robot import Pose
-from winchkit.model.robot.rotation import rotation_by
+from winchkit.model.robot.pose_estimation import Iteration, estimated_pose, moved_pose
 
 __all__ = [
     "Linear",
@@ -42,7 +42,7 @@ _STEPS = 60
 _DONE = 1e-3
 _POSE_DAMPING, _ROUNDING = 1.0, 1e-13
 _MOST_DAMPED = 1e8
-_PLACING, _STRIDE = 30, 0.3
+_PLACING = Iteration(damping=_POSE_DAMPING, relative_damping=_ROUNDING, tolerance=1e-7, steps=30)
 
 
 @dataclass(frozen=True)
@@ -113,15 +113,16 @@ class Solution:
 
 def place(equations: Equations, state: State, weights: Weights) -> State:
     """Search the poses alone, from where they are, with the parameters as they are."""
-    for _ in range(_PLACING):
-        linear = linearise(equations, state, weights)
-        step = _pose_steps(linear, np.zeros(len(state.values)))
-        size = np.max(np.abs(step), axis=1, keepdims=True)
-        step *= np.minimum(1.0, _STRIDE / np.maximum(size, _STRIDE))
-        state = moved(state, state.values, step)
-        if np.max(size) < 1e-7:
-            break
-    return state
+
+    def whitened(pose: Pose) -> tuple[Array, Array]:
+        found = list(equations.constraints(State(state.values, pose)))
+        residual = np.concatenate([c.residual / weights.sigma[kind] for kind, c in found], axis=1)
+        by_pose = np.concatenate([c.by_pose / weights.sigma[kind] for kind, c in found], axis=1)
+        known = np.isfinite(residual) & np.all(np.isfinite(by_pose), axis=2)
+        residual[~known], by_pose[~known] = 0.0, 0.0
+        return residual, by_pose
+
+    return State(state.values, estimated_pose(whitened, state.pose, _PLACING))
 
 
 def solve(
@@ -153,8 +154,7 @@ def solve(
 
 def moved(state: State, values: Array, step: Array) -> State:
     """Another state: parameters as given, poses moved by (p, 6)."""
-    pose = Pose(state.pose.position + step[:, :3], rotation_by(step[:, 3:]) @ state.pose.rotation)
-    return State(values, pose)
+    return State(values, moved_pose(state.pose, step))
 
 
 def linearise(equations: Equations, state: State, weights: Weights) -> Linear:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
 from winchkit.model.robot import Pose, forward, rotation_of
+from winchkit.model.robot.pose_estimation import start_pose
 from winchkit.model.robot.rotation import rotation_vector
-from winchkit.schema.profiles.robot import PlatformSpec
 
 __all__ = ["PoseErrors", "errors_at", "rms", "start_of"]
 
@@ -53,14 +53,14 @@ def rms(values: Sequence[float] | Array) -> float:
 
 def _poses(equations: Equations, values: Array) -> tuple[Pose, int]:
     """Search from what was measured, else from home; a rope's strain is found along with it."""
-    geometry, slack = equations.geometry(values), equations.rope(values)
+    geometry, slack = equations.geometry(values), equations.by_drum(values)
     dead, measured = equations.robot.dead_length, equations.measured
     start = start_of(equations)
-    given, platform = slack, _platform(equations, values)
+    given, platform = slack, equations.platform(values)
     rounds = 1 if equations.parameters.law is None or equations.forces.middle is None else _ROUNDS
     for _ in range(rounds):
-        strain, _by = equations.strain(values, start)
-        given = (slack + strain * dead) / (1 - strain)
+        if (strain := equations.strain(values, start)) is not None:
+            given = (slack + strain.value * dead) / (1 - strain.value)
         found = forward(geometry, given, start, platform)
         # A pose that is lost is searched for once more from home.
         start = _where(found.converged.astype(bool), found.pose, equations)
@@ -76,17 +76,9 @@ def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
     )
 
 
-def _platform(equations: Equations, values: Array) -> PlatformSpec:
-    block = equations.parameters.block
-    x, y, z = values[block["payload_centre"]].tolist()
-    return PlatformSpec(float(values[block["payload_mass"][0]]), (x, y, z))
-
-
 def start_of(equations: Equations) -> Pose:
-    """Measured positions and rotations, home's where there is none."""
-    home, measured = equations.robot.home, equations.measured
-    position = np.where(np.isfinite(measured.position), measured.position, home.position)
-    whole = np.all(np.isfinite(measured.angles), axis=1)
-    rotation = np.repeat(home.rotation, len(measured), axis=0)
-    rotation[whole] = rotation_of(*measured.angles[whole].T)
-    return Pose(position, rotation)
+    """Measured positions and rotations; those of the home pose where one was not measured whole."""
+    measured = equations.measured
+    whole = np.all(np.isfinite(measured.angles), axis=1, keepdims=True)
+    angles = np.where(whole, measured.angles, np.nan)
+    return start_pose(measured.position, angles, equations.robot.home)
