@@ -78,7 +78,7 @@ def on_ropes(problem: RobotProblem, errors: Errors) -> Errors:
     if "tension" in out:
         known = np.isfinite(out["tension"])
         inside = np.where(known, out["tension"], 0.0)
-        spread = (problem.equations.to_ropes @ inside[..., None])[..., 0]
+        spread = (problem.equations.to_cables @ inside[..., None])[..., 0]
         out["tension"] = np.where(known.all(axis=1, keepdims=True), spread, np.nan)
     return out
 

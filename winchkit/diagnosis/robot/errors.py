@@ -111,7 +111,7 @@ def signals(problem: RobotProblem) -> dict[str, float]:
     """How much each output varies, rms about its mean, SI."""
     measured = problem.dataset.measured
     length = problem.equations.residuals(problem.robot)["rope"] + problem.robot.lengths_at(
-        measured.motor_angle, problem.equations.forces(problem.robot), problem.equations.warm
+        measured.motor_angle, problem.equations.forces(problem.robot), problem.equations.temperature
     )
     values = {
         "cable_length": length,

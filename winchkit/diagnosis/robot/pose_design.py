@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.design.discrimination import APART, power_of
@@ -17,15 +16,21 @@ from winchkit.diagnosis.robot.regression import RobotProblem
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 from winchkit.model.robot import (
-    ForceLimits,
     Pose,
     Robot,
     angles_of,
     approximate_forces,
     lengths,
-    rotation_of,
     swivel_angle,
-    wrench_feasibility,
+)
+from winchkit.model.robot.pose_design import (
+    chosen_in_turn,
+    in_box,
+    is_held,
+    middle_and_half,
+    noncentrality,
+    pose_information,
+    random_poses,
 )
 from winchkit.runs.poses import Measured, joined
 
@@ -49,8 +54,6 @@ _WIDER, _INSIDE = 2.0, 0.85
 _TURNED, _MORE = np.radians(12.0), 2.0
 _LEAST_BOX = 0.02
 _STRONGER, _WARMER = 2.0, 15.0
-_PULLING = ForceLimits(0.0, float("inf"))
-_FREEDOMS = 6
 
 
 @dataclass(frozen=True)
@@ -93,9 +96,9 @@ def imagined(problem: RobotProblem, robot: Robot, kind: PoseKind) -> tuple[Measu
     rng = np.random.default_rng(_SEED)
     pose = _placed(problem, robot, kind, rng)
     force = _forces(problem, robot, kind, pose, rng)
-    good = _held(robot, pose) & np.isfinite(force).all(axis=1) & (force > 0).all(axis=1)
-    if not problem.dataset.has_tension:
-        good = _held(robot, pose)
+    good = is_held(robot.geometry, robot.platform, pose)
+    if problem.dataset.has_tension:
+        good &= np.isfinite(force).all(axis=1) & (force > 0).all(axis=1)
     pose, force = Pose(pose.position[good], pose.rotation[good]), force[good]
     return _measured(problem.dataset, robot, kind, pose, force), pose
 
@@ -104,33 +107,16 @@ def _placed(problem: RobotProblem, robot: Robot, kind: PoseKind, rng: np.random.
     """Random poses of a kind that the geometry can take."""
     seen = problem.standing.pose
     corners = robot.geometry.exit_point
-    middle, half = _middle(seen.position)
+    middle, half = middle_and_half(seen.position)
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
     room = _INSIDE * np.ptp(corners, axis=0) / 2
     wide = np.maximum(_WIDER * half, _LEAST_BOX) if kind.out else half
-    place = middle + wide * rng.uniform(-1, 1, (_CANDIDATES, 3))
+    place = in_box((middle, wide), _CANDIDATES, rng)
     if np.all(room > 0):
         place = centre + np.clip(place - centre, -room, room)
-    level, tilt = _middle(angles_of(seen.rotation))
+    level, tilt = middle_and_half(angles_of(seen.rotation))
     more = np.maximum(_MORE * tilt, _TURNED) if kind.turned else tilt
-    angles = level + more * rng.uniform(-1, 1, (_CANDIDATES, 3))
-    pose = Pose(place, rotation_of(*angles.T))
-    sound = np.isfinite(lengths(robot.geometry, pose.position, pose.rotation)).all(axis=1)
-    return Pose(pose.position[sound], pose.rotation[sound])
-
-
-def _middle(values: Array) -> tuple[Array, Array]:
-    """Middle and half width, column by column."""
-    low, high = values.min(axis=0), values.max(axis=0)
-    return (low + high) / 2, (high - low) / 2
-
-
-def _held(robot: Robot, pose: Pose) -> NDArray[np.bool_]:
-    """Whether ropes that only pull balance the platform's weight there."""
-    if len(robot.names) < _FREEDOMS:
-        return np.ones(len(pose.position), dtype=bool)
-    pairs = zip(robot.structure(pose), robot.weight(pose), strict=True)
-    return np.array([wrench_feasibility(a, w, _PULLING).margin > 0 for a, w in pairs], dtype=bool)
+    return random_poses(robot.geometry, place, in_box((level, more), _CANDIDATES, rng))
 
 
 def _forces(
@@ -184,7 +170,6 @@ _SURE, WORTHWHILE = 0.9, 0.2
 _OFFERED = 2
 _ENOUGH = 3.04
 """Deviations beyond what is needed where more is of no use: a power of 99.9 %."""
-_RIDGE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -243,7 +228,7 @@ def pose_offers(
     parts = [_information(wide, final, question) for question in questions]
     begin = len(problem.dataset.measured)
     base = [part[-1] + part[:begin].sum(axis=0) for part in parts]
-    so_far = _powers([float(_left_over(own)) for own in base], needed)
+    so_far = _powers([float(noncentrality(own)) for own in base], needed)
     out = []
     for kind, seen, pose in tried:
         own = slice(begin, begin + len(seen))
@@ -313,36 +298,29 @@ def _information(problem: RobotProblem, final: Hypothesis, question: Question) -
     size = np.sqrt(np.sum(columns[:, 1:] ** 2, axis=0))
     kept = np.concatenate([[True], size > 0])
     columns = columns[:, kept] / np.concatenate([[1.0], size[size > 0]])
-    row = problem.pose_of_row
-    out = np.zeros((len(problem.dataset.measured) + 1, columns.shape[1], columns.shape[1]))
-    for pose in np.unique(row):
-        own = columns[row == pose]
-        out[max(pose, -1)] += own.T @ own
-    return out
-
-
-def _left_over(information: Array) -> Array:
-    """λ of the first column where all the others may take any size; (…)."""
-    rest = information[..., 1:, 1:] + _RIDGE * np.eye(information.shape[-1] - 1)
-    across = information[..., 1:, :1]
-    taken = np.swapaxes(across, -1, -2) @ np.linalg.solve(rest, across)
-    return np.asarray(np.maximum(information[..., 0, 0] - taken[..., 0, 0], 0.0))
+    row = np.maximum(problem.pose_of_row, -1)
+    return pose_information(columns, row, len(problem.dataset.measured) + 1)
 
 
 def _chosen(
     parts: Sequence[Array], base: Sequence[Array], needed: Sequence[float], count: int
 ) -> tuple[list[int], list[float]]:
-    """Poses chosen one after another for what they add to λ of all questions, and λ with them."""
-    sums, left = list(base), np.ones(len(parts[0]), dtype=bool)
+    """Poses chosen in turn for what they add to λ of all questions, and λ with them."""
+    sums = list(base)
     enough = (np.sqrt(needed) + _ENOUGH) ** 2
     chosen: list[int] = []
-    while len(chosen) < count and np.any(left):
-        gains = sum(
-            np.minimum(_left_over(total + part), most)
+
+    def gains() -> Array:
+        each = (
+            np.minimum(noncentrality(total + part), most)
             for total, part, most in zip(sums, parts, enough, strict=True)
         )
-        best = int(np.argmax(np.where(left, gains, -np.inf)))
-        left[best] = False
-        chosen.append(best)
-        sums = [total + part[best] for total, part in zip(sums, parts, strict=True)]
-    return chosen, [float(_left_over(total)) for total in sums]
+        return np.asarray(np.sum(list(each), axis=0))
+
+    def add(index: int, gain: float) -> bool:
+        chosen.append(index)
+        sums[:] = [total + part[index] for total, part in zip(sums, parts, strict=True)]
+        return True
+
+    chosen_in_turn(len(parts[0]), count, gains, add)
+    return chosen, [float(noncentrality(total)) for total in sums]

@@ -14,23 +14,21 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.robot.equations import POSED
+from winchkit.model.robot.variance_components import START as COMMON
+from winchkit.model.robot.variance_components import re_estimated
 
 __all__ = ["START", "PoseNoise", "Stack", "contrasts", "noise_of", "repeated_differences"]
 
 START: Mapping[str, float] = {
-    "rope": 5e-5,
-    "position": 5e-5,
-    "rotation": 2e-3,
-    "swivel": 2e-3,
-    "gauge": 1e-4,
-    "tension": 1.0,
+    **{kind: COMMON[kind] for kind in ("rope", "position", "rotation", "swivel")},
+    "gauge": COMMON["cable_length"],
+    "tension": COMMON["balance"],
 }
-"""Standard deviations before anything is known, SI."""
+"""Standard deviations at the start of the iteration, SI, by kind of residual."""
 _LEAST = 1e-3
 _ROUNDS = 12
 _SETTLED = 0.01
-_FREE_LEAST = 8.0
-_SHARE_LEAST = 0.02
+_LEAST_REDUNDANCY = 8.0
 _REPEATS_LEAST = 24.0
 _ROWS_EACH = 2
 
@@ -122,12 +120,15 @@ def _round(stack: Stack, kinds: Sequence[str], sigma: dict[str, float]) -> dict[
     for kind in kinds:
         part = slice(at, at + stack.kind[kind].shape[1])
         at = part.stop
-        count = np.count_nonzero(known[:, part])
-        left = float(np.sum((1 - used[:, part])[known[:, part]]))
-        out[kind] = max(left, 0.0)
-        if left >= max(_FREE_LEAST, _SHARE_LEAST * count):
-            square = float(np.sum(residual[:, part] ** 2)) / left
-            sigma[kind] = max(sigma[kind] * float(np.sqrt(square)), _LEAST * START[kind])
+        here = known[:, part]
+        found = re_estimated(
+            sigma[kind],
+            residual[:, part][here],
+            used[:, part][here],
+            least_redundancy=_LEAST_REDUNDANCY,
+            least=_LEAST * START[kind],
+        )
+        sigma[kind], out[kind] = found.sigma, max(found.redundancy, 0.0)
     return out
 
 
