@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.residuals.attribution import Followed
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.diagnosis.robot.attribution import follows_of
@@ -15,7 +16,7 @@ from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
 from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
 from winchkit.diagnosis.robot.regression import RobotProblem, Standing
-from winchkit.diagnosis.robot.variance_components import START, contrasts
+from winchkit.diagnosis.robot.variance_components import START
 from winchkit.effects.bind_robot import robot_terms, robot_with_effects
 from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
@@ -91,7 +92,7 @@ def _noise(errors: Errors, dataset: RobotDataset) -> dict[str, float]:
     if not many:
         return {}
     apart = {
-        name: np.concatenate([contrasts(error[group]) for group in many])
+        name: np.concatenate([contrasts(error[group])[1] for group in many])
         for name, error in errors.items()
     }
     return {name: rms(name, values) for name, values in apart.items()}

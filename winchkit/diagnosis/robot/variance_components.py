@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.robot.equations import POSED
 from winchkit.model.robot.variance_components import START as COMMON
 from winchkit.model.robot.variance_components import re_estimated
 
-__all__ = ["START", "PoseNoise", "Stack", "contrasts", "noise_of", "repeated_differences"]
+__all__ = ["START", "PoseNoise", "Stack", "noise_of", "repeated_differences"]
 
 START: Mapping[str, float] = {
     **{kind: COMMON[kind] for kind in ("rope", "position", "rotation", "swivel")},
@@ -65,7 +66,7 @@ def repeated_differences(stack: Stack, pose: NDArray[np.intp]) -> Stack | None:
         return None
     kind, by = {}, {}
     for name, values in stack.kind.items():
-        kind[name] = np.concatenate([contrasts(values[g]) for g in many])
+        kind[name] = np.concatenate([contrasts(values[g])[1] for g in many])
     for name, slope in stack.by_pose.items():
         by[name] = np.concatenate([np.repeat(slope[g[:1]], len(g) - 1, axis=0) for g in many])
     nothing = {name: np.zeros((*values.shape, 0)) for name, values in kind.items()}
@@ -149,13 +150,3 @@ def _strongest(columns: Array, most: int) -> Array:
     kept = values > 1e-8 * values[-1]
     kept[: max(0, len(values) - most)] = False
     return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
-
-
-def contrasts(values: Array) -> Array:
-    """Orthonormal differences among k rows, (k − 1, …), each as noisy as one row (Helmert)."""
-    return np.stack(
-        [
-            (values[:j].sum(axis=0) - j * values[j]) / np.sqrt(j * (j + 1))
-            for j in range(1, len(values))
-        ]
-    )
