@@ -5,7 +5,7 @@
 
 A maximum of the posterior over all poses and parameters at once. The paper (Lessanibahri et al.)
 searches every pose again inside each evaluation; here the pose is an unknown beside the
-parameters, so that also the rope equations that a searched pose would drop are used.
+parameters, so that also the cable equations that a searched pose would drop are used.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Options:
     sigma: Mapping[str, float] | None = None
     """Standard deviations by kind of equation, SI; what is not given is estimated."""
     middle_force: float | None = None
-    """N; rope forces near it where no tension was measured and an effect needs them."""
+    """N; cable forces near it where no tension was measured and an effect needs them."""
 
 
 @dataclass(frozen=True)
@@ -161,17 +161,17 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
     needing = [e for e in options.effects if e.startswith(("cable-elongation", "payload"))]
     if needing and not tension and options.middle_force is None:
         raise UsageError(
-            f"{needing[0]} needs rope forces: record 'LINE.tension [N]', or give the forces that "
+            f"{needing[0]} needs cable forces: record 'LINE.tension [N]', or give the forces that "
             "the robot keeps near, e.g. --middle-force '60 N'"
         )
     if options.middle_force is not None and not options.middle_force > 0:
         raise UsageError(
-            f"--middle-force is {options.middle_force:g} N; ropes only pull, so that it is above 0"
+            f"--middle-force is {options.middle_force:g} N; cables only pull, so that it is above 0"
         )
     payload = [e for e in options.effects if e.startswith("payload")]
     if payload and len(robot.names) < 6:
         raise UsageError(
-            f"{payload[0]} needs ropes that hold all six freedoms; the robot has "
+            f"{payload[0]} needs cables that hold all six freedoms; the robot has "
             f"{len(robot.names)} lines"
         )
     if payload and not tension and parameters.law is None:
@@ -281,7 +281,7 @@ def _warnings(
     if lost:
         out.append(
             f"{lost} held-out poses were not found from their motor angles: a tension is missing "
-            "that an effect needs, or the ropes contradict each other"
+            "that an effect needs, or the cables contradict each other"
         )
     out += _disagreements(equations, weights)
     if not solution.converged:

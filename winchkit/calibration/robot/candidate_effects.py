@@ -41,7 +41,7 @@ class Candidate:
 def candidates(
     equations: Equations, solution: Solution, weights: Weights, effects: tuple[str, ...]
 ) -> tuple[Candidate, ...]:
-    """Effects worth trying, the best first, of the rope's laws one; none where noise is left over.
+    """Effects worth trying, the best first, of the cable's laws one; none where noise is left over.
 
     ``effects`` are those in the fit already. Payloads, which only weigh on tensions, are no
     candidates for errors of position.

@@ -38,4 +38,4 @@ LAWS: dict[str, tuple[LawParameter, ...]] = {
         LawParameter("force_scale", "N", 200.0, 100.0, 1.0, 1e6),
     ),
 }
-"""Effects of the catalogue that a robot's calibration can fit, one law for all ropes."""
+"""Effects of the catalogue that a robot's calibration can fit, one law for all cables."""

@@ -174,7 +174,7 @@ def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
         weight = np.nansum(turned * turned, axis=0)
         radius = -np.nansum(gain * turned, axis=0) / np.where(weight > 0, weight, 1.0)
         yield (
-            "the ropes stay within one layer: the layer growth cannot be told from the winding "
+            "the cables stay within one layer: the layer growth cannot be told from the winding "
             "radii ({count} direction{s}); wind over more turns",
             [_scaled(equations, {"winding_radius": radius, "layer_growth": np.ones(1)})],
         )
@@ -220,7 +220,7 @@ def refuse_unfit(equations: Equations) -> None:
     if many < _FEW or known <= 6 * many:
         cure = f"record more poses (90 is a good number, {_FEW} the least)"
         if known <= 6 * many:
-            cure = "measure more at each: positions, rotations, swivel angles or rope lengths"
+            cure = "measure more at each: positions, rotations, swivel angles or cable lengths"
         raise UsageError(
             f"{many} poses with {known} measured values cannot calibrate a robot of {lines} lines: "
             f"{6 * many} of them go into the poses themselves; {cure}"

@@ -16,7 +16,7 @@ _WORDS = {
     "position": "positions",
     "rotation": "rotations",
     "swivel": "swivel angles",
-    "cable_length": "rope lengths",
+    "cable_length": "cable lengths",
 }
 _FAR = 10.0
 """In robust standard deviations; the largest of ten thousand normal values lies within four."""

@@ -281,11 +281,11 @@ def _known(effects: Sequence[str]) -> None:
             )
     laws = [effect for effect in effects if effect in LAWS]
     if len(set(laws)) > 1:
-        raise UsageError(f"{' and '.join(laws)} are laws of the same rope; name one of them")
+        raise UsageError(f"{' and '.join(laws)} are laws of the same cable; name one of them")
 
 
 def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
-    """One growth for all layered drums: they wind the same rope."""
+    """One growth for all layered drums: they wind the same cable."""
     growths = {
         getattr(drum_of(winch), "growth", 0.0) for winch in winches if winch.drum.kind in LAYERED
     }
@@ -294,7 +294,7 @@ def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
         raise UsageError(
             f"the winches of '{build.robot.profile.name}' have the layer growths {listed}; the "
             "lines of "
-            "one robot are calibrated with one, so give them the same rope"
+            "one robot are calibrated with one, so give them the same cable"
         )
     prior = build.prior("layer_growth")
     low, high = prior.bounds or (0.0, np.inf)

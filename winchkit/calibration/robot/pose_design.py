@@ -47,7 +47,7 @@ def next_poses(found: Calibrated, count: int) -> list[NextPose]:
     """Choose ``count`` of random candidates, one after another, for the greatest gain each.
 
     Candidates lie in the box of positions and rotations measured so far, a quarter wider, where
-    pulling ropes can hold the platform; what else is in the way is for the user to check. What is
+    pulling cables can hold the platform; what else is in the way is for the user to check. What is
     measured at each is what was measured. Fewer are returned where fewer can be held.
     """
     candidates = _candidates(found)

@@ -30,7 +30,7 @@ class PoseErrors:
     place: NDArray[np.str_]
     """Which row of which run each pose is, (p,)."""
     unfound: int
-    """Poses that no search found from their rope lengths."""
+    """Poses that no search found from their cable lengths."""
 
 
 def errors_at(equations: Equations, values: Array) -> PoseErrors:
@@ -52,7 +52,7 @@ def rms(values: Sequence[float] | Array) -> float:
 
 
 def _poses(equations: Equations, values: Array) -> tuple[Pose, int]:
-    """Search from what was measured, else from home; a rope's strain is found along with it."""
+    """Search from what was measured, else from home; a cable's strain is found along with it."""
     geometry, slack = equations.geometry(values), equations.by_drum(values)
     dead, measured = equations.robot.dead_length, equations.measured
     start = start_of(equations)

@@ -10,7 +10,7 @@ from winchkit.arrays import Array
 __all__ = ["bridged", "gaps"]
 
 _GAP = 2.5
-"""Shortest gap in median sampling intervals (rule of thumb: above one missing sample and jitter)."""
+"""Shortest gap in median sampling intervals (rule of thumb: one missing sample and jitter)."""
 
 
 def bridged(values: Array) -> Array:

@@ -17,7 +17,7 @@ from winchkit.diagnosis.robot.errors import Errors
 from winchkit.diagnosis.robot.regression import RobotProblem
 from winchkit.model.robot import angles_of
 
-__all__ = ["AXES", "ON_PLATFORM", "follows_of", "most_telling", "on_ropes", "variables_of_poses"]
+__all__ = ["AXES", "ON_PLATFORM", "follows_of", "most_telling", "on_cables", "variables_of_poses"]
 
 AXES = ("x", "y", "z")
 """Columns of a position's error."""
@@ -51,7 +51,7 @@ def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
     have in common.
     """
     variables, out = variables_of_poses(problem), []
-    for output, error in on_ropes(problem, errors).items():
+    for output, error in on_cables(problem, errors).items():
         lines = AXES if output == "platform_position" else problem.dataset.names
         found = []
         for name, values in variables.items():
@@ -72,7 +72,7 @@ def most_telling(values: Array, error: Array) -> int:
     return _taken(np.broadcast_to(values, error.shape), error).column
 
 
-def on_ropes(problem: RobotProblem, errors: Errors) -> Errors:
+def on_cables(problem: RobotProblem, errors: Errors) -> Errors:
     """Errors as they are drawn: a tension's as the least forces that would balance it, by line."""
     out = dict(errors)
     if "tension" in out:

@@ -50,7 +50,7 @@ class RobotDataset(Dataset):
 
     @property
     def has_tension(self) -> bool:
-        """Whether most rows have the tension of their rope."""
+        """Whether most rows have the tension of their cable."""
         return bool(np.mean(np.isfinite(self.measured.tension)) > _MOSTLY)
 
     @property

@@ -1,8 +1,8 @@
 """What users read of a robot's model: errors in SI, in sample and on poses held out.
 
-``cable_length`` is the rope by the drum against the rope by geometry at the pose measured,
+``cable_length`` is the cable by the drum against the cable by geometry at the pose measured,
 ``platform_position`` the pose that the motor angles stand for against the one measured, and
-``tension`` what measured rope forces and the weight leave unbalanced.
+``tension`` what measured cable forces and the weight leave unbalanced.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def _seen(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
 
 def _maps(problem: RobotProblem) -> tuple[Array, Array]:
     """Per pose: what takes what unmeasured coordinates can undo out of closures (p, n, n), and
-    closures to the place where the ropes put the platform (p, 3, n)."""
+    closures to the place where the cables put the platform (p, 3, n)."""
     by = problem.slope()["rope"]
     by = np.where(np.isfinite(by), by, 0.0)
     free = by * ~_seen(problem.residuals(()))[:, None, :]

@@ -29,7 +29,7 @@ def what_poses_cannot_show(study: Study) -> list[str]:
         )
     if not dataset.has_tension:
         notes.append(
-            "no tensions measured: what depends on the ropes' force (elasticity, payload, cells) "
+            "no tensions measured: what depends on the cables' force (elasticity, payload, cells) "
             "cannot be seen; record LINE.tension [N]"
         )
     elif not dataset.has_balance:

@@ -63,10 +63,10 @@ class PoseKind:
     name: str
     words: str
     out: bool = False
-    """Farther out, as far as ropes hold inside the frame."""
+    """Farther out, as far as cables hold inside the frame."""
     turned: bool = False
     stronger: bool = False
-    """Rope forces from half to twice those so far."""
+    """Cable forces from half to twice those so far."""
     warmer: bool = False
 
 
@@ -75,8 +75,8 @@ KINDS = (
     PoseKind("turned", "turned more", turned=True),
     PoseKind("farther", "farther out", out=True),
     PoseKind("farther-turned", "farther out and turned more", out=True, turned=True),
-    PoseKind("tensions", "under rope forces from half to twice those so far", stronger=True),
-    PoseKind("warmth", "with the ropes 15 K colder and warmer", warmer=True),
+    PoseKind("tensions", "under cable forces from half to twice those so far", stronger=True),
+    PoseKind("warmth", "with the cables 15 K colder and warmer", warmer=True),
 )
 """Those that ask least of the user first."""
 
@@ -91,7 +91,7 @@ def usable(kind: PoseKind, dataset: RobotDataset) -> bool:
 def imagined(problem: RobotProblem, robot: Robot, kind: PoseKind) -> tuple[Measured, Pose]:
     """What would be measured at poses of a kind, without noise, and those poses.
 
-    Only where pulling ropes hold the platform; NaN where nothing was measured so far.
+    Only where pulling cables hold the platform; NaN where nothing was measured so far.
     """
     rng = np.random.default_rng(_SEED)
     pose = _placed(problem, robot, kind, rng)
@@ -122,7 +122,7 @@ def _placed(problem: RobotProblem, robot: Robot, kind: PoseKind, rng: np.random.
 def _forces(
     problem: RobotProblem, robot: Robot, kind: PoseKind, pose: Pose, rng: np.random.Generator
 ) -> Array:
-    """Rope forces that balance the weight, spread as those measured so far; zero without cells."""
+    """Cable forces that balance the weight, spread as those measured so far; zero without cells."""
     measured, many = problem.dataset.measured.tension, len(pose.position)
     if not problem.dataset.has_tension:
         return np.zeros((many, measured.shape[1]))
@@ -181,7 +181,7 @@ class PoseOffer:
     motor_angle: Array
     """That goes with them, (k, n), rad."""
     tension: Array
-    """Of the ropes there, (k, n), N; NaN where none is measured."""
+    """Of the cables there, (k, n), N; NaN where none is measured."""
     powers: tuple[float, ...]
     """Per question the chance that these poses and all so far answer it."""
     so_far: tuple[float, ...]

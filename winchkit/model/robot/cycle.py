@@ -15,7 +15,7 @@ import numpy as np
 from winchkit.errors import UsageError
 from winchkit.model.robot.kernels import PLAIN, RobotKernels
 from winchkit.model.robot.kinematics import Pose
-from winchkit.model.robot.robot import Robot, ropes_of
+from winchkit.model.robot.robot import Robot, cables_of
 
 __all__ = ["RobotCycle", "flat_pose"]
 
@@ -30,7 +30,7 @@ def flat_pose(pose: Pose) -> list[float]:
 
 
 class RobotCycle:
-    """Motor angles of a pose and the pose of rope lengths, without numpy's overhead.
+    """Motor angles of a pose and the pose of cable lengths, without numpy's overhead.
 
     Poses are twelve floats as of :func:`flat_pose`; with compiled kernels they and all other
     sequences are float64 arrays, made by ``kernels.array``. What is returned is overwritten by the
@@ -52,7 +52,7 @@ class RobotCycle:
     def __init__(self, robot: Robot, kernels: RobotKernels = PLAIN) -> None:
         count = len(robot.names)
         self._kernels = kernels
-        self._lines = kernels.lines(ropes_of(robot))
+        self._lines = kernels.lines(cables_of(robot))
         self._motors, self._find = kernels.motors, kernels.find
         self._still = kernels.array([0.0] * count)
         self._lengths = kernels.array([0.0] * count)
@@ -61,7 +61,7 @@ class RobotCycle:
         self._pose = kernels.array(flat_pose(robot.home))
 
     def motor_angles(self, pose: Any, strains: Any = None) -> Any:
-        """Motor angles (n) at a pose, rad, ropes strained more than at home by ``strains`` (n).
+        """Motor angles (n) at a pose, rad, cables strained more than at home by ``strains`` (n).
 
         NaN for a line whose anchor lies inside its swivel pulley.
         """
@@ -70,7 +70,7 @@ class RobotCycle:
         return self._angles
 
     def pose_at(self, lengths: Any) -> Any | None:
-        """The pose (12) of rope lengths (n), found from the last one; None where there is none.
+        """The pose (12) of cable lengths (n), found from the last one; None where there is none.
 
         A search that fails leaves the last pose as it was. Raises UsageError below six lines.
         """

@@ -1,4 +1,4 @@
-"""Which rope forces balance a wrench, within limits: three methods, and whether there are any.
+"""Which cable forces balance a wrench, within limits: three methods, and whether there are any.
 
 At rest Aᵀ f + w = 0 with the structure matrix Aᵀ (6, n) and the wrench w (6,) on the platform.
 Among all solutions each method looks for the one closest to the middle of the limits.
@@ -31,7 +31,7 @@ _WITHIN = 1e-9
 
 @dataclass(frozen=True)
 class ForceLimits:
-    """Least and greatest rope force, N: one for all lines or one each, (n,)."""
+    """Least and greatest cable force, N: one for all lines or one each, (n,)."""
 
     low: float | Array
     high: float | Array
@@ -54,7 +54,7 @@ class ForceLimits:
 
 @dataclass(frozen=True)
 class Forces:
-    """Rope forces of one pose."""
+    """Cable forces of one pose."""
 
     value: Array
     """(n,), N; what the method found even where it is not feasible, NaN where it found nothing."""
@@ -66,7 +66,7 @@ class Forces:
 
 @dataclass(frozen=True)
 class Feasibility:
-    """Whether some rope forces within the limits balance a wrench."""
+    """Whether some cable forces within the limits balance a wrench."""
 
     feasible: bool
     margin: float

@@ -1,11 +1,11 @@
-"""Forward kinematics: the platform's pose from its rope lengths.
+"""Forward kinematics: the platform's pose from its cable lengths.
 
     found = forward(geometry, lengths, start, platform=PlatformSpec(mass=3.0))
     found.pose.position[found.converged]
 
-With six ropes or more that hold all six freedoms the pose follows from the lengths alone, by Gauss
+With six cables or more that hold all six freedoms the pose follows from the lengths alone, by Gauss
 and Newton. With fewer, the platform hangs where its weight is lowest (Lagrange's multipliers are
-the rope forces), by sequential quadratic programming on the same step; a rope that would have to
+the cable forces), by sequential quadratic programming on the same step; a cable that would have to
 push is slack and may be longer than its way.
 """
 
@@ -40,7 +40,7 @@ _PUSH, _SHORT = 1e-9, 1e-9
 
 @dataclass(frozen=True)
 class Found:
-    """Poses found for given rope lengths; NaN where the search did not end in one."""
+    """Poses found for given cable lengths; NaN where the search did not end in one."""
 
     pose: Pose
     converged: Array
@@ -48,8 +48,8 @@ class Found:
     residual: Array
     """Given minus geometric length, (p, n), m: what no pose explains."""
     forces: Array
-    """Rope forces of a platform that hangs, (p, n), N, zero in a slack rope; NaN with six or
-    more ropes, which may be tight to any degree."""
+    """Cable forces of a platform that hangs, (p, n), N, zero in a slack cable; NaN with six or
+    more cables, which may be tight to any degree."""
     steps: int
 
 
@@ -60,9 +60,9 @@ def forward(
     platform: PlatformSpec | None = None,
     steps: int = 100,
 ) -> Found:
-    """Poses with rope lengths ``given`` (p, n), searched from ``start`` (one pose or p).
+    """Poses with cable lengths ``given`` (p, n), searched from ``start`` (one pose or p).
 
-    Raises UsageError for fewer than six ropes without a platform's mass.
+    Raises UsageError for fewer than six cables without a platform's mass.
     """
     count = len(geometry.exit_point)
     given = np.atleast_2d(np.asarray(given, dtype=float))
@@ -78,8 +78,8 @@ def forward(
     return search.run(start, steps)
 
 
-class _Ropes(NamedTuple):
-    """Which ropes of each pose are taken as taut, and which of them was tightened last."""
+class _Cables(NamedTuple):
+    """Which cables of each pose are taken as taut, and which of them was tightened last."""
 
     taut: NDArray[np.bool_]
     tightened: NDArray[np.intp]
@@ -97,24 +97,24 @@ class _Search:
         position = np.broadcast_to(start.position, (many, 3)).copy()
         rotation = np.broadcast_to(start.rotation, (many, 3, 3)).copy()
         forces = np.full_like(self.given, np.nan)
-        ropes = _Ropes(np.ones_like(self.given, dtype=bool), np.full(many, -1))
+        cables = _Cables(np.ones_like(self.given, dtype=bool), np.full(many, -1))
         converged = np.zeros(many, dtype=bool)
         going = np.flatnonzero(np.all(np.isfinite(self.given), axis=1))
         taken = 0
         while len(going) and taken < steps:
             taken += 1
             at, late = Pose(position[going], rotation[going]), taken > _EARLY
-            step, forces[going] = self._step(at, self.given[going], ropes.taut[going], late)
+            step, forces[going] = self._step(at, self.given[going], cables.taut[going], late)
             step = _no_longer(step, _LONGEST[min(taken // _EARLY, len(_LONGEST) - 1)])
             position[going] += step[:, :3]
             rotation[going] = rotation_by(step[:, 3:]) @ rotation[going]
             size = np.linalg.norm(step, axis=1)
             still = size < _TOLERANCE
-            # Ropes that cannot all be taut have no rest to wait for.
+            # Cables that cannot all be taut have no rest to wait for.
             asked = still | (taken % _PATIENCE == 0)
             which = going[asked]
             there = Pose(position[which], rotation[which])
-            still[asked] &= self._settle(there, forces[which], ropes, which)
+            still[asked] &= self._settle(there, forces[which], cables, which)
             converged[going[still]] = True
             going = going[~still & np.isfinite(size)]
         if self.platform is None:
@@ -126,30 +126,30 @@ class _Search:
         return Found(Pose(position, rotation), converged, residual, forces, taken)
 
     def _settle(
-        self, at: Pose, forces: Array, ropes: _Ropes, which: NDArray[np.intp]
+        self, at: Pose, forces: Array, cables: _Cables, which: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Whether poses at rest may stay so; else slackens or tightens one rope of each."""
+        """Whether poses at rest may stay so; else slackens or tightens one cable of each."""
         if self.platform is None:
             return np.ones(len(which), dtype=bool)
-        taut, row = ropes.taut[which], np.arange(len(which))
+        taut, row = cables.taut[which], np.arange(len(which))
         excess = lengths(self.geometry, at.position, at.rotation) - self.given[which]
         push = np.where(taut, -forces / (self.platform.mass * GRAVITY), -np.inf)
         short = np.where(taut, -np.inf, excess)
-        # The rope tightened last goes last, or the same two states would take turns for ever.
-        other = np.where(np.arange(push.shape[1]) == ropes.tightened[which, None], -np.inf, push)
+        # The cable tightened last goes last, or the same two states would take turns for ever.
+        other = np.where(np.arange(push.shape[1]) == cables.tightened[which, None], -np.inf, push)
         push = np.where(np.max(other, axis=1, keepdims=True) > _PUSH, other, push)
         worst, missing = np.argmax(push, axis=1), np.argmax(short, axis=1)
         slacken = push[row, worst] > _PUSH
         tighten = ~slacken & (short[row, missing] > _SHORT)
-        ropes.taut[which[slacken], worst[slacken]] = False
-        ropes.taut[which[tighten], missing[tighten]] = True
-        ropes.tightened[which[tighten]] = missing[tighten]
+        cables.taut[which[slacken], worst[slacken]] = False
+        cables.taut[which[tighten], missing[tighten]] = True
+        cables.tightened[which[tighten]] = missing[tighten]
         return np.asarray(~slacken & ~tighten)
 
     def _step(
         self, at: Pose, given: Array, taut: NDArray[np.bool_], late: bool
     ) -> tuple[Array, Array]:
-        """Next step of position and rotation vector, (p, 6), and the rope forces, (p, n)."""
+        """Next step of position and rotation vector, (p, 6), and the cable forces, (p, n)."""
         length, by = linearised(self.geometry, at.position, at.rotation)
         slope, missing = np.concatenate([by.position, by.rotation], axis=-1), given - length
         good = np.all(np.isfinite(slope), axis=(1, 2)) & np.all(np.isfinite(missing), axis=1)
@@ -228,7 +228,7 @@ def _balanced(matrix: Array) -> tuple[Array, Array]:
 
 
 def _holds(geometry: Geometry, at: Pose) -> NDArray[np.bool_]:
-    """Where the ropes hold all six freedoms, (p,)."""
+    """Where the cables hold all six freedoms, (p,)."""
     by = linearised(geometry, at.position, at.rotation)[1]
     slope = np.concatenate([by.position, by.rotation], axis=-1)
     stiff = np.linalg.eigvalsh(_balanced(np.swapaxes(slope, 1, 2) @ slope)[0])

@@ -1,6 +1,6 @@
 """Inverse kinematics of a cable robot with swivel pulleys, and every first derivative of it.
 
-The rope reaches its pulley along ``swivel_axis`` and first touches it in ``exit_point``; the
+The cable reaches its pulley along ``swivel_axis`` and first touches it in ``exit_point``; the
 pulley's centre lies ``swivel_radius`` from there, square to the axis, towards the anchor. With x
 the anchor's distance from the axis, y its coordinate along it, r the radius and D = hypot(x − r, y)
 
@@ -55,7 +55,7 @@ class Geometry:
     swivel_radius: Array
     """(n,), m; zero is a fixed exit point."""
     swivel_axis: Array
-    """Unit vectors of the rope's direction when it reaches the pulley, base frame, (n, 3)."""
+    """Unit vectors of the cable's direction when it reaches the pulley, base frame, (n, 3)."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Sensitivities:
 
 
 class _Tangent(NamedTuple):
-    """The rope around its pulley: arrays of shape (p, n), vectors by component."""
+    """The cable around its pulley: arrays of shape (p, n), vectors by component."""
 
     arm: tuple[Array, Array, Array]
     """Anchor point seen from the platform's origin, in base axes."""
@@ -117,7 +117,7 @@ def home_of(profile: RobotProfile) -> Pose:
 
 
 def _tangent(geometry: Geometry, position: Array, rotation: Array) -> _Tangent:
-    """Lay the ropes around their pulleys; NaN where an anchor lies inside its pulley."""
+    """Lay the cables around their pulleys; NaN where an anchor lies inside its pulley."""
     b, e, s = geometry.anchor_point.T, geometry.exit_point, geometry.swivel_axis
     r = geometry.swivel_radius
     arm = (rotation[:, 0] @ b, rotation[:, 1] @ b, rotation[:, 2] @ b)
@@ -137,7 +137,7 @@ def _tangent(geometry: Geometry, position: Array, rotation: Array) -> _Tangent:
 
 
 def lengths(geometry: Geometry, position: Array, rotation: Array) -> Array:
-    """Rope from exit point to anchor point with the arc on the pulley, (p, n), m.
+    """Cable from exit point to anchor point with the arc on the pulley, (p, n), m.
 
     ``position`` is (p, 3), ``rotation`` (p, 3, 3). NaN where an anchor lies inside its pulley.
     """
@@ -152,12 +152,12 @@ def lengths(geometry: Geometry, position: Array, rotation: Array) -> Array:
 
 
 def wrap_angle(geometry: Geometry, position: Array, rotation: Array) -> Array:
-    """How far the rope is wrapped round its swivel pulley, (p, n), rad."""
+    """How far the cable is wrapped round its swivel pulley, (p, n), rad."""
     return _tangent(geometry, position, rotation).wrap
 
 
 def sensitivities(geometry: Geometry, position: Array, rotation: Array) -> Sensitivities:
-    """Derivatives of :func:`lengths`, with u the rope's direction from pulley to platform.
+    """Derivatives of :func:`lengths`, with u the cable's direction from pulley to platform.
 
     ∂L/∂c = u, ∂L/∂ω = (R b) × u, ∂L/∂p = −u, ∂L/∂b = Rᵀ u, ∂L/∂r = wrap − sin wrap.
     """
@@ -198,7 +198,7 @@ def swivel_sensitivities(geometry: Geometry, position: Array, rotation: Array) -
 
 
 def structure_matrix(geometry: Geometry, position: Array, rotation: Array) -> Array:
-    """Aᵀ, (p, 6, n): its product with the rope forces is their wrench on the platform.
+    """Aᵀ, (p, 6, n): its product with the cable forces is their wrench on the platform.
 
     Forces above, moments about the platform's origin below, base axes; Aᵀ f + w = 0 at rest
     (IPAnema paper, Eq. 7).

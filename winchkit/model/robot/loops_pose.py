@@ -84,7 +84,7 @@ def straighten(pose: Any) -> None:
 
 
 def find_loop(
-    ropes: Function, normal: Function, solve: Function, turn: Function, straighten: Function
+    cables: Function, normal: Function, solve: Function, turn: Function, straighten: Function
 ) -> Function:
     """Gauss and Newton from the pose handed in, which is moved; steps taken, or −1."""
 
@@ -93,7 +93,7 @@ def find_loop(
     ) -> int:
         rows, system = work
         for step in range(1, most + 1):
-            ropes(lines, pose, rows)
+            cables(lines, pose, rows)
             for i in range(len(lines)):
                 rows[7 * i] = given[i] - rows[7 * i]
             normal(rows, rows, 7, system)
@@ -114,14 +114,14 @@ def find_loop(
     return find
 
 
-def forces_loop(ropes: Function, normal: Function, solve: Function) -> Function:
-    """Rope forces by the IPAnema paper's Eq. 8, its sign put right; false where singular."""
+def forces_loop(cables: Function, normal: Function, solve: Function) -> Function:
+    """Cable forces by the IPAnema paper's Eq. 8, its sign put right; false where singular."""
 
     def forces(  # noqa: PLR0917 - numba takes no keywords
         lines: Any, pose: Any, initial: Any, wrench: Any, work: Any, out: Any
     ) -> bool:
         rows, system = work
-        ropes(lines, pose, rows)
+        cables(lines, pose, rows)
         normal(rows, initial, 1, system)
         # Aᵀ = −Gᵀ, hence f = f_i + G (GᵀG)⁻¹ (w − Gᵀ f_i).
         for a in range(6):

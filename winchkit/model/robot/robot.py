@@ -1,4 +1,4 @@
-"""A robot as declared, ready to compute with: poses, rope lengths and motor angles."""
+"""A robot as declared, ready to compute with: poses, cable lengths and motor angles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
 from winchkit.model.line import Line
 from winchkit.model.robot.forward import Found, forward
-from winchkit.model.robot.kernels import RopeLine
+from winchkit.model.robot.kernels import CableLine
 from winchkit.model.robot.kinematics import (
     Geometry,
     Pose,
@@ -27,7 +27,7 @@ from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
 from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Robot", "robot_of", "ropes_of", "standing"]
+__all__ = ["Robot", "cables_of", "robot_of", "standing"]
 
 _TURN = 2 * np.pi
 _NEWTON_STEPS = 5
@@ -62,7 +62,7 @@ class Robot:
 
     @cached_property
     def lines(self) -> tuple[Line, ...]:
-        """The winches as lines that begin with their rope at home."""
+        """The winches as lines that begin with their cable at home."""
         return tuple(
             Line(
                 replace(winch, reference=replace(winch.reference, cable_length=float(there))),
@@ -75,11 +75,11 @@ class Robot:
 
     @property
     def dead_length(self) -> Array:
-        """Stressed rope between drum and exit point, (n,), m."""
+        """Stressed cable between drum and exit point, (n,), m."""
         return np.array([winch.cable.dead_length for winch in self.winches])
 
     def lengths(self, pose: Pose) -> Array:
-        """Geometric rope lengths, arcs included, (p, n), m."""
+        """Geometric cable lengths, arcs included, (p, n), m."""
         return lengths(self.geometry, pose.position, pose.rotation)
 
     def structure(self, pose: Pose) -> Array:
@@ -93,7 +93,7 @@ class Robot:
     def motor_angles(
         self, pose: Pose, strain: Array | float = 0.0, tension: Array | float = 0.0
     ) -> Array:
-        """Motor angles at poses, (p, n), rad, at which the ropes reach there under ``tension``, N.
+        """Motor angles at poses, (p, n), rad, at which the cables reach there under ``tension``, N.
 
         ``strain`` is by how much more they are strained than at home, by whatever is no effect of
         the profile; it acts on length and dead length. Both are one number, (n,) or (p, n).
@@ -118,9 +118,9 @@ class Robot:
         tension: Array | float = 0.0,
         temperature: Array | float = 20.0,
     ) -> Array:
-        """Rope lengths that motor angles (p, n) stand for, effects included, (p, n), m.
+        """Cable lengths that motor angles (p, n) stand for, effects included, (p, n), m.
 
-        Ropes that stretch do so under ``tension``, N; it and the temperature (degrees Celsius)
+        Cables that stretch do so under ``tension``, N; it and the temperature (degrees Celsius)
         are one number, (n,) or (p, n).
         """
         angles = np.atleast_2d(np.asarray(motor_angles, dtype=float))
@@ -198,12 +198,12 @@ def standing(
     return line.moments(zero, motor_angle, zero, pulled, warm)
 
 
-def ropes_of(robot: Robot) -> list[RopeLine]:
+def cables_of(robot: Robot) -> list[CableLine]:
     """The lines as the loops of a control cycle want them."""
-    return [_rope(robot, i, winch) for i, winch in enumerate(robot.winches)]
+    return [_cable(robot, i, winch) for i, winch in enumerate(robot.winches)]
 
 
-def _rope(robot: Robot, index: int, winch: WinchProfile) -> RopeLine:
+def _cable(robot: Robot, index: int, winch: WinchProfile) -> CableLine:
     place = robot.geometry
     _only_drums(robot, index)
     drum, home = robot.lines[index].drum, _TURN * winch.reference.wound_turns
@@ -211,7 +211,7 @@ def _rope(robot: Robot, index: int, winch: WinchProfile) -> RopeLine:
     ex, ey, ez = place.exit_point[index].tolist()
     bx, by, bz = place.anchor_point[index].tolist()
     sx, sy, sz = place.swivel_axis[index].tolist()
-    return RopeLine(
+    return CableLine(
         ex=ex,
         ey=ey,
         ez=ez,

@@ -1,4 +1,4 @@
-"""The wrench that ropes have to balance: the platform's weight, and what else acts on it."""
+"""The wrench that cables have to balance: the platform's weight, and what else acts on it."""
 
 from __future__ import annotations
 
