@@ -1,11 +1,12 @@
-"""Calibrates a cable robot: geometry and winches from poses of which anything was measured.
+"""Calibration of a cable robot: geometry and winches from poses with any kind of measurement.
 
     result = calibrate(robot, read_poses(runs, robot.profile))
     result.estimates["1.exit_point.x"].value
 
-A maximum of the posterior over all poses and parameters at once. The paper (Lessanibahri et al.)
-searches every pose again inside each evaluation; here the pose is an unknown beside the
-parameters, so that also the cable equations that a searched pose would drop are used.
+The estimate is the maximum of the posterior over all poses and parameters at once, with the
+constraint equations of :mod:`winchkit.model.robot.constraints`. The CABTIVE paper (Lessanibahri et
+al., Eq. 5 and 6) solves the forward kinematics of every pose inside each evaluation of its cost;
+here the pose is an unknown beside the parameters, so that all cable equations count.
 """
 
 from __future__ import annotations
@@ -48,25 +49,29 @@ Told = Callable[[str], None]
 _EVERY = 10
 _NOISE_ROUNDS = 8
 _SETTLED = 0.03
+"""Relative change of a standard deviation at which variance components have settled."""
 _COARSE = 5.0
+"""Standard deviation of positions, in that of the exit points' prior, above which a warning is due
+(rule of thumb: a camera may be coarser than a drawing)."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """How to calibrate."""
+    """Options of a calibration."""
 
     effects: tuple[str, ...] = ()
-    """Effects of the catalogue that join the geometry."""
+    """Effects of the catalogue that are fitted beside the geometry."""
     loss: Loss = "least-squares"
     sigma: Mapping[str, float] | None = None
-    """Standard deviations by kind of equation, SI; what is not given is estimated."""
+    """Standard deviations by kind of equation, SI; those that are not given are estimated."""
     middle_force: float | None = None
-    """N; cable forces near it where no tension was measured and an effect needs them."""
+    """Force, N, to which cable forces are nearest where an effect needs them and no tension was
+    measured."""
 
 
 @dataclass(frozen=True)
 class Estimated:
-    """One parameter after the fit, in the unit of files."""
+    """Estimate of one parameter, in the unit of files."""
 
     parameter: Parameter
     nominal: float
@@ -79,7 +84,7 @@ class Estimated:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A robot's calibration."""
+    """Result of a calibration."""
 
     equations: Equations
     solution: Solution
@@ -91,18 +96,18 @@ class Calibrated:
     validation_after: PoseErrors
     observed: Observability
     candidates: tuple[Candidate, ...]
-    """Effects that would explain much of what is left over."""
+    """Effects that would explain a large part of the remaining cost."""
     seconds: float
     warnings: tuple[str, ...]
 
     @property
     def values(self) -> Array:
-        """Parameters, (q,), as they are fitted."""
+        """Parameters in fitted units, (q,)."""
         return self.solution.state.values
 
 
 def split(measured: Measured) -> tuple[Measured, Measured]:
-    """Poses to fit, and every tenth to hold out; none where there are fewer than ten."""
+    """Split poses into those to fit and every tenth to hold out (none of fewer than ten)."""
     held = np.arange(len(measured)) % _EVERY == _EVERY - 1
     return measured[~held], measured[held]
 
@@ -114,10 +119,39 @@ def calibrate(
     options: Options | None = None,
     tell: Told = lambda text: None,
 ) -> Calibrated:
-    """Fit the robot to poses, and judge it on others.
+    """Fit a robot's geometry, winches and named effects to poses.
 
-    Raises UsageError where the poses leave nothing to fit parameters with, or an effect lacks what
-    it needs.
+    Parameters
+    ----------
+    robot : Robot
+        With the nominal values, which are the means of the priors.
+    fit : Measured
+        Poses to fit, p of n lines.
+    validation : Measured
+        Poses for the held-out error.
+    options : Options, optional
+        Effects, loss and known standard deviations.
+    tell : callable, optional
+        Called with a line of progress.
+
+    Returns
+    -------
+    Calibrated
+        Estimates with posterior standard deviations, prediction errors before and after,
+        identifiability, candidate effects and warnings.
+
+    Raises
+    ------
+    UsageError
+        Where the poses have no redundancy for parameters, or a measurement is missing that an
+        effect needs.
+
+    Notes
+    -----
+    The cost is ½ Σ ρ(r/σ) + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
+    deviations σ by kind of measurement are variance components
+    (:mod:`winchkit.model.robot.variance_components`): fit and estimate alternate until σ changes by
+    less than 3 %, at most eight times. A robust loss ρ is used after the first fit.
     """
     options = options or Options()
     effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
@@ -149,7 +183,10 @@ def calibrate(
 
 
 def equations_of(robot: Robot, measured: Measured, options: Options) -> Equations:
-    """The equations of a robot's poses with the instruments and effects that there are."""
+    """Constraint equations of measured poses with the parameters of an option's effects.
+
+    Raises UsageError where a measurement is missing that an effect needs.
+    """
     parameters = parameters_of(
         robot,
         options.effects,
@@ -187,7 +224,7 @@ def _forces(measured: Measured, options: Options) -> CableForces:
 
 
 def _start(equations: Equations, options: Options) -> tuple[Equations, State]:
-    """Nominal parameters within bounds, poses found with them, instruments' zeros from both."""
+    """Nominal parameters within bounds, poses estimated with them, zeros of instruments."""
     low, high = equations.parameters.bounds
     values = np.clip(equations.parameters.nominal, low, high)
     blind = Weights({**_sigma(equations, options), "swivel": np.inf, "cable_length": np.inf})
@@ -208,7 +245,7 @@ def _sigma(equations: Equations, options: Options) -> dict[str, float]:
 def _fit(
     equations: Equations, state: State, options: Options, tell: Told
 ) -> tuple[Solution, Weights]:
-    """Fit, judge the instruments by what is left, and fit again until both agree."""
+    """Fit and variance components in turn until both have settled."""
     given = options.sigma or {}
     weights = Weights(_sigma(equations, options))
     solution = solve(equations, state, weights, _teller(tell, "fit"))
@@ -244,7 +281,7 @@ def _estimates(
 
 
 def _left_out(equations: Equations) -> list[str]:
-    """Effects that the profiles have and this model has not."""
+    """Effects of the profiles that this model leaves out."""
     robot = equations.robot
     tables = [*robot.profile.effect, *(table for winch in robot.winches for table in winch.effect)]
     own = {table.id for table in robot.profile.effect if table.id in EFFECTS}
@@ -255,7 +292,7 @@ def _left_out(equations: Equations) -> list[str]:
 
 
 def _disagreements(equations: Equations, weights: Weights) -> list[str]:
-    """Noise beyond the doubt in the points: poses of another robot, or read another way."""
+    """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
     doubt, sigma = float(equations.parameters.std[0]), weights.sigma
     causes = {
         "rope": "gearbox.direction, the lines' order, [home] and the motor angles there",

@@ -11,7 +11,7 @@ __all__ = ["LAWS", "LawParameter"]
 
 @dataclass(frozen=True)
 class LawParameter:
-    """One number of a law, as it is fitted."""
+    """One parameter of a law in the unit that is fitted."""
 
     name: str
     unit: str

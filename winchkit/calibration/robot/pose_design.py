@@ -1,4 +1,4 @@
-"""Which poses to measure next: those that say most of what is known least (D-optimal)."""
+"""Poses to measure next for a calibration: greedy D-optimal choice among random candidates."""
 
 from __future__ import annotations
 
@@ -33,22 +33,36 @@ _SEED = 20
 
 @dataclass(frozen=True)
 class NextPose:
-    """A pose worth measuring."""
+    """Proposed pose."""
 
     position: tuple[float, ...]
     """m."""
     angles: tuple[float, ...]
     """Roll, pitch, yaw, rad."""
     gain: float
-    """By which factor it shrinks the volume of what is uncertain, as a logarithm to base 2."""
+    """Logarithm to base 2 of the factor by which the pose reduces the volume of the confidence
+    ellipsoid."""
 
 
 def next_poses(found: Calibrated, count: int) -> list[NextPose]:
-    """Choose ``count`` of random candidates, one after another, for the greatest gain each.
+    """Choose poses one after another, each for the greatest gain of information.
 
-    Candidates lie in the box of positions and rotations measured so far, a quarter wider, where
-    pulling cables can hold the platform; what else is in the way is for the user to check. What is
-    measured at each is what was measured. Fewer are returned where fewer can be held.
+    Parameters
+    ----------
+    found : Calibrated
+        With the information so far.
+    count : int
+        Number of poses; fewer where pulling cables hold the platform at fewer candidates.
+
+    Returns
+    -------
+    list of NextPose
+        In the order of choice.
+
+    Notes
+    -----
+    Candidates are 400 random poses in the box of positions and rotations measured so far, a quarter
+    wider. Collisions are not checked. The same kinds of measurement are assumed at each.
     """
     candidates = _candidates(found)
     parts = _information(found, candidates)
@@ -73,7 +87,7 @@ def next_poses(found: Calibrated, count: int) -> list[NextPose]:
 
 
 def _candidates(found: Calibrated) -> Pose:
-    """Random poses in the box measured, all of which the geometry can take."""
+    """Random poses in the box measured so far."""
     pose, rng = found.solution.state.pose, np.random.default_rng(_SEED)
 
     def spread(values: Array, least: float) -> Array:
@@ -85,7 +99,7 @@ def _candidates(found: Calibrated) -> Pose:
     pose = random_poses(geometry, position, spread(angles_of(pose.rotation), _LEAST_TILT))
     if len(geometry.exit_point) >= FREEDOMS:
         return pose
-    # A platform that hangs takes none of them, but comes to rest near by.
+    # A hanging platform comes to rest near these poses, not at them.
     length = lengths(geometry, pose.position, pose.rotation)
     rest = forward(geometry, length, pose, found.equations.robot.profile.platform)
     taut = rest.converged & np.all(rest.forces > 0, axis=1)
@@ -93,7 +107,7 @@ def _candidates(found: Calibrated) -> Pose:
 
 
 def _information(found: Calibrated, pose: Pose) -> Array:
-    """Whitened equations of each candidate freed of its pose, (c, r, q)."""
+    """Whitened equations of each candidate with its pose projected out, (c, r, q)."""
     equations = found.equations
     measured = _as_measured(found, pose)
     forces = replace(equations.forces, tension=measured.tension)
@@ -102,7 +116,7 @@ def _information(found: Calibrated, pose: Pose) -> Array:
 
 
 def _as_measured(found: Calibrated, pose: Pose) -> Measured:
-    """Placeholders for what would be measured: only where there is a value counts."""
+    """Placeholders for measurements: only which of them are finite is used."""
     measured, many = found.equations.measured, len(pose.position)
 
     def typical(values: Array) -> Array:
@@ -126,7 +140,7 @@ def _as_measured(found: Calibrated, pose: Pose) -> Measured:
 
 
 def _fitted_robot(found: Calibrated) -> Robot:
-    """The robot with the drums found, for the angles that go with a pose."""
+    """The robot with the fitted drums, for the motor angles at a pose."""
     profile, block = found.equations.robot.profile, found.equations.parameters.block
     growth = float(found.values[block["layer_growth"][0]])
     lines = []

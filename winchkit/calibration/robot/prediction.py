@@ -1,4 +1,4 @@
-"""Where a robot's model says its platform is: poses from motor angles alone."""
+"""Prediction errors of a robot's model: poses by motor angles alone against measured ones."""
 
 from __future__ import annotations
 
@@ -28,13 +28,21 @@ class PoseErrors:
     angle: Array
     """(p,), rad; NaN where the rotation was not measured whole."""
     place: NDArray[np.str_]
-    """Which row of which run each pose is, (p,)."""
+    """Run and row of each pose, (p,)."""
     unfound: int
-    """Poses that no search found from their cable lengths."""
+    """Number of poses for which the forward kinematics did not converge."""
 
 
 def errors_at(equations: Equations, values: Array) -> PoseErrors:
-    """Predict every pose from its motor angles with the parameters' ``values``, and compare."""
+    """Predict every pose from its motor angles, and compare it with the measured one.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the p poses to predict.
+    values : (q,) array
+        Parameters in fitted units.
+    """
     pose, unfound = _poses(equations, values)
     measured = equations.measured
     distance = np.linalg.norm(pose.position - measured.position, axis=1)
@@ -46,13 +54,13 @@ def errors_at(equations: Equations, values: Array) -> PoseErrors:
 
 
 def rms(values: Sequence[float] | Array) -> float:
-    """Root of the mean square of what is known; NaN where nothing is."""
+    """Root of the mean square of finite values; NaN without any."""
     known = np.asarray(values)[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
 
 def _poses(equations: Equations, values: Array) -> tuple[Pose, int]:
-    """Search from what was measured, else from home; a cable's strain is found along with it."""
+    """Forward kinematics from the measured pose or home, with strains by fixed-point iteration."""
     geometry, slack = equations.geometry(values), equations.by_drum(values)
     dead, measured = equations.robot.dead_length, equations.measured
     start = start_of(equations)
@@ -62,7 +70,7 @@ def _poses(equations: Equations, values: Array) -> tuple[Pose, int]:
         if (strain := equations.strain(values, start)) is not None:
             given = (slack + strain.value * dead) / (1 - strain.value)
         found = forward(geometry, given, start, platform)
-        # A pose that is lost is searched for once more from home.
+        # A search that did not converge starts again from home.
         start = _where(found.converged.astype(bool), found.pose, equations)
     known = np.all(np.isfinite(measured.motor_angle), axis=1)
     return found.pose, int(np.count_nonzero(known & ~found.converged.astype(bool)))
