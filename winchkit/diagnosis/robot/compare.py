@@ -1,4 +1,4 @@
-"""A robot's profile against poses: how far off, and what the error follows. Nothing is fitted."""
+"""Comparison of a robot's profile with poses: errors and their attribution, without a fit."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ __all__ = ["RobotCompared", "compare_robot", "compared_robot"]
 
 @dataclass(frozen=True)
 class RobotCompared:
-    """A comparison with everything behind it, for reports."""
+    """Comparison with regression and errors, for reports."""
 
     comparison: Comparison
     problem: RobotProblem
     errors: Errors
     followed: Mapping[str, Followed]
-    """Per output what its error follows most."""
+    """By output the variable with the largest share of its error."""
 
 
 def compare_robot(
@@ -41,7 +41,26 @@ def compare_robot(
 ) -> Comparison:
     """Compare poses with a robot's profile at its file values.
 
-    Raises RunError with every fault of every run, FileError for effects that do not bind.
+    Parameters
+    ----------
+    runs : sequence of Run
+        With motor angles and measured poses.
+    profile : RobotProfile
+        With its own effects.
+    catalogue : Catalogue, optional
+        Of effects; the one that ships by default.
+
+    Returns
+    -------
+    Comparison
+        Errors by output, SI, and the variables that explain them.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run.
+    FileError
+        For effects that cannot be bound to the robot.
     """
     return compared_robot(runs, profile, catalogue).comparison
 
@@ -49,7 +68,7 @@ def compare_robot(
 def compared_robot(
     runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue | None = None
 ) -> RobotCompared:
-    """As :func:`compare_robot`, with the errors that its figures were taken from."""
+    """As :func:`compare_robot`, with regression and errors."""
     dataset = prepare_poses(runs, profile)
     robot = robot_with_effects(profile, catalogue)
     equations = Equations(dataset, start_pose(dataset), robot)
@@ -86,7 +105,7 @@ def _largest(name: str, error: Array) -> float:
 
 
 def _noise(errors: Errors, dataset: RobotDataset) -> dict[str, float]:
-    """Rms of the differences of repeated poses; empty without any."""
+    """Rms of the contrasts of repeated poses (pure error); empty without repeats."""
     groups = [np.flatnonzero(dataset.pose == n) for n in range(int(dataset.pose.max()) + 1)]
     many = [group for group in groups if len(group) > 1]
     if not many:

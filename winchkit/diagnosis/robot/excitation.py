@@ -1,4 +1,4 @@
-"""What a set of poses cannot show, said before anything is concluded from it."""
+"""Excitation: effects that a set of poses cannot show, by missing measurements or motion."""
 
 from __future__ import annotations
 

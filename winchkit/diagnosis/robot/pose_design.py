@@ -1,4 +1,9 @@
-"""Kinds of poses that a robot may take next, imagined on its model: farther out, turned more, …"""
+"""Candidate kinds of further poses, simulated on a robot's model, and their power.
+
+Each kind differs from the poses so far in one respect (farther out, turned more, other forces,
+other temperatures). Of each, the poses are chosen greedily for the noncentrality that they add
+(:mod:`winchkit.model.robot.pose_design`) to every question.
+"""
 
 from __future__ import annotations
 
@@ -58,12 +63,12 @@ _STRONGER, _WARMER = 2.0, 15.0
 
 @dataclass(frozen=True)
 class PoseKind:
-    """A kind of poses, and in what it differs from those so far."""
+    """Kind of poses: its difference from the poses so far."""
 
     name: str
     words: str
     out: bool = False
-    """Farther out, as far as cables hold inside the frame."""
+    """Farther out, within the frame and where cables hold the platform."""
     turned: bool = False
     stronger: bool = False
     """Cable forces from half to twice those so far."""
@@ -78,20 +83,34 @@ KINDS = (
     PoseKind("tensions", "under cable forces from half to twice those so far", stronger=True),
     PoseKind("warmth", "with the cables 15 K colder and warmer", warmer=True),
 )
-"""Those that ask least of the user first."""
+"""In ascending order of effort for the user."""
 
 
 def usable(kind: PoseKind, dataset: RobotDataset) -> bool:
-    """Whether a kind differs in something that is measured on this robot."""
+    """Whether the difference of a kind is measured on this robot."""
     if kind.stronger and not dataset.has_tension:
         return False
     return bool(np.isfinite(dataset.measured.temperature).all()) or not kind.warmer
 
 
 def imagined(problem: RobotProblem, robot: Robot, kind: PoseKind) -> tuple[Measured, Pose]:
-    """What would be measured at poses of a kind, without noise, and those poses.
+    """Simulate measurements at random poses of a kind, without noise.
 
-    Only where pulling cables hold the platform; NaN where nothing was measured so far.
+    Parameters
+    ----------
+    problem : RobotProblem
+        With the poses so far.
+    robot : Robot
+        With the effects of the final model.
+    kind : PoseKind
+        Of the poses.
+
+    Returns
+    -------
+    Measured
+        NaN where nothing was measured so far.
+    Pose
+        Where pulling cables hold the platform.
     """
     rng = np.random.default_rng(_SEED)
     pose = _placed(problem, robot, kind, rng)
@@ -104,7 +123,7 @@ def imagined(problem: RobotProblem, robot: Robot, kind: PoseKind) -> tuple[Measu
 
 
 def _placed(problem: RobotProblem, robot: Robot, kind: PoseKind, rng: np.random.Generator) -> Pose:
-    """Random poses of a kind that the geometry can take."""
+    """Random poses of a kind."""
     seen = problem.standing.pose
     corners = robot.geometry.exit_point
     middle, half = middle_and_half(seen.position)
@@ -163,37 +182,51 @@ def _measured(
 
 
 Question = tuple[Term, Term | None]
-"""An effect, and the rival that it is to be told from; without one, from nothing at all."""
+"""An effect and the rival from which it is to be separated; None asks for its detection."""
 POSES = 12
-"""Of an offer."""
+"""Poses per offer."""
 _SURE, WORTHWHILE = 0.9, 0.2
 _OFFERED = 2
 _ENOUGH = 3.04
-"""Deviations beyond what is needed where more is of no use: a power of 99.9 %."""
+"""Standard deviations above the threshold beyond which more information is not counted: a power of
+99.9 %."""
 
 
 @dataclass(frozen=True)
 class PoseOffer:
-    """Poses of one kind, the most telling ones first."""
+    """Poses of one kind, the most informative first."""
 
     kind: PoseKind
     pose: Pose
     motor_angle: Array
-    """That goes with them, (k, n), rad."""
+    """At these poses, (k, n), rad."""
     tension: Array
-    """Of the cables there, (k, n), N; NaN where none is measured."""
+    """Cable forces at these poses, (k, n), N; NaN where none is measured."""
     powers: tuple[float, ...]
-    """Per question the chance that these poses and all so far answer it."""
+    """Power of these poses and all so far, by question."""
     so_far: tuple[float, ...]
-    """The same without them."""
+    """Power of the poses so far, by question."""
 
 
 def next_pose_runs(
     problem: RobotProblem, final: Hypothesis, pairs: Sequence[tuple[Term, Term]]
 ) -> tuple[NextRun, ...]:
-    """Per pair the kinds of poses that tell it apart, with the power that they would have.
+    """Kinds of poses that separate pairs of effects.
 
-    The first that is sure to, else the best; where no poses do, what the effect's card says.
+    Parameters
+    ----------
+    problem : RobotProblem
+        With the poses so far.
+    final : Hypothesis
+        The final model of the diagnosis.
+    pairs : sequence of pairs of Term
+        To separate.
+
+    Returns
+    -------
+    tuple of NextRun
+        Per pair the first kind with a power of 90 %, else the two best above 20 %; else the advice
+        of the effects' cards, with a power of NaN.
     """
     out: list[NextRun] = []
     for first, second in pairs:
@@ -216,9 +249,25 @@ def pose_offers(
     needed: Sequence[float],
     count: int = POSES,
 ) -> list[PoseOffer]:
-    """Every kind of poses with the ``count`` that answer the questions best, least effort first.
+    """Choose poses of every kind for a set of questions.
 
-    ``needed`` are the whitened squares that answer each question.
+    Parameters
+    ----------
+    problem : RobotProblem
+        With the poses so far.
+    final : Hypothesis
+        The final model of the diagnosis.
+    questions : sequence of Question
+        To be answered.
+    needed : sequence of float
+        Whitened squares (χ²) at which each question counts as answered.
+    count : int
+        Poses per offer.
+
+    Returns
+    -------
+    list of PoseOffer
+        In ascending order of effort.
     """
     robot = problem.standing.robot(final.terms)
     kinds = [kind for kind in KINDS if usable(kind, problem.dataset)]
@@ -243,12 +292,12 @@ def pose_offers(
 
 
 def _powers(strength: Sequence[float], needed: Sequence[float]) -> tuple[float, ...]:
-    """Chance of an answer to each question."""
+    """Power for each question."""
     return tuple(power_of(*both) for both in zip(strength, needed, strict=True))
 
 
 def reach(offer: PoseOffer) -> tuple[float, float]:
-    """How far its poses are from their middle, m, and how much they turn, rad, at most."""
+    """Largest distance of an offer's poses from their middle, m, and largest angle, rad."""
     place, turned = offer.pose.position, angles_of(offer.pose.rotation)
     away = np.linalg.norm(place - (place.min(axis=0) + place.max(axis=0)) / 2, axis=1)
     return float(away.max()), float(np.abs(turned).max())
@@ -266,7 +315,7 @@ def _words(offer: PoseOffer) -> str:
 def _with_all(
     problem: RobotProblem, tried: Sequence[tuple[PoseKind, Measured, Pose]]
 ) -> RobotProblem:
-    """The poses so far and all imagined ones as one regression."""
+    """Regression of the poses so far and all simulated ones."""
     standing, dataset = problem.standing, problem.dataset
     poses = [standing.pose, *(pose for _, _, pose in tried)]
     measured = joined([dataset.measured, *(seen for _, seen, _ in tried)])
@@ -279,9 +328,9 @@ def _with_all(
 
 
 def _information(problem: RobotProblem, final: Hypothesis, question: Question) -> Array:
-    """Squares and products of an effect, its rival and nuisances, pose by pose; the prior's last.
+    """Information of an effect's column, its rival's and the nuisances', (poses + 1, k, k).
 
-    (poses + 1, k, k); the effect comes first.
+    The effect's column is the first; the last matrix is that of the prior.
     """
     first, second = question
     asked = {term.effect.id for term in question if term is not None}
@@ -305,7 +354,7 @@ def _information(problem: RobotProblem, final: Hypothesis, question: Question) -
 def _chosen(
     parts: Sequence[Array], base: Sequence[Array], needed: Sequence[float], count: int
 ) -> tuple[list[int], list[float]]:
-    """Poses chosen in turn for what they add to λ of all questions, and λ with them."""
+    """Poses chosen in turn for the noncentrality λ of all questions, and λ with them."""
     sums = list(base)
     enough = (np.sqrt(needed) + _ENOUGH) ** 2
     chosen: list[int] = []
