@@ -1,9 +1,9 @@
 """Errors of a robot's model in SI: in sample, held out and by noise alone.
 
 ``cable_length`` is the length by the drum less the length by geometry at the measured pose, with
-what unmeasured coordinates of the pose can explain projected out; ``platform_position`` the position
-by the motor angles (linearised forward kinematics) less the measured one; ``tension`` the whitened
-wrench that measured cable forces and the weight leave over.
+what unmeasured coordinates of the pose can explain projected out; ``platform_position`` the
+position by the motor angles (linearised forward kinematics) less the measured one; ``tension`` the
+whitened wrench that measured cable forces and the weight leave over.
 """
 
 from __future__ import annotations

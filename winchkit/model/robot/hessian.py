@@ -1,4 +1,4 @@
-"""Second derivatives of cable lengths by the pose: what stiffens a platform that hangs."""
+"""Second derivatives of cable lengths by the pose, for the stiffness of hanging platforms."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def length_hessian(geometry: Geometry, position: Array, rotation: Array) -> Arra
     radius = geometry.swivel_radius[:, None]
     free = np.sqrt((distance - radius) ** 2 + along**2 - radius**2)
     away = outward / np.where(distance > 0, distance, 1.0)
-    # On the axis the cable runs straight and may lean to either side alike.
+    # On the swivel axis the limit is that of a straight cable.
     side = np.where(
         distance > 1e-12, np.sin(wrap) / np.where(distance > 0, distance, 1.0), 1 / free
     )

@@ -1,4 +1,4 @@
-"""The loops of a robot's cycle, built in plain Python or, from the same lines, compiled."""
+"""Loops of a robot's control cycle in plain Python or, from the same source, compiled by numba."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True)
 class RobotKernels:
-    """The inner loops as they were built."""
+    """Inner loops, plain or compiled."""
 
     name: str
     """``plain`` or ``numba``."""
@@ -37,12 +37,12 @@ class RobotKernels:
     forces: Function
     """Lines, pose, initial forces, wrench, work → fills forces (n); false where singular."""
     array: Callable[[list[float]], Any]
-    """A flat sequence of the kind that these loops want."""
+    """Makes the sequence type of these loops."""
     lines: Callable[[list[CableLine]], Any]
-    """Lines of the kind that these loops want."""
+    """Makes the type of lines of these loops."""
 
     def work(self, count: int) -> tuple[Any, Any]:
-        """Room for the rows of :attr:`cables`, and for a 6 by 6 system with its right side."""
+        """Buffers for the rows of :attr:`cables`, and for a 6 by 6 system with its right side."""
         return self.array([0.0] * (7 * count)), self.array([0.0] * 42)
 
 
@@ -52,7 +52,7 @@ def _build(
     array: Callable[[list[float]], Any],
     lines: Callable[[list[CableLine]], Any],
 ) -> RobotKernels:
-    """All loops, each through ``jit``."""
+    """Build all loops, each passed through ``jit``."""
     steep, squares, solve = jit(cables_loop(True)), jit(normal), jit(cholesky)
     return RobotKernels(
         name,
@@ -70,9 +70,12 @@ PLAIN = _build("plain", lambda function: function, list, list)
 
 
 def compiled() -> RobotKernels:
-    """Compile the loops with numba and run each once: seconds, to be spent before motion.
+    """Compile the loops with numba and run each once, which takes seconds.
 
-    Raises UsageError where numba is not installed (``pip install 'winchkit[fast]'``).
+    Raises
+    ------
+    UsageError
+        Where numba is not installed (``pip install 'winchkit[fast]'``).
     """
     try:
         from numba import njit

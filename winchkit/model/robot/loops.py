@@ -1,4 +1,4 @@
-"""Cables and drums of one pose: loops that run in plain Python and compile with numba as they are.
+"""Inverse kinematics of one pose in loops that numba compiles unchanged.
 
 A pose is twelve floats (position, then the rotation by rows), a line is an object or a record with
 the fields of :class:`CableLine`; results go into sequences that are handed in.
@@ -21,7 +21,7 @@ _EDGE = 1e-12
 
 @dataclass(slots=True)
 class CableLine:
-    """One line as the loops want it, in SI; built by :func:`winchkit.model.robot.cables_of`."""
+    """One line for the loops, SI; made by :func:`winchkit.model.robot.cables_of`."""
 
     ex: float
     ey: float
@@ -54,7 +54,7 @@ class CableLine:
 
 
 def cables_loop(steep: bool) -> Function:
-    """Cable lengths; where ``steep`` each followed by its gradient by position and rotation."""
+    """Loop of cable lengths; with ``steep`` each is followed by its gradient by the pose (6)."""
     width = 7 if steep else 1
 
     def cables(lines: Any, pose: Any, rows: Any) -> None:

@@ -1,4 +1,4 @@
-"""Pose from lengths and forces from a pose, one at a time: loops like those of loops.py."""
+"""Forward kinematics and force distribution of one pose in loops that numba compiles unchanged."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def turn(pose: Any, system: Any) -> None:
 
 
 def straighten(pose: Any) -> None:
-    """Square up the rotation's rows again: rounding adds up over many cycles."""
+    """Orthonormalise the rotation's rows: rounding adds up over many cycles."""
     a, b, c, d, e, f = pose[3], pose[4], pose[5], pose[6], pose[7], pose[8]
     size = sqrt(a * a + b * b + c * c)
     a, b, c = a / size, b / size, c / size
@@ -86,7 +86,7 @@ def straighten(pose: Any) -> None:
 def find_loop(
     cables: Function, normal: Function, solve: Function, turn: Function, straighten: Function
 ) -> Function:
-    """Gauss and Newton from the pose handed in, which is moved; steps taken, or −1."""
+    """Loop of Gauss and Newton's method; moves the given pose, returns its steps, or −1."""
 
     def find(  # noqa: PLR0917 - numba takes no keywords
         lines: Any, given: Any, pose: Any, work: Any, tolerance: float, most: int

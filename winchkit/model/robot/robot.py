@@ -1,4 +1,4 @@
-"""A robot as declared, ready to compute with: poses, cable lengths and motor angles."""
+"""Kinematic model of a declared robot: poses, cable lengths and motor angles."""
 
 from __future__ import annotations
 
@@ -93,10 +93,22 @@ class Robot:
     def motor_angles(
         self, pose: Pose, strain: Array | float = 0.0, tension: Array | float = 0.0
     ) -> Array:
-        """Motor angles at poses, (p, n), rad, at which the cables reach there under ``tension``, N.
+        """Inverse kinematics with drums and effects.
 
-        ``strain`` is by how much more they are strained than at home, by whatever is no effect of
-        the profile; it acts on length and dead length. Both are one number, (n,) or (p, n).
+        Parameters
+        ----------
+        pose : Pose
+            The p poses.
+        strain : float, (n,) or (p, n) array
+            Strain against home that no effect of the profile describes; it acts on the length and
+            on the dead length.
+        tension : float, (n,) or (p, n) array
+            Cable forces, N, for effects that depend on them.
+
+        Returns
+        -------
+        (p, n) array
+            Motor angles, rad.
         """
         there = self.lengths(pose)
         slack = there - strain * (there + self.dead_length)
@@ -118,10 +130,21 @@ class Robot:
         tension: Array | float = 0.0,
         temperature: Array | float = 20.0,
     ) -> Array:
-        """Cable lengths that motor angles (p, n) stand for, effects included, (p, n), m.
+        """Cable lengths by drums and effects.
 
-        Cables that stretch do so under ``tension``, N; it and the temperature (degrees Celsius)
-        are one number, (n,) or (p, n).
+        Parameters
+        ----------
+        motor_angles : (p, n) array
+            rad.
+        tension : float, (n,) or (p, n) array
+            Cable forces, N.
+        temperature : float, (n,) or (p, n) array
+            Of the cables, degrees Celsius.
+
+        Returns
+        -------
+        (p, n) array
+            m.
         """
         angles = np.atleast_2d(np.asarray(motor_angles, dtype=float))
         if angles.shape[1] != len(self.profile.line):
@@ -143,7 +166,7 @@ class Robot:
         tension: Array | float = 0.0,
         temperature: Array | float = 20.0,
     ) -> Found:
-        """Poses at motor angles (p, n), searched from ``start``, else from home."""
+        """Forward kinematics of motor angles (p, n), rad, from ``start``, else from home."""
         given = self.lengths_at(motor_angles, tension, temperature)
         return forward(self.geometry, given, start or self.home, self.platform)
 
@@ -153,10 +176,17 @@ def robot_of(
     modifiers: Sequence[Sequence[Modifier]] = (),
     payload: Sequence[Modifier] = (),
 ) -> Robot:
-    """The robot that a profile declares, with modifiers per line and of its platform.
+    """Build the robot that a profile declares, with modifiers per line and of its platform.
 
-    Without them it is the nominal robot; ``winchkit.effects.robot_with_effects`` has those of the
-    profile's own effects.
+    Parameters
+    ----------
+    profile : RobotProfile
+        With the winch of each line read.
+    modifiers : sequence, optional
+        Modifiers of each line. Without them it is the nominal robot;
+        ``winchkit.effects.robot_with_effects`` applies the profile's own effects.
+    payload : sequence, optional
+        Modifiers of the platform.
     """
     home, geometry = home_of(profile), geometry_of(profile)
     own = tuple(tuple(m) for m in modifiers) or ((),) * len(profile.line)
@@ -165,7 +195,7 @@ def robot_of(
         return Robot(profile, geometry, home, there, profile.platform, own)
     exits, anchors = geometry.exit_point.copy(), geometry.anchor_point.copy()
     radii, offsets = geometry.swivel_radius.copy(), np.zeros(len(own))
-    # Effects of place look at no motion: one line at rest serves them all.
+    # Effects of place do not depend on motion: one line at rest serves all.
     rest = standing(Line(_winches(profile)[0]), np.zeros(1))
     for i, stages in enumerate(own):
         place, offset = LinePlace(exits[i], anchors[i], float(radii[i])), 0.0
@@ -191,7 +221,7 @@ def standing(
     tension: Array | None = None,
     temperature: Array | None = None,
 ) -> At:
-    """Samples of a line that each stand still, (n,); no tension and 20 degrees by default."""
+    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default."""
     zero = np.zeros_like(motor_angle)
     pulled = zero if tension is None else tension
     warm = zero + 20.0 if temperature is None else temperature
@@ -199,7 +229,7 @@ def standing(
 
 
 def cables_of(robot: Robot) -> list[CableLine]:
-    """The lines as the loops of a control cycle want them."""
+    """Lines for the loops of a control cycle."""
     return [_cable(robot, i, winch) for i, winch in enumerate(robot.winches)]
 
 
@@ -235,7 +265,7 @@ def _cable(robot: Robot, index: int, winch: WinchProfile) -> CableLine:
 
 
 def _only_drums(robot: Robot, index: int) -> None:
-    """The loops know drums; what else acts on a line they would leave out unseen."""
+    """Refuse modifiers that the loops do not compute."""
     if any(m.stage not in (Stage.DRUM, Stage.CELL) for m in robot.modifiers[index]):
         raise UsageError(
             f"line {robot.names[index]} has effects beside its drum's; the loops of a control "
@@ -244,7 +274,7 @@ def _only_drums(robot: Robot, index: int) -> None:
 
 
 def _law(drum: Drum) -> tuple[float, float, float]:
-    """A winding law as stepped or smooth, with its first radius and its growth a turn."""
+    """Winding law as stepped (1) or smooth (0), first radius and growth per turn."""
     match drum:
         case Spiral(radius, growth):
             return 1.0, radius, growth

@@ -1,4 +1,4 @@
-"""The wrench that cables have to balance: the platform's weight, and what else acts on it."""
+"""Wrench of the platform's weight, and its derivatives."""
 
 from __future__ import annotations
 
