@@ -47,6 +47,7 @@ __all__ = ["Calibrated", "Estimated", "Options", "calibrate", "equations_of", "s
 Told = Callable[[str], None]
 
 _EVERY = 10
+_WORDS = {"rope": "lengths by the drums", "position": "positions"}
 _NOISE_ROUNDS = 8
 _SETTLED = 0.03
 """Relative change of a standard deviation at which variance components have settled."""
@@ -301,8 +302,8 @@ def _disagreements(equations: Equations, weights: Weights) -> list[str]:
     # A camera may well be coarser than a drawing.
     most = {"rope": doubt, "position": _COARSE * doubt}
     return [
-        f"{kind}s and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the exit points "
-        f"are in doubt: check {cause}"
+        f"{_WORDS[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the "
+        f"standard deviation of the exit points' prior: check {cause}"
         for kind, cause in causes.items()
         if sigma.get(kind, 0.0) > most[kind]
     ]
@@ -322,13 +323,13 @@ def _warnings(
         )
     out += _disagreements(equations, weights)
     if not solution.converged:
-        out.append(f"the fit had not settled after {solution.steps} steps")
+        out.append(f"the fit did not converge within {solution.steps} steps")
     held = [p.name for p, at in zip(equations.parameters, solution.held, strict=True) if at != 0]
     if held:
         out.append(f"stopped at a bound: {', '.join(held)}; is the bound right, or the model?")
     if observed.weak:
         out.append(
-            f"{observed.weak} of {observed.free} directions of the parameters get more from the "
-            "prior than from the data"
+            f"{observed.weak} of {observed.free} directions of the parameters have more information "
+            "from the prior than from the data"
         )
     return tuple(out)

@@ -136,7 +136,7 @@ def _words(equations: Equations, data: Array, unseen: Array, floor: float) -> It
     for direction in others[:_LISTED]:
         largest = np.argsort(-np.abs(direction))[:_NAMED]
         listed = ", ".join(f"{direction[i]:+.2f} {names[i]}" for i in largest)
-        yield f"only the prior knows the combination {listed}"
+        yield f"only the prior determines the combination {listed}"
     if len(others) > _LISTED:
         yield f"and {len(others) - _LISTED} more combinations of that kind"
 
@@ -159,7 +159,7 @@ def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
 
     each = np.eye(3 * lines).reshape(3 * lines, lines, 3)
     yield (
-        "no rotation in the data: exit and anchor points cannot be told apart "
+        "no rotation in the data: exit and anchor points cannot be distinguished "
         "({count} direction{s}); turn the platform between poses",
         [points(shift) for shift in each],
     )
@@ -183,8 +183,8 @@ def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
         weight = np.nansum(turned * turned, axis=0)
         radius = -np.nansum(gain * turned, axis=0) / np.where(weight > 0, weight, 1.0)
         yield (
-            "the cables stay within one layer: the layer growth cannot be told from the winding "
-            "radii ({count} direction{s}); wind over more turns",
+            "the cables stay within one layer: the layer growth cannot be distinguished from the "
+            "winding radii ({count} direction{s}); wind over more turns",
             [_scaled(equations, {"winding_radius": radius, "layer_growth": np.ones(1)})],
         )
 
@@ -229,7 +229,7 @@ def refuse_unfit(equations: Equations) -> None:
             cure = "measure more at each: positions, rotations, swivel angles or cable lengths"
         raise UsageError(
             f"{many} poses with {known} measured values cannot calibrate a robot of {lines} lines: "
-            f"{6 * many} of them go into the poses themselves; {cure}"
+            f"{6 * many} of them determine the poses themselves; {cure}"
         )
 
 
@@ -252,4 +252,4 @@ def outside_bounds(parameters: Parameters) -> list[str]:
     names = [p.name for p in parameters if p.std > 0 and not p.low <= p.nominal <= p.high]
     if not names:
         return []
-    return [f"nominal values outside their bounds, begun from the bound: {', '.join(names)}"]
+    return [f"nominal values outside their bounds, started at the bound: {', '.join(names)}"]

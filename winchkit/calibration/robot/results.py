@@ -79,8 +79,8 @@ def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
             *_errors(found),
             "",
             *_table(found),
-            *_section("cannot be told from these poses:", found.observed.unobservable),
-            *_section("may be missing from the model:", candidate_lines(found)),
+            *_section("not identifiable from these poses:", found.observed.unobservable),
+            *_section("candidate effects:", candidate_lines(found)),
             *_section("note:", found.warnings),
             *_section("measure next:", [_pose(p) for p in following]),
         ]
@@ -90,7 +90,7 @@ def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
 def candidate_lines(found: Calibrated) -> list[str]:
     """Candidate effects in words."""
     return [
-        f"the effect {c.effect} would explain {c.share * 100:.0f} % of what is left over; "
+        f"the effect {c.effect} would explain {c.share * 100:.0f} % of the remaining cost; "
         f"try --effect {c.effect}"
         for c in found.candidates
     ]
@@ -132,7 +132,7 @@ def _errors(found: Calibrated) -> Iterator[str]:
         )
     yield f"noise (1 sigma): {noise_words(found)}"
     yield (
-        f"{found.observed.rank} of {found.observed.free} parameter directions seen, "
+        f"{found.observed.rank} of {found.observed.free} parameter directions identifiable, "
         f"{found.seconds:.2f} s"
     )
 

@@ -85,8 +85,8 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
     if spare <= 0:
         raise RunError(
             Fault(
-                "nothing measured beside what the poses themselves take up; measure the platform "
-                "(platform_x, platform_y, platform_z)",
+                "no measurement beyond those that determine the poses themselves; measure the "
+                "platform (platform_x, platform_y, platform_z)",
                 place,
             )
         )

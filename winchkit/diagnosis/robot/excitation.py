@@ -46,10 +46,12 @@ def what_poses_cannot_show(study: Study) -> list[str]:
         turned = rotation_vector(rotation_of(*whole.T) @ rotation_of(*whole[0]).T)
         if float(np.max(np.linalg.norm(turned, axis=1))) < _TURNED:
             notes.append(
-                "the platform never turned: exit and anchor points cannot be told apart; turn it "
-                "between poses"
+                "the platform never turned: exit and anchor points cannot be distinguished; "
+                "turn it between poses"
             )
     distinct = int(dataset.pose.max()) + 1
     if distinct < _FEW:
-        notes.append(f"{distinct} distinct poses only; ninety, widely spread, tell much more")
+        notes.append(
+            f"{distinct} distinct poses only; ninety, widely spread, are much more informative"
+        )
     return notes
