@@ -329,7 +329,7 @@ def _warnings(
         out.append(f"stopped at a bound: {', '.join(held)}; is the bound right, or the model?")
     if observed.weak:
         out.append(
-            f"{observed.weak} of {observed.free} directions of the parameters have more information "
-            "from the prior than from the data"
+            f"{observed.weak} of {observed.free} directions of the parameters have more "
+            "information from the prior than from the data"
         )
     return tuple(out)
