@@ -7,6 +7,11 @@ The estimate is the maximum of the posterior over all poses and parameters at on
 constraint equations of :mod:`winchkit.model.robot.constraints`. The CABTIVE paper (Lessanibahri et
 al., Eq. 5 and 6) solves the forward kinematics of every pose inside each evaluation of its cost;
 here the pose is an unknown beside the parameters, so that all cable equations count.
+
+The cost is ½ Σ ρ(r/σ) + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
+deviations σ by kind of measurement are variance components
+(:mod:`winchkit.model.robot.variance_components`): fit and estimate alternate until σ changes by
+less than 3 %, at most eight times. A robust loss ρ is used after the first fit.
 """
 
 from __future__ import annotations
@@ -138,21 +143,12 @@ def calibrate(
     Returns
     -------
     Calibrated
-        Estimates with posterior standard deviations, prediction errors before and after,
-        identifiability, candidate effects and warnings.
+        Estimates, prediction errors before and after, identifiability and warnings.
 
     Raises
     ------
     UsageError
-        Where the poses have no redundancy for parameters, or a measurement is missing that an
-        effect needs.
-
-    Notes
-    -----
-    The cost is ½ Σ ρ(r/σ) + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
-    deviations σ by kind of measurement are variance components
-    (:mod:`winchkit.model.robot.variance_components`): fit and estimate alternate until σ changes by
-    less than 3 %, at most eight times. A robust loss ρ is used after the first fit.
+        Where the poses have no redundancy, or a measurement is missing that an effect needs.
     """
     options = options or Options()
     effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
