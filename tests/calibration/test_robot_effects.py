@@ -71,7 +71,7 @@ def test_an_effect_that_needs_forces_says_so() -> None:
     with pytest.raises(UsageError, match="tension"):
         calibrate(robot(), measured(csv(rows())), held(), Options(("cable-elongation-linear",)))
     both = ("cable-elongation-linear", "cable-elongation-quartic")
-    with pytest.raises(UsageError, match="laws of the same rope"):
+    with pytest.raises(UsageError, match="laws of the same cable"):
         calibrate(robot(), measured(csv(rows())), held(), Options(both))
 
 

@@ -30,8 +30,8 @@ from winchkit.model.robot import (
     Robot,
     RobotKernels,
     approximate_forces,
+    cables_of,
     flat_pose,
-    ropes_of,
 )
 
 __all__ = ["ElongationCorrection", "Stretch"]
@@ -113,7 +113,7 @@ class ElongationCorrection:
                 raise UsageError(f"{found} {name} were given for a robot of {count} lines")
         weight = robot.weight(reference)[0] if wrench is None else np.asarray(wrench, dtype=float)
         self._laws = [law.strain for law in laws]
-        self._lines = kernels.lines(ropes_of(robot))
+        self._lines = kernels.lines(cables_of(robot))
         self._dead = robot.dead_length.tolist()
         self._estimate, self._room = kernels.forces, kernels.work(count)
         self._initial = kernels.array(np.asarray(initial, dtype=float).tolist())

@@ -1,5 +1,7 @@
-"""Calibration of cable robots: least squares over all poses and geometric parameters.
+"""Calibration of cable robots: geometry and winches from poses of which anything was measured.
 
-:func:`~winchkit.calibration.robot.calibrate.calibrate_robot` fits a profile's numbers to measured
-poses, with priors, bounds and a robust loss.
+``calibrate`` fits ``parameters`` in ``equations`` (the constraints of
+:mod:`winchkit.model.robot.constraints`) by ``least_squares``, alternating with
+``variance_components``. ``identifiability``, ``outliers``, ``candidate_effects`` and ``prediction``
+judge the fit; ``pose_design`` proposes poses; ``results`` and ``profile`` write it.
 """

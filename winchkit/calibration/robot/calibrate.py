@@ -1,11 +1,17 @@
-"""Calibrates a cable robot: geometry and winches from poses of which anything was measured.
+"""Calibration of a cable robot: geometry and winches from poses with any kind of measurement.
 
     result = calibrate(robot, read_poses(runs, robot.profile))
     result.estimates["1.exit_point.x"].value
 
-A maximum of the posterior over all poses and parameters at once. The paper (Lessanibahri et al.)
-searches every pose again inside each evaluation; here the pose is an unknown beside the
-parameters, so that also the rope equations that a searched pose would drop are used.
+The estimate is the maximum of the posterior over all poses and parameters at once, with the
+constraint equations of :mod:`winchkit.model.robot.constraints`. The CABTIVE paper (Lessanibahri et
+al., Eq. 5 and 6) solves the forward kinematics of every pose inside each evaluation of its cost;
+here the pose is an unknown beside the parameters, so that all cable equations count.
+
+The cost is ½ Σ ρ(r/σ) + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
+deviations σ by kind of measurement are variance components
+(:mod:`winchkit.model.robot.variance_components`): fit and estimate alternate until σ changes by
+less than 3 %, at most eight times. A robust loss ρ is used after the first fit.
 """
 
 from __future__ import annotations
@@ -17,7 +23,7 @@ from time import perf_counter
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.calibration.robot.cable_forces import RopeForces
+from winchkit.calibration.robot.cable_forces import CableForces
 from winchkit.calibration.robot.candidate_effects import Candidate, candidates
 from winchkit.calibration.robot.equations import Equations, State
 from winchkit.calibration.robot.identifiability import (
@@ -36,7 +42,7 @@ from winchkit.calibration.robot.parameters import (
     parameters_of,
 )
 from winchkit.calibration.robot.prediction import PoseErrors, errors_at, start_of
-from winchkit.calibration.robot.variance_components import NOISE, re_estimated
+from winchkit.calibration.robot.variance_components import NOISE, re_estimated_weights
 from winchkit.errors import UsageError
 from winchkit.model.robot import Robot
 from winchkit.runs.poses import Measured
@@ -46,27 +52,32 @@ __all__ = ["Calibrated", "Estimated", "Options", "calibrate", "equations_of", "s
 Told = Callable[[str], None]
 
 _EVERY = 10
+_WORDS = {"rope": "lengths by the drums", "position": "positions"}
 _NOISE_ROUNDS = 8
 _SETTLED = 0.03
+"""Relative change of a standard deviation at which variance components have settled."""
 _COARSE = 5.0
+"""Standard deviation of positions, in that of the exit points' prior, above which a warning is due
+(rule of thumb: a camera may be coarser than a drawing)."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """How to calibrate."""
+    """Options of a calibration."""
 
     effects: tuple[str, ...] = ()
-    """Effects of the catalogue that join the geometry."""
+    """Effects of the catalogue that are fitted beside the geometry."""
     loss: Loss = "least-squares"
     sigma: Mapping[str, float] | None = None
-    """Standard deviations by kind of equation, SI; what is not given is estimated."""
+    """Standard deviations by kind of equation, SI; those that are not given are estimated."""
     middle_force: float | None = None
-    """N; rope forces near it where no tension was measured and an effect needs them."""
+    """Force, N, to which cable forces are nearest where an effect needs them and no tension was
+    measured."""
 
 
 @dataclass(frozen=True)
 class Estimated:
-    """One parameter after the fit, in the unit of files."""
+    """Estimate of one parameter, in the unit of files."""
 
     parameter: Parameter
     nominal: float
@@ -79,7 +90,7 @@ class Estimated:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A robot's calibration."""
+    """Result of a calibration."""
 
     equations: Equations
     solution: Solution
@@ -91,18 +102,18 @@ class Calibrated:
     validation_after: PoseErrors
     observed: Observability
     candidates: tuple[Candidate, ...]
-    """Effects that would explain much of what is left over."""
+    """Effects that would explain a large part of the remaining cost."""
     seconds: float
     warnings: tuple[str, ...]
 
     @property
     def values(self) -> Array:
-        """Parameters, (q,), as they are fitted."""
+        """Parameters in fitted units, (q,)."""
         return self.solution.state.values
 
 
 def split(measured: Measured) -> tuple[Measured, Measured]:
-    """Poses to fit, and every tenth to hold out; none where there are fewer than ten."""
+    """Split poses into those to fit and every tenth to hold out (none of fewer than ten)."""
     held = np.arange(len(measured)) % _EVERY == _EVERY - 1
     return measured[~held], measured[held]
 
@@ -114,10 +125,30 @@ def calibrate(
     options: Options | None = None,
     tell: Told = lambda text: None,
 ) -> Calibrated:
-    """Fit the robot to poses, and judge it on others.
+    """Fit a robot's geometry, winches and named effects to poses.
 
-    Raises UsageError where the poses leave nothing to fit parameters with, or an effect lacks what
-    it needs.
+    Parameters
+    ----------
+    robot : Robot
+        With the nominal values, which are the means of the priors.
+    fit : Measured
+        Poses to fit, p of n lines.
+    validation : Measured
+        Poses for the held-out error.
+    options : Options, optional
+        Effects, loss and known standard deviations.
+    tell : callable, optional
+        Called with a line of progress.
+
+    Returns
+    -------
+    Calibrated
+        Estimates, prediction errors before and after, identifiability and warnings.
+
+    Raises
+    ------
+    UsageError
+        Where the poses have no redundancy, or a measurement is missing that an effect needs.
     """
     options = options or Options()
     effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
@@ -149,7 +180,10 @@ def calibrate(
 
 
 def equations_of(robot: Robot, measured: Measured, options: Options) -> Equations:
-    """The equations of a robot's poses with the instruments and effects that there are."""
+    """Constraint equations of measured poses with the parameters of an option's effects.
+
+    Raises UsageError where a measurement is missing that an effect needs.
+    """
     parameters = parameters_of(
         robot,
         options.effects,
@@ -161,17 +195,17 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
     needing = [e for e in options.effects if e.startswith(("cable-elongation", "payload"))]
     if needing and not tension and options.middle_force is None:
         raise UsageError(
-            f"{needing[0]} needs rope forces: record 'LINE.tension [N]', or give the forces that "
+            f"{needing[0]} needs cable forces: record 'LINE.tension [N]', or give the forces that "
             "the robot keeps near, e.g. --middle-force '60 N'"
         )
     if options.middle_force is not None and not options.middle_force > 0:
         raise UsageError(
-            f"--middle-force is {options.middle_force:g} N; ropes only pull, so that it is above 0"
+            f"--middle-force is {options.middle_force:g} N; cables only pull, so that it is above 0"
         )
     payload = [e for e in options.effects if e.startswith("payload")]
     if payload and len(robot.names) < 6:
         raise UsageError(
-            f"{payload[0]} needs ropes that hold all six freedoms; the robot has "
+            f"{payload[0]} needs cables that hold all six freedoms; the robot has "
             f"{len(robot.names)} lines"
         )
     if payload and not tension and parameters.law is None:
@@ -182,12 +216,12 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
     return Equations(robot, parameters, measured, _forces(measured, options))
 
 
-def _forces(measured: Measured, options: Options) -> RopeForces:
-    return RopeForces(measured.tension, options.middle_force)
+def _forces(measured: Measured, options: Options) -> CableForces:
+    return CableForces(measured.tension, options.middle_force)
 
 
 def _start(equations: Equations, options: Options) -> tuple[Equations, State]:
-    """Nominal parameters within bounds, poses found with them, instruments' zeros from both."""
+    """Nominal parameters within bounds, poses estimated with them, zeros of instruments."""
     low, high = equations.parameters.bounds
     values = np.clip(equations.parameters.nominal, low, high)
     blind = Weights({**_sigma(equations, options), "swivel": np.inf, "cable_length": np.inf})
@@ -208,12 +242,12 @@ def _sigma(equations: Equations, options: Options) -> dict[str, float]:
 def _fit(
     equations: Equations, state: State, options: Options, tell: Told
 ) -> tuple[Solution, Weights]:
-    """Fit, judge the instruments by what is left, and fit again until both agree."""
+    """Fit and variance components in turn until both have settled."""
     given = options.sigma or {}
     weights = Weights(_sigma(equations, options))
     solution = solve(equations, state, weights, _teller(tell, "fit"))
     for _ in range(_NOISE_ROUNDS):
-        found = replace(re_estimated(solution, weights, given), loss=options.loss)
+        found = replace(re_estimated_weights(solution, weights, given), loss=options.loss)
         if found.loss == weights.loss and _settled(found.sigma, weights.sigma):
             break
         weights = found
@@ -244,7 +278,7 @@ def _estimates(
 
 
 def _left_out(equations: Equations) -> list[str]:
-    """Effects that the profiles have and this model has not."""
+    """Effects of the profiles that this model leaves out."""
     robot = equations.robot
     tables = [*robot.profile.effect, *(table for winch in robot.winches for table in winch.effect)]
     own = {table.id for table in robot.profile.effect if table.id in EFFECTS}
@@ -255,7 +289,7 @@ def _left_out(equations: Equations) -> list[str]:
 
 
 def _disagreements(equations: Equations, weights: Weights) -> list[str]:
-    """Noise beyond the doubt in the points: poses of another robot, or read another way."""
+    """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
     doubt, sigma = float(equations.parameters.std[0]), weights.sigma
     causes = {
         "rope": "gearbox.direction, the lines' order, [home] and the motor angles there",
@@ -264,8 +298,8 @@ def _disagreements(equations: Equations, weights: Weights) -> list[str]:
     # A camera may well be coarser than a drawing.
     most = {"rope": doubt, "position": _COARSE * doubt}
     return [
-        f"{kind}s and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the exit points "
-        f"are in doubt: check {cause}"
+        f"{_WORDS[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the "
+        f"standard deviation of the exit points' prior: check {cause}"
         for kind, cause in causes.items()
         if sigma.get(kind, 0.0) > most[kind]
     ]
@@ -281,17 +315,17 @@ def _warnings(
     if lost:
         out.append(
             f"{lost} held-out poses were not found from their motor angles: a tension is missing "
-            "that an effect needs, or the ropes contradict each other"
+            "that an effect needs, or the cables contradict each other"
         )
     out += _disagreements(equations, weights)
     if not solution.converged:
-        out.append(f"the fit had not settled after {solution.steps} steps")
+        out.append(f"the fit did not converge within {solution.steps} steps")
     held = [p.name for p, at in zip(equations.parameters, solution.held, strict=True) if at != 0]
     if held:
         out.append(f"stopped at a bound: {', '.join(held)}; is the bound right, or the model?")
     if observed.weak:
         out.append(
-            f"{observed.weak} of {observed.free} directions of the parameters get more from the "
-            "prior than from the data"
+            f"{observed.weak} of {observed.free} directions of the parameters have more "
+            "information from the prior than from the data"
         )
     return tuple(out)

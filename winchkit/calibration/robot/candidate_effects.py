@@ -1,9 +1,9 @@
-"""Which effect would explain what a robot's calibration leaves over: one step of each, untaken.
+"""Score of effects that a calibration leaves out: the fall of its cost in one linearised step.
 
-Poses and parameters stay where the fit ended; for each effect that is not in it, the fit is
-linearised with the effect's parameters beside the others, and the fall of the cost that one step
-promises is its score (a score test). A hint where to look, to be confirmed by fitting the effect
-and by poses held out.
+Poses and parameters stay at the end of the fit. For each effect that is not in it, the equations
+are linearised with the effect's parameters beside the others, and the predicted fall of the cost,
+½ gᵀ (H + 1)⁻¹ g with gradient g and information H, is the score (Rao's score test with a prior).
+It is a hint, to be confirmed by a fit of the effect and by the held-out error.
 """
 
 from __future__ import annotations
@@ -25,26 +25,38 @@ Blocks = Mapping[str, NDArray[np.intp]]
 Values = NDArray[np.float64] | NDArray[np.bool_]
 
 _WORTH = 0.2
+"""Least share of the cost (rule of thumb)."""
 _SURE = 25.0
+"""Least fall of the cost, half of χ² (rule of thumb: seven standard deviations)."""
 _ALIKE = 0.1
+"""Difference of shares within which the law with fewest parameters is named (rule of thumb)."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that is not in the model."""
+    """Candidate effect: one that is not in the model."""
 
     effect: str
     share: float
-    """Of the fit's cost that its parameters would take away, between 0 and 1."""
+    """Share of the fit's cost that its parameters would explain, between 0 and 1."""
 
 
 def candidates(
     equations: Equations, solution: Solution, weights: Weights, effects: tuple[str, ...]
 ) -> tuple[Candidate, ...]:
-    """Effects worth trying, the best first, of the rope's laws one; none where noise is left over.
+    """Effects that would explain much of the remaining cost, the largest share first.
 
-    ``effects`` are those in the fit already. Payloads, which only weigh on tensions, are no
-    candidates for errors of position.
+    Parameters
+    ----------
+    equations, solution, weights
+        Of the fit.
+    effects : tuple of str
+        Effects in the fit already.
+
+    Returns
+    -------
+    tuple of Candidate
+        At most one law of elongation. Payloads, which act on tensions alone, are left out.
     """
     out = []
     for effect in EFFECTS:
@@ -57,14 +69,14 @@ def candidates(
     laws = [c for c in out if c.effect in LAWS]
     if laws:
         best = max(c.share for c in laws)
-        # They stand in the order of their freedoms: of equals the first is kept.
+        # They are in the order of their numbers of parameters.
         kept = next(c for c in laws if c.share > best - _ALIKE)
         out = [c for c in out if c not in laws or c == kept]
     return tuple(sorted(out, key=lambda c: -c.share))
 
 
 def _possible(equations: Equations, effect: str) -> bool:
-    """Whether an effect has the forces that it needs, and the place of no other law."""
+    """Whether an effect has the forces that it needs, and excludes no effect of the fit."""
     if effect not in LAWS:
         return "home_length" not in equations.parameters.block
     forces = bool(np.any(np.isfinite(equations.measured.tension)))
@@ -74,7 +86,7 @@ def _possible(equations: Equations, effect: str) -> bool:
 def _gain(
     equations: Equations, solution: Solution, weights: Weights, effects: tuple[str, ...]
 ) -> float:
-    """By how much the cost would fall in one step with the effect's parameters free."""
+    """Fall of the cost in one linearised step with the effect's parameters free."""
     wider = parameters_of(
         equations.robot,
         effects,
@@ -94,13 +106,13 @@ def _gain(
 
 
 def _carry(old: Blocks, new: Blocks, source: Values, target: Values) -> None:
-    """Copy what both layouts have, block by block."""
+    """Copy the blocks of one layout of parameters into another."""
     for name, place in old.items():
         target[new[name]] = source[place]
 
 
 def _with_nominal(equations: Equations, wider: Parameters) -> Parameters:
-    """The wider parameters with the zeros of the instruments as the fit began with them."""
+    """The wider parameters with the nominal values that the fit started with."""
     nominal = equations.parameters.nominal
     for name, place in equations.parameters.block.items():
         wider = wider.starting(name, nominal[place])

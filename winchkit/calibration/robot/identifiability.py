@@ -1,4 +1,9 @@
-"""What a robot's data say of its parameters, and what they cannot say, in words."""
+"""Identifiability of a robot's parameters: rank, posterior, and unidentifiable directions in words.
+
+The information matrix of the scaled parameters, poses and zeros of instruments eliminated, is
+decomposed into its eigenvectors. A direction with an eigenvalue below 1e-11 of the largest is not
+identifiable at any noise; one with an eigenvalue below one gets more from the prior than from data.
+"""
 
 from __future__ import annotations
 
@@ -23,34 +28,38 @@ __all__ = [
 ]
 
 _SEEN = 1e-11
+"""Least eigenvalue of an identifiable direction, as a share of the largest: above rounding."""
 _SIGNIFICANT = 25.0
+"""Variance of rotations over that of their noise above which the platform has turned (rule of
+thumb: five standard deviations)."""
 _BESIDE = 0.1
+"""Least singular value of a direction that others do not span (rule of thumb)."""
 _NAMED = 4
 _LISTED = 6
 
 
 @dataclass(frozen=True)
 class Observability:
-    """Directions of the parameters by how much the data know of them."""
+    """Directions of the parameters by the information of the data about them."""
 
     std: Array
-    """Posterior standard deviation, (q,), in the units that are fitted."""
+    """Posterior standard deviation in fitted units, (q,)."""
     information: Array
-    """Of the free directions, falling, in units of the prior's: 1 says as much as the prior."""
+    """Eigenvalues in descending order; 1 is the information of the prior."""
     rank: int
-    """Directions of which the data say anything at all, were the noise ever so small."""
+    """Number of identifiable directions."""
     weak: int
-    """Directions that get less from the data than from the prior."""
+    """Number of directions with more information from the prior than from the data."""
     unobservable: tuple[str, ...]
 
     @property
     def free(self) -> int:
-        """How many parameters are fitted."""
+        """Number of fitted parameters."""
         return len(self.information)
 
 
 def observability(equations: Equations, solution: Solution, weights: Weights) -> Observability:
-    """Rank, posterior and unobservable directions at the fit's end."""
+    """Rank, posterior and unidentifiable directions at the end of a fit."""
     scale = equations.parameters.std
     data = solution.linear.information
     inverse = np.linalg.inv(data + np.eye(len(data)))
@@ -66,10 +75,10 @@ def observability(equations: Equations, solution: Solution, weights: Weights) ->
 
 
 def _calmed(equations: Equations, solution: Solution, weights: Weights) -> Array:
-    """Information at poses whose rotations are freed of what is only noise.
+    """Information at poses whose rotations are replaced by their significant part.
 
-    Platforms that never turned seem to turn by the noise of their poses, and the data to tell
-    apart by it what they cannot. Zeros of instruments are eliminated as the poses are.
+    A platform that never turned seems to turn by the noise of its estimated poses, which would
+    make exit and anchor points seem identifiable. Zeros of instruments are eliminated.
     """
     pose, many = solution.state.pose, len(solution.state.pose.rotation)
     mean, home = _mean_rotation(pose.rotation), equations.robot.home.rotation[0]
@@ -93,7 +102,7 @@ def _calmed(equations: Equations, solution: Solution, weights: Weights) -> Array
 
 
 def _rotation_noise(linear: Linear) -> Array:
-    """Mean covariance of the poses' rotations, (3, 3), with what is unknown of the parameters."""
+    """Mean covariance of the poses' rotations, with that of the parameters, (3, 3)."""
     inverse = np.swapaxes(linear.factor, 1, 2) @ linear.factor
     coupled = np.swapaxes(linear.stack.by_pose, 1, 2) @ linear.stack.by_values
     follow = (inverse[:, 3:] @ coupled).reshape(-1, coupled.shape[2])
@@ -104,13 +113,13 @@ def _rotation_noise(linear: Linear) -> Array:
 
 
 def _mean_rotation(rotation: Array) -> Array:
-    """The rotation nearest to the mean of rotations (p, 3, 3)."""
+    """Mean rotation: the one nearest to the mean of matrices (p, 3, 3)."""
     left, _, right = np.linalg.svd(np.mean(rotation, axis=0))
     return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
 
 
 def _words(equations: Equations, data: Array, unseen: Array, floor: float) -> Iterator[str]:
-    """Known reasons first; what they leave over by the names of its parameters."""
+    """Directions with a known reason first, then the others by their largest parameters."""
     if not unseen.shape[1]:
         return
     lasting = equations.parameters.lasting
@@ -127,30 +136,30 @@ def _words(equations: Equations, data: Array, unseen: Array, floor: float) -> It
     for direction in others[:_LISTED]:
         largest = np.argsort(-np.abs(direction))[:_NAMED]
         listed = ", ".join(f"{direction[i]:+.2f} {names[i]}" for i in largest)
-        yield f"only the prior knows the combination {listed}"
+        yield f"only the prior determines the combination {listed}"
     if len(others) > _LISTED:
         yield f"and {len(others) - _LISTED} more combinations of that kind"
 
 
 def _beyond(told: Array, directions: Array) -> Array:
-    """An orthonormal basis of what ``directions`` (q, k) span beside the basis ``told`` (q, m)."""
+    """Orthonormal basis of ``directions`` (q, k) with the basis ``told`` (q, m) projected out."""
     rest = directions - told @ (told.T @ directions)
     left, size, _ = np.linalg.svd(rest, full_matrices=False)
     return np.asarray(left[:, size > _BESIDE])
 
 
 def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
-    """Directions in scaled parameters that are blind for a reason that has a name."""
+    """Directions in scaled parameters that are not identifiable for a known reason."""
     home, lines = equations.robot.home, len(equations.robot.names)
     turn = home.rotation[0]
 
     def points(shift: Array) -> Array:
-        """Exit points moved by (n, 3), and the anchor points with them as they lie at home."""
+        """Shift exit points by (n, 3), and anchor points by the same vectors at home."""
         return _scaled(equations, {"exit_point": shift, "anchor_point": shift @ turn})
 
     each = np.eye(3 * lines).reshape(3 * lines, lines, 3)
     yield (
-        "no rotation in the data: exit and anchor points cannot be told apart "
+        "no rotation in the data: exit and anchor points cannot be distinguished "
         "({count} direction{s}); turn the platform between poses",
         [points(shift) for shift in each],
     )
@@ -174,14 +183,14 @@ def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
         weight = np.nansum(turned * turned, axis=0)
         radius = -np.nansum(gain * turned, axis=0) / np.where(weight > 0, weight, 1.0)
         yield (
-            "the ropes stay within one layer: the layer growth cannot be told from the winding "
-            "radii ({count} direction{s}); wind over more turns",
+            "the cables stay within one layer: the layer growth cannot be distinguished from the "
+            "winding radii ({count} direction{s}); wind over more turns",
             [_scaled(equations, {"winding_radius": radius, "layer_growth": np.ones(1)})],
         )
 
 
 def _scaled(equations: Equations, shift: dict[str, Array]) -> Array:
-    """A shift of blocks of parameters, counted in standard deviations of their priors."""
+    """Shift of blocks of parameters in standard deviations of their priors, (q,)."""
     scale = equations.parameters.std
     out = np.zeros(len(scale))
     for name, part in shift.items():
@@ -195,10 +204,7 @@ _REACH = 2.0
 
 
 def refuse_unfit(equations: Equations) -> None:
-    """Raise UsageError for poses that are too few, too many, or of another robot.
-
-    Something must be left over for parameters once the poses are found.
-    """
+    """Raise UsageError for poses that are too few, too many, without redundancy or out of reach."""
     measured, many = equations.measured, len(equations.measured)
     known = sum(
         int(np.count_nonzero(np.isfinite(values)))
@@ -220,15 +226,15 @@ def refuse_unfit(equations: Equations) -> None:
     if many < _FEW or known <= 6 * many:
         cure = f"record more poses (90 is a good number, {_FEW} the least)"
         if known <= 6 * many:
-            cure = "measure more at each: positions, rotations, swivel angles or rope lengths"
+            cure = "measure more at each: positions, rotations, swivel angles or cable lengths"
         raise UsageError(
             f"{many} poses with {known} measured values cannot calibrate a robot of {lines} lines: "
-            f"{6 * many} of them go into the poses themselves; {cure}"
+            f"{6 * many} of them determine the poses themselves; {cure}"
         )
 
 
 def _near(equations: Equations) -> None:
-    """Refuse positions that no robot of this size can reach: another unit, or another frame."""
+    """Refuse positions that a robot of this size cannot reach: wrong unit or frame."""
     exits, home = equations.robot.geometry.exit_point, equations.robot.home.position
     size = float(np.max(np.linalg.norm(exits[:, None] - exits, axis=2)))
     away = np.linalg.norm(equations.measured.position - home, axis=1)
@@ -242,8 +248,8 @@ def _near(equations: Equations) -> None:
 
 
 def outside_bounds(parameters: Parameters) -> list[str]:
-    """Nominal values that their own bounds exclude: a bound, or the profile, is mistaken."""
+    """Warning about nominal values outside their own bounds."""
     names = [p.name for p in parameters if p.std > 0 and not p.low <= p.nominal <= p.high]
     if not names:
         return []
-    return [f"nominal values outside their bounds, begun from the bound: {', '.join(names)}"]
+    return [f"nominal values outside their bounds, started at the bound: {', '.join(names)}"]

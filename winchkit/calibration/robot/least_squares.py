@@ -1,9 +1,20 @@
-"""Fits all poses and all parameters of a robot at once, with priors, bounds and a robust loss.
+"""Levenberg-Marquardt fit of all poses and parameters, with priors, bounds and robust loss.
 
-Every equation belongs to one pose. The normal equations are therefore reduced to the parameters by
-the Schur complement over the poses (6 by 6 each), so that a step costs the square of the
-parameters a pose, and no pose is ever searched for within the search. Parameters are counted in
-standard deviations of their priors, so that the prior is the unit matrix.
+With whitened residuals r, their derivatives A by pose (p blocks of 6 columns) and B by parameters
+in standard deviations of their priors, the normal equations are
+
+    [AᵀA  AᵀB    ] [pose step ]      [Aᵀ r    ]
+    [BᵀA  BᵀB + 1] [parameters] = −  [Bᵀ r + x]
+
+with x the parameters' distance from their nominal values, so that the prior is the unit matrix.
+Every equation belongs to one pose, so that AᵀA is block diagonal (6 by 6) and the equations are
+reduced to the parameters by the Schur complement BᵀB − BᵀA (AᵀA)⁻¹ AᵀB. A step costs the square of
+the number of parameters per pose.
+
+References
+----------
+B. Triggs et al., *Bundle Adjustment – A Modern Synthesis*, 2000. P. J. Huber, *Robust Statistics*,
+1981 (weights of the losses as iteratively reweighted least squares).
 """
 
 from __future__ import annotations
@@ -18,7 +29,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations, State
 from winchkit.model.robot import Pose
-from winchkit.model.robot.rotation import rotation_by
+from winchkit.model.robot.pose_estimation import Iteration, estimated_pose, moved_pose
 
 __all__ = [
     "Linear",
@@ -38,16 +49,17 @@ Progress = Callable[[int, float], None]
 """Called with a step's number and the cost after it."""
 
 _HUBER, _CAUCHY = 1.345, 2.385
+"""Scales of the losses in standard deviations, of 95 % efficiency for normal residuals."""
 _STEPS = 60
 _DONE = 1e-3
 _POSE_DAMPING, _ROUNDING = 1.0, 1e-13
 _MOST_DAMPED = 1e8
-_PLACING, _STRIDE = 30, 0.3
+_PLACING = Iteration(damping=_POSE_DAMPING, relative_damping=_ROUNDING, tolerance=1e-7, steps=30)
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Standard deviation of each kind of equation, and how outliers count."""
+    """Standard deviation of each kind of equation, and the loss."""
 
     sigma: Mapping[str, float]
     loss: Loss = "least-squares"
@@ -55,7 +67,7 @@ class Weights:
 
 @dataclass(frozen=True)
 class Stack:
-    """The equations of all kinds beside each other, whitened and weighed by the loss."""
+    """Equations of all kinds beside each other, whitened and weighted by the loss."""
 
     kinds: dict[str, slice]
     known: Mask
@@ -70,29 +82,29 @@ class Stack:
 
 @dataclass(frozen=True)
 class Linear:
-    """The equations at a state, reduced to the parameters."""
+    """Equations linearised at a state and reduced to the parameters."""
 
     stack: Stack
     cost: float
     prior: Array
-    """How far the parameters are from their nominal values, in standard deviations, (q,)."""
+    """Parameters less nominal values in standard deviations of the prior, (q,)."""
     factor: Array
     """Inverse Cholesky factors of the poses' normal matrices, (p, 6, 6)."""
     information: Array
-    """Of the scaled parameters by the data alone, (q, q)."""
+    """Information matrix of the scaled parameters, without the prior, (q, q)."""
     gradient: Array
-    """Of the cost by the scaled parameters, poses moved along, prior included, (q,)."""
+    """Gradient of the cost by the scaled parameters, poses eliminated, with the prior, (q,)."""
 
     def damped(self, damping: float) -> Linear:
-        """The same equations with poses that are held back as the parameters are.
+        """The same equations with the poses damped as the parameters are.
 
-        Where a pose is hardly measured, its own step is what goes too far.
+        A pose with few measurements has the longest step of its own.
         """
         return self if damping == 0.0 else _reduced(self.cost, self.prior, self.stack, damping)
 
     @property
     def pose_free(self) -> Array:
-        """Derivatives by the parameters that no move of the pose can undo, (p, r, q)."""
+        """Derivatives by the parameters with the pose projected out, (p, r, q)."""
         half = self.factor @ np.swapaxes(self.stack.by_pose, 1, 2)
         return np.asarray(
             self.stack.by_values - np.swapaxes(half, 1, 2) @ (half @ self.stack.by_values)
@@ -101,7 +113,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class Solution:
-    """Where the fit ended."""
+    """End of a fit."""
 
     state: State
     linear: Linear
@@ -112,22 +124,47 @@ class Solution:
 
 
 def place(equations: Equations, state: State, weights: Weights) -> State:
-    """Search the poses alone, from where they are, with the parameters as they are."""
-    for _ in range(_PLACING):
-        linear = linearise(equations, state, weights)
-        step = _pose_steps(linear, np.zeros(len(state.values)))
-        size = np.max(np.abs(step), axis=1, keepdims=True)
-        step *= np.minimum(1.0, _STRIDE / np.maximum(size, _STRIDE))
-        state = moved(state, state.values, step)
-        if np.max(size) < 1e-7:
-            break
-    return state
+    """Estimate the poses alone, with least squares and the parameters of the state."""
+
+    def whitened(pose: Pose) -> tuple[Array, Array]:
+        found = list(equations.constraints(State(state.values, pose)))
+        residual = np.concatenate([c.residual / weights.sigma[kind] for kind, c in found], axis=1)
+        by_pose = np.concatenate([c.by_pose / weights.sigma[kind] for kind, c in found], axis=1)
+        known = np.isfinite(residual) & np.all(np.isfinite(by_pose), axis=2)
+        residual[~known], by_pose[~known] = 0.0, 0.0
+        return residual, by_pose
+
+    return State(state.values, estimated_pose(whitened, state.pose, _PLACING))
 
 
 def solve(
     equations: Equations, state: State, weights: Weights, progress: Progress | None = None
 ) -> Solution:
-    """Levenberg and Marquardt's method from a state; a step is taken only if the cost falls."""
+    """Fit poses and parameters by Levenberg and Marquardt's method with bounds.
+
+    Parameters
+    ----------
+    equations : Equations
+        With the parameters' priors and bounds.
+    state : State
+        Where the iteration starts.
+    weights : Weights
+        Standard deviations by kind and the loss.
+    progress : callable, optional
+        Called with the number of each step and the cost after it.
+
+    Returns
+    -------
+    Solution
+        The state after the last step that reduced the cost. ``converged`` is false after 60 steps
+        or where no step reduces the cost.
+
+    Notes
+    -----
+    A step is accepted where the cost falls; the damping is then divided by ten, else multiplied.
+    The iteration ends where the cost falls by less than 1e-3 (1 + 1e-6 cost); a fall of ½ is one
+    standard deviation of an estimate.
+    """
     scale = equations.parameters.std
     linear = linearise(equations, state, weights)
     damping, held = 0.0, np.zeros(len(scale), dtype=int)
@@ -152,13 +189,15 @@ def solve(
 
 
 def moved(state: State, values: Array, step: Array) -> State:
-    """Another state: parameters as given, poses moved by (p, 6)."""
-    pose = Pose(state.pose.position + step[:, :3], rotation_by(step[:, 3:]) @ state.pose.rotation)
-    return State(values, pose)
+    """State with other parameters and with poses moved by (p, 6)."""
+    return State(values, moved_pose(state.pose, step))
 
 
 def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
-    """Whitened equations at a state and their reduction to the parameters."""
+    """Whiten the equations at a state and reduce them to the parameters.
+
+    Equations without a measurement get a residual and derivatives of zero.
+    """
     scale = equations.parameters.std
     kinds, parts, at = {}, [], 0
     for rows in equations.rows(state):
@@ -196,7 +235,7 @@ def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> L
     many, rows, count = stack.by_values.shape
     turned = np.swapaxes(stack.by_pose, 1, 2)
     normal = turned @ stack.by_pose
-    # A pose of which too little was measured stays where it is in what it is free to do.
+    # Directions of a pose that nothing measured stay where they are.
     firm = _POSE_DAMPING + _ROUNDING * np.trace(normal, axis1=1, axis2=2)
     normal[:, range(6), range(6)] *= 1 + damping
     normal[:, range(6), range(6)] += firm[:, None]
@@ -211,7 +250,7 @@ def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> L
 
 
 def _pose_steps(linear: Linear, change: Array) -> Array:
-    """Steps of the poses that go with a change of the scaled parameters, (p, 6)."""
+    """Steps of the poses that belong to a change of the scaled parameters, (p, 6)."""
     left = linear.stack.residual + linear.stack.by_values @ change
     gradient = np.swapaxes(linear.stack.by_pose, 1, 2) @ left[..., None]
     turned = np.swapaxes(linear.factor, 1, 2)
@@ -221,9 +260,10 @@ def _pose_steps(linear: Linear, change: Array) -> Array:
 def _bounded_step(
     equations: Equations, state: State, linear: Linear, damping: float
 ) -> tuple[Array, NDArray[np.int_]]:
-    """Parameters after a damped step that keeps to the bounds, and which it stops at.
+    """Parameters after a damped step within the bounds, and the bounds that are active.
 
-    What the step carries beyond a bound is put on it, and the others step again without it.
+    Parameters that the step carries beyond a bound are put on it, and the step of the others is
+    computed again (active set).
     """
     scale = equations.parameters.std
     low, high = equations.parameters.bounds
@@ -263,7 +303,7 @@ def _loss(residual: Array, loss: Loss) -> tuple[Array, Array]:
 
 
 def leverage(linear: Linear) -> Array:
-    """Share of each equation that the fit itself uses up, (p, r), between 0 and 1."""
+    """Leverage of each equation: diagonal of the hat matrix, (p, r), between 0 and 1."""
     half = linear.factor @ np.swapaxes(linear.stack.by_pose, 1, 2)
     rest = linear.pose_free
     posterior = np.linalg.inv(linear.information + np.eye(len(linear.gradient)))

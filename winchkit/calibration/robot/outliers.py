@@ -1,4 +1,4 @@
-"""Which measurements lie far outside what all others of their kind leave over."""
+"""Gross errors: measurements with residuals far outside the spread of their kind."""
 
 from __future__ import annotations
 
@@ -16,20 +16,23 @@ _WORDS = {
     "position": "positions",
     "rotation": "rotations",
     "swivel": "swivel angles",
-    "cable_length": "rope lengths",
+    "cable_length": "cable lengths",
 }
 _FAR = 10.0
-"""In robust standard deviations; the largest of ten thousand normal values lies within four."""
+"""Limit in robust standard deviations; the largest of ten thousand normal values is near four."""
 _NORMAL = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
 _MOST = 0.1
 _LISTED = 5
 
 
 def gross_errors(equations: Equations, solution: Solution) -> list[str]:
-    """A sentence per kind of measurement of which a few values cannot be noise.
+    """One sentence per kind of measurement with gross errors.
 
-    The scale is the median of what the fit leaves over, which a few gross errors do not move; where
-    many values are far off it is the model that fails, and nothing is said here.
+    Notes
+    -----
+    The scale is 1.4826 times the median of the absolute residuals, which a few gross errors do not
+    change. Above a share of 10 % the model is wrong and not the measurement: then no sentence.
     """
     out = []
     for rows in equations.rows(solution.state):
@@ -48,7 +51,7 @@ def gross_errors(equations: Equations, solution: Solution) -> list[str]:
 
 
 def _far(residual: Array) -> tuple[NDArray[np.bool_], int]:
-    """Which residuals (p, k) are gross, and how many there are at all."""
+    """Mask of gross residuals (p, k), and the number of residuals."""
     size = np.abs(residual)
     known = np.isfinite(size)
     if not np.any(known):

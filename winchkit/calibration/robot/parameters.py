@@ -1,4 +1,4 @@
-"""The numbers that a robot's calibration fits: names, units, priors and bounds, in one vector."""
+"""Parameters of a robot's calibration: names, units, priors and bounds, in one vector."""
 
 from __future__ import annotations
 
@@ -32,10 +32,17 @@ _HOME = "home-length"
 
 
 def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
-    """Values by effect, SI: parameters of a law, home lengths by line.
+    """Values of a profile's effects that a calibration fits.
 
-    Effects that a calibration does not fit are left out. Raises FileError for a value that cannot
-    be read.
+    Returns
+    -------
+    dict
+        By effect the parameters of a law of elongation, or home lengths by line, SI.
+
+    Raises
+    ------
+    FileError
+        For a value that cannot be read.
     """
     out: dict[str, dict[str, float]] = {}
     faults: list[Fault] = []
@@ -87,13 +94,13 @@ PRIORS: dict[PriorName, float] = {
     "swivel_radius": 0.4e-3,
     "layer_growth": 0.04e-3,
 }
-"""Standard deviations where a robot's file has none, m: CABTIVE paper, Table 4, whose bounds are
-read as two standard deviations."""
+"""Standard deviations where a robot's file has none, m: half of the bounds of CABTIVE paper,
+Table 4."""
 
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius")
 """Effects of the catalogue that every calibration fits."""
 EFFECTS = (*LAWS, "home-length", "payload-mass", "payload-centre")
-"""Effects that join by name."""
+"""Effects that are fitted where they are named."""
 
 _HOME_LENGTH = 1e-3
 _MASS_SHARE, _MASS_LEAST = 0.2, 0.1
@@ -103,24 +110,24 @@ _ZERO, _OFFSET = 0.2, 0.05
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number, as it is fitted."""
+    """One parameter in the unit that is fitted."""
 
     name: str
     """``LINE.exit_point.x``, ``layer_growth``, ``cable-elongation-linear.axial_stiffness`` …"""
     unit: str
-    """Of the value as files have it."""
+    """Unit of the value in files."""
     nominal: float
     std: float
-    """Of the prior; zero for a number that stays as it is."""
+    """Of the prior; zero for a parameter that is held."""
     low: float = -np.inf
     high: float = np.inf
     reciprocal: bool = False
     """Files have 1/value."""
     zero: bool = False
-    """The zero of an instrument, which is no part of the robot."""
+    """Whether it is the zero of an instrument and no part of the robot."""
 
     def shown(self, value: float, std: float) -> tuple[float, float]:
-        """Value and standard deviation as files have them; an infinite stiffness has none."""
+        """Value and standard deviation in the unit of files; NaN for an infinite stiffness's."""
         if not self.reciprocal:
             return value, std
         return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
@@ -128,13 +135,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Parameters:
-    """All of them, and where each block of them stands."""
+    """All parameters, and the indices of each block."""
 
     all: tuple[Parameter, ...]
     block: dict[str, Indices]
     """Indices by block; (n, 3) for points, (n,) for what a line has one of."""
     law: str | None
-    """The law of elongation that is fitted."""
+    """Law of elongation that is fitted."""
 
     def __iter__(self) -> Iterator[Parameter]:
         return iter(self.all)
@@ -159,16 +166,16 @@ class Parameters:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which of them are fitted at all."""
+        """Mask of parameters that are fitted, (q,)."""
         return np.array([p.std > 0 for p in self.all])
 
     @property
     def lasting(self) -> NDArray[np.bool_]:
-        """Which of them are fitted and are the robot's own."""
+        """Mask of parameters that are fitted and belong to the robot, (q,)."""
         return np.array([p.std > 0 and not p.zero for p in self.all])
 
     def starting(self, block: str, values: Array) -> Parameters:
-        """The same with other nominal values of a block."""
+        """The same parameters with other nominal values of a block."""
         everything = list(self.all)
         for at, value in zip(self.block[block].ravel(), values.ravel(), strict=True):
             everything[at] = replace(everything[at], nominal=float(value))
@@ -176,7 +183,7 @@ class Parameters:
 
 
 class _Builder:
-    """Lays parameters one after another."""
+    """Appends blocks of parameters."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -190,7 +197,7 @@ class _Builder:
         self.block[block] = np.arange(start, len(self.all)).reshape(shape or (-1,))
 
     def prior(self, name: PriorName) -> PriorSpec:
-        """As the robot's file has it, else the paper's."""
+        """Prior of the robot's file, else of the paper."""
         return self.robot.profile.prior.get(name, PriorSpec(PRIORS[name]))
 
     def points(self, name: PriorName, values: Array) -> None:
@@ -204,7 +211,7 @@ class _Builder:
         self.add(name, found, -1, 3)
 
     def lengths(self, name: PriorName, values: Sequence[float], fitted: Sequence[bool]) -> None:
-        """One length a line; what is not fitted stays as it is."""
+        """One length a line; those that are not fitted have a prior of zero width."""
         prior = self.prior(name)
         low, high = prior.bounds or (0.0, np.inf)
         found = [
@@ -228,10 +235,22 @@ def parameters_of(
     swivel: bool = False,
     length_offset: bool = False,
 ) -> Parameters:
-    """Geometry, winches, the effects named, and the zeros of instruments that there are.
+    """Parameters of geometry, winches, named effects and zeros of instruments.
 
-    An elongation law brings the home lengths with it, since the tension at home is unknown. Raises
-    UsageError for an effect that a robot's calibration does not know.
+    Parameters
+    ----------
+    robot : Robot
+        Of n lines; its numbers are the nominal values.
+    effects : sequence of str
+        Beside those of the robot's profile. A law of elongation adds home lengths, since the
+        tension at home is unknown.
+    swivel, length_offset : bool
+        Whether the zeros of swivel angles and the offsets of length instruments are unknown.
+
+    Raises
+    ------
+    UsageError
+        For an effect that a calibration cannot fit, or two laws of elongation.
     """
     own = own_effects(robot.profile)
     effects = tuple(dict.fromkeys((*effects, *own)))
@@ -262,7 +281,7 @@ def parameters_of(
 
 
 def _of_law(law: str, spec: LawParameter, own: Mapping[str, float]) -> Parameter:
-    """A law's parameter, from where the robot's file has it."""
+    """Parameter of a law that starts at the value of the robot's file."""
     start = spec.start
     if spec.name in own:
         start = 1 / own[spec.name] if spec.reciprocal else own[spec.name]
@@ -281,11 +300,11 @@ def _known(effects: Sequence[str]) -> None:
             )
     laws = [effect for effect in effects if effect in LAWS]
     if len(set(laws)) > 1:
-        raise UsageError(f"{' and '.join(laws)} are laws of the same rope; name one of them")
+        raise UsageError(f"{' and '.join(laws)} are laws of the same cable; name one of them")
 
 
 def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
-    """One growth for all layered drums: they wind the same rope."""
+    """One growth for all layered drums, which wind the same cable."""
     growths = {
         getattr(drum_of(winch), "growth", 0.0) for winch in winches if winch.drum.kind in LAYERED
     }
@@ -294,7 +313,7 @@ def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
         raise UsageError(
             f"the winches of '{build.robot.profile.name}' have the layer growths {listed}; the "
             "lines of "
-            "one robot are calibrated with one, so give them the same rope"
+            "one robot are calibrated with one, so give them the same cable"
         )
     prior = build.prior("layer_growth")
     low, high = prior.bounds or (0.0, np.inf)

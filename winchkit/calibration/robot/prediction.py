@@ -1,4 +1,4 @@
-"""Where a robot's model says its platform is: poses from motor angles alone."""
+"""Prediction errors of a robot's model: poses by motor angles alone against measured ones."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
 from winchkit.model.robot import Pose, forward, rotation_of
+from winchkit.model.robot.pose_estimation import start_pose
 from winchkit.model.robot.rotation import rotation_vector
-from winchkit.schema.profiles.robot import PlatformSpec
 
 __all__ = ["PoseErrors", "errors_at", "rms", "start_of"]
 
@@ -28,13 +28,21 @@ class PoseErrors:
     angle: Array
     """(p,), rad; NaN where the rotation was not measured whole."""
     place: NDArray[np.str_]
-    """Which row of which run each pose is, (p,)."""
+    """Run and row of each pose, (p,)."""
     unfound: int
-    """Poses that no search found from their rope lengths."""
+    """Number of poses for which the forward kinematics did not converge."""
 
 
 def errors_at(equations: Equations, values: Array) -> PoseErrors:
-    """Predict every pose from its motor angles with the parameters' ``values``, and compare."""
+    """Predict every pose from its motor angles, and compare it with the measured one.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the p poses to predict.
+    values : (q,) array
+        Parameters in fitted units.
+    """
     pose, unfound = _poses(equations, values)
     measured = equations.measured
     distance = np.linalg.norm(pose.position - measured.position, axis=1)
@@ -46,23 +54,23 @@ def errors_at(equations: Equations, values: Array) -> PoseErrors:
 
 
 def rms(values: Sequence[float] | Array) -> float:
-    """Root of the mean square of what is known; NaN where nothing is."""
+    """Root of the mean square of finite values; NaN without any."""
     known = np.asarray(values)[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
 
 def _poses(equations: Equations, values: Array) -> tuple[Pose, int]:
-    """Search from what was measured, else from home; a rope's strain is found along with it."""
-    geometry, slack = equations.geometry(values), equations.rope(values)
+    """Forward kinematics from the measured pose or home, with strains by fixed-point iteration."""
+    geometry, slack = equations.geometry(values), equations.by_drum(values)
     dead, measured = equations.robot.dead_length, equations.measured
     start = start_of(equations)
-    given, platform = slack, _platform(equations, values)
+    given, platform = slack, equations.platform(values)
     rounds = 1 if equations.parameters.law is None or equations.forces.middle is None else _ROUNDS
     for _ in range(rounds):
-        strain, _by = equations.strain(values, start)
-        given = (slack + strain * dead) / (1 - strain)
+        if (strain := equations.strain(values, start)) is not None:
+            given = (slack + strain.value * dead) / (1 - strain.value)
         found = forward(geometry, given, start, platform)
-        # A pose that is lost is searched for once more from home.
+        # A search that did not converge starts again from home.
         start = _where(found.converged.astype(bool), found.pose, equations)
     known = np.all(np.isfinite(measured.motor_angle), axis=1)
     return found.pose, int(np.count_nonzero(known & ~found.converged.astype(bool)))
@@ -76,17 +84,9 @@ def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
     )
 
 
-def _platform(equations: Equations, values: Array) -> PlatformSpec:
-    block = equations.parameters.block
-    x, y, z = values[block["payload_centre"]].tolist()
-    return PlatformSpec(float(values[block["payload_mass"][0]]), (x, y, z))
-
-
 def start_of(equations: Equations) -> Pose:
-    """Measured positions and rotations, home's where there is none."""
-    home, measured = equations.robot.home, equations.measured
-    position = np.where(np.isfinite(measured.position), measured.position, home.position)
-    whole = np.all(np.isfinite(measured.angles), axis=1)
-    rotation = np.repeat(home.rotation, len(measured), axis=0)
-    rotation[whole] = rotation_of(*measured.angles[whole].T)
-    return Pose(position, rotation)
+    """Measured positions and rotations; those of the home pose where one was not measured whole."""
+    measured = equations.measured
+    whole = np.all(np.isfinite(measured.angles), axis=1, keepdims=True)
+    angles = np.where(whole, measured.angles, np.nan)
+    return start_pose(measured.position, angles, equations.robot.home)

@@ -1,4 +1,4 @@
-"""Writes a calibrated robot into a copy of its profile, with where every number came from."""
+"""Writes a calibrated robot into a copy of its profile, with date, runs and errors of the fit."""
 
 from __future__ import annotations
 
@@ -28,17 +28,30 @@ _STD_DIGITS = 3
 
 @dataclass(frozen=True)
 class Provenance:
-    """What the numbers were fitted to."""
+    """Runs and date of a fit."""
 
     runs: Sequence[str]
     date: date
 
 
 def write_calibrated(source: Path, found: Calibrated, out: Path, where: Provenance) -> None:
-    """Copy the robot's profile ``source`` to ``out`` with the numbers found.
+    """Copy a robot's profile with the estimates of a calibration.
 
-    Lines that named a winch get its tables for their own, since their radii now differ. Raises
-    FileError where a file cannot be read or written.
+    Lines that name a winch file get its tables as their own, since their radii now differ.
+
+    Parameters
+    ----------
+    source, out : Path
+        Profile to copy, and the copy.
+    found : Calibrated
+        The estimates.
+    where : Provenance
+        Date and runs, written into the table ``[fitted]``.
+
+    Raises
+    ------
+    FileError
+        Where a file cannot be read or written.
     """
     document = read_document(source)
     for line in document["line"]:

@@ -25,7 +25,7 @@ _SHOWN = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0))}
 
 
 def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[str, Any]:
-    """What ``winchkit calibrate --json`` prints; SI, rms over poses."""
+    """The object that ``winchkit calibrate --json`` prints; SI, rms over poses."""
     after, angle = found.validation_after, found.validation_after.angle
     return {
         "schema": 1,
@@ -73,14 +73,14 @@ def _entry(estimate: Estimated) -> dict[str, Any]:
 
 
 def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
-    """Errors, parameters, what could not be seen, what to measure next."""
+    """Errors, parameters, unidentifiable directions, candidate effects, warnings, next poses."""
     return "\n".join(
         [
             *_errors(found),
             "",
             *_table(found),
-            *_section("cannot be told from these poses:", found.observed.unobservable),
-            *_section("may be missing from the model:", candidate_lines(found)),
+            *_section("not identifiable from these poses:", found.observed.unobservable),
+            *_section("candidate effects:", candidate_lines(found)),
             *_section("note:", found.warnings),
             *_section("measure next:", [_pose(p) for p in following]),
         ]
@@ -88,16 +88,16 @@ def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
 
 
 def candidate_lines(found: Calibrated) -> list[str]:
-    """Effects worth trying, in words."""
+    """Candidate effects in words."""
     return [
-        f"the effect {c.effect} would explain {c.share * 100:.0f} % of what is left over; "
+        f"the effect {c.effect} would explain {c.share * 100:.0f} % of the remaining cost; "
         f"try --effect {c.effect}"
         for c in found.candidates
     ]
 
 
 def noise_words(found: Calibrated) -> str:
-    """What the fit leaves over of each kind of measurement."""
+    """Standard deviation of each kind of measurement in words."""
     return ", ".join(
         f"{kind.replace('_', ' ')} {_shown(sigma, NOISE[kind].unit)}"
         for kind, sigma in found.weights.sigma.items()
@@ -105,7 +105,7 @@ def noise_words(found: Calibrated) -> str:
 
 
 def in_words(estimate: Estimated) -> tuple[str, str, str, str]:
-    """Nominal value, value, sigma and unit as people read them: to the second digit of sigma."""
+    """Nominal value, value, sigma and unit, rounded to the second digit of sigma."""
     unit, worth = _SHOWN.get(estimate.parameter.unit, (estimate.parameter.unit, 1.0))
     std = estimate.std * worth
     if not (isfinite(std) and std > 0):
@@ -132,7 +132,7 @@ def _errors(found: Calibrated) -> Iterator[str]:
         )
     yield f"noise (1 sigma): {noise_words(found)}"
     yield (
-        f"{found.observed.rank} of {found.observed.free} parameter directions seen, "
+        f"{found.observed.rank} of {found.observed.free} parameter directions identifiable, "
         f"{found.seconds:.2f} s"
     )
 

@@ -1,54 +1,65 @@
-"""How exact each kind of measurement was, from the fit's own residuals (Helmert's estimate of
-variance components): Σ r² over what the fit left free of that kind."""
+"""Standard deviation of each kind of measurement of a calibration, from the fit's own residuals.
+
+The estimate is that of :mod:`winchkit.model.robot.variance_components`, with the leverages of
+poses and parameters together.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from winchkit.calibration.robot.least_squares import Solution, Weights, leverage
+from winchkit.model.robot.variance_components import START, re_estimated
 
-__all__ = ["NOISE", "KindNoise", "re_estimated"]
+__all__ = ["NOISE", "KindNoise", "re_estimated_weights"]
 
 
 @dataclass(frozen=True)
 class KindNoise:
-    """What is believed of a kind of measurement before anything is fitted."""
+    """Start and lower limit of a kind's standard deviation."""
 
     unit: str
     start: float
     least: float
 
 
+def _noise(unit: str, kind: str, least: float = 1e-7) -> KindNoise:
+    return KindNoise(unit, START[kind], least)
+
+
 NOISE: dict[str, KindNoise] = {
-    "rope": KindNoise("m", 5e-5, 1e-7),
-    "position": KindNoise("m", 5e-5, 1e-7),
-    "rotation": KindNoise("rad", 2e-3, 1e-7),
-    "swivel": KindNoise("rad", 2e-3, 1e-7),
-    "cable_length": KindNoise("m", 1e-4, 1e-7),
-    "balance": KindNoise("N", 1.0, 1e-4),
+    "rope": _noise("m", "rope"),
+    "position": _noise("m", "position"),
+    "rotation": _noise("rad", "rotation"),
+    "swivel": _noise("rad", "swivel"),
+    "cable_length": _noise("m", "cable_length"),
+    "balance": _noise("N", "balance", 1e-4),
 }
-"""Kinds of equations; ``rope`` is what the drum says against what the geometry says."""
+"""Kinds of equations; ``rope`` is the length by the drum against the length by geometry."""
 
-_FREE_LEAST = 12.0
-_SHARE_LEAST = 0.02
+_LEAST_REDUNDANCY = 12.0
 
 
-def re_estimated(solution: Solution, weights: Weights, given: Mapping[str, float]) -> Weights:
+def re_estimated_weights(
+    solution: Solution, weights: Weights, given: Mapping[str, float]
+) -> Weights:
     """Weights with the standard deviation of every kind that was not given, re-estimated.
 
-    A kind that the fit leaves hardly any freedom (a position alone of its pose) keeps its own.
+    A kind with hardly any redundancy (a position that alone determines its pose) keeps its own.
     """
     linear = solution.linear
     used = leverage(linear)
     sigma = dict(weights.sigma)
     for kind, part in linear.stack.kinds.items():
-        known = linear.stack.known[:, part]
-        free = float(np.sum((1 - used[:, part])[known]))
-        if kind in given or free < max(_FREE_LEAST, _SHARE_LEAST * np.count_nonzero(known)):
+        if kind in given:
             continue
-        square = float(np.sum(linear.stack.residual[:, part] ** 2)) / free
-        sigma[kind] = max(sigma[kind] * float(np.sqrt(square)), NOISE[kind].least)
+        known = linear.stack.known[:, part]
+        sigma[kind] = re_estimated(
+            sigma[kind],
+            linear.stack.residual[:, part][known],
+            used[:, part][known],
+            least_redundancy=_LEAST_REDUNDANCY,
+            least=NOISE[kind].least,
+        ).sigma
     return Weights(sigma, weights.loss)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from datetime import date
@@ -15,6 +14,7 @@ from typing import Any
 import click
 
 from winchkit.errors import CONTROL_CHARACTERS
+from winchkit.plain_json import finite_or_none
 
 __all__ = ["echo_each", "echo_json", "plain", "to_json"]
 
@@ -61,7 +61,7 @@ def _(value: Any) -> Any:
 
 @plain.register
 def _(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    return finite_or_none(value)
 
 
 @plain.register

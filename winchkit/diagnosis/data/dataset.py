@@ -16,6 +16,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.decimation import Thinning, thinning_for
 from winchkit.diagnosis.data.input_denoising import calm_motions
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
+from winchkit.diagnosis.data.sampling import bridged, gaps
 from winchkit.diagnosis.data.spectrum import Band, torque_band
 from winchkit.diagnosis.data.transients import jerked
 from winchkit.diagnosis.data.validation import admit
@@ -42,7 +43,6 @@ class Filtering:
     """Decimation of long runs; None for none."""
 
 
-_GAP = 2.5
 _SHAKEN = 0.25
 
 
@@ -159,28 +159,19 @@ def assemble(
     return Dataset(profile, recordings, tuple(repeats))
 
 
-def _bridged(values: Array) -> Array:
-    """Linear interpolation over NaN."""
-    good = np.isfinite(values)
-    if good.all():
-        return values
-    index = np.arange(len(values))
-    return np.interp(index, index[good], values[good])
-
-
 def _fastest(run: Run) -> float:
     """Fastest motor rate of a run, rad/s."""
-    rate = np.gradient(_bridged(run["motor_angle"]), run.time)
+    rate = np.gradient(bridged(run["motor_angle"]), run.time)
     return float(np.max(np.abs(rate)))
 
 
 def _signals(run: Run, fastest: float) -> Signals:
     def channel(name: str) -> Array | None:
-        return _bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
+        return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
 
     return Signals(
         time=run.time,
-        motor_angle=_bridged(run["motor_angle"]),
+        motor_angle=bridged(run["motor_angle"]),
         load=channel("load"),
         load_mass=run.load_mass,
         tension=channel("tension"),
@@ -200,7 +191,7 @@ def _recording(
     return Recording(
         name=run.name,
         signals=signals,
-        measured={output: _bridged(run[output]) for output in outputs},
+        measured={output: bridged(run[output]) for output in outputs},
         valid={output: _valid(run, output, raw, bands[output]) for output in outputs},
         bands=bands,
         zeroed=run.length_zeroed,
@@ -236,15 +227,14 @@ def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
         good[:edge] = good[-edge:] = False
     good = _away_from_gaps(good, band.rate, band.cut_off)
     if output != "cable_length":
-        good &= ~jerked(run.time, _bridged(run[output]), output, motion)
+        good &= ~jerked(run.time, bridged(run[output]), output, motion)
     return good
 
 
 def _away_from_time_gaps(time: Array) -> Mask:
     """Samples away from gaps in time, within which the motion is not known."""
-    steps = np.diff(time)
     out = np.ones(len(time), dtype=bool)
-    for index in np.flatnonzero(steps > _GAP * np.median(steps)):
+    for index in gaps(time):
         out &= (time < time[index] - _SHAKEN) | (time > time[index + 1] + _SHAKEN)
     return out
 

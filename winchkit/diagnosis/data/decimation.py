@@ -21,6 +21,7 @@ import numpy as np
 from scipy.signal import firwin, upfirdn, welch
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.sampling import bridged, gaps
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Motion
 from winchkit.model.stages import At
@@ -44,7 +45,6 @@ _BLOCKS = 8
 """Least number of blocks of a Welch spectrum, overlapping by half."""
 _CLEAR = 2.0
 """Ratio to the noise power from which a frequency holds signal."""
-_GAP = 2.5
 _TAPS = 10
 _BETA = 7.857
 """Shape of the Kaiser window for 80 dB stop-band attenuation."""
@@ -116,10 +116,8 @@ class Thinning:
             return self._passed(values, pieces)
         if not known.any():
             return self._every(values, pieces)
-        index = np.arange(len(values))
-        bridged = np.interp(index, index[known], values[known])
         share = self._passed(known.astype(float), pieces)
-        return np.where(share > 0.5, self._passed(bridged, pieces), np.nan)
+        return np.where(share > 0.5, self._passed(bridged(values), pieces), np.nan)
 
     def _passed(self, values: Array, pieces: Sequence[slice]) -> Array:
         """Zero-phase low-pass and decimation, each piece between gaps by itself."""
@@ -181,11 +179,11 @@ def _quickest(values: Array, rate: float) -> float:
     length = min(len(values) // _BLOCKS, round(_BLOCK * rate))
     if not known.any() or length < 2:
         return 0.0
-    index = np.arange(len(values))
-    bridged = values if known.all() else np.interp(index, index[known], values[known])
     # A ramp over many turns leaks over all frequencies through a Hann window.
     window = ("general_cosine", (3 / 8, 1 / 2, 1 / 8))
-    frequency, power = welch(bridged, fs=rate, window=window, nperseg=length, detrend=_levelled)
+    frequency, power = welch(
+        bridged(values), fs=rate, window=window, nperseg=length, detrend=_levelled
+    )
     noise = float(np.median(power[frequency > rate / 4]))
     clear = np.where(power > _CLEAR * noise, power - noise, 0.0)
     beyond = np.cumsum(clear[::-1])[::-1]
@@ -201,7 +199,6 @@ def _levelled(values: Array) -> Array:
 
 def _pieces(time: Array) -> list[slice]:
     """Slices between gaps in time."""
-    steps = np.diff(time)
-    ends = np.flatnonzero(steps > _GAP * np.median(steps)) + 1
+    ends = gaps(time) + 1
     edges = [0, *ends.tolist(), len(time)]
     return [slice(low, high) for low, high in pairwise(edges)]

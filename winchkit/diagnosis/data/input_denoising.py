@@ -36,26 +36,26 @@ _FLOOR_SHARE = 1 / 3
 
 
 def contrasts(aligned: Array) -> tuple[Array, Array]:
-    """Mean part and Helmert contrasts of repeats, each with the variance of one run's noise.
+    """Mean part and Helmert contrasts of repeats, each with the variance of one repeat's noise.
 
     Parameters
     ----------
-    aligned : (m, n) array
-        The same n samples of m repeats.
+    aligned : (m, ...) array
+        Values of m repeats.
 
     Returns
     -------
-    mean : (n,) array
-        Sum over the repeats divided by √m.
-    differences : (m - 1, n) array
-        Orthonormal contrasts, orthogonal to the mean.
+    mean : (...) array
+        The sum divided by √m.
+    differences : (m − 1, ...) array
+        (x₁ + … + x_j − j x_{j+1}) / √(j (j + 1)): orthogonal to the mean and to each other.
     """
     m = len(aligned)
     mean = aligned.sum(axis=0) / np.sqrt(m)
     differences = [
         (aligned[:j].sum(axis=0) - j * aligned[j]) / np.sqrt(j * (j + 1)) for j in range(1, m)
     ]
-    return mean, np.array(differences).reshape(m - 1, aligned.shape[1])
+    return mean, np.array(differences).reshape(m - 1, *aligned.shape[1:])
 
 
 def quiet(signal: Array) -> Array:

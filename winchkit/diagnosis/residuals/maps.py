@@ -18,6 +18,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.residuals.attribution import by_chance, kept_rows, variables_of
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
+from winchkit.plain_json import significant
 
 __all__ = ["PAIRS", "ResidualMap", "residual_maps", "same_cells"]
 
@@ -189,4 +190,4 @@ def _index(values: Array, edges: Array) -> NDArray[np.intp]:
 
 def _rounded(values: Array) -> list[float | None]:
     """Numbers to five significant digits, None for NaN."""
-    return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in values]
+    return significant(values.tolist(), _DIGITS)

@@ -1,7 +1,8 @@
-"""What a robot's errors follow: lines, the platform's place and turn, lengths, tensions, warmth.
+"""Attribution of a robot's errors to lines, position, rotation, lengths, tensions, temperature.
 
-An effect on one line shows there alone, and a shifted point turns its sign with the pose. So a
-share is that of means over bins of a variable, line by line (axis by axis of a position).
+The share is the correlation ratio η²: variance of the means over eight bins of a variable, over the
+error's power, less its expectation by chance. It is taken line by line (axis by axis of a
+position), since an effect on one line shows there alone.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from winchkit.diagnosis.robot.errors import Errors
 from winchkit.diagnosis.robot.regression import RobotProblem
 from winchkit.model.robot import angles_of
 
-__all__ = ["AXES", "ON_PLATFORM", "follows_of", "most_telling", "on_ropes", "variables_of_poses"]
+__all__ = ["AXES", "ON_PLATFORM", "follows_of", "most_telling", "on_cables", "variables_of_poses"]
 
 AXES = ("x", "y", "z")
 """Columns of a position's error."""
@@ -25,33 +26,46 @@ ON_PLATFORM = tuple(f"platform_{name}" for name in (*AXES, "roll", "pitch", "yaw
 """Variables of the pose itself."""
 _BINS = 8
 _WORTH = 0.02
+"""Least share that is reported (rule of thumb)."""
 _SURE = 3.0
+"""Standard deviations by chance that a share must exceed."""
 _MOSTLY = 0.5
+"""Share of one line above which the line is named."""
 _FEWEST = 20
+"""Least number of samples of a line (rule of thumb)."""
 
 
 @dataclass(frozen=True)
 class _Share:
-    """What the means over a variable's bins take of an error's power."""
+    """Share of an error's power explained by the means over a variable's bins."""
 
     share: float
-    """Less what chance gives."""
+    """η² less its expectation by chance."""
     by_chance: float
-    """What chance hardly reaches."""
+    """Three standard deviations of the share by chance."""
     column: int
-    """Which line or axis has most of it."""
+    """Line or axis with the largest part of it."""
     alone: bool
-    """Whether that one has over half of it."""
+    """Whether that line has more than half of it."""
 
 
 def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
-    """Per output the variables that its error follows, largest share first.
+    """Variables that explain the errors of each output, the largest share first.
 
-    ``winch`` is the share of the lines' own constants, ``pose`` that of what the lines of one pose
-    have in common.
+    Parameters
+    ----------
+    problem : RobotProblem
+        Of p poses.
+    errors : dict
+        By output, as :func:`winchkit.diagnosis.robot.errors.errors_of` returns them.
+
+    Returns
+    -------
+    list of Followed
+        ``winch`` is the share of a constant per line, ``pose`` that of a constant per pose.
     """
     variables, out = variables_of_poses(problem), []
-    for output, error in on_ropes(problem, errors).items():
+    for output, error in on_cables(problem, errors).items():
         lines = AXES if output == "platform_position" else problem.dataset.names
         found = []
         for name, values in variables.items():
@@ -68,23 +82,23 @@ def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
 
 
 def most_telling(values: Array, error: Array) -> int:
-    """Which line or axis, a column, follows a variable with most of its error."""
+    """Column (line or axis) whose error a variable explains most."""
     return _taken(np.broadcast_to(values, error.shape), error).column
 
 
-def on_ropes(problem: RobotProblem, errors: Errors) -> Errors:
-    """Errors as they are drawn: a tension's as the least forces that would balance it, by line."""
+def on_cables(problem: RobotProblem, errors: Errors) -> Errors:
+    """Errors as they are drawn: those of tensions as the least cable forces that balance them."""
     out = dict(errors)
     if "tension" in out:
         known = np.isfinite(out["tension"])
         inside = np.where(known, out["tension"], 0.0)
-        spread = (problem.equations.to_ropes @ inside[..., None])[..., 0]
+        spread = (problem.equations.to_cables @ inside[..., None])[..., 0]
         out["tension"] = np.where(known.all(axis=1, keepdims=True), spread, np.nan)
     return out
 
 
 def variables_of_poses(problem: RobotProblem) -> dict[str, Array]:
-    """By name, (p, 1) of the platform, (p, n) of the lines, SI."""
+    """Variables by name, (p, 1) of the platform, (p, n) of the lines, SI."""
     dataset, measured = problem.dataset, problem.dataset.measured
     angle = measured.motor_angle
     drum = np.empty_like(angle)
@@ -107,7 +121,7 @@ def variables_of_poses(problem: RobotProblem) -> dict[str, Array]:
 
 
 def _taken(values: Array, error: Array) -> _Share:
-    """Share of the error's power in its means over bins, column by column, constants left out."""
+    """η² over quantile bins, column by column, without the columns' means."""
     known = np.isfinite(error) & np.isfinite(values)
     total, count, between, bins = 0.0, 0, np.zeros(error.shape[1]), 0
     for k in range(error.shape[1]):
@@ -132,7 +146,7 @@ def _taken(values: Array, error: Array) -> _Share:
 
 
 def _constants(problem: RobotProblem, output: str, error: Array) -> list[Followed]:
-    """Shares of what is constant on a line, and common to the lines of one pose."""
+    """Shares of a constant per line and of a constant per pose."""
     known, out = np.isfinite(error), []
     winch = np.broadcast_to(np.arange(error.shape[1]), error.shape)
     pose = np.broadcast_to(problem.dataset.pose[:, None], error.shape)
@@ -146,7 +160,7 @@ def _constants(problem: RobotProblem, output: str, error: Array) -> list[Followe
 
 
 def _category_share(category: NDArray[np.intp], error: Array) -> _Share:
-    """Share of the error's power in the means of its categories, less what chance gives."""
+    """η² over categories less its expectation by chance."""
     total = float(error @ error)
     if total == 0.0:
         return _Share(0.0, 1.0, 0, alone=False)

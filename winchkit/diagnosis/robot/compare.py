@@ -1,4 +1,4 @@
-"""A robot's profile against poses: how far off, and what the error follows. Nothing is fitted."""
+"""Comparison of a robot's profile with poses: errors and their attribution, without a fit."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.residuals.attribution import Followed
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.diagnosis.robot.attribution import follows_of
@@ -15,7 +16,7 @@ from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
 from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
 from winchkit.diagnosis.robot.regression import RobotProblem, Standing
-from winchkit.diagnosis.robot.variance_components import START, contrasts
+from winchkit.diagnosis.robot.variance_components import START
 from winchkit.effects.bind_robot import robot_terms, robot_with_effects
 from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
@@ -26,13 +27,13 @@ __all__ = ["RobotCompared", "compare_robot", "compared_robot"]
 
 @dataclass(frozen=True)
 class RobotCompared:
-    """A comparison with everything behind it, for reports."""
+    """Comparison with regression and errors, for reports."""
 
     comparison: Comparison
     problem: RobotProblem
     errors: Errors
     followed: Mapping[str, Followed]
-    """Per output what its error follows most."""
+    """By output the variable with the largest share of its error."""
 
 
 def compare_robot(
@@ -40,7 +41,26 @@ def compare_robot(
 ) -> Comparison:
     """Compare poses with a robot's profile at its file values.
 
-    Raises RunError with every fault of every run, FileError for effects that do not bind.
+    Parameters
+    ----------
+    runs : sequence of Run
+        With motor angles and measured poses.
+    profile : RobotProfile
+        With its own effects.
+    catalogue : Catalogue, optional
+        Of effects; the one that ships by default.
+
+    Returns
+    -------
+    Comparison
+        Errors by output, SI, and the variables that explain them.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run.
+    FileError
+        For effects that cannot be bound to the robot.
     """
     return compared_robot(runs, profile, catalogue).comparison
 
@@ -48,7 +68,7 @@ def compare_robot(
 def compared_robot(
     runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue | None = None
 ) -> RobotCompared:
-    """As :func:`compare_robot`, with the errors that its figures were taken from."""
+    """As :func:`compare_robot`, with regression and errors."""
     dataset = prepare_poses(runs, profile)
     robot = robot_with_effects(profile, catalogue)
     equations = Equations(dataset, start_pose(dataset), robot)
@@ -85,13 +105,13 @@ def _largest(name: str, error: Array) -> float:
 
 
 def _noise(errors: Errors, dataset: RobotDataset) -> dict[str, float]:
-    """Rms of the differences of repeated poses; empty without any."""
+    """Rms of the contrasts of repeated poses (pure error); empty without repeats."""
     groups = [np.flatnonzero(dataset.pose == n) for n in range(int(dataset.pose.max()) + 1)]
     many = [group for group in groups if len(group) > 1]
     if not many:
         return {}
     apart = {
-        name: np.concatenate([contrasts(error[group]) for group in many])
+        name: np.concatenate([contrasts(error[group])[1] for group in many])
         for name, error in errors.items()
     }
     return {name: rms(name, values) for name, values in apart.items()}

@@ -1,4 +1,4 @@
-"""A robot's poses made ready: which of them repeat each other, and what their runs cannot show."""
+"""Data set of a robot's poses: measurements of all runs and which rows repeat a pose."""
 
 from __future__ import annotations
 
@@ -20,27 +20,31 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = ["RobotDataset", "prepare_poses"]
 
 _FEWEST = 10
+"""Least number of poses (rule of thumb)."""
 _ANGLES_AGREE = 0.02
+"""Rms difference of motor angles within which rows repeat a pose, in their standard deviation."""
 _TENSIONS_AGREE = 0.03
+"""Relative difference of the mean tension within which rows repeat a pose (rule of thumb)."""
 _MOSTLY = 0.5
+"""Share of finite tensions above which tensions are used."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotDataset(Dataset):
-    """Poses of one robot. A row is a pose at rest; there is no time between rows."""
+    """Poses of one robot: a row is a pose at rest, and rows have no order in time."""
 
     robot: RobotProfile
     measured: Measured
     pose: NDArray[np.intp]
-    """Number of the distinct pose that each row takes, (p,)."""
+    """Number of the distinct pose of each row, (p,)."""
     runs: tuple[str, ...]
     """Files."""
     balanced: bool = True
-    """Whether the tensions measured carry the platform's weight at all."""
+    """Whether the measured tensions balance the platform's weight well enough to be used."""
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Kinds of equations: lengths, and tensions where they were measured."""
+        """Outputs: cable lengths, and tensions where they are compared with the weight."""
         return ("cable_length", "tension") if self.has_balance else ("cable_length",)
 
     @property
@@ -50,7 +54,7 @@ class RobotDataset(Dataset):
 
     @property
     def has_tension(self) -> bool:
-        """Whether most rows have the tension of their rope."""
+        """Whether most tensions were measured."""
         return bool(np.mean(np.isfinite(self.measured.tension)) > _MOSTLY)
 
     @property
@@ -60,7 +64,14 @@ class RobotDataset(Dataset):
 
 
 def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
-    """Read the poses of a robot's runs. Raises RunError with every fault of every run."""
+    """Read the poses of a robot's runs.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run; for fewer than ten poses, or without redundancy beyond the
+        six coordinates of each pose.
+    """
     if not runs:
         raise RunError("no run given")
     measured = read_poses(runs, robot)
@@ -74,8 +85,8 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
     if spare <= 0:
         raise RunError(
             Fault(
-                "nothing measured beside what the poses themselves take up; measure the platform "
-                "(platform_x, platform_y, platform_z)",
+                "no measurement beyond those that determine the poses themselves; measure the "
+                "platform (platform_x, platform_y, platform_z)",
                 place,
             )
         )
@@ -94,7 +105,7 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
 
 
 def _distinct(measured: Measured) -> NDArray[np.intp]:
-    """Number of each row's pose: motor angles agree to 2 % of their spread, tensions to 3 %."""
+    """Number of each row's distinct pose, (p,)."""
     angle = measured.motor_angle
     spread = np.maximum(np.nanstd(angle, axis=0), 1e-9)
     scaled = np.where(np.isfinite(angle), angle / spread, np.inf)

@@ -1,8 +1,9 @@
-"""What users read of a robot's model: errors in SI, in sample and on poses held out.
+"""Errors of a robot's model in SI: in sample, held out and by noise alone.
 
-``cable_length`` is the rope by the drum against the rope by geometry at the pose measured,
-``platform_position`` the pose that the motor angles stand for against the one measured, and
-``tension`` what measured rope forces and the weight leave unbalanced.
+``cable_length`` is the length by the drum less the length by geometry at the measured pose, with
+what unmeasured coordinates of the pose can explain projected out; ``platform_position`` the
+position by the motor angles (linearised forward kinematics) less the measured one; ``tension`` the
+whitened wrench that measured cable forces and the weight leave over.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _HELD = 6
 
 @dataclass(frozen=True)
 class Shown:
-    """A fitted model with all that is needed to judge it."""
+    """Fitted model with the noise and the folds by which it is judged."""
 
     problem: RobotProblem
     fit: Fit
@@ -39,7 +40,20 @@ class Shown:
 
 
 def errors_of(problem: RobotProblem, residuals: Mapping[str, Array]) -> Errors:
-    """By output, (p, k), SI, NaN where unknown."""
+    """Errors by output.
+
+    Parameters
+    ----------
+    problem : RobotProblem
+        Of p poses.
+    residuals : mapping
+        Residuals by kind, (p, k), SI.
+
+    Returns
+    -------
+    dict
+        By output (p, n), (p, 3) or (p, k), SI; NaN where something was not measured.
+    """
     at_pose, to_place = _maps(problem)
     known = _seen(residuals)
     moved = np.where(known, np.concatenate([residuals["position"], residuals["rotation"]], 1), 0.0)
@@ -60,7 +74,7 @@ def errors_of(problem: RobotProblem, residuals: Mapping[str, Array]) -> Errors:
 
 
 def noise_rms(problem: RobotProblem, noise: PoseNoise) -> dict[str, float]:
-    """What the instruments alone would leave, by output, SI."""
+    """Rms of the errors by the noise of the instruments alone, by output, SI."""
     at_pose, to_place = _maps(problem)
     sigma, by = noise.sigma, problem.slope()["rope"]
     here = problem.residuals(())
@@ -76,7 +90,7 @@ def noise_rms(problem: RobotProblem, noise: PoseNoise) -> dict[str, float]:
 
 
 def figures(begin: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit]:
-    """Every output before and after; a position's rms is of its distance."""
+    """Error statistics of every output before and after; of positions those of the distance."""
     before, after = (errors_of(s.problem, s.problem.at(s.fit.hypothesis)) for s in (begin, final))
     held_before, held_after = held_out_rms(begin), held_out_rms(final)
     least = noise_rms(final.problem, noise)
@@ -100,7 +114,7 @@ def figures(begin: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit
 
 
 def rms(name: str, error: Array) -> float:
-    """Of all values; of a position of its distance."""
+    """Root mean square of all values; of a position that of its distance."""
     known = error[np.isfinite(error).all(axis=1)] if name == "platform_position" else error
     squares = np.nansum(known**2, axis=1) if name == "platform_position" else known**2
     squares = squares[np.isfinite(squares)]
@@ -111,7 +125,7 @@ def signals(problem: RobotProblem) -> dict[str, float]:
     """How much each output varies, rms about its mean, SI."""
     measured = problem.dataset.measured
     length = problem.equations.residuals(problem.robot)["rope"] + problem.robot.lengths_at(
-        measured.motor_angle, problem.equations.forces(problem.robot), problem.equations.warm
+        measured.motor_angle, problem.equations.forces(problem.robot), problem.equations.temperature
     )
     values = {
         "cable_length": length,
@@ -127,12 +141,12 @@ def signals(problem: RobotProblem) -> dict[str, float]:
 
 
 def held_out_rms(shown: Shown) -> dict[str, float]:
-    """Error of every output on poses held out, rms in SI."""
+    """Held-out error of every output, rms, SI."""
     return {name: rms(name, error) for name, error in _held_out(shown).items()}
 
 
 def _held_out(shown: Shown) -> Errors:
-    """Errors of every pose with the unknowns fitted without its fold, linearised."""
+    """Errors of every pose with the parameters fitted without its fold (linearised), SI."""
     problem, found = shown.problem, shown.fit
     here = problem.at(found.hypothesis)
     steps = left_out_steps(problem, found, shown.noise, shown.folds)
@@ -158,8 +172,8 @@ def _seen(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
 
 
 def _maps(problem: RobotProblem) -> tuple[Array, Array]:
-    """Per pose: what takes what unmeasured coordinates can undo out of closures (p, n, n), and
-    closures to the place where the ropes put the platform (p, 3, n)."""
+    """Per pose the projection of closures beside the unmeasured coordinates (p, n, n), and the map
+    from closures to positions (p, 3, n)."""
     by = problem.slope()["rope"]
     by = np.where(np.isfinite(by), by, 0.0)
     free = by * ~_seen(problem.residuals(()))[:, None, :]

@@ -1,4 +1,4 @@
-"""What a set of poses cannot show, said before anything is concluded from it."""
+"""Excitation: effects that a set of poses cannot show, by missing measurements or motion."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def what_poses_cannot_show(study: Study) -> list[str]:
         )
     if not dataset.has_tension:
         notes.append(
-            "no tensions measured: what depends on the ropes' force (elasticity, payload, cells) "
+            "no tensions measured: what depends on the cables' force (elasticity, payload, cells) "
             "cannot be seen; record LINE.tension [N]"
         )
     elif not dataset.has_balance:
@@ -46,10 +46,12 @@ def what_poses_cannot_show(study: Study) -> list[str]:
         turned = rotation_vector(rotation_of(*whole.T) @ rotation_of(*whole[0]).T)
         if float(np.max(np.linalg.norm(turned, axis=1))) < _TURNED:
             notes.append(
-                "the platform never turned: exit and anchor points cannot be told apart; turn it "
-                "between poses"
+                "the platform never turned: exit and anchor points cannot be distinguished; "
+                "turn it between poses"
             )
     distinct = int(dataset.pose.max()) + 1
     if distinct < _FEW:
-        notes.append(f"{distinct} distinct poses only; ninety, widely spread, tell much more")
+        notes.append(
+            f"{distinct} distinct poses only; ninety, widely spread, are much more informative"
+        )
     return notes

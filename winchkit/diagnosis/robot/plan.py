@@ -1,4 +1,4 @@
-"""What poses to take next, as a list: what they tell apart, and what they show besides."""
+"""Plan of further poses: pairs of effects that they separate, effects that become detectable."""
 
 from __future__ import annotations
 
@@ -22,36 +22,38 @@ from winchkit.runs.run import Channel, Run
 __all__ = ["PosePlan", "plan_poses"]
 
 _SURE = 0.9
+"""Power from which on a question counts as answered."""
 _MOST = 6
+"""Most effects whose detectability is asked for."""
 
 
 @dataclass(frozen=True)
 class PosePlan:
-    """Kinds of poses, the most telling first, and what was asked of them."""
+    """Kinds of poses, the most informative first, and the questions that they answer."""
 
     pairs: tuple[tuple[Term, Term], ...]
-    """To be told apart; the first powers of every offer are theirs."""
+    """Pairs of effects to separate; the first powers of every offer are theirs."""
     hidden: tuple[Term, ...]
-    """Effects of a usual size that the poses so far would not have shown."""
+    """Effects that are not detectable in their usual size with the poses so far."""
     offers: tuple[PoseOffer, ...]
     lines: tuple[str, ...]
 
     def shows(self, offer: PoseOffer) -> list[str]:
-        """Effects that an offer would show for the first time."""
+        """Effects that become detectable with an offer."""
         powers = offer.powers[len(self.pairs) :]
         shown = zip(self.hidden, powers, strict=True)
         return [term.effect.id for term, power in shown if power >= _SURE]
 
     @property
     def best(self) -> PoseOffer | None:
-        """The most telling offer; None where none tells anything apart or shows anything new."""
+        """First offer; None where it separates no pair and makes no effect detectable."""
         for offer in self.offers[:1]:
             if self.shows(offer) or max(self.of_pairs(offer), default=0.0) >= WORTHWHILE:
                 return offer
         return None
 
     def of_pairs(self, offer: PoseOffer) -> tuple[float, ...]:
-        """Chances of telling each pair apart."""
+        """Power of separating each pair."""
         return offer.powers[: len(self.pairs)]
 
     def to_json(self) -> dict[str, Any]:
@@ -81,7 +83,7 @@ class PosePlan:
         }
 
     def run(self, offer: PoseOffer) -> Run:
-        """The poses of an offer, as a run to drive to and to fill with what is measured."""
+        """Poses of an offer as a run: targets to drive to, to be completed by measurements."""
         angles = angles_of(offer.pose.rotation)
         channels = {
             f"platform_{axis}": Channel(offer.pose.position[:, k], "m")
@@ -101,7 +103,21 @@ class PosePlan:
 
 
 def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
-    """Kinds of poses, tried on the model that a diagnosis came to; the most telling first."""
+    """Rank kinds of poses by simulation on the model of a diagnosis.
+
+    Parameters
+    ----------
+    answer : RobotAnswer
+        Of a diagnosis.
+    count : int
+        Poses per offer.
+
+    Returns
+    -------
+    PosePlan
+        Ranked by the number of pairs separated, then by their powers, then the same for
+        detectable effects.
+    """
     problem, final = answer.robot_problem, answer.found.final.hypothesis
     pairs = tuple(pairs_of(answer.sets))
     hidden = _hidden(answer)
@@ -122,9 +138,9 @@ def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
 
 
 def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
-    """Effects whose usual size these poses would not have shown, the nearest to it first.
+    """Effects that are not detectable in their usual size, the most nearly detectable first.
 
-    Of those on one line each, the line where it shows least.
+    Of effects on one line each, the line with the least power.
     """
     faint: dict[str, tuple[float, Term]] = {}
     there = {term.effect.id for term in answer.found.final.hypothesis.terms}

@@ -1,4 +1,9 @@
-"""Kinds of poses that a robot may take next, imagined on its model: farther out, turned more, …"""
+"""Candidate kinds of further poses, simulated on a robot's model, and their power.
+
+Each kind differs from the poses so far in one respect (farther out, turned more, other forces,
+other temperatures). Of each, the poses are chosen greedily for the noncentrality that they add
+(:mod:`winchkit.model.robot.pose_design`) to every question.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.design.discrimination import APART, power_of
@@ -17,15 +21,21 @@ from winchkit.diagnosis.robot.regression import RobotProblem
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 from winchkit.model.robot import (
-    ForceLimits,
     Pose,
     Robot,
     angles_of,
     approximate_forces,
     lengths,
-    rotation_of,
     swivel_angle,
-    wrench_feasibility,
+)
+from winchkit.model.robot.pose_design import (
+    chosen_in_turn,
+    in_box,
+    is_held,
+    middle_and_half,
+    noncentrality,
+    pose_information,
+    random_poses,
 )
 from winchkit.runs.poses import Measured, joined
 
@@ -49,21 +59,19 @@ _WIDER, _INSIDE = 2.0, 0.85
 _TURNED, _MORE = np.radians(12.0), 2.0
 _LEAST_BOX = 0.02
 _STRONGER, _WARMER = 2.0, 15.0
-_PULLING = ForceLimits(0.0, float("inf"))
-_FREEDOMS = 6
 
 
 @dataclass(frozen=True)
 class PoseKind:
-    """A kind of poses, and in what it differs from those so far."""
+    """Kind of poses: its difference from the poses so far."""
 
     name: str
     words: str
     out: bool = False
-    """Farther out, as far as ropes hold inside the frame."""
+    """Farther out, within the frame and where cables hold the platform."""
     turned: bool = False
     stronger: bool = False
-    """Rope forces from half to twice those so far."""
+    """Cable forces from half to twice those so far."""
     warmer: bool = False
 
 
@@ -72,71 +80,68 @@ KINDS = (
     PoseKind("turned", "turned more", turned=True),
     PoseKind("farther", "farther out", out=True),
     PoseKind("farther-turned", "farther out and turned more", out=True, turned=True),
-    PoseKind("tensions", "under rope forces from half to twice those so far", stronger=True),
-    PoseKind("warmth", "with the ropes 15 K colder and warmer", warmer=True),
+    PoseKind("tensions", "under cable forces from half to twice those so far", stronger=True),
+    PoseKind("warmth", "with the cables 15 K colder and warmer", warmer=True),
 )
-"""Those that ask least of the user first."""
+"""In ascending order of effort for the user."""
 
 
 def usable(kind: PoseKind, dataset: RobotDataset) -> bool:
-    """Whether a kind differs in something that is measured on this robot."""
+    """Whether the difference of a kind is measured on this robot."""
     if kind.stronger and not dataset.has_tension:
         return False
     return bool(np.isfinite(dataset.measured.temperature).all()) or not kind.warmer
 
 
 def imagined(problem: RobotProblem, robot: Robot, kind: PoseKind) -> tuple[Measured, Pose]:
-    """What would be measured at poses of a kind, without noise, and those poses.
+    """Simulate measurements at random poses of a kind, without noise.
 
-    Only where pulling ropes hold the platform; NaN where nothing was measured so far.
+    Parameters
+    ----------
+    problem : RobotProblem
+        With the poses so far.
+    robot : Robot
+        With the effects of the final model.
+    kind : PoseKind
+        Of the poses.
+
+    Returns
+    -------
+    Measured
+        NaN where nothing was measured so far.
+    Pose
+        Where pulling cables hold the platform.
     """
     rng = np.random.default_rng(_SEED)
     pose = _placed(problem, robot, kind, rng)
     force = _forces(problem, robot, kind, pose, rng)
-    good = _held(robot, pose) & np.isfinite(force).all(axis=1) & (force > 0).all(axis=1)
-    if not problem.dataset.has_tension:
-        good = _held(robot, pose)
+    good = is_held(robot.geometry, robot.platform, pose)
+    if problem.dataset.has_tension:
+        good &= np.isfinite(force).all(axis=1) & (force > 0).all(axis=1)
     pose, force = Pose(pose.position[good], pose.rotation[good]), force[good]
     return _measured(problem.dataset, robot, kind, pose, force), pose
 
 
 def _placed(problem: RobotProblem, robot: Robot, kind: PoseKind, rng: np.random.Generator) -> Pose:
-    """Random poses of a kind that the geometry can take."""
+    """Random poses of a kind."""
     seen = problem.standing.pose
     corners = robot.geometry.exit_point
-    middle, half = _middle(seen.position)
+    middle, half = middle_and_half(seen.position)
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
     room = _INSIDE * np.ptp(corners, axis=0) / 2
     wide = np.maximum(_WIDER * half, _LEAST_BOX) if kind.out else half
-    place = middle + wide * rng.uniform(-1, 1, (_CANDIDATES, 3))
+    place = in_box((middle, wide), _CANDIDATES, rng)
     if np.all(room > 0):
         place = centre + np.clip(place - centre, -room, room)
-    level, tilt = _middle(angles_of(seen.rotation))
+    level, tilt = middle_and_half(angles_of(seen.rotation))
     more = np.maximum(_MORE * tilt, _TURNED) if kind.turned else tilt
-    angles = level + more * rng.uniform(-1, 1, (_CANDIDATES, 3))
-    pose = Pose(place, rotation_of(*angles.T))
-    sound = np.isfinite(lengths(robot.geometry, pose.position, pose.rotation)).all(axis=1)
-    return Pose(pose.position[sound], pose.rotation[sound])
-
-
-def _middle(values: Array) -> tuple[Array, Array]:
-    """Middle and half width, column by column."""
-    low, high = values.min(axis=0), values.max(axis=0)
-    return (low + high) / 2, (high - low) / 2
-
-
-def _held(robot: Robot, pose: Pose) -> NDArray[np.bool_]:
-    """Whether ropes that only pull balance the platform's weight there."""
-    if len(robot.names) < _FREEDOMS:
-        return np.ones(len(pose.position), dtype=bool)
-    pairs = zip(robot.structure(pose), robot.weight(pose), strict=True)
-    return np.array([wrench_feasibility(a, w, _PULLING).margin > 0 for a, w in pairs], dtype=bool)
+    return random_poses(robot.geometry, place, in_box((level, more), _CANDIDATES, rng))
 
 
 def _forces(
     problem: RobotProblem, robot: Robot, kind: PoseKind, pose: Pose, rng: np.random.Generator
 ) -> Array:
-    """Rope forces that balance the weight, spread as those measured so far; zero without cells."""
+    """Cable forces that balance the weight, spread as those measured so far; zero without cells."""
     measured, many = problem.dataset.measured.tension, len(pose.position)
     if not problem.dataset.has_tension:
         return np.zeros((many, measured.shape[1]))
@@ -177,38 +182,51 @@ def _measured(
 
 
 Question = tuple[Term, Term | None]
-"""An effect, and the rival that it is to be told from; without one, from nothing at all."""
+"""An effect and the rival from which it is to be separated; None asks for its detection."""
 POSES = 12
-"""Of an offer."""
+"""Poses per offer."""
 _SURE, WORTHWHILE = 0.9, 0.2
 _OFFERED = 2
 _ENOUGH = 3.04
-"""Deviations beyond what is needed where more is of no use: a power of 99.9 %."""
-_RIDGE = 1e-9
+"""Standard deviations above the threshold beyond which more information is not counted: a power of
+99.9 %."""
 
 
 @dataclass(frozen=True)
 class PoseOffer:
-    """Poses of one kind, the most telling ones first."""
+    """Poses of one kind, the most informative first."""
 
     kind: PoseKind
     pose: Pose
     motor_angle: Array
-    """That goes with them, (k, n), rad."""
+    """At these poses, (k, n), rad."""
     tension: Array
-    """Of the ropes there, (k, n), N; NaN where none is measured."""
+    """Cable forces at these poses, (k, n), N; NaN where none is measured."""
     powers: tuple[float, ...]
-    """Per question the chance that these poses and all so far answer it."""
+    """Power of these poses and all so far, by question."""
     so_far: tuple[float, ...]
-    """The same without them."""
+    """Power of the poses so far, by question."""
 
 
 def next_pose_runs(
     problem: RobotProblem, final: Hypothesis, pairs: Sequence[tuple[Term, Term]]
 ) -> tuple[NextRun, ...]:
-    """Per pair the kinds of poses that tell it apart, with the power that they would have.
+    """Kinds of poses that separate pairs of effects.
 
-    The first that is sure to, else the best; where no poses do, what the effect's card says.
+    Parameters
+    ----------
+    problem : RobotProblem
+        With the poses so far.
+    final : Hypothesis
+        The final model of the diagnosis.
+    pairs : sequence of pairs of Term
+        To separate.
+
+    Returns
+    -------
+    tuple of NextRun
+        Per pair the first kind with a power of 90 %, else the two best above 20 %; else the advice
+        of the effects' cards, with a power of NaN.
     """
     out: list[NextRun] = []
     for first, second in pairs:
@@ -231,9 +249,25 @@ def pose_offers(
     needed: Sequence[float],
     count: int = POSES,
 ) -> list[PoseOffer]:
-    """Every kind of poses with the ``count`` that answer the questions best, least effort first.
+    """Choose poses of every kind for a set of questions.
 
-    ``needed`` are the whitened squares that answer each question.
+    Parameters
+    ----------
+    problem : RobotProblem
+        With the poses so far.
+    final : Hypothesis
+        The final model of the diagnosis.
+    questions : sequence of Question
+        To be answered.
+    needed : sequence of float
+        Whitened squares (χ²) at which each question counts as answered.
+    count : int
+        Poses per offer.
+
+    Returns
+    -------
+    list of PoseOffer
+        In ascending order of effort.
     """
     robot = problem.standing.robot(final.terms)
     kinds = [kind for kind in KINDS if usable(kind, problem.dataset)]
@@ -243,7 +277,7 @@ def pose_offers(
     parts = [_information(wide, final, question) for question in questions]
     begin = len(problem.dataset.measured)
     base = [part[-1] + part[:begin].sum(axis=0) for part in parts]
-    so_far = _powers([float(_left_over(own)) for own in base], needed)
+    so_far = _powers([float(noncentrality(own)) for own in base], needed)
     out = []
     for kind, seen, pose in tried:
         own = slice(begin, begin + len(seen))
@@ -258,12 +292,12 @@ def pose_offers(
 
 
 def _powers(strength: Sequence[float], needed: Sequence[float]) -> tuple[float, ...]:
-    """Chance of an answer to each question."""
+    """Power for each question."""
     return tuple(power_of(*both) for both in zip(strength, needed, strict=True))
 
 
 def reach(offer: PoseOffer) -> tuple[float, float]:
-    """How far its poses are from their middle, m, and how much they turn, rad, at most."""
+    """Largest distance of an offer's poses from their middle, m, and largest angle, rad."""
     place, turned = offer.pose.position, angles_of(offer.pose.rotation)
     away = np.linalg.norm(place - (place.min(axis=0) + place.max(axis=0)) / 2, axis=1)
     return float(away.max()), float(np.abs(turned).max())
@@ -281,7 +315,7 @@ def _words(offer: PoseOffer) -> str:
 def _with_all(
     problem: RobotProblem, tried: Sequence[tuple[PoseKind, Measured, Pose]]
 ) -> RobotProblem:
-    """The poses so far and all imagined ones as one regression."""
+    """Regression of the poses so far and all simulated ones."""
     standing, dataset = problem.standing, problem.dataset
     poses = [standing.pose, *(pose for _, _, pose in tried)]
     measured = joined([dataset.measured, *(seen for _, seen, _ in tried)])
@@ -294,9 +328,9 @@ def _with_all(
 
 
 def _information(problem: RobotProblem, final: Hypothesis, question: Question) -> Array:
-    """Squares and products of an effect, its rival and nuisances, pose by pose; the prior's last.
+    """Information of an effect's column, its rival's and the nuisances', (poses + 1, k, k).
 
-    (poses + 1, k, k); the effect comes first.
+    The effect's column is the first; the last matrix is that of the prior.
     """
     first, second = question
     asked = {term.effect.id for term in question if term is not None}
@@ -313,36 +347,29 @@ def _information(problem: RobotProblem, final: Hypothesis, question: Question) -
     size = np.sqrt(np.sum(columns[:, 1:] ** 2, axis=0))
     kept = np.concatenate([[True], size > 0])
     columns = columns[:, kept] / np.concatenate([[1.0], size[size > 0]])
-    row = problem.pose_of_row
-    out = np.zeros((len(problem.dataset.measured) + 1, columns.shape[1], columns.shape[1]))
-    for pose in np.unique(row):
-        own = columns[row == pose]
-        out[max(pose, -1)] += own.T @ own
-    return out
-
-
-def _left_over(information: Array) -> Array:
-    """λ of the first column where all the others may take any size; (…)."""
-    rest = information[..., 1:, 1:] + _RIDGE * np.eye(information.shape[-1] - 1)
-    across = information[..., 1:, :1]
-    taken = np.swapaxes(across, -1, -2) @ np.linalg.solve(rest, across)
-    return np.asarray(np.maximum(information[..., 0, 0] - taken[..., 0, 0], 0.0))
+    row = np.maximum(problem.pose_of_row, -1)
+    return pose_information(columns, row, len(problem.dataset.measured) + 1)
 
 
 def _chosen(
     parts: Sequence[Array], base: Sequence[Array], needed: Sequence[float], count: int
 ) -> tuple[list[int], list[float]]:
-    """Poses chosen one after another for what they add to λ of all questions, and λ with them."""
-    sums, left = list(base), np.ones(len(parts[0]), dtype=bool)
+    """Poses chosen in turn for the noncentrality λ of all questions, and λ with them."""
+    sums = list(base)
     enough = (np.sqrt(needed) + _ENOUGH) ** 2
     chosen: list[int] = []
-    while len(chosen) < count and np.any(left):
-        gains = sum(
-            np.minimum(_left_over(total + part), most)
+
+    def gains() -> Array:
+        each = (
+            np.minimum(noncentrality(total + part), most)
             for total, part, most in zip(sums, parts, enough, strict=True)
         )
-        best = int(np.argmax(np.where(left, gains, -np.inf)))
-        left[best] = False
-        chosen.append(best)
-        sums = [total + part[best] for total, part in zip(sums, parts, strict=True)]
-    return chosen, [float(_left_over(total)) for total in sums]
+        return np.asarray(np.sum(list(each), axis=0))
+
+    def add(index: int, gain: float) -> bool:
+        chosen.append(index)
+        sums[:] = [total + part[index] for total, part in zip(sums, parts, strict=True)]
+        return True
+
+    chosen_in_turn(len(parts[0]), count, gains, add)
+    return chosen, [float(noncentrality(total)) for total in sums]

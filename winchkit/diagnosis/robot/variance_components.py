@@ -1,7 +1,10 @@
-"""How noisy each kind of measurement of a robot is: variance components (Helmert, Förstner).
+"""Noise of each kind of measurement of a robot before effects are selected.
 
-From differences of repeated poses where there are enough of them; else from what no effect of the
-catalogue and no geometry can explain, so that an effect outside the catalogue counts as noise.
+Variance components (:mod:`winchkit.model.robot.variance_components`) of
+
+* contrasts of repeated poses (pure error), where they have at least 24 degrees of freedom;
+* else residuals with the pose, the geometry and the strongest directions of all candidate effects
+  projected out (saturated model), so that an effect outside the catalogue counts as noise.
 """
 
 from __future__ import annotations
@@ -13,61 +16,74 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.robot.equations import POSED
+from winchkit.model.robot.variance_components import START as COMMON
+from winchkit.model.robot.variance_components import re_estimated
 
-__all__ = ["START", "PoseNoise", "Stack", "contrasts", "noise_of", "repeated_differences"]
+__all__ = ["START", "PoseNoise", "Stack", "noise_of", "repeated_differences"]
 
 START: Mapping[str, float] = {
-    "rope": 5e-5,
-    "position": 5e-5,
-    "rotation": 2e-3,
-    "swivel": 2e-3,
-    "gauge": 1e-4,
-    "tension": 1.0,
+    **{kind: COMMON[kind] for kind in ("rope", "position", "rotation", "swivel")},
+    "gauge": COMMON["cable_length"],
+    "tension": COMMON["balance"],
 }
-"""Standard deviations before anything is known, SI."""
+"""Standard deviations at the start of the iteration, SI, by kind of residual."""
 _LEAST = 1e-3
+"""Lower limit of a standard deviation over its start."""
 _ROUNDS = 12
 _SETTLED = 0.01
-_FREE_LEAST = 8.0
-_SHARE_LEAST = 0.02
+"""Relative change of a standard deviation at which the iteration ends."""
+_LEAST_REDUNDANCY = 8.0
 _REPEATS_LEAST = 24.0
+"""Degrees of freedom of repeats from which on they are used (rule of thumb)."""
 _ROWS_EACH = 2
+"""Least degrees of freedom per projected direction (rule of thumb)."""
 
 
 @dataclass(frozen=True)
 class PoseNoise:
-    """Standard deviations by kind, SI, and how well they are known."""
+    """Standard deviations by kind, SI, and their degrees of freedom."""
 
     sigma: Mapping[str, float]
     freedom: Mapping[str, float]
     """Degrees of freedom of lengths and of tensions, by output."""
     from_repeats: bool
     unexplained: Mapping[str, float]
-    """By kind what neither geometry nor any known effect explains."""
+    """Standard deviations of the saturated model by kind, SI."""
 
 
 @dataclass(frozen=True)
 class Stack:
-    """Residuals of several kinds with what they depend on, NaN-free; SI."""
+    """Residuals of several kinds and the columns that may explain them, SI."""
 
     kind: Mapping[str, Array]
-    """(p, k) each, NaN where unknown."""
+    """Residuals, (p, k) each, NaN where nothing was measured."""
     by_pose: Mapping[str, Array]
-    """(p, k, 6)."""
+    """Derivatives by the pose, (p, k, 6)."""
     columns: Mapping[str, Array]
-    """What may explain them, (p, k, m)."""
+    """Columns of geometry and candidate effects, (p, k, m)."""
 
 
 def repeated_differences(stack: Stack, pose: NDArray[np.intp]) -> Stack | None:
-    """Contrasts of rows that take one pose; what explains a pose explains no difference."""
+    """Helmert contrasts of rows that repeat a pose; None without any.
+
+    Geometry and effects are the same at all repeats of a pose and take no part.
+
+    Parameters
+    ----------
+    stack : Stack
+        Of p rows.
+    pose : (p,) array
+        Number of the distinct pose of each row.
+    """
     groups = [np.flatnonzero(pose == n) for n in range(int(pose.max()) + 1)]
     many = [g for g in groups if len(g) > 1]
     if not many:
         return None
     kind, by = {}, {}
     for name, values in stack.kind.items():
-        kind[name] = np.concatenate([contrasts(values[g]) for g in many])
+        kind[name] = np.concatenate([contrasts(values[g])[1] for g in many])
     for name, slope in stack.by_pose.items():
         by[name] = np.concatenate([np.repeat(slope[g[:1]], len(g) - 1, axis=0) for g in many])
     nothing = {name: np.zeros((*values.shape, 0)) for name, values in kind.items()}
@@ -75,7 +91,15 @@ def repeated_differences(stack: Stack, pose: NDArray[np.intp]) -> Stack | None:
 
 
 def noise_of(stack: Stack, repeats: Stack | None) -> PoseNoise:
-    """Noise by kind, from repeats where they say enough."""
+    """Noise by kind, from repeats where they have enough degrees of freedom.
+
+    Parameters
+    ----------
+    stack : Stack
+        Residuals with all columns of the saturated model.
+    repeats : Stack or None
+        Contrasts of repeated poses.
+    """
     left, free = _components(stack)
     if repeats is not None:
         sigma, freedom = _components(repeats)
@@ -100,7 +124,7 @@ def _components(stack: Stack) -> tuple[dict[str, float], dict[str, float]]:
 
 
 def _round(stack: Stack, kinds: Sequence[str], sigma: dict[str, float]) -> dict[str, float]:
-    """One step towards each kind's own scatter; returns what the fit leaves free of each."""
+    """Re-estimate each kind's ``sigma`` in place; returns their redundancies."""
     known = np.concatenate([np.isfinite(stack.kind[k]) for k in kinds], axis=1)
     residual = np.concatenate([stack.kind[k] / sigma[k] for k in kinds], axis=1)
     residual = np.where(known, residual, 0.0)
@@ -122,23 +146,26 @@ def _round(stack: Stack, kinds: Sequence[str], sigma: dict[str, float]) -> dict[
     for kind in kinds:
         part = slice(at, at + stack.kind[kind].shape[1])
         at = part.stop
-        count = np.count_nonzero(known[:, part])
-        left = float(np.sum((1 - used[:, part])[known[:, part]]))
-        out[kind] = max(left, 0.0)
-        if left >= max(_FREE_LEAST, _SHARE_LEAST * count):
-            square = float(np.sum(residual[:, part] ** 2)) / left
-            sigma[kind] = max(sigma[kind] * float(np.sqrt(square)), _LEAST * START[kind])
+        here = known[:, part]
+        found = re_estimated(
+            sigma[kind],
+            residual[:, part][here],
+            used[:, part][here],
+            least_redundancy=_LEAST_REDUNDANCY,
+            least=_LEAST * START[kind],
+        )
+        sigma[kind], out[kind] = found.sigma, max(found.redundancy, 0.0)
     return out
 
 
 def _pose_basis(slope: Array) -> Array:
-    """Orthonormal directions of (p, r, 6) that a pose can take up, zero where fewer; (p, r, 6)."""
+    """Orthonormal basis of each pose's columns (p, r, 6), zero beyond its rank; (p, r, 6)."""
     left, size, _ = np.linalg.svd(slope, full_matrices=False)
     return np.asarray(left * (size > 1e-9 * np.maximum(size[:, :1], 1e-300))[:, None, :])
 
 
 def _strongest(columns: Array, most: int) -> Array:
-    """Orthonormal basis of at most ``most`` directions of columns, each counted alike."""
+    """Orthonormal basis of the ``most`` strongest directions of columns scaled to length one."""
     size = np.sqrt(np.sum(columns**2, axis=0))
     there = size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)
     scaled = columns[:, there] / size[there]
@@ -148,13 +175,3 @@ def _strongest(columns: Array, most: int) -> Array:
     kept = values > 1e-8 * values[-1]
     kept[: max(0, len(values) - most)] = False
     return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
-
-
-def contrasts(values: Array) -> Array:
-    """Orthonormal differences among k rows, (k − 1, …), each as noisy as one row (Helmert)."""
-    return np.stack(
-        [
-            (values[:j].sum(axis=0) - j * values[j]) / np.sqrt(j * (j + 1))
-            for j in range(1, len(values))
-        ]
-    )

@@ -1,4 +1,4 @@
-"""Cable robots: kinematics with swivel pulleys, rope forces, poses and motor angles.
+"""Cable robots: kinematics with swivel pulleys, cable forces, poses and motor angles.
 
 robot = robot_of(read_robot(find("profiles", "cabtive")))
 angles = robot.motor_angles(Pose(position, rotation))
@@ -32,7 +32,7 @@ from winchkit.model.robot.kinematics import (
     swivel_sensitivities,
     wrap_angle,
 )
-from winchkit.model.robot.robot import Robot, robot_of, ropes_of
+from winchkit.model.robot.robot import Robot, cables_of, robot_of
 from winchkit.model.robot.rotation import angles_of, rotation_of
 from winchkit.model.robot.wrench import gravity_wrench
 
@@ -54,6 +54,7 @@ __all__ = [
     "Sensitivities",
     "angles_of",
     "approximate_forces",
+    "cables_of",
     "closed_form",
     "compiled",
     "fastest",
@@ -66,7 +67,6 @@ __all__ = [
     "lengths",
     "quadratic",
     "robot_of",
-    "ropes_of",
     "rotation_of",
     "sensitivities",
     "structure_matrix",

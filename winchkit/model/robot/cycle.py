@@ -1,4 +1,4 @@
-"""A robot in a control cycle: one pose at a time, as fast as it goes.
+"""Kinematics of a robot in a control cycle: one pose at a time, without numpy's overhead.
 
 cycle = RobotCycle(robot, kernels=fastest())
 angles = cycle.motor_angles(pose)          # twelve floats: position, then rotation by rows
@@ -15,7 +15,7 @@ import numpy as np
 from winchkit.errors import UsageError
 from winchkit.model.robot.kernels import PLAIN, RobotKernels
 from winchkit.model.robot.kinematics import Pose
-from winchkit.model.robot.robot import Robot, ropes_of
+from winchkit.model.robot.robot import Robot, cables_of
 
 __all__ = ["RobotCycle", "flat_pose"]
 
@@ -30,7 +30,7 @@ def flat_pose(pose: Pose) -> list[float]:
 
 
 class RobotCycle:
-    """Motor angles of a pose and the pose of rope lengths, without numpy's overhead.
+    """Inverse and forward kinematics of one pose per call.
 
     Poses are twelve floats as of :func:`flat_pose`; with compiled kernels they and all other
     sequences are float64 arrays, made by ``kernels.array``. What is returned is overwritten by the
@@ -52,7 +52,7 @@ class RobotCycle:
     def __init__(self, robot: Robot, kernels: RobotKernels = PLAIN) -> None:
         count = len(robot.names)
         self._kernels = kernels
-        self._lines = kernels.lines(ropes_of(robot))
+        self._lines = kernels.lines(cables_of(robot))
         self._motors, self._find = kernels.motors, kernels.find
         self._still = kernels.array([0.0] * count)
         self._lengths = kernels.array([0.0] * count)
@@ -61,18 +61,42 @@ class RobotCycle:
         self._pose = kernels.array(flat_pose(robot.home))
 
     def motor_angles(self, pose: Any, strains: Any = None) -> Any:
-        """Motor angles (n) at a pose, rad, ropes strained more than at home by ``strains`` (n).
+        """Inverse kinematics with strained cables.
 
-        NaN for a line whose anchor lies inside its swivel pulley.
+        Parameters
+        ----------
+        pose : (12,) sequence
+            As of :func:`flat_pose`.
+        strains : (n,) sequence, optional
+            Strains of the cables against home.
+
+        Returns
+        -------
+        (n,) sequence
+            Motor angles, rad; NaN for a line whose anchor point lies inside its swivel pulley.
         """
         held = self._still if strains is None else strains
         self._motors(self._lines, pose, held, self._lengths, self._angles)
         return self._angles
 
     def pose_at(self, lengths: Any) -> Any | None:
-        """The pose (12) of rope lengths (n), found from the last one; None where there is none.
+        """Forward kinematics from the last pose.
 
-        A search that fails leaves the last pose as it was. Raises UsageError below six lines.
+        Parameters
+        ----------
+        lengths : (n,) sequence
+            Geometric cable lengths, m.
+
+        Returns
+        -------
+        (12,) sequence or None
+            As of :func:`flat_pose`; None where the iteration does not converge, which keeps the
+            last pose.
+
+        Raises
+        ------
+        UsageError
+            For fewer than six lines.
         """
         if len(self._lines) < 6:
             raise UsageError(
@@ -86,5 +110,5 @@ class RobotCycle:
         return pose
 
     def start_from(self, pose: Any) -> None:
-        """Take a pose (12) as the last one."""
+        """Set the pose (12) from which :meth:`pose_at` starts."""
         self._pose = self._kernels.array(np.asarray(pose, dtype=float).tolist())

@@ -1,4 +1,4 @@
-"""Laws of a rope's elongation: strain from force (IPAnema paper, Eq. 4, 5 and 6).
+"""Laws of a cable's elongation, force from strain and inverse (IPAnema paper, Eq. 4, 5 and 6).
 
 The paper writes F = k1 δl + k0 and so on with coefficients of its own test; here the laws are in
 strain and in newtons, and their offset k0 cancels wherever elongation is taken between two states.

@@ -1,7 +1,7 @@
-"""Which rope forces balance a wrench, within limits: three methods, and whether there are any.
+"""Distribution of cable forces within limits: three methods, and wrench feasibility.
 
 At rest Aᵀ f + w = 0 with the structure matrix Aᵀ (6, n) and the wrench w (6,) on the platform.
-Among all solutions each method looks for the one closest to the middle of the limits.
+Each method approximates the solution closest to the middle of the limits.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _WITHIN = 1e-9
 
 @dataclass(frozen=True)
 class ForceLimits:
-    """Least and greatest rope force, N: one for all lines or one each, (n,)."""
+    """Least and greatest cable force, N: one for all lines or one each, (n,)."""
 
     low: float | Array
     high: float | Array
@@ -45,7 +45,7 @@ class ForceLimits:
         return low, high
 
     def between(self, count: int) -> tuple[Array, Array]:
-        """The same for a method that aims at their middle: both finite, else UsageError."""
+        """Both limits per line; raises UsageError where one is infinite."""
         low, high = self.spread(count)
         if not np.all(np.isfinite(low) & np.isfinite(high)):
             raise UsageError("force limits must be finite: the forces aim at their middle")
@@ -54,10 +54,10 @@ class ForceLimits:
 
 @dataclass(frozen=True)
 class Forces:
-    """Rope forces of one pose."""
+    """Cable forces of one pose."""
 
     value: Array
-    """(n,), N; what the method found even where it is not feasible, NaN where it found nothing."""
+    """(n,), N; also where they are not feasible; NaN without a solution."""
     feasible: bool
     """Whether they balance the wrench within the limits."""
     residual: float
@@ -66,19 +66,34 @@ class Forces:
 
 @dataclass(frozen=True)
 class Feasibility:
-    """Whether some rope forces within the limits balance a wrench."""
+    """Whether some cable forces within the limits balance a wrench."""
 
     feasible: bool
     margin: float
-    """How far all forces can stay from their limits at once, N; negative: by how much the limits
-    would have to give; NaN where no forces at all balance the wrench."""
+    """Largest distance that all forces can have from their limits at once, N; negative where the
+    limits would have to be wider by that much; NaN where no forces balance the wrench."""
 
 
 def approximate_forces(structure: Array, wrench: Array, initial: Array) -> Array:
-    """Forces at a pose from those at another: f = f_i − A⁺ᵀ (w + Aᵀ f_i), (p, n), N.
+    """Forces that balance a wrench and are nearest to given ones.
 
-    IPAnema paper, Eq. 8 with its sign put right, so that its Eq. 7 holds. ``structure`` is
-    (p, 6, n), ``wrench`` (6,) or (p, 6), ``initial`` (n,) or (p, n).
+    Parameters
+    ----------
+    structure : (p, 6, n) array
+        Structure matrices Aᵀ.
+    wrench : (6,) or (p, 6) array
+        w, N and N m.
+    initial : (n,) or (p, n) array
+        Forces f_i, N, for example at another pose.
+
+    Returns
+    -------
+    (p, n) array
+        f = f_i − A⁺ᵀ (w + Aᵀ f_i), N.
+
+    Notes
+    -----
+    IPAnema paper, Eq. 8, with the sign corrected so that its Eq. 7 holds.
     """
     missing = wrench + (structure @ np.asarray(initial)[..., None])[..., 0]
     change = np.linalg.pinv(structure, rcond=_RANK) @ missing[..., None]
@@ -86,20 +101,40 @@ def approximate_forces(structure: Array, wrench: Array, initial: Array) -> Array
 
 
 def closed_form(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
-    """The solution closest to the middle of the limits, which may lie outside them.
+    """Closed-form distribution, which may lie outside the limits.
 
+    Parameters
+    ----------
+    structure : (6, n) array
+        Aᵀ.
+    wrench : (6,) array
+        w, N and N m.
+    limits : ForceLimits
+        Both finite.
+
+    Returns
+    -------
+    Forces
+        f = f_m − A⁺ᵀ (w + Aᵀ f_m) with the middle f_m of the limits.
+
+    References
+    ----------
     A. Pott, T. Bruckmann, L. Mikelsons, *Closed-form force distribution for parallel wire robots*,
-    2009: f = f_m − A⁺ᵀ (w + Aᵀ f_m).
+    2009.
     """
     low, high = limits.between(structure.shape[1])
     return _judge(_nearest(structure, wrench, (low + high) / 2), structure, wrench, low, high)
 
 
 def improved_closed_form(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
-    """Closed form that fixes the worst offender at its limit and solves for the rest again.
+    """Closed form in turns: the force farthest outside its limits is fixed at the limit.
 
+    Parameters as of :func:`closed_form`. Finds more than that, and less than :func:`quadratic`.
+
+    References
+    ----------
     A. Pott, *An improved force distribution algorithm for over-constrained cable-driven parallel
-    robots*, 2014. Finds more than the closed form; not everything that :func:`quadratic` finds.
+    robots*, 2014.
     """
     low, high = limits.between(structure.shape[1])
     value = np.array((low + high) / 2)
@@ -116,11 +151,19 @@ def improved_closed_form(structure: Array, wrench: Array, limits: ForceLimits) -
 
 
 def quadratic(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
-    """The solution within the limits closest to their middle: min ‖f − f_m‖², if there is any.
+    """Solution within the limits closest to their middle: min ‖f − f_m‖², if there is any.
 
+    Parameters as of :func:`closed_form`.
+
+    Notes
+    -----
     With an orthonormal null space N of Aᵀ, f = f_c + N λ from the closed form f_c, and the problem
     is one of least distance, min ‖λ‖ within the limits, which non-negative least squares solves
-    exactly (C. Lawson, R. Hanson, *Solving Least Squares Problems*, ch. 23).
+    exactly.
+
+    References
+    ----------
+    C. Lawson, R. Hanson, *Solving Least Squares Problems*, ch. 23.
     """
     low, high = limits.between(structure.shape[1])
     centre = _nearest(structure, wrench, (low + high) / 2)
@@ -133,9 +176,13 @@ def quadratic(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
 
 
 def wrench_feasibility(structure: Array, wrench: Array, limits: ForceLimits) -> Feasibility:
-    """Whether forces within the limits balance ``wrench``, with the largest margin to them.
+    """Whether forces within the limits balance a wrench, and the largest margin to the limits.
 
-    A linear programme; a limit may be infinite, and its margin is then the other one's.
+    Parameters as of :func:`closed_form`; a limit may be infinite.
+
+    Notes
+    -----
+    A linear programme: the margin is maximised, at most 1000 times the largest force in it.
     """
     from scipy.optimize import linprog
 
@@ -161,20 +208,20 @@ def wrench_feasibility(structure: Array, wrench: Array, limits: ForceLimits) -> 
 
 
 def _nearest(structure: Array, wrench: Array, middle: Array) -> Array:
-    """The solution of least squares closest to ``middle``."""
+    """Least-squares solution closest to ``middle``."""
     missing = wrench + structure @ middle
     return np.asarray(middle - np.linalg.pinv(structure, rcond=_RANK) @ missing)
 
 
 def _null_space(structure: Array) -> Array:
-    """Orthonormal columns that Aᵀ maps to zero, (n, n − rank)."""
+    """Orthonormal basis of the null space of Aᵀ, (n, n − rank)."""
     _, values, right = np.linalg.svd(structure)
     rank = int(np.sum(values > _RANK * values[0]))
     return np.asarray(right[rank:].T)
 
 
 def _least_distance(slope: Array, least: Array) -> Array | None:
-    """The shortest x with ``slope`` x ≥ ``least``, or None where there is none."""
+    """Shortest x with ``slope`` x ≥ ``least``, or None where there is none."""
     from scipy.optimize import nnls
 
     if np.all(least <= 0):
@@ -191,7 +238,7 @@ def _least_distance(slope: Array, least: Array) -> Array | None:
 
 
 def _scale(structure: Array, wrench: Array, low: Array, high: Array) -> float:
-    """A force typical of the problem, N, so that it may be solved with numbers about one."""
+    """Largest force of the problem, N, by which it is scaled."""
     limits = np.abs(np.concatenate([low, high]))
     sizes = np.append(limits[np.isfinite(limits)], np.linalg.norm(wrench[:3]))
     return float(np.max(sizes, initial=0.0)) or 1.0

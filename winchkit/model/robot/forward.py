@@ -1,12 +1,13 @@
-"""Forward kinematics: the platform's pose from its rope lengths.
+"""Forward kinematics: the platform's pose from cable lengths.
 
     found = forward(geometry, lengths, start, platform=PlatformSpec(mass=3.0))
     found.pose.position[found.converged]
 
-With six ropes or more that hold all six freedoms the pose follows from the lengths alone, by Gauss
-and Newton. With fewer, the platform hangs where its weight is lowest (Lagrange's multipliers are
-the rope forces), by sequential quadratic programming on the same step; a rope that would have to
-push is slack and may be longer than its way.
+With six cables or more that hold all six degrees of freedom the pose is the least-squares solution
+of the lengths (Gauss-Newton, after twelve steps Newton). With fewer, the platform hangs where its
+potential energy is least under the constraint of the lengths (sequential quadratic programming;
+Lagrange's multipliers are the cable forces); a cable whose force would be negative is slack, and
+its length is a bound and not an equation (active set).
 """
 
 from __future__ import annotations
@@ -40,16 +41,16 @@ _PUSH, _SHORT = 1e-9, 1e-9
 
 @dataclass(frozen=True)
 class Found:
-    """Poses found for given rope lengths; NaN where the search did not end in one."""
+    """Poses for given cable lengths; NaN where the iteration did not converge."""
 
     pose: Pose
     converged: Array
-    """(p,), true where the pose solves the problem to rounding."""
+    """(p,), true where the iteration converged to rounding."""
     residual: Array
-    """Given minus geometric length, (p, n), m: what no pose explains."""
+    """Given less geometric length, (p, n), m."""
     forces: Array
-    """Rope forces of a platform that hangs, (p, n), N, zero in a slack rope; NaN with six or
-    more ropes, which may be tight to any degree."""
+    """Cable forces of a platform that hangs, (p, n), N, zero in a slack cable; NaN with six or
+    more cables, which may be tight to any degree."""
     steps: int
 
 
@@ -60,9 +61,30 @@ def forward(
     platform: PlatformSpec | None = None,
     steps: int = 100,
 ) -> Found:
-    """Poses with rope lengths ``given`` (p, n), searched from ``start`` (one pose or p).
+    """Solve the forward kinematics of p poses.
 
-    Raises UsageError for fewer than six ropes without a platform's mass.
+    Parameters
+    ----------
+    geometry : Geometry
+        Of n lines.
+    given : (p, n) array
+        Cable lengths, m.
+    start : Pose
+        Where the iteration starts, one pose or p.
+    platform : PlatformSpec, optional
+        Mass and centre of mass, needed for fewer than six cables.
+    steps : int
+        Most steps.
+
+    Returns
+    -------
+    Found
+        NaN where the iteration did not converge.
+
+    Raises
+    ------
+    UsageError
+        For fewer than six cables without a platform's mass.
     """
     count = len(geometry.exit_point)
     given = np.atleast_2d(np.asarray(given, dtype=float))
@@ -78,8 +100,8 @@ def forward(
     return search.run(start, steps)
 
 
-class _Ropes(NamedTuple):
-    """Which ropes of each pose are taken as taut, and which of them was tightened last."""
+class _Cables(NamedTuple):
+    """Active set of each pose: taut cables, and the cable tightened last."""
 
     taut: NDArray[np.bool_]
     tightened: NDArray[np.intp]
@@ -92,29 +114,29 @@ class _Search:
     platform: PlatformSpec | None
 
     def run(self, start: Pose, steps: int) -> Found:
-        """Step all poses until every one has converged or is lost."""
+        """Step all poses until each has converged or has failed."""
         many = len(self.given)
         position = np.broadcast_to(start.position, (many, 3)).copy()
         rotation = np.broadcast_to(start.rotation, (many, 3, 3)).copy()
         forces = np.full_like(self.given, np.nan)
-        ropes = _Ropes(np.ones_like(self.given, dtype=bool), np.full(many, -1))
+        cables = _Cables(np.ones_like(self.given, dtype=bool), np.full(many, -1))
         converged = np.zeros(many, dtype=bool)
         going = np.flatnonzero(np.all(np.isfinite(self.given), axis=1))
         taken = 0
         while len(going) and taken < steps:
             taken += 1
             at, late = Pose(position[going], rotation[going]), taken > _EARLY
-            step, forces[going] = self._step(at, self.given[going], ropes.taut[going], late)
+            step, forces[going] = self._step(at, self.given[going], cables.taut[going], late)
             step = _no_longer(step, _LONGEST[min(taken // _EARLY, len(_LONGEST) - 1)])
             position[going] += step[:, :3]
             rotation[going] = rotation_by(step[:, 3:]) @ rotation[going]
             size = np.linalg.norm(step, axis=1)
             still = size < _TOLERANCE
-            # Ropes that cannot all be taut have no rest to wait for.
+            # Lengths that cannot all be taut have no fixed point: look at the set in between too.
             asked = still | (taken % _PATIENCE == 0)
             which = going[asked]
             there = Pose(position[which], rotation[which])
-            still[asked] &= self._settle(there, forces[which], ropes, which)
+            still[asked] &= self._settle(there, forces[which], cables, which)
             converged[going[still]] = True
             going = going[~still & np.isfinite(size)]
         if self.platform is None:
@@ -126,30 +148,30 @@ class _Search:
         return Found(Pose(position, rotation), converged, residual, forces, taken)
 
     def _settle(
-        self, at: Pose, forces: Array, ropes: _Ropes, which: NDArray[np.intp]
+        self, at: Pose, forces: Array, cables: _Cables, which: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Whether poses at rest may stay so; else slackens or tightens one rope of each."""
+        """Whether the active set is right; else slackens or tightens one cable of each pose."""
         if self.platform is None:
             return np.ones(len(which), dtype=bool)
-        taut, row = ropes.taut[which], np.arange(len(which))
+        taut, row = cables.taut[which], np.arange(len(which))
         excess = lengths(self.geometry, at.position, at.rotation) - self.given[which]
         push = np.where(taut, -forces / (self.platform.mass * GRAVITY), -np.inf)
         short = np.where(taut, -np.inf, excess)
-        # The rope tightened last goes last, or the same two states would take turns for ever.
-        other = np.where(np.arange(push.shape[1]) == ropes.tightened[which, None], -np.inf, push)
+        # The cable tightened last is slackened last, or the set would alternate for ever.
+        other = np.where(np.arange(push.shape[1]) == cables.tightened[which, None], -np.inf, push)
         push = np.where(np.max(other, axis=1, keepdims=True) > _PUSH, other, push)
         worst, missing = np.argmax(push, axis=1), np.argmax(short, axis=1)
         slacken = push[row, worst] > _PUSH
         tighten = ~slacken & (short[row, missing] > _SHORT)
-        ropes.taut[which[slacken], worst[slacken]] = False
-        ropes.taut[which[tighten], missing[tighten]] = True
-        ropes.tightened[which[tighten]] = missing[tighten]
+        cables.taut[which[slacken], worst[slacken]] = False
+        cables.taut[which[tighten], missing[tighten]] = True
+        cables.tightened[which[tighten]] = missing[tighten]
         return np.asarray(~slacken & ~tighten)
 
     def _step(
         self, at: Pose, given: Array, taut: NDArray[np.bool_], late: bool
     ) -> tuple[Array, Array]:
-        """Next step of position and rotation vector, (p, 6), and the rope forces, (p, n)."""
+        """Next step of position and rotation vector, (p, 6), and the cable forces, (p, n)."""
         length, by = linearised(self.geometry, at.position, at.rotation)
         slope, missing = np.concatenate([by.position, by.rotation], axis=-1), given - length
         good = np.all(np.isfinite(slope), axis=(1, 2)) & np.all(np.isfinite(missing), axis=1)
@@ -166,14 +188,14 @@ class _Search:
         return step, forces
 
     def _bend(self, at: Pose, missing: Array) -> Array:
-        """What Gauss and Newton leave out: Newton's own step is faster where lengths disagree."""
+        """Second-order term of Newton's method, which converges faster where lengths disagree."""
         bend = length_hessian(self.geometry, at.position, at.rotation)
         return -np.asarray(np.einsum("pn,pnij->pij", missing, bend))
 
     def _hanging(
         self, platform: PlatformSpec, at: Pose, slope: Array, missing: Array
     ) -> tuple[Array, Array]:
-        """Meet the lengths, and go downhill where they leave the platform free."""
+        """Step that meets the lengths, and a Newton step of the energy in their null space."""
         weight = gravity_wrench(platform, at.rotation)
         left, values, right = np.linalg.svd(slope)
         count = slope.shape[1]
@@ -201,13 +223,13 @@ class _Search:
 
 
 def _no_longer(step: Array, longest: float) -> Array:
-    """Steps of at most this many metres and radians: a search that swings has gone too far."""
+    """Limit steps to a length, m and rad."""
     size = np.linalg.norm(step, axis=1, keepdims=True)
     return np.asarray(step * (longest / np.maximum(size, longest)))
 
 
 def _downhill(slope: Array, missing: Array, bend: Array | float) -> Array:
-    """Step of least squares, (p, 6); with ``bend`` Newton's, turned downhill."""
+    """Least-squares step, (p, 6); with ``bend`` Newton's with positive curvatures."""
     turned = np.swapaxes(slope, 1, 2)
     right = turned @ missing[..., None]
     matrix, scale = _balanced(turned @ slope)
@@ -222,13 +244,13 @@ def _downhill(slope: Array, missing: Array, bend: Array | float) -> Array:
 
 
 def _balanced(matrix: Array) -> tuple[Array, Array]:
-    """A normal matrix with ones on its diagonal, and what it was divided by."""
+    """Normal matrix scaled to a unit diagonal, and the scales."""
     scale = np.sqrt(np.maximum(np.diagonal(matrix, axis1=1, axis2=2), np.finfo(float).tiny))
     return matrix / scale[:, :, None] / scale[:, None, :], scale
 
 
 def _holds(geometry: Geometry, at: Pose) -> NDArray[np.bool_]:
-    """Where the ropes hold all six freedoms, (p,)."""
+    """Whether the cables hold all six degrees of freedom, (p,)."""
     by = linearised(geometry, at.position, at.rotation)[1]
     slope = np.concatenate([by.position, by.rotation], axis=-1)
     stiff = np.linalg.eigvalsh(_balanced(np.swapaxes(slope, 1, 2) @ slope)[0])

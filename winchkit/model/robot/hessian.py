@@ -1,4 +1,4 @@
-"""Second derivatives of rope lengths by the pose: what stiffens a platform that hangs."""
+"""Second derivatives of cable lengths by the pose, for the stiffness of hanging platforms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["length_hessian"]
 def length_hessian(geometry: Geometry, position: Array, rotation: Array) -> Array:
     """Second derivatives of the lengths by position and rotation vector, (p, n, 6, 6).
 
-    An anchor that moves across the rope in the pulley's plane turns the free rope by δ/free; one
+    An anchor that moves across the cable in the pulley's plane turns the free cable by δ/free; one
     that moves square to that plane turns the pulley by δ/distance from the axis. The rotation
     vector's own second order is ½ ω × (ω × R b).
     """
@@ -29,7 +29,7 @@ def length_hessian(geometry: Geometry, position: Array, rotation: Array) -> Arra
     radius = geometry.swivel_radius[:, None]
     free = np.sqrt((distance - radius) ** 2 + along**2 - radius**2)
     away = outward / np.where(distance > 0, distance, 1.0)
-    # On the axis the rope runs straight and may lean to either side alike.
+    # On the swivel axis the limit is that of a straight cable.
     side = np.where(
         distance > 1e-12, np.sin(wrap) / np.where(distance > 0, distance, 1.0), 1 / free
     )

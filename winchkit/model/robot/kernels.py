@@ -1,4 +1,4 @@
-"""The loops of a robot's cycle, built in plain Python or, from the same lines, compiled."""
+"""Loops of a robot's control cycle in plain Python or, from the same source, compiled by numba."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import astuple, dataclass, fields
 from typing import Any
 
 from winchkit.errors import UsageError
-from winchkit.model.robot.loops import RopeLine, motors_loop, ropes_loop, wound_angle
+from winchkit.model.robot.loops import CableLine, cables_loop, motors_loop, wound_angle
 from winchkit.model.robot.loops_pose import (
     cholesky,
     find_loop,
@@ -17,18 +17,18 @@ from winchkit.model.robot.loops_pose import (
     turn,
 )
 
-__all__ = ["PLAIN", "RobotKernels", "RopeLine", "compiled", "fastest"]
+__all__ = ["PLAIN", "CableLine", "RobotKernels", "compiled", "fastest"]
 
 Function = Callable[..., Any]
 
 
 @dataclass(frozen=True)
 class RobotKernels:
-    """The inner loops as they were built."""
+    """Inner loops, plain or compiled."""
 
     name: str
     """``plain`` or ``numba``."""
-    ropes: Function
+    cables: Function
     """Lines, pose → fills rows of a length and its gradient (7 n)."""
     motors: Function
     """Lines, pose, strains → fills lengths (n) and motor angles (n)."""
@@ -37,12 +37,12 @@ class RobotKernels:
     forces: Function
     """Lines, pose, initial forces, wrench, work → fills forces (n); false where singular."""
     array: Callable[[list[float]], Any]
-    """A flat sequence of the kind that these loops want."""
-    lines: Callable[[list[RopeLine]], Any]
-    """Lines of the kind that these loops want."""
+    """Makes the sequence type of these loops."""
+    lines: Callable[[list[CableLine]], Any]
+    """Makes the type of lines of these loops."""
 
     def work(self, count: int) -> tuple[Any, Any]:
-        """Room for the rows of :attr:`ropes`, and for a 6 by 6 system with its right side."""
+        """Buffers for the rows of :attr:`cables`, and for a 6 by 6 system with its right side."""
         return self.array([0.0] * (7 * count)), self.array([0.0] * 42)
 
 
@@ -50,14 +50,14 @@ def _build(
     name: str,
     jit: Function,
     array: Callable[[list[float]], Any],
-    lines: Callable[[list[RopeLine]], Any],
+    lines: Callable[[list[CableLine]], Any],
 ) -> RobotKernels:
-    """All loops, each through ``jit``."""
-    steep, squares, solve = jit(ropes_loop(True)), jit(normal), jit(cholesky)
+    """Build all loops, each passed through ``jit``."""
+    steep, squares, solve = jit(cables_loop(True)), jit(normal), jit(cholesky)
     return RobotKernels(
         name,
         steep,
-        jit(motors_loop(jit(ropes_loop(False)), jit(wound_angle))),
+        jit(motors_loop(jit(cables_loop(False)), jit(wound_angle))),
         jit(find_loop(steep, squares, solve, jit(turn), jit(straighten))),
         jit(forces_loop(steep, squares, solve)),
         array,
@@ -70,9 +70,12 @@ PLAIN = _build("plain", lambda function: function, list, list)
 
 
 def compiled() -> RobotKernels:
-    """Compile the loops with numba and run each once: seconds, to be spent before motion.
+    """Compile the loops with numba and run each once, which takes seconds.
 
-    Raises UsageError where numba is not installed (``pip install 'winchkit[fast]'``).
+    Raises
+    ------
+    UsageError
+        Where numba is not installed (``pip install 'winchkit[fast]'``).
     """
     try:
         from numba import njit
@@ -83,13 +86,13 @@ def compiled() -> RobotKernels:
         ) from None
     import numpy as np
 
-    record = np.dtype([(field.name, np.float64) for field in fields(RopeLine)])
+    record = np.dtype([(field.name, np.float64) for field in fields(CableLine)])
 
     def array(values: list[float]) -> Any:
         return np.array(values, dtype=np.float64)
 
-    def lines(ropes: list[RopeLine]) -> Any:
-        return np.array([astuple(rope) for rope in ropes], dtype=record)
+    def lines(cables: list[CableLine]) -> Any:
+        return np.array([astuple(cable) for cable in cables], dtype=record)
 
     built = _build("numba", njit, array, lines)
     _warm_up(built)
@@ -97,9 +100,9 @@ def compiled() -> RobotKernels:
 
 
 def _warm_up(kernels: RobotKernels) -> None:
-    """Run every loop once, on six ropes of any kind."""
-    rope = RopeLine(1, 0, 0, 0, 0, 0, 0, 0, 1, 0.01, 1, 1, 0.1, 0.001, 1, 1, 1, 0, 0)
-    lines, work = kernels.lines([rope] * 6), kernels.work(6)
+    """Run every loop once, on six cables of any kind."""
+    cable = CableLine(1, 0, 0, 0, 0, 0, 0, 0, 1, 0.01, 1, 1, 0.1, 0.001, 1, 1, 1, 0, 0)
+    lines, work = kernels.lines([cable] * 6), kernels.work(6)
     pose = kernels.array([0.0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1])
     some, out = kernels.array([0.0] * 6), kernels.array([0.0] * 6)
     kernels.motors(lines, pose, some, kernels.array([0.0] * 6), out)

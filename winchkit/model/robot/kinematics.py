@@ -1,6 +1,6 @@
-"""Inverse kinematics of a cable robot with swivel pulleys, and every first derivative of it.
+"""Inverse kinematics of a cable robot with swivel pulleys, with all first derivatives.
 
-The rope reaches its pulley along ``swivel_axis`` and first touches it in ``exit_point``; the
+The cable reaches its pulley along ``swivel_axis`` and first touches it in ``exit_point``; the
 pulley's centre lies ``swivel_radius`` from there, square to the axis, towards the anchor. With x
 the anchor's distance from the axis, y its coordinate along it, r the radius and D = hypot(x − r, y)
 
@@ -46,7 +46,7 @@ _BEHIND = -1e-6
 
 @dataclass(frozen=True)
 class Geometry:
-    """Where n lines leave the frame and meet the platform."""
+    """Exit points, anchor points and swivel pulleys of n lines."""
 
     exit_point: Array
     """In the base frame, (n, 3), m."""
@@ -55,7 +55,7 @@ class Geometry:
     swivel_radius: Array
     """(n,), m; zero is a fixed exit point."""
     swivel_axis: Array
-    """Unit vectors of the rope's direction when it reaches the pulley, base frame, (n, 3)."""
+    """Unit vectors of the cable's direction when it reaches the pulley, base frame, (n, 3)."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Sensitivities:
 
 
 class _Tangent(NamedTuple):
-    """The rope around its pulley: arrays of shape (p, n), vectors by component."""
+    """The cable around its pulley: arrays of shape (p, n), vectors by component."""
 
     arm: tuple[Array, Array, Array]
     """Anchor point seen from the platform's origin, in base axes."""
@@ -117,7 +117,7 @@ def home_of(profile: RobotProfile) -> Pose:
 
 
 def _tangent(geometry: Geometry, position: Array, rotation: Array) -> _Tangent:
-    """Lay the ropes around their pulleys; NaN where an anchor lies inside its pulley."""
+    """Tangents from anchor points to pulleys; NaN where an anchor lies inside its pulley."""
     b, e, s = geometry.anchor_point.T, geometry.exit_point, geometry.swivel_axis
     r = geometry.swivel_radius
     arm = (rotation[:, 0] @ b, rotation[:, 1] @ b, rotation[:, 2] @ b)
@@ -137,12 +137,24 @@ def _tangent(geometry: Geometry, position: Array, rotation: Array) -> _Tangent:
 
 
 def lengths(geometry: Geometry, position: Array, rotation: Array) -> Array:
-    """Rope from exit point to anchor point with the arc on the pulley, (p, n), m.
+    """Lengths from exit point to anchor point with the arc on the pulley.
 
-    ``position`` is (p, 3), ``rotation`` (p, 3, 3). NaN where an anchor lies inside its pulley.
+    Parameters
+    ----------
+    geometry : Geometry
+        Of n lines.
+    position : (p, 3) array
+        Of the platform's origin in the base frame, m.
+    rotation : (p, 3, 3) array
+        From platform to base axes.
+
+    Returns
+    -------
+    (p, n) array
+        m; NaN where an anchor point lies inside its pulley.
     """
     out = np.empty((len(position), len(geometry.exit_point)))
-    # In pieces that stay in the processor's cache: many poses at once take half the time.
+    # In pieces that fit the processor's cache: half the time for many poses.
     for start in range(0, len(position), _CHUNK):
         piece = slice(start, start + _CHUNK)
         t = _tangent(geometry, position[piece], rotation[piece])
@@ -152,12 +164,16 @@ def lengths(geometry: Geometry, position: Array, rotation: Array) -> Array:
 
 
 def wrap_angle(geometry: Geometry, position: Array, rotation: Array) -> Array:
-    """How far the rope is wrapped round its swivel pulley, (p, n), rad."""
+    """Wrap angle of the cable on its swivel pulley, (p, n), rad."""
     return _tangent(geometry, position, rotation).wrap
 
 
 def sensitivities(geometry: Geometry, position: Array, rotation: Array) -> Sensitivities:
-    """Derivatives of :func:`lengths`, with u the rope's direction from pulley to platform.
+    """Derivatives of :func:`lengths`, arguments as there.
+
+    Notes
+    -----
+    With u the cable's direction from pulley to platform:
 
     ∂L/∂c = u, ∂L/∂ω = (R b) × u, ∂L/∂p = −u, ∂L/∂b = Rᵀ u, ∂L/∂r = wrap − sin wrap.
     """
@@ -165,7 +181,7 @@ def sensitivities(geometry: Geometry, position: Array, rotation: Array) -> Sensi
 
 
 def linearised(geometry: Geometry, position: Array, rotation: Array) -> tuple[Array, Sensitivities]:
-    """:func:`lengths` and :func:`sensitivities` in one go."""
+    """:func:`lengths` and :func:`sensitivities` together."""
     t = _tangent(geometry, position, rotation)
     scale = np.hypot(t.sine, t.cosine)
     scale = np.where(scale > 0, scale, np.nan)
@@ -177,10 +193,13 @@ def linearised(geometry: Geometry, position: Array, rotation: Array) -> tuple[Ar
 
 
 def swivel_angle(geometry: Geometry, position: Array, rotation: Array) -> Array:
-    """Angle of the swivelling pulley, right-handed about its axis, (p, n), rad within ±π.
+    """Angle of the swivelling pulley about its axis, right-handed.
 
-    Zero is the base axis that is most nearly square to the swivel axis, seen along it (x for an
-    upright one); NaN where the anchor lies on the axis. Instruments have a zero of their own.
+    Returns
+    -------
+    (p, n) array
+        rad, within ±π. Zero is the direction of the base axis that is most nearly perpendicular to
+        the swivel axis (x for a vertical one), projected; NaN where the anchor lies on the axis.
     """
     t = _tangent(geometry, position, rotation)
     outward = np.stack(t.outward, axis=-1)
@@ -198,10 +217,13 @@ def swivel_sensitivities(geometry: Geometry, position: Array, rotation: Array) -
 
 
 def structure_matrix(geometry: Geometry, position: Array, rotation: Array) -> Array:
-    """Aᵀ, (p, 6, n): its product with the rope forces is their wrench on the platform.
+    """Structure matrices Aᵀ: their product with the cable forces is the wrench on the platform.
 
-    Forces above, moments about the platform's origin below, base axes; Aᵀ f + w = 0 at rest
-    (IPAnema paper, Eq. 7).
+    Returns
+    -------
+    (p, 6, n) array
+        Forces first, then moments about the platform's origin, base axes; Aᵀ f + w = 0 at rest
+        (IPAnema paper, Eq. 7).
     """
     by = sensitivities(geometry, position, rotation)
     return -np.concatenate([by.position, by.rotation], axis=-1).transpose(0, 2, 1)

@@ -1,7 +1,7 @@
-"""Ropes and drums of one pose: loops that run in plain Python and compile with numba as they are.
+"""Inverse kinematics of one pose in loops that numba compiles unchanged.
 
 A pose is twelve floats (position, then the rotation by rows), a line is an object or a record with
-the fields of :class:`RopeLine`; results go into sequences that are handed in.
+the fields of :class:`CableLine`; results go into sequences that are handed in.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import atan2, floor, nan, pi, sqrt
 from typing import Any
 
-__all__ = ["RopeLine", "motors_loop", "ropes_loop", "wound_angle"]
+__all__ = ["CableLine", "cables_loop", "motors_loop", "wound_angle"]
 
 Function = Callable[..., Any]
 _TURN = 2.0 * pi
@@ -20,8 +20,8 @@ _EDGE = 1e-12
 
 
 @dataclass(slots=True)
-class RopeLine:
-    """One line as the loops want it, in SI; built by :func:`winchkit.model.robot.ropes_of`."""
+class CableLine:
+    """One line for the loops, SI; made by :func:`winchkit.model.robot.cables_of`."""
 
     ex: float
     ey: float
@@ -42,7 +42,7 @@ class RopeLine:
     growth: float
     """Radius gained a turn."""
     home_wound: float
-    """Rope on the drum at home, m."""
+    """Cable on the drum at home, m."""
     home_angle: float
     """Angle wound at home, rad."""
     ratio: float
@@ -50,14 +50,14 @@ class RopeLine:
     motor_angle: float
     """At home."""
     dead_length: float
-    """Stressed rope between drum and exit point."""
+    """Stressed cable between drum and exit point."""
 
 
-def ropes_loop(steep: bool) -> Function:
-    """Rope lengths; where ``steep`` each followed by its gradient by position and rotation."""
+def cables_loop(steep: bool) -> Function:
+    """Loop of cable lengths; with ``steep`` each is followed by its gradient by the pose (6)."""
     width = 7 if steep else 1
 
-    def ropes(lines: Any, pose: Any, rows: Any) -> None:
+    def cables(lines: Any, pose: Any, rows: Any) -> None:
         px, py, pz, xx, xy, xz = pose[0], pose[1], pose[2], pose[3], pose[4], pose[5]
         yx, yy, yz, zx, zy, zz = pose[6], pose[7], pose[8], pose[9], pose[10], pose[11]
         for i in range(len(lines)):
@@ -92,7 +92,7 @@ def ropes_loop(steep: bool) -> Function:
                 rows[g + 5] = az * ux - ax * uz
                 rows[g + 6] = ax * uy - ay * ux
 
-    return ropes
+    return cables
 
 
 def wound_angle(line: Any, wound: float) -> float:
@@ -109,11 +109,11 @@ def wound_angle(line: Any, wound: float) -> float:
     return _TURN * n + (wound - full) / (winding + n * growth)  # type: ignore[no-any-return]
 
 
-def motors_loop(ropes: Function, wound_angle: Function) -> Function:
-    """Motor angles at a pose with ropes strained by ``strains``, relative to those at home."""
+def motors_loop(cables: Function, wound_angle: Function) -> Function:
+    """Motor angles at a pose with cables strained by ``strains``, relative to those at home."""
 
     def motors(lines: Any, pose: Any, strains: Any, lengths: Any, angles: Any) -> None:
-        ropes(lines, pose, lengths)
+        cables(lines, pose, lengths)
         for i in range(len(lines)):
             line = lines[i]
             length = lengths[i]

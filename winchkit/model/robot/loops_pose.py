@@ -1,4 +1,4 @@
-"""Pose from lengths and forces from a pose, one at a time: loops like those of loops.py."""
+"""Forward kinematics and force distribution of one pose in loops that numba compiles unchanged."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def turn(pose: Any, system: Any) -> None:
 
 
 def straighten(pose: Any) -> None:
-    """Square up the rotation's rows again: rounding adds up over many cycles."""
+    """Orthonormalise the rotation's rows: rounding adds up over many cycles."""
     a, b, c, d, e, f = pose[3], pose[4], pose[5], pose[6], pose[7], pose[8]
     size = sqrt(a * a + b * b + c * c)
     a, b, c = a / size, b / size, c / size
@@ -84,16 +84,16 @@ def straighten(pose: Any) -> None:
 
 
 def find_loop(
-    ropes: Function, normal: Function, solve: Function, turn: Function, straighten: Function
+    cables: Function, normal: Function, solve: Function, turn: Function, straighten: Function
 ) -> Function:
-    """Gauss and Newton from the pose handed in, which is moved; steps taken, or −1."""
+    """Loop of Gauss and Newton's method; moves the given pose, returns its steps, or −1."""
 
     def find(  # noqa: PLR0917 - numba takes no keywords
         lines: Any, given: Any, pose: Any, work: Any, tolerance: float, most: int
     ) -> int:
         rows, system = work
         for step in range(1, most + 1):
-            ropes(lines, pose, rows)
+            cables(lines, pose, rows)
             for i in range(len(lines)):
                 rows[7 * i] = given[i] - rows[7 * i]
             normal(rows, rows, 7, system)
@@ -114,14 +114,14 @@ def find_loop(
     return find
 
 
-def forces_loop(ropes: Function, normal: Function, solve: Function) -> Function:
-    """Rope forces by the IPAnema paper's Eq. 8, its sign put right; false where singular."""
+def forces_loop(cables: Function, normal: Function, solve: Function) -> Function:
+    """Cable forces by the IPAnema paper's Eq. 8, its sign put right; false where singular."""
 
     def forces(  # noqa: PLR0917 - numba takes no keywords
         lines: Any, pose: Any, initial: Any, wrench: Any, work: Any, out: Any
     ) -> bool:
         rows, system = work
-        ropes(lines, pose, rows)
+        cables(lines, pose, rows)
         normal(rows, initial, 1, system)
         # Aᵀ = −Gᵀ, hence f = f_i + G (GᵀG)⁻¹ (w − Gᵀ f_i).
         for a in range(6):

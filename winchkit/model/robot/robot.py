@@ -1,4 +1,4 @@
-"""A robot as declared, ready to compute with: poses, rope lengths and motor angles."""
+"""Kinematic model of a declared robot: poses, cable lengths and motor angles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
 from winchkit.model.line import Line
 from winchkit.model.robot.forward import Found, forward
-from winchkit.model.robot.kernels import RopeLine
+from winchkit.model.robot.kernels import CableLine
 from winchkit.model.robot.kinematics import (
     Geometry,
     Pose,
@@ -27,7 +27,7 @@ from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
 from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Robot", "robot_of", "ropes_of", "standing"]
+__all__ = ["Robot", "cables_of", "robot_of", "standing"]
 
 _TURN = 2 * np.pi
 _NEWTON_STEPS = 5
@@ -62,7 +62,7 @@ class Robot:
 
     @cached_property
     def lines(self) -> tuple[Line, ...]:
-        """The winches as lines that begin with their rope at home."""
+        """The winches as lines that begin with their cable at home."""
         return tuple(
             Line(
                 replace(winch, reference=replace(winch.reference, cable_length=float(there))),
@@ -75,11 +75,11 @@ class Robot:
 
     @property
     def dead_length(self) -> Array:
-        """Stressed rope between drum and exit point, (n,), m."""
+        """Stressed cable between drum and exit point, (n,), m."""
         return np.array([winch.cable.dead_length for winch in self.winches])
 
     def lengths(self, pose: Pose) -> Array:
-        """Geometric rope lengths, arcs included, (p, n), m."""
+        """Geometric cable lengths, arcs included, (p, n), m."""
         return lengths(self.geometry, pose.position, pose.rotation)
 
     def structure(self, pose: Pose) -> Array:
@@ -93,10 +93,22 @@ class Robot:
     def motor_angles(
         self, pose: Pose, strain: Array | float = 0.0, tension: Array | float = 0.0
     ) -> Array:
-        """Motor angles at poses, (p, n), rad, at which the ropes reach there under ``tension``, N.
+        """Inverse kinematics with drums and effects.
 
-        ``strain`` is by how much more they are strained than at home, by whatever is no effect of
-        the profile; it acts on length and dead length. Both are one number, (n,) or (p, n).
+        Parameters
+        ----------
+        pose : Pose
+            The p poses.
+        strain : float, (n,) or (p, n) array
+            Strain against home that no effect of the profile describes; it acts on the length and
+            on the dead length.
+        tension : float, (n,) or (p, n) array
+            Cable forces, N, for effects that depend on them.
+
+        Returns
+        -------
+        (p, n) array
+            Motor angles, rad.
         """
         there = self.lengths(pose)
         slack = there - strain * (there + self.dead_length)
@@ -118,10 +130,21 @@ class Robot:
         tension: Array | float = 0.0,
         temperature: Array | float = 20.0,
     ) -> Array:
-        """Rope lengths that motor angles (p, n) stand for, effects included, (p, n), m.
+        """Cable lengths by drums and effects.
 
-        Ropes that stretch do so under ``tension``, N; it and the temperature (degrees Celsius)
-        are one number, (n,) or (p, n).
+        Parameters
+        ----------
+        motor_angles : (p, n) array
+            rad.
+        tension : float, (n,) or (p, n) array
+            Cable forces, N.
+        temperature : float, (n,) or (p, n) array
+            Of the cables, degrees Celsius.
+
+        Returns
+        -------
+        (p, n) array
+            m.
         """
         angles = np.atleast_2d(np.asarray(motor_angles, dtype=float))
         if angles.shape[1] != len(self.profile.line):
@@ -143,7 +166,7 @@ class Robot:
         tension: Array | float = 0.0,
         temperature: Array | float = 20.0,
     ) -> Found:
-        """Poses at motor angles (p, n), searched from ``start``, else from home."""
+        """Forward kinematics of motor angles (p, n), rad, from ``start``, else from home."""
         given = self.lengths_at(motor_angles, tension, temperature)
         return forward(self.geometry, given, start or self.home, self.platform)
 
@@ -153,10 +176,17 @@ def robot_of(
     modifiers: Sequence[Sequence[Modifier]] = (),
     payload: Sequence[Modifier] = (),
 ) -> Robot:
-    """The robot that a profile declares, with modifiers per line and of its platform.
+    """Build the robot that a profile declares, with modifiers per line and of its platform.
 
-    Without them it is the nominal robot; ``winchkit.effects.robot_with_effects`` has those of the
-    profile's own effects.
+    Parameters
+    ----------
+    profile : RobotProfile
+        With the winch of each line read.
+    modifiers : sequence, optional
+        Modifiers of each line. Without them it is the nominal robot;
+        ``winchkit.effects.robot_with_effects`` applies the profile's own effects.
+    payload : sequence, optional
+        Modifiers of the platform.
     """
     home, geometry = home_of(profile), geometry_of(profile)
     own = tuple(tuple(m) for m in modifiers) or ((),) * len(profile.line)
@@ -165,7 +195,7 @@ def robot_of(
         return Robot(profile, geometry, home, there, profile.platform, own)
     exits, anchors = geometry.exit_point.copy(), geometry.anchor_point.copy()
     radii, offsets = geometry.swivel_radius.copy(), np.zeros(len(own))
-    # Effects of place look at no motion: one line at rest serves them all.
+    # Effects of place do not depend on motion: one line at rest serves all.
     rest = standing(Line(_winches(profile)[0]), np.zeros(1))
     for i, stages in enumerate(own):
         place, offset = LinePlace(exits[i], anchors[i], float(radii[i])), 0.0
@@ -191,19 +221,19 @@ def standing(
     tension: Array | None = None,
     temperature: Array | None = None,
 ) -> At:
-    """Samples of a line that each stand still, (n,); no tension and 20 degrees by default."""
+    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default."""
     zero = np.zeros_like(motor_angle)
     pulled = zero if tension is None else tension
     warm = zero + 20.0 if temperature is None else temperature
     return line.moments(zero, motor_angle, zero, pulled, warm)
 
 
-def ropes_of(robot: Robot) -> list[RopeLine]:
-    """The lines as the loops of a control cycle want them."""
-    return [_rope(robot, i, winch) for i, winch in enumerate(robot.winches)]
+def cables_of(robot: Robot) -> list[CableLine]:
+    """Lines for the loops of a control cycle."""
+    return [_cable(robot, i, winch) for i, winch in enumerate(robot.winches)]
 
 
-def _rope(robot: Robot, index: int, winch: WinchProfile) -> RopeLine:
+def _cable(robot: Robot, index: int, winch: WinchProfile) -> CableLine:
     place = robot.geometry
     _only_drums(robot, index)
     drum, home = robot.lines[index].drum, _TURN * winch.reference.wound_turns
@@ -211,7 +241,7 @@ def _rope(robot: Robot, index: int, winch: WinchProfile) -> RopeLine:
     ex, ey, ez = place.exit_point[index].tolist()
     bx, by, bz = place.anchor_point[index].tolist()
     sx, sy, sz = place.swivel_axis[index].tolist()
-    return RopeLine(
+    return CableLine(
         ex=ex,
         ey=ey,
         ez=ez,
@@ -235,7 +265,7 @@ def _rope(robot: Robot, index: int, winch: WinchProfile) -> RopeLine:
 
 
 def _only_drums(robot: Robot, index: int) -> None:
-    """The loops know drums; what else acts on a line they would leave out unseen."""
+    """Refuse modifiers that the loops do not compute."""
     if any(m.stage not in (Stage.DRUM, Stage.CELL) for m in robot.modifiers[index]):
         raise UsageError(
             f"line {robot.names[index]} has effects beside its drum's; the loops of a control "
@@ -244,7 +274,7 @@ def _only_drums(robot: Robot, index: int) -> None:
 
 
 def _law(drum: Drum) -> tuple[float, float, float]:
-    """A winding law as stepped or smooth, with its first radius and its growth a turn."""
+    """Winding law as stepped (1) or smooth (0), first radius and growth per turn."""
     match drum:
         case Spiral(radius, growth):
             return 1.0, radius, growth

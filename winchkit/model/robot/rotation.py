@@ -67,7 +67,7 @@ def rotation_by(vector: ArrayLike) -> Array:
     v = np.asarray(vector, dtype=float)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     cross = skew(v)
-    # sinc keeps both factors exact down to no rotation at all.
+    # sinc keeps both factors exact for small angles.
     first = np.sinc(angle / np.pi)
     second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
     return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
@@ -126,7 +126,7 @@ def angle_rates(rotation: Array) -> Array:
     _, pitch, yaw = angles_of(rotation).T
     cp, sp, cy, sy = np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
     zero, one = np.zeros_like(cp), np.ones_like(cp)
-    # Near a pitch of a right angle roll and yaw are one: no finite rate says anything there.
+    # Near a pitch of 90 degrees roll and yaw are not separate: their rates are infinite.
     level = np.where(np.abs(cp) > 1e-6, cp, np.nan)
     rows = (
         (cy / level, sy / level, zero),

@@ -1,4 +1,4 @@
-"""The wrench that ropes have to balance: the platform's weight, and what else acts on it."""
+"""Wrench of the platform's weight, and its derivatives."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from winchkit.arrays import Array
 from winchkit.model.line import GRAVITY
 from winchkit.schema.profiles.robot import PlatformSpec
 
-__all__ = ["gravity_wrench", "weight_hessian"]
+__all__ = ["gravity_wrench", "weight_by_payload", "weight_hessian"]
 
 _DOWN = np.array([0.0, 0.0, -GRAVITY])
 
@@ -18,6 +18,15 @@ def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
     lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
     force = np.broadcast_to(platform.mass * _DOWN, lever.shape)
     return np.concatenate([force, np.cross(lever, force)], axis=-1)
+
+
+def weight_by_payload(platform: PlatformSpec, rotation: Array) -> Array:
+    """Derivatives of :func:`gravity_wrench` by mass and centre of mass, (p, 6, 4)."""
+    out = np.zeros((len(rotation), 6, 4))
+    out[..., 0] = gravity_wrench(PlatformSpec(1.0, platform.center_of_mass), rotation)
+    for k in range(3):
+        out[:, 3:, 1 + k] = np.cross(rotation[:, :, k], platform.mass * _DOWN)
+    return out
 
 
 def weight_hessian(platform: PlatformSpec, rotation: Array) -> Array:

@@ -13,6 +13,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.residuals.attribution import Followed, variables_of
 from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.plain_json import significant
 from winchkit.report.figures.reduction import bin_edges, bin_means, strongest, thin, thin_points
 from winchkit.report.html.chart import reading
 from winchkit.report.words.numbers import Scale, percent, scale_for
@@ -237,7 +238,7 @@ def _labelled(name: str, unit: str) -> str:
 
 def _numbers(values: Array, digits: int = _DIGITS) -> list[float | None]:
     """Values to a few significant digits; None for NaN."""
-    return [_number(float(v), digits) if np.isfinite(v) else None for v in values]
+    return significant(values.tolist(), digits)
 
 
 def _number(value: float, digits: int = _DIGITS) -> float:

@@ -13,7 +13,7 @@ from winchkit.diagnosis.robot.attribution import (
     AXES,
     follows_of,
     most_telling,
-    on_ropes,
+    on_cables,
     variables_of_poses,
 )
 from winchkit.diagnosis.robot.errors import UNITS, Errors
@@ -91,8 +91,8 @@ def trace_over(
 ) -> Trace:
     """Errors of one output over one variable, of the line that shows it most."""
     name = over.output
-    error = on_ropes(problem, {name: before[name]})[name]
-    then = None if after is None else on_ropes(problem, {name: after[name]})[name]
+    error = on_cables(problem, {name: before[name]})[name]
+    then = None if after is None else on_cables(problem, {name: after[name]})[name]
     x = np.broadcast_to(_values(problem, over, error), error.shape)
     line = None
     if over.variable not in _POOLED:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from html import escape
-from math import isfinite
 from typing import Any
+
+from winchkit.plain_json import without_nan
 
 __all__ = [
     "Markup",
@@ -84,7 +85,7 @@ def table(
 def compact(value: Any, indent: int | None = None) -> str:
     """JSON with null where there is no finite number."""
     separators = (",", ":") if indent is None else (",", ": ")
-    plain = _finite(value)
+    plain = without_nan(value)
     return json.dumps(
         plain, ensure_ascii=False, allow_nan=False, indent=indent, separators=separators
     )
@@ -94,13 +95,3 @@ def inline(value: Any) -> str:
     """JSON that no text in it can end the script element of."""
     text = compact(value)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float):
-        return float(value) if isfinite(value) else None
-    return value

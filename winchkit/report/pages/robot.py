@@ -10,7 +10,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.results import Where
 from winchkit.diagnosis.robot.add import RobotGrown
-from winchkit.diagnosis.robot.attribution import AXES, on_ropes
+from winchkit.diagnosis.robot.attribution import AXES, on_cables
 from winchkit.diagnosis.robot.compare import RobotCompared
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.diagnosis.robot.errors import UNITS, Errors
@@ -62,8 +62,8 @@ def _output(
     name = trace.over.output
     title = element("h3", capital(OUTPUT_NAMES.get(name, name)))
     lines = list(AXES) if name == "platform_position" else list(problem.dataset.names)
-    then = None if after is None else on_ropes(problem, {name: after[name]})[name]
-    each = _each_line(name, lines, on_ropes(problem, {name: before[name]})[name], then)
+    then = None if after is None else on_cables(problem, {name: after[name]})[name]
+    each = _each_line(name, lines, on_cables(problem, {name: before[name]})[name], then)
     pair = element("div", _figure(trace, noise), each, class_="pair maps")
     return element("div", title, pair, class_="output")
 

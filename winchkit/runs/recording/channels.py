@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,6 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.plain_json import without_nan
 from winchkit.runs.align import Aligner, Moments
 from winchkit.runs.files import abandoned
 from winchkit.runs.formats.mcap_file import (
@@ -160,10 +160,4 @@ class ChannelLog(LogWriter):
 
 def _json(value: object) -> bytes:
     """JSON with null for what is no finite number."""
-    return json.dumps(_finite(value), separators=(",", ":"), allow_nan=False).encode()
-
-
-def _finite(value: object) -> object:
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json.dumps(without_nan(value), separators=(",", ":"), allow_nan=False).encode()
