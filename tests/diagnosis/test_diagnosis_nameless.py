@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, inquire
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import Found, search
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.specification_test import (
     Beside,
     Doubt,
@@ -96,17 +96,17 @@ def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
     # Slowly: a curve does not ask how the weight's acceleration changes with it.
     slow = Ride(samples=2000, period=20.0)
     run = made(0, GROOVED, noise=dict.fromkeys(OUTPUTS, 0.0), ride=slow, encoder=0.0)
-    problem = Problem(prepare([run], GROOVED))
+    regression = TimeSeriesRegression(prepare([run], GROOVED))
     radius = term("drum-radius", radius_error=share * 0.06)
-    wrong = problem.change(Hypothesis().with_term(radius, problem.runs))
-    lengths = [r.smooth.at.free_length for r in problem.dataset.recordings]
+    wrong = regression.change(Hypothesis().with_term(radius, regression.n_runs))
+    lengths = [r.smooth.at.free_length for r in regression.dataset.recordings]
     knots = np.linspace(min(map(np.min, lengths)), max(map(np.max, lengths)), 20)
     hats = [hats_over(length, knots) for length in lengths]
-    curve = np.zeros(problem.rows)
-    for own, columns in columns_of(problem, PLACES["winding"], hats, knots):
+    curve = np.zeros(regression.n_rows)
+    for own, columns in columns_of(regression, PLACES["winding"], hats, knots):
         curve[own] = (share * (knots - 4.0)) @ columns
     for output, close in (("cable_length", 0.02), ("motor_torque", 0.02)):
-        rows = np.concatenate([np.r_[s.rows] for s in problem.segments if s.output == output])
+        rows = np.concatenate([np.r_[s.rows] for s in regression.segments if s.output == output])
         across = wrong[rows] - wrong[rows].mean(), curve[rows] - curve[rows].mean()
         assert np.linalg.norm(across[0] - across[1]) < close * np.linalg.norm(across[0]), output
 
@@ -133,18 +133,18 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
         far = (run["cable_length"] - 4.0) / 0.5
         bent = run["cable_length"] + 1.5e-5 * far**3
         runs.append(with_channel(run, "cable_length", bent, "m"))
-    inquiry = inquire(prepare(runs, GROOVED), CATALOGUE)
-    begin, noise = inquiry.settle(inquiry.begin)
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    begin, noise = engine.settle(engine.begin)
     hypothesis = begin.hypothesis
     for added in (term("motor-coulomb", torque=0.05), term("gear-ratio", ratio_error=1e-5)):
-        hypothesis = hypothesis.with_term(added, inquiry.problem.runs)
-    final, noise = inquiry.settle(hypothesis, noise)
-    presence = inquiry.presence(final, noise)
-    begun = inquiry.presence(begin, noise)
+        hypothesis = hypothesis.with_term(added, engine.regression.n_runs)
+    final, noise = engine.settle(hypothesis, noise)
+    presence = engine.presence(final, noise)
+    begun = engine.presence(begin, noise)
     found = Found(
         begin, noise, begun, True, final.hypothesis, final, noise, presence, False, (), (), 0.0
     )
-    judged = judge_and_doubt(inquiry, found)
+    judged = judge_and_doubt(engine, found)
     assert judged.verdict == "explained"
     assert judged.shown.final.labels == ("motor-coulomb",)
     (note,) = judged.notes
@@ -153,27 +153,29 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
 
 
 @cache
-def rubbed() -> tuple[Inquiry, Found]:
+def rubbed() -> tuple[TimeSeriesSelection, Found]:
     """A search that found dry friction of the motor."""
-    inquiry = inquire(prepare(driven((term("motor-coulomb", torque=0.05),)), GROOVED), CATALOGUE)
-    return inquiry, search(inquiry)
+    engine = selection_engine(
+        prepare(driven((term("motor-coulomb", torque=0.05),)), GROOVED), CATALOGUE
+    )
+    return engine, search(engine)
 
 
 def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
-    inquiry, found = rubbed()
-    doubt = Doubt(inquiry, found)
+    engine, found = rubbed()
+    doubt = Doubt(engine, found)
     whole = doubt.beside(())
     assert 0.99 * found.final.cost < whole.cost <= found.final.cost * (1 + 1e-9)
     without = doubt.beside([0])
-    refitted = inquiry.refit(found.final.hypothesis.without(0), found.noise)
+    refitted = engine.refit(found.final.hypothesis.without(0), found.noise)
     # What sampling may have rounded is taken out of the one and not of the other.
     assert 0.95 * refitted.cost < without.cost <= refitted.cost * (1 + 1e-9)
 
 
 def test_curves_are_sought_only_where_the_names_act() -> None:
-    inquiry, found = rubbed()
-    beside = Doubt(inquiry, found).beside([0])
-    curve = best_curve(inquiry.problem, beside, ["motor_torque"], inquiry.price)
+    engine, found = rubbed()
+    beside = Doubt(engine, found).beside([0])
+    curve = best_curve(engine.regression, beside, ["motor_torque"], engine.price)
     assert curve is not None
     assert curve.place in {"motor_torque", "rope force"}
-    assert best_curve(inquiry.problem, beside, [], inquiry.price) is None
+    assert best_curve(engine.regression, beside, [], engine.price) is None

@@ -8,7 +8,7 @@ from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term, with_channel
 
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.diagnose import diagnose, inquire
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.exclusion import calmed
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 
@@ -26,8 +26,8 @@ def dataset_of(load_mass: float | None) -> Dataset:
 
 
 def with_play(dataset: Dataset) -> Hypothesis:
-    inquiry = inquire(dataset, CATALOGUE)
-    return inquiry.begin.with_term(PLAY, inquiry.problem.runs)
+    engine = selection_engine(dataset, CATALOGUE)
+    return engine.begin.with_term(PLAY, engine.regression.n_runs)
 
 
 @pytest.mark.parametrize("load_mass", [10.0, None], ids=["weight", "measured"])

@@ -81,7 +81,7 @@ def unseen(answer: Answer) -> list[tuple[str, list[str]]]:
     tried = {e.partition("/")[0] for e in effects_of(answer)}
     out = []
     for effect in load_catalogue():
-        lacking = answer.inquiry.lacking(effect) if effect.id not in tried else []
+        lacking = answer.engine.regression.missing_needs(effect) if effect.id not in tried else []
         if lacking:
             out.append((effect.id, list(lacking)))
     return out

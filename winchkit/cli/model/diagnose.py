@@ -26,7 +26,7 @@ from winchkit.cli.model.options import (
 )
 
 if TYPE_CHECKING:
-    from winchkit.diagnosis.diagnose import Answer
+    from winchkit.diagnosis.diagnose import Answer, WinchAnswer
     from winchkit.diagnosis.results import Diagnosis
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
@@ -137,7 +137,7 @@ def _tell_robot(
         write_page(html, robot_report_html(answer, title, asked.profile, options=asked.options))
 
 
-def _page(answer: Answer, title: str, asked: Asked) -> str:
+def _page(answer: WinchAnswer, title: str, asked: Asked) -> str:
     """An answer as a page, with the commands that repeat it."""
     from winchkit.report.pages.pages import report_html
 

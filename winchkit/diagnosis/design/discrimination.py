@@ -16,7 +16,7 @@ from scipy.stats import ncx2
 from winchkit.arrays import Array
 from winchkit.diagnosis.design.programmes import KINDS, imagined
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import NextRun
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
@@ -42,15 +42,15 @@ class SoFar:
 
 
 def next_runs(
-    problem: Problem, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
+    regression: TimeSeriesRegression, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
 ) -> tuple[NextRun, ...]:
     """The programmes that separate each pair best per minute, with the power they would have."""
     if not pairs:
         return ()
     out: list[NextRun] = []
-    tried = [(kind, imagined(problem.dataset, kind)) for kind in KINDS]
+    tried = [(kind, imagined(regression.dataset, kind)) for kind in KINDS]
     for first, second in pairs:
-        offers, known = [], so_far(problem, first, second, noise)
+        offers, known = [], so_far(regression, first, second, noise)
         for kind, programme in tried:
             minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
             strength = separation(programme, first, second, noise, known=known)
@@ -72,7 +72,7 @@ def power_of(strength: float, needed: float = APART) -> float:
 
 
 def separation(
-    problem: Problem,
+    regression: TimeSeriesRegression,
     first: Term,
     second: Term | None,
     noise: Mapping[str, float],
@@ -86,7 +86,7 @@ def separation(
     so far say, by how much λ grows: the second must be one size there and here, so that a run
     which shows nothing of it tells as much as one that does.
     """
-    rows = _rows(problem, first, second, noise)
+    rows = _rows(regression, first, second, noise)
     if rows is None:
         return 0.0
     own, shared, shown = (np.asarray(np.sqrt(repeats) * part) for part in rows)
@@ -98,10 +98,10 @@ def separation(
 
 
 def so_far(
-    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+    regression: TimeSeriesRegression, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> SoFar | None:
     """What the runs of a problem know of two effects; None where that is no number."""
-    rows = _rows(problem, first, second, noise)
+    rows = _rows(regression, first, second, noise)
     if rows is None:
         return None
     own, shared, shown = rows
@@ -111,28 +111,28 @@ def so_far(
 
 
 def _rows(
-    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+    regression: TimeSeriesRegression, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> tuple[Array, Array, Array] | None:
     """Columns that are a run's own (states), those that all runs share, and the first effect.
 
     All in units of the noise; None where an effect is no number somewhere.
     """
-    weight = np.empty(problem.rows)
-    for segment in problem.segments:
+    weight = np.empty(regression.n_rows)
+    for segment in regression.segments:
         weight[segment.rows] = 1 / max(noise.get(segment.output, np.inf), 1e-300)
-    shown = problem.change(Hypothesis().with_term(first, problem.runs)) * weight
+    shown = regression.change(Hypothesis().with_term(first, regression.n_runs)) * weight
     rival = Hypothesis()
     if second is not None:
-        rival = rival.with_term(second, problem.runs)
-    imitation = problem.jacobian(problem.vector(rival), rival) * weight[:, None]
+        rival = rival.with_term(second, regression.n_runs)
+    imitation = regression.jacobian(regression.vector(rival), rival) * weight[:, None]
     if not (np.isfinite(imitation).all() and np.isfinite(shown).all()):
         return None
     states = sum(len(start) for start in rival.starts)
-    nuisances, offset = problem.nuisance_columns.shape[1], int(problem.fits_offset)
+    nuisances, offset = regression.nuisance_columns.shape[1], int(regression.fits_offset)
     own = [*range(offset, nuisances), *range(imitation.shape[1] - states, imitation.shape[1])]
     numbers = imitation[:, nuisances : imitation.shape[1] - states]
-    level = imitation[:, :1] if offset else np.zeros((problem.rows, 1))
-    shared = np.column_stack([level, numbers, problem.change(rival) * weight])
+    level = imitation[:, :1] if offset else np.zeros((regression.n_rows, 1))
+    shared = np.column_stack([level, numbers, regression.change(rival) * weight])
     return imitation[:, own], shared, shown
 
 

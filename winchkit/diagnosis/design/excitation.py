@@ -8,7 +8,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.repeats import mean_load
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 
 __all__ = ["what_runs_cannot_show"]
 
@@ -20,9 +20,9 @@ _ONE_SPEED = 0.1
 _PLATEAU = 0.75
 
 
-def what_runs_cannot_show(problem: Problem) -> list[str]:
+def what_runs_cannot_show(regression: TimeSeriesRegression) -> list[str]:
     """Sentences on missing repeats, loads, directions, reversals, speeds and temperatures."""
-    dataset = problem.dataset
+    dataset = regression.dataset
     notes = []
     if not dataset.repeated:
         notes.append(

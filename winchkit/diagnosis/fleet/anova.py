@@ -80,11 +80,13 @@ class SharedError:
 
 def errors_of(compared: Compared) -> dict[str, WinchErrors]:
     """Errors per output of one winch, as few as its shares need."""
-    problem, out = compared.problem, {}
-    times = problem.in_time(compared.residual)
+    regression, out = compared.regression, {}
+    times = regression.in_time(compared.residual)
     for output, told in compared.comparison.outputs.items():
-        own = [(s, t) for s, t in zip(problem.segments, times, strict=True) if s.output == output]
-        recordings = [problem.dataset.recordings[s.run] for s, _ in own]
+        own = [
+            (s, t) for s, t in zip(regression.segments, times, strict=True) if s.output == output
+        ]
+        recordings = [regression.dataset.recordings[s.run] for s, _ in own]
         valid = [recording.valid[output] for recording in recordings]
         step = max(1, told.samples // _MOST)
         known = [variables_of(recording) for recording in recordings]
@@ -96,7 +98,7 @@ def errors_of(compared: Compared) -> dict[str, WinchErrors]:
             if all(name in run for run in known)
         }
         error = np.concatenate([t[v] for (_, t), v in zip(own, valid, strict=True)])[::step]
-        kept = min(len(error), kept_rows(problem, output))
+        kept = min(len(error), kept_rows(regression, output))
         out[output] = WinchErrors(told.unit, told.rms**2, error, variables, kept)
     return out
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from threading import Thread
 
-from winchkit.diagnosis.diagnose import Answer, Told, diagnose, silent
+from winchkit.diagnosis.diagnose import Told, WinchAnswer, diagnose, silent
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -25,7 +25,7 @@ def diagnose_each(
     *,
     thin: bool = True,
     told: Told = silent,
-) -> Iterator[tuple[str, Answer]]:
+) -> Iterator[tuple[str, WinchAnswer]]:
     """Name and answer of every winch, in order, all against one profile.
 
     Two are worked on at a time: on long arrays numpy leaves a second core to the other. An answer
@@ -34,7 +34,7 @@ def diagnose_each(
     catalogue = catalogue or load_catalogue()
     shares = dict.fromkeys(winches, 0.0)
 
-    def one(name: str) -> Answer:
+    def one(name: str) -> WinchAnswer:
         def heard(what: str, share: float) -> None:
             shares[name] = share
             told(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
@@ -43,7 +43,7 @@ def diagnose_each(
         heard("done", 1.0)
         return answer
 
-    begun: deque[tuple[str, Future[Answer]]] = deque()
+    begun: deque[tuple[str, Future[WinchAnswer]]] = deque()
     for name in winches:
         begun.append((name, _begun(one, name)))
         if len(begun) == _AT_A_TIME:
@@ -52,19 +52,19 @@ def diagnose_each(
         yield _taken(begun)
 
 
-def _taken(begun: deque[tuple[str, Future[Answer]]]) -> tuple[str, Answer]:
+def _taken(begun: deque[tuple[str, Future[WinchAnswer]]]) -> tuple[str, WinchAnswer]:
     """The oldest, waited for; nothing here keeps its answer."""
     name, future = begun.popleft()
     return name, future.result()
 
 
-def _begun(work: Callable[[str], Answer], name: str) -> Future[Answer]:
+def _begun(work: Callable[[str], WinchAnswer], name: str) -> Future[WinchAnswer]:
     """An answer being worked on.
 
     Whoever is interrupted while waiting gets away at once; a pool would first wait for its
     threads, for seconds.
     """
-    future: Future[Answer] = Future()
+    future: Future[WinchAnswer] = Future()
 
     def run() -> None:
         try:

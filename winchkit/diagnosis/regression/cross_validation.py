@@ -6,7 +6,6 @@ linear solve, so that cross-validation needs no fit of its own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -14,67 +13,24 @@ from numpy.typing import NDArray
 from scipy.stats import wilcoxon
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
 
 __all__ = [
-    "Folds",
-    "blocks_of",
     "confidence",
-    "groups_of",
+    "extrapolation",
     "held_out",
     "held_out_rms",
     "left_out_steps",
 ]
 
-_BLOCKS = 48
 _TOUCHED = 0.02
 _AT_LEAST = 8
 _RIDGE = 1e-12
 
 
-@dataclass(frozen=True)
-class Folds:
-    """A partition of every sample in time: per segment a fold number per sample."""
-
-    of: tuple[NDArray[np.intp], ...]
-    count: int
-
-
-def blocks_of(problem: Problem, wanted: int = _BLOCKS) -> Folds:
-    """Contiguous blocks of time, equally long within a run, the same for all its outputs."""
-    total = sum(len(r.signals.time) for r in problem.dataset.recordings)
-    first, starts, counts = 0, [], []
-    for recording in problem.dataset.recordings:
-        share = max(2, round(wanted * len(recording.signals.time) / total))
-        starts.append(first)
-        counts.append(share)
-        first += share
-    of = tuple(
-        starts[s.run] + (np.arange(s.band.count) * counts[s.run]) // s.band.count
-        for s in problem.segments
-    )
-    return Folds(of, first)
-
-
-def five_blocks(problem: Problem) -> Folds:
-    """Five stretches of time, one after another through all runs."""
-    blocks = blocks_of(problem)
-    return Folds(tuple((b * 5) // blocks.count for b in blocks.of), 5)
-
-
-def groups_of(problem: Problem) -> Folds:
-    """Whole groups of programme and load; with one group only, five blocks of time."""
-    groups = problem.dataset.repeats
-    if len(groups) < 2:
-        return five_blocks(problem)
-    of_run = {run: index for index, group in enumerate(groups) for run in group.runs}
-    of = tuple(np.full(s.band.count, of_run[s.run], dtype=np.intp) for s in problem.segments)
-    return Folds(of, len(groups))
-
-
-def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> float:
+def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> float:
     """Variance of a fold's prediction from the other folds, at most, over the noise's.
 
     Per output and in its unit, as held-out errors are told: noise that is strongest at low
@@ -82,10 +38,10 @@ def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> flo
     whitened rows say.
     """
     shared = _shared(fit)
-    columns = _in_time(problem, shared * noise.weight(problem)[:, None])
-    plain = _in_time(problem, shared)
+    columns = _in_time(regression, shared * noise.weight(regression)[:, None])
+    plain = _in_time(regression, shared)
     fold = np.concatenate(folds.of)
-    output = np.concatenate([np.full(s.band.count, s.output) for s in problem.segments])
+    output = np.concatenate([np.full(s.band.count, s.output) for s in regression.segments])
     size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
     columns, plain = columns / size, plain / size
     whole = columns.T @ columns
@@ -102,44 +58,44 @@ def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> flo
     return worst
 
 
-def held_out(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Array:
+def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
     """Whitened squares of every fold, predicted with unknowns fitted without it; (folds,).
 
     The state in which a run began is its own, whatever is left out.
     """
-    weight = noise.weight(problem)
-    residual = np.concatenate(problem.in_time(fit.residual * weight))
-    columns = _in_time(problem, _shared(fit) * weight[:, None])
+    weight = noise.weight(regression)
+    residual = np.concatenate(regression.in_time(fit.residual * weight))
+    columns = _in_time(regression, _shared(fit) * weight[:, None])
     fold = np.concatenate(folds.of)
     left = _left_out(residual, columns, fold, folds.count)
     return np.asarray(np.bincount(fold, weights=left**2, minlength=folds.count), dtype=float)
 
 
-def left_out_steps(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Array:
+def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
     """Change of the unknowns when each fold is left out, linearised; (folds, unknowns)."""
-    weight = noise.weight(problem)
-    residual = np.concatenate(problem.in_time(fit.residual * weight))
-    columns = _in_time(problem, fit.jacobian * weight[:, None])
+    weight = noise.weight(regression)
+    residual = np.concatenate(regression.in_time(fit.residual * weight))
+    columns = _in_time(regression, fit.jacobian * weight[:, None])
     return _steps(residual, columns, np.concatenate(folds.of), folds.count)
 
 
-def held_out_rms(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
     """Held-out error per output, rms in SI."""
-    weight = noise.weight(problem)
-    white = np.concatenate(problem.in_time(fit.residual * weight))
+    weight = noise.weight(regression)
+    white = np.concatenate(regression.in_time(fit.residual * weight))
     shared = _shared(fit)
-    columns = _in_time(problem, shared * weight[:, None])
+    columns = _in_time(regression, shared * weight[:, None])
     steps = _steps(white, columns, np.concatenate(folds.of), folds.count)
-    plain = np.concatenate(problem.in_time(fit.residual))
-    plain_columns = _in_time(problem, shared)
+    plain = np.concatenate(regression.in_time(fit.residual))
+    plain_columns = _in_time(regression, shared)
     fold = np.concatenate(folds.of)
     left = plain - np.einsum("ij,ij->i", plain_columns, steps[fold])
-    squares, at = dict.fromkeys(problem.dataset.outputs, 0.0), 0
-    for segment in problem.segments:
+    squares, at = dict.fromkeys(regression.outputs, 0.0), 0
+    for segment in regression.segments:
         part = left[at : at + segment.band.count]
         at += segment.band.count
         squares[segment.output] += float(part @ part)
-    return {o: float(np.sqrt(total / problem.samples(o))) for o, total in squares.items()}
+    return {o: float(np.sqrt(total / regression.n_samples(o))) for o, total in squares.items()}
 
 
 def confidence(before: Array, after: Array) -> float:
@@ -162,12 +118,12 @@ def _shared(fit: Fit) -> Array:
     return fit.jacobian[:, : fit.jacobian.shape[1] - states]
 
 
-def _in_time(problem: Problem, columns: Array) -> Array:
+def _in_time(regression: Regression, columns: Array) -> Array:
     """Columns back in time, (samples, k)."""
-    samples = sum(s.band.count for s in problem.segments)
+    samples = sum(s.band.count for s in regression.segments)
     out = np.empty((columns.shape[1], samples)).T
     for index, column in enumerate(columns.T):
-        out[:, index] = np.concatenate(problem.in_time(column))
+        out[:, index] = np.concatenate(regression.in_time(column))
     return out
 
 

@@ -9,39 +9,41 @@ difference is what an effect's values, and what it leaves, may be wrong by.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.data.dataset import Dataset, Recording
 from winchkit.diagnosis.data.spectrum import to_frequency
+from winchkit.diagnosis.regression.base import Regression, Segment
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.effects.term import modifiers_of
 from winchkit.model.derivatives import is_calmer
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 
-__all__ = ["rounded", "without_rounding"]
+__all__ = ["discretization_error", "without_discretization_error"]
 
 _FINER = 4
 _DEGREE = 3
 
 
-def rounded(problem: Problem, hypothesis: Hypothesis) -> Array:
+def discretization_error(
+    dataset: Dataset, segments: Sequence[Segment], hypothesis: Hypothesis
+) -> Array:
     """What the terms add on a motion of finer steps, less what they add on the samples, rows."""
-    out = np.zeros(problem.rows)
-    dataset = problem.dataset
-    if not hypothesis.terms or not dataset.recordings:
+    out = np.zeros(segments[-1].rows.stop)
+    if not hypothesis.terms:
         return out
     moved = [
         _moved(Line(dataset.profile, modifiers_of(started(hypothesis, run))), recording)
         for run, recording in enumerate(dataset.recordings)
     ]
-    for segment in problem.segments:
+    for segment in segments:
         recording = dataset.recordings[segment.run]
         valid = recording.valid[segment.output]
         signal = moved[segment.run].get(segment.output)
@@ -50,9 +52,9 @@ def rounded(problem: Problem, hypothesis: Hypothesis) -> Array:
     return out
 
 
-def without_rounding(problem: Problem, fit: Fit, weight: Array) -> Array:
+def without_discretization_error(regression: Regression, fit: Fit, weight: Array) -> Array:
     """A fit's residual without the part, between none and all, that rounding explains, rows."""
-    column = rounded(problem, fit.hypothesis)
+    column = regression.discretization_error(fit.hypothesis)
     across = _beside(fit.jacobian * weight[:, None], column * weight)
     size = float(across @ across)
     if not size:

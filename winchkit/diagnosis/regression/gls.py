@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
 
 __all__ = ["Fit", "fit", "fit_from"]
 
@@ -45,18 +45,18 @@ class Fit:
         return tuple(term.label for term in self.hypothesis.terms)
 
 
-def fit(problem: Problem, start: Hypothesis, weight: Array, most: int | None = None) -> Fit:
+def fit(regression: Regression, start: Hypothesis, weight: Array, most: int | None = None) -> Fit:
     """Fit all unknowns from ``start``; ``weight`` is 1/σ per row. Bounds are kept.
 
     ``most`` is how many steps it may take, by default as many as are worth walking.
     """
-    x = problem.vector(start)
-    low, high = problem.bounds(start)
+    x = regression.vector(start)
+    low, high = regression.bounds(start)
     x = np.clip(x, low, high)
-    residual = problem.residual(problem.hypothesis(x, start))
+    residual = regression.residual(regression.hypothesis(x, start))
     cost = _cost(residual, weight)
     damping = 1e-6
-    jacobian = problem.jacobian(x, start)
+    jacobian = regression.jacobian(x, start)
     for _ in range((_iterations(start) if most is None else most) if len(x) else 0):
         step, promised = _step(
             jacobian * weight[:, None], residual * weight, damping, x, (low, high)
@@ -64,29 +64,29 @@ def fit(problem: Problem, start: Hypothesis, weight: Array, most: int | None = N
         if promised < _ENOUGH:
             break
         trial = np.clip(x + step, low, high)
-        there = problem.residual(problem.hypothesis(trial, start))
+        there = regression.residual(regression.hypothesis(trial, start))
         new = _cost(there, weight)
         if new < cost:
             gained = cost - new
             x, residual, cost, damping = trial, there, new, damping / 10
-            jacobian = problem.jacobian(x, start)
+            jacobian = regression.jacobian(x, start)
             if gained < _ENOUGH:
                 break
         else:
             damping = max(damping * 100, 1e-4)
             if damping > 1e6:
                 break
-    fitted = problem.hypothesis(x, start)
+    fitted = regression.hypothesis(x, start)
     return Fit(fitted, x, residual, jacobian, cost, len(x))
 
 
-def fit_from(problem: Problem, starts: Sequence[Hypothesis], weight: Array) -> Fit:
+def fit_from(regression: Regression, starts: Sequence[Hypothesis], weight: Array) -> Fit:
     """The best fit from several starts; after a first look only from the most promising ones."""
     if len(starts) > _PROMISING:
-        looked = [fit(problem, start, weight, _LOOK) for start in starts]
+        looked = [fit(regression, start, weight, _LOOK) for start in starts]
         looked.sort(key=lambda fitted: fitted.cost)
         starts = [fitted.hypothesis for fitted in looked[:_PROMISING]]
-    return min((fit(problem, start, weight) for start in starts), key=lambda fitted: fitted.cost)
+    return min((fit(regression, start, weight) for start in starts), key=lambda fitted: fitted.cost)
 
 
 def _iterations(start: Hypothesis) -> int:

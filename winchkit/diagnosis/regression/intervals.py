@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.cross_validation import Folds, left_out_steps
-from winchkit.diagnosis.regression.discretization import rounded
+from winchkit.diagnosis.regression.base import Folds, Regression
+from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.results import Estimate
 from winchkit.effects.effect import Parameter
 from winchkit.effects.parametrization import Coordinates
@@ -41,7 +40,7 @@ _FARTHEST = 4.0
 
 
 def profile_ends(
-    problem: Problem, fit: Fit, weight: Array, covariance: Array, reach: Array
+    regression: Regression, fit: Fit, weight: Array, covariance: Array, reach: Array
 ) -> tuple[Array, Array]:
     """Where the whitened squares have risen by ``reach``² with all else refitted; two (unknowns,).
 
@@ -51,12 +50,12 @@ def profile_ends(
     """
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     low, high = fit.vector - reach * deviation, fit.vector + reach * deviation
-    bounds = problem.bounds(fit.hypothesis)
-    first = problem.nuisance_columns.shape[1]
+    bounds = regression.bounds(fit.hypothesis)
+    first = regression.nuisance_columns.shape[1]
     states = sum(len(start) for start in fit.hypothesis.starts)
     for index in range(first, len(fit.vector) - states):
         if deviation[index] > 0.0:
-            walk = _Walk(problem, fit, weight, covariance, index)
+            walk = _Walk(regression, fit, weight, covariance, index)
             low[index] = fit.vector[index] - walk.length(-1.0, reach[index])
             high[index] = fit.vector[index] + walk.length(1.0, reach[index])
     return np.clip(low, *bounds), np.clip(high, *bounds)
@@ -66,16 +65,16 @@ class _Walk:
     """Away from a fit along one unknown, the others following."""
 
     def __init__(
-        self, problem: Problem, fit: Fit, weight: Array, covariance: Array, index: int
+        self, regression: Regression, fit: Fit, weight: Array, covariance: Array, index: int
     ) -> None:
-        self._problem, self._fit, self._weight, self._index = problem, fit, weight, index
+        self._regression, self._fit, self._weight, self._index = regression, fit, weight, index
         self._deviation = float(np.sqrt(covariance[index, index]))
         self._along = covariance[:, index] / covariance[index, index]
         others = np.arange(len(covariance)) != index
         whitened = fit.jacobian[:, others] * weight[:, None]
         normal = np.linalg.pinv(whitened.T @ whitened, rcond=1e-12, hermitian=True)
         self._others, self._whitened, self._normal = others, whitened, normal
-        self._bounds = problem.bounds(fit.hypothesis)
+        self._bounds = regression.bounds(fit.hypothesis)
 
     def length(self, side: float, reach: float) -> float:
         """How far one may go, in the unknown's coordinate."""
@@ -106,7 +105,7 @@ class _Walk:
 
     def _residual(self, vector: Array) -> Array:
         like = self._fit.hypothesis
-        return self._problem.residual(self._problem.hypothesis(vector, like)) * self._weight
+        return self._regression.residual(self._regression.hypothesis(vector, like)) * self._weight
 
 
 _95 = 1.959964
@@ -127,24 +126,24 @@ class Spread:
     high: Array
 
 
-def spread_of(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
+def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
     """Standard deviations and 95 % intervals of every unknown."""
-    weight = noise.weight(problem)
+    weight = noise.weight(regression)
     whitened = fit.jacobian * weight[:, None]
     normal = whitened.T @ whitened
     covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    statistical = np.maximum(likelihood, _jackknife(problem, fit, noise, blocks))
+    statistical = np.maximum(likelihood, _jackknife(regression, fit, noise, blocks))
     unknown = (statistical > _NOTHING) | (np.diag(normal) == 0.0)
     covariance[unknown] = covariance[:, unknown] = likelihood[unknown] = 0.0
     statistical[unknown] = _NOTHING
-    shift = covariance @ (whitened.T @ (rounded(problem, fit.hypothesis) * weight))
-    contradiction = _contradiction(problem, whitened, fit.residual * weight, covariance)
+    shift = covariance @ (whitened.T @ (regression.discretization_error(fit.hypothesis) * weight))
+    contradiction = _contradiction(regression, whitened, fit.residual * weight, covariance)
     systematic = np.hypot(shift, contradiction)
     wider = np.divide(
         statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
     )
-    low, high = profile_ends(problem, fit, weight, covariance, _95 * wider)
+    low, high = profile_ends(regression, fit, weight, covariance, _95 * wider)
     below, above = (
         np.where(unknown, _NOTHING, way) for way in (fit.vector - low, high - fit.vector)
     )
@@ -155,14 +154,16 @@ def spread_of(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Spread
     )
 
 
-def _jackknife(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Array:
+def _jackknife(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Array:
     """Standard deviation of every unknown from leaving out each block of time."""
-    steps = left_out_steps(problem, fit, noise, blocks)
+    steps = left_out_steps(regression, fit, noise, blocks)
     n = blocks.count
     return np.asarray(np.sqrt((n - 1) / n * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
 
 
-def _contradiction(problem: Problem, whitened: Array, residual: Array, covariance: Array) -> Array:
+def _contradiction(
+    regression: Regression, whitened: Array, residual: Array, covariance: Array
+) -> Array:
     """Half of the largest difference between what a part and the rest of the data say.
 
     Zero where noise alone may have made it. A part's pull on an unknown u = C Jᵀr, of say
@@ -170,7 +171,7 @@ def _contradiction(problem: Problem, whitened: Array, residual: Array, covarianc
     """
     out = np.zeros(len(covariance))
     variance = np.maximum(np.diag(covariance), 1e-300)
-    for part in _parts(problem):
+    for part in _parts(regression):
         own = whitened[part]
         normal = own.T @ own
         pull = covariance @ (own.T @ residual[part])
@@ -184,21 +185,26 @@ def _contradiction(problem: Problem, whitened: Array, residual: Array, covarianc
     return out
 
 
-def _parts(problem: Problem) -> Iterator[NDArray[np.intp]]:
+def _parts(regression: Regression) -> Iterator[NDArray[np.intp]]:
     """Rows of each output, and of each group of programme and load, where there are several."""
-    groups = {run: i for i, group in enumerate(problem.dataset.repeats) for run in group.runs}
-    for key in (lambda s: s.output, lambda s: groups[s.run]):
-        kinds = dict.fromkeys(key(s) for s in problem.segments)
+    by_output = [s.output for s in regression.segments]
+    by_group = [str(regression.group_of_run[s.run]) for s in regression.segments]
+    for keys in (by_output, by_group):
+        kinds = dict.fromkeys(keys)
         for kind in kinds if len(kinds) > 1 else ():
             rows = [
-                np.arange(s.rows.start, s.rows.stop) for s in problem.segments if key(s) == kind
+                np.arange(s.rows.start, s.rows.stop)
+                for s, key in zip(regression.segments, keys, strict=True)
+                if key == kind
             ]
             yield np.concatenate(rows)
 
 
-def estimates(problem: Problem, fit: Fit, spread: Spread) -> list[tuple[Term, dict[str, Estimate]]]:
+def estimates(
+    regression: Regression, fit: Fit, spread: Spread
+) -> list[tuple[Term, dict[str, Estimate]]]:
     """Every term of a fit with its values, standard deviations, 95 % intervals and units."""
-    at = problem.nuisance_columns.shape[1]
+    at = regression.nuisance_columns.shape[1]
     out = []
     for term in fit.hypothesis.terms:
         coordinates = Coordinates(term.effect)

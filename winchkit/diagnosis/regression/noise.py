@@ -17,9 +17,17 @@ from scipy.stats import f as f_distribution
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.data.spectrum import smoothed
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.base import Regression
 
-__all__ = ["Noise", "Presence", "noise_from_repeats", "noise_saturated", "orthonormal", "presence"]
+__all__ = [
+    "Noise",
+    "Presence",
+    "noise_from_repeats",
+    "noise_saturated",
+    "orthonormal",
+    "presence",
+    "replicate_rms",
+]
 
 _KNOWN_DIFFERENCES = 6
 _NOTICEABLE = 0.02
@@ -39,20 +47,20 @@ class Noise:
     """Per output, in time, SI."""
     from_repeats: bool
 
-    def weight(self, problem: Problem) -> Array:
+    def weight(self, regression: Regression) -> Array:
         """1/σ of every row."""
-        return np.asarray(1 / np.sqrt(self.power[problem.band_of_row]))
+        return np.asarray(1 / np.sqrt(self.power[regression.band_of_row]))
 
-    def uncertainty(self, problem: Problem) -> dict[str, float]:
+    def uncertainty(self, regression: Regression) -> dict[str, float]:
         """By how much (relative, two deviations) mean squares may exceed the noise's by chance.
 
         Coloured noise has few independent values: most of its power is in its lowest bands.
         """
-        rows = _sums(np.ones(problem.rows), problem.band_of_row, len(self.power))
+        rows = _sums(np.ones(regression.n_rows), regression.band_of_row, len(self.power))
         total, spread = self.power * rows, (self.power * rows) ** 2
         out = {}
         for output in self.rms:
-            own = np.array([band[0] == output for band in problem.bands])
+            own = np.array([band[0] == output for band in regression.bands])
             variance = 2 * np.sum((spread * (1 / self.freedom + 1 / np.maximum(rows, 1.0)))[own])
             out[output] = float(2 * np.sqrt(variance) / np.sum(total[own]))
         return out
@@ -81,7 +89,7 @@ class _Split:
 
 
 def noise_from_repeats(
-    problem: Problem, residual: Array, known: Array, own: Array | None = None
+    regression: Regression, residual: Array, known: Array, own: Array | None = None
 ) -> Noise:
     """Noise power from differences of repeats.
 
@@ -89,60 +97,60 @@ def noise_from_repeats(
     projected out where they are noticeable. ``own`` (rows, m) are derivatives by unknowns that
     each run has for itself: as much of a difference as they may have taken is no noise's lack.
     """
-    split = _split(problem, residual)
-    count = len(problem.bands)
+    split = _split(regression, residual)
+    count = len(regression.bands)
     freedom = _sums(np.ones_like(split.difference), split.difference_band, count)
-    power = _power(problem, split.difference, split.difference_band, freedom)
+    power = _power(regression, split.difference, split.difference_band, freedom)
     whole = freedom
-    taken = _differences(problem, own)
+    taken = _differences(regression, own)
     for _ in range(_REWEIGHTED if known.size or taken.size else 0):
         # What differs for a known reason made the first weights: they are drawn anew without it.
-        weight = 1 / np.sqrt(_smooth(problem, power, np.maximum(freedom, 0.1))[0])
+        weight = 1 / np.sqrt(_smooth(regression, power, np.maximum(freedom, 0.1))[0])
         weight = weight[split.difference_band]
-        basis = _noticeable(problem, known, weight)
+        basis = _noticeable(regression, known, weight)
         if taken.size:
             basis = orthonormal(np.hstack([basis, taken * weight[:, None]]))
         whitened = split.difference * weight
         left = (whitened - basis @ (basis.T @ whitened)) / weight
         freedom = whole - _sums(np.sum(basis**2, axis=1), split.difference_band, count)
-        power = _power(problem, left, split.difference_band, np.maximum(freedom, 1.0))
-    power, freedom = _smooth(problem, power, np.maximum(freedom, 0.1))
-    return Noise(power, freedom, _rms(problem, power), from_repeats=True)
+        power = _power(regression, left, split.difference_band, np.maximum(freedom, 1.0))
+    power, freedom = _smooth(regression, power, np.maximum(freedom, 0.1))
+    return Noise(power, freedom, _rms(regression, power), from_repeats=True)
 
 
-def noise_saturated(problem: Problem, residual: Array, columns: Array) -> Noise:
+def noise_saturated(regression: Regression, residual: Array, columns: Array) -> Noise:
     """Noise power as what no effect of the catalogue can explain: without repeats.
 
     It begins with even weights: weights from the residual itself would trust least the very
     frequencies in which something is missing. An effect outside the catalogue is taken for noise
     here, so that it cannot be excluded.
     """
-    count = len(problem.bands)
-    bands = problem.band_of_row
-    total = _sums(np.ones(problem.rows), bands, count)
-    power = _even(problem, residual)
+    count = len(regression.bands)
+    bands = regression.band_of_row
+    total = _sums(np.ones(regression.n_rows), bands, count)
+    power = _even(regression, residual)
     for _ in range(_REWEIGHTED):
         weight = 1 / np.sqrt(power[bands])
-        basis = orthonormal(columns * weight[:, None], _fewest_rows(problem) // _ROWS_EACH)
+        basis = orthonormal(columns * weight[:, None], _fewest_rows(regression) // _ROWS_EACH)
         whitened = residual * weight
         left = (whitened - basis @ (basis.T @ whitened)) / weight
         freedom = np.maximum(total - _sums(np.sum(basis**2, axis=1), bands, count), 1.0)
-        power = _power(problem, left, bands, freedom)
-    return Noise(power, freedom, _rms(problem, power), from_repeats=False)
+        power = _power(regression, left, bands, freedom)
+    return Noise(power, freedom, _rms(regression, power), from_repeats=False)
 
 
-def presence(problem: Problem, residual: Array, jacobian: Array, noise: Noise) -> Presence:
+def presence(regression: Regression, residual: Array, jacobian: Array, noise: Noise) -> Presence:
     """F test of the repeats' mean against the noise, band by band."""
-    count = len(problem.bands)
+    count = len(regression.bands)
     if not noise.from_repeats:
         nothing = np.zeros(count)
         return Presence(float("nan"), nothing, nothing.astype(bool))
-    split = _split(problem, residual)
+    split = _split(regression, residual)
     total = _sums(split.mean**2, split.mean_band, count)
     freedom = _sums(np.ones_like(split.mean), split.mean_band, count)
-    basis = orthonormal(jacobian * noise.weight(problem)[:, None])
+    basis = orthonormal(jacobian * noise.weight(regression)[:, None])
     # Each fitted unknown takes one degree of freedom from where it has leverage.
-    taken = _sums(np.sum(basis**2, axis=1), problem.band_of_row, count)
+    taken = _sums(np.sum(basis**2, axis=1), regression.band_of_row, count)
     freedom = np.maximum(freedom - taken, 1.0)
     ratio = total / freedom / noise.power
     p = np.asarray(f_distribution.sf(ratio, freedom, noise.freedom))
@@ -151,16 +159,35 @@ def presence(problem: Problem, residual: Array, jacobian: Array, noise: Noise) -
     return Presence(worst, total / noise.power - freedom, p * tested < 0.05)
 
 
-def _split(problem: Problem, rows: Array) -> _Split:
+def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
+    """Rms of the differences of repeats per output; empty without repeats."""
+    times = {
+        (s.run, s.output): time
+        for s, time in zip(regression.segments, regression.in_time(residual), strict=True)
+    }
+    squares: dict[str, list[Array]] = {}
+    for group in regression.replicates:
+        for output in regression.outputs:
+            if all((run, output) in times for run in group.runs):
+                aligned = [
+                    times[run, output][rows]
+                    for run, rows in zip(group.runs, group.rows, strict=True)
+                ]
+                squares.setdefault(output, []).append(contrasts(np.array(aligned))[1].ravel() ** 2)
+    return {o: float(np.sqrt(np.mean(np.concatenate(parts)))) for o, parts in squares.items()}
+
+
+def _split(regression: Regression, rows: Array) -> _Split:
     """Differences and means of repeats, transformed anew on their common samples."""
     times = dict(
-        zip(((s.run, s.output) for s in problem.segments), problem.in_time(rows), strict=True)
+        zip(((s.run, s.output) for s in regression.segments), regression.in_time(rows), strict=True)
     )
-    edges = _edges(problem)
+    edges = _edges(regression)
     parts: tuple[list[Array], list[Array]] = ([], [])
     bands: tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]] = ([], [])
-    for group in problem.dataset.repeated:
-        for output in problem.dataset.outputs:
+    bands_of = {(s.run, s.output): s.band for s in regression.segments}
+    for group in regression.replicates:
+        for output in regression.outputs:
             if any((run, output) not in times for run in group.runs):
                 continue
             aligned = np.array(
@@ -170,7 +197,7 @@ def _split(problem: Problem, rows: Array) -> _Split:
                 ]
             )
             mean, differences = contrasts(aligned)
-            band = replace(problem.dataset.recordings[group.runs[0]].bands[output], count=len(mean))
+            band = replace(bands_of[group.runs[0], output], count=len(mean))
             frequency = band.frequency
             kept = slice(len(frequency))
             first, own = edges[output]
@@ -188,28 +215,28 @@ def _split(problem: Problem, rows: Array) -> _Split:
     )
 
 
-def _edges(problem: Problem) -> dict[str, tuple[int, Array]]:
+def _edges(regression: Regression) -> dict[str, tuple[int, Array]]:
     """Per output the number of its first band, and its edges from minus to plus infinity."""
     out: dict[str, tuple[int, Array]] = {}
-    for output in problem.dataset.outputs:
-        own = [i for i, band in enumerate(problem.bands) if band[0] == output]
-        inner = [problem.bands[i][1] for i in own[1:]]
+    for output in regression.outputs:
+        own = [i for i, band in enumerate(regression.bands) if band[0] == output]
+        inner = [regression.bands[i][1] for i in own[1:]]
         out[output] = own[0], np.array([-np.inf, *inner, np.inf])
     return out
 
 
-def _differences(problem: Problem, columns: Array | None) -> Array:
+def _differences(regression: Regression, columns: Array | None) -> Array:
     """What of columns differs between repeats, (differences, m)."""
     if columns is None or not columns.size:
         return np.zeros((0, 0))
-    return np.array([_split(problem, column).difference for column in columns.T]).T
+    return np.array([_split(regression, column).difference for column in columns.T]).T
 
 
-def _noticeable(problem: Problem, known: Array, weight: Array) -> Array:
+def _noticeable(regression: Regression, known: Array, weight: Array) -> Array:
     """Orthonormal directions in which known signatures differ between repeats."""
     different = []
     for column in known.T:
-        split = _split(problem, column)
+        split = _split(regression, column)
         whitened = split.difference * weight
         mean = split.mean / np.sqrt(_nearest(weight, split))
         if whitened @ whitened > _NOTICEABLE * float(mean @ mean):
@@ -228,10 +255,10 @@ def _nearest(weight: Array, split: _Split) -> Array:
     return power[split.mean_band]
 
 
-def _fewest_rows(problem: Problem) -> int:
+def _fewest_rows(regression: Regression) -> int:
     """Rows of the output that has fewest."""
-    rows = dict.fromkeys(problem.dataset.outputs, 0)
-    for segment in problem.segments:
+    rows = dict.fromkeys(regression.outputs, 0)
+    for segment in regression.segments:
         rows[segment.output] += len(segment.band.frequency)
     return min(rows.values())
 
@@ -257,36 +284,36 @@ def _sums(values: Array, bands: NDArray[np.intp], count: int) -> Array:
     return np.asarray(np.bincount(bands, weights=values, minlength=count))
 
 
-def _smooth(problem: Problem, power: Array, freedom: Array) -> tuple[Array, Array]:
+def _smooth(regression: Regression, power: Array, freedom: Array) -> tuple[Array, Array]:
     """Every output's spectrum smoothed over its bands."""
     power, freedom = power.copy(), freedom.copy()
-    for output in problem.dataset.outputs:
-        own = np.array([band[0] == output for band in problem.bands])
+    for output in regression.outputs:
+        own = np.array([band[0] == output for band in regression.bands])
         power[own], freedom[own] = smoothed(power[own], freedom[own])
     return power, freedom
 
 
-def _even(problem: Problem, residual: Array) -> Array:
+def _even(regression: Regression, residual: Array) -> Array:
     """One power per output, the same in all its bands."""
-    out = np.empty(len(problem.bands))
-    for output in problem.dataset.outputs:
-        rows = np.concatenate([residual[s.rows] for s in problem.segments if s.output == output])
-        own = [band[0] == output for band in problem.bands]
+    out = np.empty(len(regression.bands))
+    for output in regression.outputs:
+        rows = np.concatenate([residual[s.rows] for s in regression.segments if s.output == output])
+        own = [band[0] == output for band in regression.bands]
         out[own] = np.mean(rows**2)
-    return np.maximum(out, problem.floor)
+    return np.maximum(out, regression.power_floor)
 
 
-def _power(problem: Problem, values: Array, bands: NDArray[np.intp], freedom: Array) -> Array:
+def _power(regression: Regression, values: Array, bands: NDArray[np.intp], freedom: Array) -> Array:
     """Mean square per band; noise-free data get a floor far below what instruments resolve."""
     power = _sums(values**2, bands, len(freedom)) / np.maximum(freedom, 1.0)
-    return np.maximum(power, problem.floor)
+    return np.maximum(power, regression.power_floor)
 
 
-def _rms(problem: Problem, power: Array) -> dict[str, float]:
+def _rms(regression: Regression, power: Array) -> dict[str, float]:
     """Root mean square of the noise per output, in time."""
     out = {}
-    for output in problem.dataset.outputs:
-        own = [s for s in problem.segments if s.output == output]
-        total = sum(float(np.sum(power[problem.band_of_row[s.rows]])) for s in own)
-        out[output] = float(np.sqrt(total / problem.samples(output)))
+    for output in regression.outputs:
+        own = [s for s in regression.segments if s.output == output]
+        total = sum(float(np.sum(power[regression.band_of_row[s.rows]])) for s in own)
+        out[output] = float(np.sqrt(total / regression.n_samples(output)))
     return out

@@ -11,7 +11,7 @@ from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.robot.candidates import lacking, needless
 from winchkit.diagnosis.robot.errors import Errors, Shown, errors_of, figures
 from winchkit.diagnosis.robot.preparation import Study, study_of
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.effects.bind_robot import declared_terms, robot_terms
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -32,7 +32,7 @@ __all__ = [
 class RobotGrown:
     """An addition with everything behind it, for reports."""
 
-    problem: RobotProblem
+    regression: PoseRegression
     errors: tuple[Errors, Errors]
     """Before and after, at every pose."""
     addition: Addition
@@ -92,22 +92,24 @@ def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
 
 
 def _added(study: Study, effect: Effect) -> RobotGrown:
-    inquiry = study.as_filed()
-    begin, noise = inquiry.settle(inquiry.begin)
-    scores = [s for s in inquiry.scores(begin, noise) if s.atom.effect.id == effect.id]
+    engine = study.as_filed()
+    begin, noise = engine.settle(engine.begin)
+    scores = [s for s in engine.scores(begin, noise) if s.atom.effect.id == effect.id]
     if not scores:
         raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
-    final: Fit = inquiry.trial(begin, scores[0], noise).fit
-    problem = inquiry.robot_problem
-    before, after = (Shown(problem, fit, noise, inquiry.groups) for fit in (begin, final))
-    spread = spread_of(problem, final, noise, inquiry.blocks)
+    final: Fit = engine.trial(begin, scores[0], noise).fit
+    regression = engine.regression
+    before, after = (
+        Shown(regression, fit, noise, engine.regression.groups) for fit in (begin, final)
+    )
+    spread = spread_of(regression, final, noise, engine.regression.blocks)
     own = {term.effect.id for term in declared_terms(study.dataset.robot, study.catalogue)}
-    found = estimates(problem, final, spread)
+    found = estimates(regression, final, spread)
     # What a line's winch brings along is refitted beside it and stays in the winch's own profile.
     terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
-    was, now = (errors_of(problem, problem.at(fit.hypothesis)) for fit in (begin, final))
+    was, now = (errors_of(regression, regression.at(fit.hypothesis)) for fit in (begin, final))
     addition = Addition(figures(before, after, study.noise), terms, study.dataset.notes)
-    return RobotGrown(problem, (was, now), addition)
+    return RobotGrown(regression, (was, now), addition)
 
 
 def remove_from_robot(
@@ -130,16 +132,20 @@ def remove_from_robot(
         has = ", ".join(own) or "none"
         raise UsageError(f"robot '{profile.name}' has no effect '{effect_id}'; it has {has}")
     study = study_of(runs, profile, catalogue)
-    inquiry = study.as_filed()
-    begin, noise = inquiry.settle(inquiry.begin)
+    engine = study.as_filed()
+    begin, noise = engine.settle(engine.begin)
     hypothesis = begin.hypothesis
     for index in reversed(range(len(hypothesis.terms))):
         if hypothesis.terms[index].effect.id in gone:
             hypothesis = hypothesis.without(index)
-    final, _ = inquiry.settle(hypothesis)
-    problem = inquiry.robot_problem
-    before, after = (Shown(problem, fit, noise, inquiry.groups) for fit in (begin, final))
-    found = estimates(problem, final, spread_of(problem, final, noise, inquiry.blocks))
+    final, _ = engine.settle(hypothesis)
+    regression = engine.regression
+    before, after = (
+        Shown(regression, fit, noise, engine.regression.groups) for fit in (begin, final)
+    )
+    found = estimates(
+        regression, final, spread_of(regression, final, noise, engine.regression.blocks)
+    )
     # What a line's winch brings along is refitted beside them and stays in the winch's own profile.
     left = tuple(item for item in found if item[0].effect.id in own)
     outputs = figures(before, after, study.noise)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.residuals.attribution import Followed
 from winchkit.diagnosis.robot.errors import Errors
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.robot import angles_of
 
 __all__ = ["AXES", "ON_PLATFORM", "follows_of", "most_telling", "on_ropes", "variables_of_poses"]
@@ -44,15 +44,15 @@ class _Share:
     """Whether that one has over half of it."""
 
 
-def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
+def follows_of(regression: PoseRegression, errors: Errors) -> list[Followed]:
     """Per output the variables that its error follows, largest share first.
 
     ``winch`` is the share of the lines' own constants, ``pose`` that of what the lines of one pose
     have in common.
     """
-    variables, out = variables_of_poses(problem), []
-    for output, error in on_ropes(problem, errors).items():
-        lines = AXES if output == "platform_position" else problem.dataset.names
+    variables, out = variables_of_poses(regression), []
+    for output, error in on_ropes(regression, errors).items():
+        lines = AXES if output == "platform_position" else regression.dataset.names
         found = []
         for name, values in variables.items():
             if values.shape[1] not in (1, error.shape[1]):
@@ -62,7 +62,7 @@ def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
                 line = lines[taken.column] if taken.alone else None
                 found.append(Followed(output, name, taken.share, line=line))
         if output != "platform_position":
-            found += _constants(problem, output, error)
+            found += _constants(regression, output, error)
         out += sorted(found, key=lambda f: -f.share)
     return out
 
@@ -72,30 +72,30 @@ def most_telling(values: Array, error: Array) -> int:
     return _taken(np.broadcast_to(values, error.shape), error).column
 
 
-def on_ropes(problem: RobotProblem, errors: Errors) -> Errors:
+def on_ropes(regression: PoseRegression, errors: Errors) -> Errors:
     """Errors as they are drawn: a tension's as the least forces that would balance it, by line."""
     out = dict(errors)
     if "tension" in out:
         known = np.isfinite(out["tension"])
         inside = np.where(known, out["tension"], 0.0)
-        spread = (problem.equations.to_ropes @ inside[..., None])[..., 0]
+        spread = (regression.equations.to_ropes @ inside[..., None])[..., 0]
         out["tension"] = np.where(known.all(axis=1, keepdims=True), spread, np.nan)
     return out
 
 
-def variables_of_poses(problem: RobotProblem) -> dict[str, Array]:
+def variables_of_poses(regression: PoseRegression) -> dict[str, Array]:
     """By name, (p, 1) of the platform, (p, n) of the lines, SI."""
-    dataset, measured = problem.dataset, problem.dataset.measured
+    dataset, measured = regression.dataset, regression.dataset.measured
     angle = measured.motor_angle
     drum = np.empty_like(angle)
-    for i, winch in enumerate(problem.robot.winches):
+    for i, winch in enumerate(regression.robot.winches):
         turned = angle[:, i] - winch.reference.motor_angle
         drum[:, i] = turned * winch.gearbox.direction / winch.gearbox.ratio
-    pose = problem.equations.pose
+    pose = regression.equations.pose
     place = np.concatenate([pose.position, angles_of(pose.rotation)], axis=1)
     out = {name: place[:, [k]] for k, name in enumerate(ON_PLATFORM)}
     out |= {
-        "cable_length": problem.robot.lengths_at(angle),
+        "cable_length": regression.robot.lengths_at(angle),
         "motor_angle": angle,
         "drum_angle": drum,
     }
@@ -131,16 +131,16 @@ def _taken(values: Array, error: Array) -> _Share:
     return _Share(max(0.0, share), _SURE * float(np.sqrt(2 * bins)) / count, most, alone)
 
 
-def _constants(problem: RobotProblem, output: str, error: Array) -> list[Followed]:
+def _constants(regression: PoseRegression, output: str, error: Array) -> list[Followed]:
     """Shares of what is constant on a line, and common to the lines of one pose."""
     known, out = np.isfinite(error), []
     winch = np.broadcast_to(np.arange(error.shape[1]), error.shape)
-    pose = np.broadcast_to(problem.dataset.pose[:, None], error.shape)
+    pose = np.broadcast_to(regression.dataset.pose[:, None], error.shape)
     for name, values in (("winch", winch), ("pose", pose)):
         taken = _category_share(values[known], error[known])
         if taken.share > max(_WORTH, taken.by_chance):
             own = name == "winch" and taken.alone
-            line = problem.dataset.names[taken.column] if own else None
+            line = regression.dataset.names[taken.column] if own else None
             out.append(Followed(output, name, taken.share, line=line))
     return out
 

@@ -23,13 +23,13 @@ from winchkit.diagnosis.regression.intervals import spread_of
 from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, Where, plain_step
 from winchkit.diagnosis.robot.attribution import follows_of
 from winchkit.diagnosis.robot.candidates import GEOMETRY
-from winchkit.diagnosis.robot.engine import RobotInquiry
+from winchkit.diagnosis.robot.engine import PoseSelection
 from winchkit.diagnosis.robot.errors import Errors, Shown, errors_of, figures, rms
 from winchkit.diagnosis.robot.excitation import what_poses_cannot_show
 from winchkit.diagnosis.robot.pose_design import next_pose_runs
 from winchkit.diagnosis.robot.preparation import Study, fitted_to, study_of
 from winchkit.diagnosis.robot.prior import Believed
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.selection.stepwise import Found, search
 from winchkit.diagnosis.verdict.decision import Judgement, judge
 from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
@@ -53,18 +53,15 @@ was, and none rises above that one."""
 class RobotAnswer(Answer):
     """A diagnosis of poses with everything behind it."""
 
+    engine: PoseSelection
+
     def __init__(self, seen: Seen, sets: Sequence[Confusion], diagnosis: RobotDiagnosis) -> None:
-        super().__init__(seen.inquiry, seen.judgement.shown, diagnosis, sets)
+        super().__init__(seen.engine, seen.judgement.shown, diagnosis, sets)
         self.seen = seen
 
     @property
-    def robot_problem(self) -> RobotProblem:
-        """The problem of the inquiry that the answer came from."""
-        return self.seen.inquiry.robot_problem
-
-    @property
-    def filed(self) -> RobotInquiry:
-        """The inquiry that took the geometry as it was filed."""
+    def filed(self) -> PoseSelection:
+        """Engine with the geometry at its file values."""
         return self.seen.filed
 
 
@@ -73,8 +70,8 @@ class Seen:
     """Where a search in poses began and ended."""
 
     study: Study
-    inquiry: RobotInquiry
-    filed: RobotInquiry
+    engine: PoseSelection
+    filed: PoseSelection
     """Takes the geometry as the profile has it; the same where that was not let go."""
     found: Found
     judgement: Judgement
@@ -82,30 +79,31 @@ class Seen:
     @property
     def refitted(self) -> bool:
         """Whether the geometry as filed had to be let go."""
-        return self.inquiry is not self.filed
+        return self.engine is not self.filed
 
     @cached_property
     def begin(self) -> Shown:
         """The profile's own effects fitted, the geometry as filed."""
         first, noise = self.filed.settle(self.filed.begin)
-        return Shown(self.filed.robot_problem, first, noise, self.filed.groups)
+        return Shown(self.filed.regression, first, noise, self.filed.regression.groups)
 
     @cached_property
     def final(self) -> Shown:
         """With all that was named."""
-        shown, inquiry = self.judgement.shown, self.inquiry
-        return Shown(inquiry.robot_problem, shown.final, shown.noise, inquiry.groups)
+        shown, engine = self.judgement.shown, self.engine
+        return Shown(engine.regression, shown.final, shown.noise, engine.regression.groups)
 
     @cached_property
     def errors(self) -> tuple[Errors, Errors]:
         """Of both, at every pose."""
         begin, final = (
-            errors_of(s.problem, s.problem.at(s.fit.hypothesis)) for s in (self.begin, self.final)
+            errors_of(s.regression, s.regression.at(s.fit.hypothesis))
+            for s in (self.begin, self.final)
         )
         return begin, final
 
     @property
-    def rest(self) -> tuple[RobotProblem, Errors]:
+    def rest(self) -> tuple[PoseRegression, Errors]:
         """Where to look for what is left: beside the geometry as filed, unless that is far off.
 
         A geometry that was let go for nothing has moved to imitate what is missing.
@@ -113,30 +111,30 @@ class Seen:
         before, after = self.errors
         falls = [rms(name, after[name]) / rms(name, before[name]) for name in after]
         if self.refitted and (min(falls) > _FAR_OFF or max(falls) > _NO_WORSE):
-            return self.begin.problem, before
-        return self.final.problem, after
+            return self.begin.regression, before
+        return self.final.regression, after
 
 
 def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
     """What was found, in words, figures and places; ``geometry`` is how that was taken."""
-    inquiry, judgement, study = seen.inquiry, seen.judgement, seen.study
+    engine, judgement, study = seen.engine, seen.judgement, seen.study
     shown, verdict = judgement.shown, judgement.verdict
-    added = range(inquiry.given, len(shown.final.hypothesis.terms))
-    sets = [confusion_of(inquiry, shown.final, shown.noise, index) for index in added]
-    steps = tuple(map(plain_step, steps_of(inquiry, shown, sets))) if sets else ()
+    added = range(engine.given, len(shown.final.hypothesis.terms))
+    sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
+    steps = tuple(map(plain_step, steps_of(engine, shown, sets))) if sets else ()
     outputs = figures(seen.begin, seen.final, study.noise)
     if seen.refitted and verdict in ("adequate", "explained"):
         verdict = "explained"
-        steps = (_geometry_step(inquiry, shown, outputs["cable_length"]), *steps)
+        steps = (_geometry_step(engine, shown, outputs["cable_length"]), *steps)
     diagnosis = RobotDiagnosis(
         verdict=verdict,
         outputs=outputs,
         steps=steps,
-        candidates=candidates_of(inquiry, seen.found),
-        detectable=detectable(seen.found.scores, Bar(inquiry.price, seen.found.threshold)),
+        candidates=candidates_of(engine, seen.found),
+        detectable=detectable(seen.found.scores, Bar(engine.price, seen.found.threshold)),
         unexplained_share=judgement.share,
         where=_places(seen) if seen.found.still else (),
-        next_runs=next_pose_runs(inquiry.robot_problem, shown.final.hypothesis, pairs_of(sets)),
+        next_runs=next_pose_runs(engine.regression, shown.final.hypothesis, pairs_of(sets)),
         notes=(*study.dataset.notes, *what_poses_cannot_show(study), *judgement.notes),
         geometry=geometry,
     )
@@ -150,12 +148,12 @@ def _places(seen: Seen) -> tuple[Where, ...]:
     return tuple(sorted(places, key=lambda w: -w.share)[:_WHERE])
 
 
-def _geometry_step(inquiry: RobotInquiry, shown: Found, output: OutputFit) -> Step:
+def _geometry_step(engine: PoseSelection, shown: Found, output: OutputFit) -> Step:
     """All of the geometry, as one addition that no few numbers can replace."""
-    problem = inquiry.robot_problem
-    believed = problem.standing.believed
-    std = spread_of(problem, shown.final, shown.noise, inquiry.blocks).std
-    first = problem.nuisance_columns.shape[1] - len(believed)
+    regression = engine.regression
+    believed = regression.standing.believed
+    std = spread_of(regression, shown.final, shown.noise, engine.regression.blocks).std
+    first = regression.nuisance_columns.shape[1] - len(believed)
     values: dict[str, dict[str, Estimate]] = {}
     for index, belief in enumerate(believed):
         by = shown.final.vector[first + index]
@@ -188,8 +186,8 @@ def diagnose_robot(
     study = study_of(runs, profile, catalogue or load_catalogue())
     told("searching", 0.4)
     if fitted_to(profile, runs):
-        inquiry = study.let_go()
-        return _concluded(study, inquiry, inquiry)
+        engine = study.let_go()
+        return _concluded(study, engine, engine)
     filed = study.as_filed()
     if _beyond_few(study, filed):
         return _concluded(study, study.let_go(), filed)
@@ -204,7 +202,7 @@ def diagnose_robot(
     return _concluded(study, study.let_go(), filed)
 
 
-def _beyond_few(study: Study, filed: RobotInquiry) -> bool:
+def _beyond_few(study: Study, filed: PoseSelection) -> bool:
     """Whether the whole geometry explains far more than any single effect does."""
     gain = _gain_of_geometry(study, filed, filed.begin)
     if not _is_real(study, gain):
@@ -214,23 +212,23 @@ def _beyond_few(study: Study, filed: RobotInquiry) -> bool:
     return best < _ONE_OF_FEW * gain
 
 
-def _gain_of_geometry(study: Study, filed: RobotInquiry, model: Hypothesis) -> float:
+def _gain_of_geometry(study: Study, filed: PoseSelection, model: Hypothesis) -> float:
     """Whitened squares that the geometry takes, beyond what its uncertainty allows it."""
-    standing = filed.robot_problem.standing
-    wide = RobotProblem(replace(standing, believed=_from(study.prior, standing.believed)))
+    standing = filed.regression.standing
+    wide = PoseRegression(replace(standing, believed=_from(study.prior, standing.believed)))
     hypothesis = replace(model, nuisances=())
-    before = filed.problem
-    cost = fit(before, hypothesis, np.ones(before.rows)).cost
-    return cost - fit(wide, hypothesis, np.ones(wide.rows)).cost
+    before = filed.regression
+    cost = fit(before, hypothesis, np.ones(before.n_rows)).cost
+    return cost - fit(wide, hypothesis, np.ones(wide.n_rows)).cost
 
 
-def _concluded(study: Study, inquiry: RobotInquiry, filed: RobotInquiry) -> RobotAnswer:
+def _concluded(study: Study, engine: PoseSelection, filed: PoseSelection) -> RobotAnswer:
     """With the geometry let go."""
-    found = search(inquiry)
-    return answer_of(Seen(study, inquiry, filed, found, judge(inquiry, found)), "refitted")
+    found = search(engine)
+    return answer_of(Seen(study, engine, filed, found, judge(engine, found)), "refitted")
 
 
-def _geometry_is_off(study: Study, filed: RobotInquiry, found: Found) -> bool:
+def _geometry_is_off(study: Study, filed: PoseSelection, found: Found) -> bool:
     """Whether the geometry as a whole would explain more of what is left than chance does."""
     return _is_real(study, _gain_of_geometry(study, filed, found.final.hypothesis))
 

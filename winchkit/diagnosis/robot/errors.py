@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.cross_validation import Folds, left_out_steps
+from winchkit.diagnosis.regression.base import Folds
+from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.results import OutputFit
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
 
 __all__ = ["UNITS", "Errors", "Shown", "errors_of", "figures", "held_out_rms", "noise_rms", "rms"]
@@ -32,23 +33,23 @@ _HELD = 6
 class Shown:
     """A fitted model with all that is needed to judge it."""
 
-    problem: RobotProblem
+    regression: PoseRegression
     fit: Fit
     noise: Noise
     folds: Folds
 
 
-def errors_of(problem: RobotProblem, residuals: Mapping[str, Array]) -> Errors:
+def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Errors:
     """By output, (p, k), SI, NaN where unknown."""
-    at_pose, to_place = _maps(problem)
+    at_pose, to_place = _maps(regression)
     known = _seen(residuals)
     moved = np.where(known, np.concatenate([residuals["position"], residuals["rotation"]], 1), 0.0)
-    by = problem.slope()["rope"]
+    by = regression.slope()["rope"]
     closure = residuals["rope"] - (by @ moved[..., None])[..., 0]
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
     out = {"cable_length": np.where(np.isfinite(closure), -length, np.nan)}
-    if problem.dataset.measured.motor_angle.shape[1] >= _HELD:
+    if regression.dataset.measured.motor_angle.shape[1] >= _HELD:
         whole = np.isfinite(residuals["rope"]).all(axis=1, keepdims=True)
         stray = np.where(whole, np.nan_to_num(residuals["rope"]), np.nan)
         found = residuals["position"] - (to_place @ stray[..., None])[..., 0]
@@ -59,11 +60,11 @@ def errors_of(problem: RobotProblem, residuals: Mapping[str, Array]) -> Errors:
     return out
 
 
-def noise_rms(problem: RobotProblem, noise: PoseNoise) -> dict[str, float]:
+def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     """What the instruments alone would leave, by output, SI."""
-    at_pose, to_place = _maps(problem)
-    sigma, by = noise.sigma, problem.slope()["rope"]
-    here = problem.residuals(())
+    at_pose, to_place = _maps(regression)
+    sigma, by = noise.sigma, regression.slope()["rope"]
+    here = regression.residuals(())
     pose = np.repeat([sigma["position"] ** 2, sigma["rotation"] ** 2], 3) * _seen(here)
     spread = by * np.sqrt(pose)[:, None, :]
     whole = spread @ np.swapaxes(spread, 1, 2) + sigma["rope"] ** 2 * np.eye(by.shape[1])
@@ -77,10 +78,12 @@ def noise_rms(problem: RobotProblem, noise: PoseNoise) -> dict[str, float]:
 
 def figures(begin: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit]:
     """Every output before and after; a position's rms is of its distance."""
-    before, after = (errors_of(s.problem, s.problem.at(s.fit.hypothesis)) for s in (begin, final))
+    before, after = (
+        errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (begin, final)
+    )
     held_before, held_after = held_out_rms(begin), held_out_rms(final)
-    least = noise_rms(final.problem, noise)
-    signal = signals(final.problem)
+    least = noise_rms(final.regression, noise)
+    signal = signals(final.regression)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         name: OutputFit(
@@ -107,11 +110,13 @@ def rms(name: str, error: Array) -> float:
     return float(np.sqrt(np.mean(squares))) if squares.size else float("nan")
 
 
-def signals(problem: RobotProblem) -> dict[str, float]:
+def signals(regression: PoseRegression) -> dict[str, float]:
     """How much each output varies, rms about its mean, SI."""
-    measured = problem.dataset.measured
-    length = problem.equations.residuals(problem.robot)["rope"] + problem.robot.lengths_at(
-        measured.motor_angle, problem.equations.forces(problem.robot), problem.equations.warm
+    measured = regression.dataset.measured
+    length = regression.equations.residuals(regression.robot)["rope"] + regression.robot.lengths_at(
+        measured.motor_angle,
+        regression.equations.forces(regression.robot),
+        regression.equations.warm,
     )
     values = {
         "cable_length": length,
@@ -133,22 +138,22 @@ def held_out_rms(shown: Shown) -> dict[str, float]:
 
 def _held_out(shown: Shown) -> Errors:
     """Errors of every pose with the unknowns fitted without its fold, linearised."""
-    problem, found = shown.problem, shown.fit
-    here = problem.at(found.hypothesis)
-    steps = left_out_steps(problem, found, shown.noise, shown.folds)
-    row, fold = problem.pose_of_row, np.concatenate(shown.folds.of)
-    of_pose = np.zeros(len(problem.dataset.measured), dtype=np.intp)
+    regression, found = shown.regression, shown.fit
+    here = regression.at(found.hypothesis)
+    steps = left_out_steps(regression, found, shown.noise, shown.folds)
+    row, fold = regression.pose_of_row, np.concatenate(shown.folds.of)
+    of_pose = np.zeros(len(regression.dataset.measured), dtype=np.intp)
     of_pose[row[row >= 0]] = fold[row >= 0]
     out = {kind: values.copy() for kind, values in here.items()}
     for index in range(len(found.vector)):
         step = 1e-3 * max(1.0, abs(found.vector[index]))
         vector = found.vector.copy()
         vector[index] += step
-        there = problem.at(problem.hypothesis(vector, found.hypothesis))
+        there = regression.at(regression.hypothesis(vector, found.hypothesis))
         by = steps[of_pose, index][:, None] / step
         for kind, values in there.items():
             out[kind] += (values - here[kind]) * by
-    return errors_of(problem, out)
+    return errors_of(regression, out)
 
 
 def _seen(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
@@ -157,12 +162,12 @@ def _seen(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(both))
 
 
-def _maps(problem: RobotProblem) -> tuple[Array, Array]:
+def _maps(regression: PoseRegression) -> tuple[Array, Array]:
     """Per pose: what takes what unmeasured coordinates can undo out of closures (p, n, n), and
     closures to the place where the ropes put the platform (p, 3, n)."""
-    by = problem.slope()["rope"]
+    by = regression.slope()["rope"]
     by = np.where(np.isfinite(by), by, 0.0)
-    free = by * ~_seen(problem.residuals(()))[:, None, :]
+    free = by * ~_seen(regression.residuals(()))[:, None, :]
     undone = free @ np.linalg.pinv(free, rcond=1e-9)
     back = np.asarray(np.linalg.pinv(by, rcond=1e-9), dtype=float)
     return np.eye(by.shape[1]) - undone, back[:, :3]

@@ -102,13 +102,13 @@ class PosePlan:
 
 def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
     """Kinds of poses, tried on the model that a diagnosis came to; the most telling first."""
-    problem, final = answer.robot_problem, answer.found.final.hypothesis
+    regression, final = answer.engine.regression, answer.found.final.hypothesis
     pairs = tuple(pairs_of(answer.sets))
     hidden = _hidden(answer)
     questions: list[Question] = [*pairs, *((term, None) for term in hidden)]
     many, bar = len(pairs), answer.bar
     needed = [APART] * many + [bar.squares(Coordinates(t.effect).freedom) for t in hidden]
-    offers = pose_offers(problem, final, questions, needed, count) if questions else []
+    offers = pose_offers(regression, final, questions, needed, count) if questions else []
 
     def worth(offer: PoseOffer) -> tuple[float, ...]:
         sure = sum(power >= _SURE for power in offer.powers[:many])
@@ -117,7 +117,7 @@ def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
         return sure, told, shown, round(sum(offer.powers[many:]), 1)
 
     return PosePlan(
-        pairs, hidden, tuple(sorted(offers, key=worth, reverse=True)), problem.dataset.names
+        pairs, hidden, tuple(sorted(offers, key=worth, reverse=True)), regression.dataset.names
     )
 
 

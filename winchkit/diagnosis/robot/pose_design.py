@@ -13,7 +13,7 @@ from winchkit.diagnosis.design.discrimination import APART, power_of
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.results import NextRun
 from winchkit.diagnosis.robot.dataset import RobotDataset
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 from winchkit.model.robot import (
@@ -85,24 +85,26 @@ def usable(kind: PoseKind, dataset: RobotDataset) -> bool:
     return bool(np.isfinite(dataset.measured.temperature).all()) or not kind.warmer
 
 
-def imagined(problem: RobotProblem, robot: Robot, kind: PoseKind) -> tuple[Measured, Pose]:
+def imagined(regression: PoseRegression, robot: Robot, kind: PoseKind) -> tuple[Measured, Pose]:
     """What would be measured at poses of a kind, without noise, and those poses.
 
     Only where pulling ropes hold the platform; NaN where nothing was measured so far.
     """
     rng = np.random.default_rng(_SEED)
-    pose = _placed(problem, robot, kind, rng)
-    force = _forces(problem, robot, kind, pose, rng)
+    pose = _placed(regression, robot, kind, rng)
+    force = _forces(regression, robot, kind, pose, rng)
     good = _held(robot, pose) & np.isfinite(force).all(axis=1) & (force > 0).all(axis=1)
-    if not problem.dataset.has_tension:
+    if not regression.dataset.has_tension:
         good = _held(robot, pose)
     pose, force = Pose(pose.position[good], pose.rotation[good]), force[good]
-    return _measured(problem.dataset, robot, kind, pose, force), pose
+    return _measured(regression.dataset, robot, kind, pose, force), pose
 
 
-def _placed(problem: RobotProblem, robot: Robot, kind: PoseKind, rng: np.random.Generator) -> Pose:
+def _placed(
+    regression: PoseRegression, robot: Robot, kind: PoseKind, rng: np.random.Generator
+) -> Pose:
     """Random poses of a kind that the geometry can take."""
-    seen = problem.standing.pose
+    seen = regression.standing.pose
     corners = robot.geometry.exit_point
     middle, half = _middle(seen.position)
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
@@ -134,11 +136,11 @@ def _held(robot: Robot, pose: Pose) -> NDArray[np.bool_]:
 
 
 def _forces(
-    problem: RobotProblem, robot: Robot, kind: PoseKind, pose: Pose, rng: np.random.Generator
+    regression: PoseRegression, robot: Robot, kind: PoseKind, pose: Pose, rng: np.random.Generator
 ) -> Array:
     """Rope forces that balance the weight, spread as those measured so far; zero without cells."""
-    measured, many = problem.dataset.measured.tension, len(pose.position)
-    if not problem.dataset.has_tension:
+    measured, many = regression.dataset.measured.tension, len(pose.position)
+    if not regression.dataset.has_tension:
         return np.zeros((many, measured.shape[1]))
     known = measured[np.isfinite(measured).all(axis=1)]
     start = known[rng.integers(len(known), size=many)]
@@ -204,7 +206,7 @@ class PoseOffer:
 
 
 def next_pose_runs(
-    problem: RobotProblem, final: Hypothesis, pairs: Sequence[tuple[Term, Term]]
+    regression: PoseRegression, final: Hypothesis, pairs: Sequence[tuple[Term, Term]]
 ) -> tuple[NextRun, ...]:
     """Per pair the kinds of poses that tell it apart, with the power that they would have.
 
@@ -212,7 +214,7 @@ def next_pose_runs(
     """
     out: list[NextRun] = []
     for first, second in pairs:
-        offers = pose_offers(problem, final, [(first, second)], [APART])
+        offers = pose_offers(regression, final, [(first, second)], [APART])
         names = (first.effect.id, second.effect.id)
         sure = [o for o in offers if o.powers[0] >= _SURE][:1]
         fair = sorted(offers, key=lambda o: -o.powers[0])
@@ -225,7 +227,7 @@ def next_pose_runs(
 
 
 def pose_offers(
-    problem: RobotProblem,
+    regression: PoseRegression,
     final: Hypothesis,
     questions: Sequence[Question],
     needed: Sequence[float],
@@ -235,13 +237,13 @@ def pose_offers(
 
     ``needed`` are the whitened squares that answer each question.
     """
-    robot = problem.standing.robot(final.terms)
-    kinds = [kind for kind in KINDS if usable(kind, problem.dataset)]
-    tried = [(kind, *imagined(problem, robot, kind)) for kind in kinds]
+    robot = regression.standing.robot(final.terms)
+    kinds = [kind for kind in KINDS if usable(kind, regression.dataset)]
+    tried = [(kind, *imagined(regression, robot, kind)) for kind in kinds]
     tried = [(kind, seen, pose) for kind, seen, pose in tried if len(seen)]
-    wide = _with_all(problem, tried)
+    wide = _with_all(regression, tried)
     parts = [_information(wide, final, question) for question in questions]
-    begin = len(problem.dataset.measured)
+    begin = len(regression.dataset.measured)
     base = [part[-1] + part[:begin].sum(axis=0) for part in parts]
     so_far = _powers([float(_left_over(own)) for own in base], needed)
     out = []
@@ -279,10 +281,10 @@ def _words(offer: PoseOffer) -> str:
 
 
 def _with_all(
-    problem: RobotProblem, tried: Sequence[tuple[PoseKind, Measured, Pose]]
-) -> RobotProblem:
+    regression: PoseRegression, tried: Sequence[tuple[PoseKind, Measured, Pose]]
+) -> PoseRegression:
     """The poses so far and all imagined ones as one regression."""
-    standing, dataset = problem.standing, problem.dataset
+    standing, dataset = regression.standing, regression.dataset
     poses = [standing.pose, *(pose for _, _, pose in tried)]
     measured = joined([dataset.measured, *(seen for _, seen, _ in tried)])
     pose = Pose(
@@ -290,10 +292,10 @@ def _with_all(
     )
     distinct = np.arange(len(measured), dtype=np.intp)
     wide = replace(dataset, measured=measured, pose=distinct)
-    return RobotProblem(replace(standing, dataset=wide, pose=pose))
+    return PoseRegression(replace(standing, dataset=wide, pose=pose))
 
 
-def _information(problem: RobotProblem, final: Hypothesis, question: Question) -> Array:
+def _information(regression: PoseRegression, final: Hypothesis, question: Question) -> Array:
     """Squares and products of an effect, its rival and nuisances, pose by pose; the prior's last.
 
     (poses + 1, k, k); the effect comes first.
@@ -303,18 +305,18 @@ def _information(problem: RobotProblem, final: Hypothesis, question: Question) -
     others = Hypothesis()
     for term in final.terms:
         if term.effect.id not in asked:
-            others = others.with_term(term, problem.runs)
-    here = problem.change(others)
-    shown = problem.change(others.with_term(first, problem.runs)) - here
-    rival = others if second is None else others.with_term(second, problem.runs)
-    imitation = problem.jacobian(problem.vector(rival), rival)
-    columns = np.column_stack([shown, imitation, problem.change(rival) - here])
+            others = others.with_term(term, regression.n_runs)
+    here = regression.change(others)
+    shown = regression.change(others.with_term(first, regression.n_runs)) - here
+    rival = others if second is None else others.with_term(second, regression.n_runs)
+    imitation = regression.jacobian(regression.vector(rival), rival)
+    columns = np.column_stack([shown, imitation, regression.change(rival) - here])
     columns = np.where(np.isfinite(columns), columns, 0.0)
     size = np.sqrt(np.sum(columns[:, 1:] ** 2, axis=0))
     kept = np.concatenate([[True], size > 0])
     columns = columns[:, kept] / np.concatenate([[1.0], size[size > 0]])
-    row = problem.pose_of_row
-    out = np.zeros((len(problem.dataset.measured) + 1, columns.shape[1], columns.shape[1]))
+    row = regression.pose_of_row
+    out = np.zeros((len(regression.dataset.measured) + 1, columns.shape[1], columns.shape[1]))
     for pose in np.unique(row):
         own = columns[row == pose]
         out[max(pose, -1)] += own.T @ own

@@ -18,10 +18,10 @@ from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.robot.candidates import candidates_at, geometry_believed
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
-from winchkit.diagnosis.robot.engine import RobotInquiry
+from winchkit.diagnosis.robot.engine import PoseSelection
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
 from winchkit.diagnosis.robot.prior import Believed
-from winchkit.diagnosis.robot.regression import RobotProblem, Standing
+from winchkit.diagnosis.robot.regression import PoseRegression, Standing
 from winchkit.diagnosis.robot.variance_components import (
     START,
     PoseNoise,
@@ -72,10 +72,10 @@ def settled(
     terms = tuple(terms)
     for _ in range(_STEPS):
         standing = _placed(standing, terms)
-        problem = RobotProblem(standing)
-        found = fit(problem, begun(terms), np.ones(problem.rows))
+        regression = PoseRegression(standing)
+        found = fit(regression, begun(terms), np.ones(regression.n_rows))
         terms = found.hypothesis.terms
-        steps = found.vector[: problem.nuisance_columns.shape[1]]
+        steps = found.vector[: regression.nuisance_columns.shape[1]]
         moves = steps[len(steps) - len(believed) :].tolist()
         moved = tuple(b.moved(by) for b, by in zip(standing.believed, moves, strict=True))
         standing = replace(standing, believed=moved)
@@ -101,11 +101,11 @@ def judged_noise(
     found = PoseNoise(START, {}, from_repeats=False, unexplained=START)
     for _ in range(2):
         standing, own = settled(dataset, terms, found.sigma, believed)
-        problem = RobotProblem(standing)
-        here = problem.residuals(own)
-        columns = _columns(problem, own, candidates, here)
+        regression = PoseRegression(standing)
+        here = regression.residuals(own)
+        columns = _columns(regression, own, candidates, here)
         kinds = [k for k, values in here.items() if np.isfinite(values).any()]
-        slope = {k: v for k, v in problem.slope().items() if k in kinds}
+        slope = {k: v for k, v in regression.slope().items() if k in kinds}
         kept = {k: here[k] for k in kinds}
         stack = Stack(kept, slope, {k: columns[k] for k in kinds})
         found = noise_of(stack, repeated_differences(Stack(kept, slope, {}), dataset.pose))
@@ -126,7 +126,10 @@ def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
 
 
 def _columns(
-    problem: RobotProblem, own: Sequence[Term], candidates: Sequence[Effect], here: dict[str, Array]
+    regression: PoseRegression,
+    own: Sequence[Term],
+    candidates: Sequence[Effect],
+    here: dict[str, Array],
 ) -> dict[str, Array]:
     """What the residuals gain from the geometry and from every candidate, (p, k, m) by kind."""
     moved: list[dict[str, Array]] = []
@@ -135,23 +138,23 @@ def _columns(
         shape = coordinates.grid()[0]
         for secant in coordinates.secants():
             term = Term(effect, {**effect.null, **shape, **secant})
-            there = problem.residuals((*own, term))
+            there = regression.residuals((*own, term))
             if base_of(effect) not in _BALANCING and "tension" in there:
                 there["tension"] = here["tension"]
             moved.append(there)
-    start = problem.residuals(()) if own else here
+    start = regression.residuals(()) if own else here
     moved += [
-        {k: here[k] + there[k] - start[k] for k in here} for there in problem.moved_by_belief()
+        {k: here[k] + there[k] - start[k] for k in here} for there in regression.moved_by_belief()
     ]
     out = {k: [m[k] - values for m in moved] for k, values in here.items()}
     for kind in ("swivel", "gauge"):
-        for i in range(len(problem.dataset.names)):
+        for i in range(len(regression.dataset.names)):
             column = np.zeros_like(here[kind])
             column[:, i] = 1.0
             out[kind].append(column)
         for other in out:
             if other != kind:
-                out[other] += [np.zeros_like(here[other])] * len(problem.dataset.names)
+                out[other] += [np.zeros_like(here[other])] * len(regression.dataset.names)
     return {k: np.nan_to_num(np.stack(v, axis=-1)) for k, v in out.items()}
 
 
@@ -176,22 +179,22 @@ class Study:
         """The profile's own effects at their file values."""
         return robot_terms(self.dataset.robot, self.catalogue)
 
-    def inquiry(self, believed: Sequence[Believed], beside: tuple[Term, ...] = ()) -> RobotInquiry:
+    def engine(self, believed: Sequence[Believed], beside: tuple[Term, ...] = ()) -> PoseSelection:
         """Beginning with the profile's own effects, the geometry believed as given."""
         terms = (*self.own, *beside)
         standing, terms = settled(self.dataset, terms, self.noise.sigma, believed)
-        problem = RobotProblem(standing)
+        regression = PoseRegression(standing)
         begin = begun(terms[: len(self.own)])
-        return RobotInquiry(problem, begin, self.candidates, self.noise)
+        return PoseSelection(regression, begin, self.candidates, self.noise)
 
-    def as_filed(self, beside: tuple[Term, ...] = ()) -> RobotInquiry:
+    def as_filed(self, beside: tuple[Term, ...] = ()) -> PoseSelection:
         """With the numbers of the file, as sure as its calibration left them."""
         believed = geometry_believed(self.dataset, self.catalogue, fitted=True)
-        return self.inquiry(believed, beside)
+        return self.engine(believed, beside)
 
-    def let_go(self) -> RobotInquiry:
+    def let_go(self) -> PoseSelection:
         """With the geometry fitted too."""
-        return self.inquiry(self.prior, self.guess)
+        return self.engine(self.prior, self.guess)
 
     def guessed(self) -> Study:
         """With the effect that explains most beside the geometry, and the noise beside it.
@@ -199,12 +202,12 @@ class Study:
         A geometry that was fitted without what is missing lies millimetres off, too far to be
         linear in between.
         """
-        inquiry = self.let_go()
-        present, noise = inquiry.settle(inquiry.begin)
-        listed = [s for s in inquiry.scores(present, noise) if s.value > 0][:_SHORT_LIST]
-        trials = [inquiry.trial(present, item, noise) for item in listed]
+        engine = self.let_go()
+        present, noise = engine.settle(engine.begin)
+        listed = [s for s in engine.scores(present, noise) if s.value > 0][:_SHORT_LIST]
+        trials = [engine.trial(present, item, noise) for item in listed]
         best = min(trials, key=lambda t: t.criterion, default=None)
-        if best is None or best.criterion > inquiry.criterion(present):
+        if best is None or best.criterion > engine.criterion(present):
             return self
         guess = best.fit.hypothesis.terms[-1:]
         absent = tuple(e for e in self.candidates if e.id != guess[0].effect.id)

@@ -7,7 +7,7 @@ import numpy as np
 from winchkit.diagnosis.regression.cross_validation import confidence, held_out, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.selection.engine import Inquiry, Trial
+from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.effects.parametrization import Coordinates
 
 __all__ = ["BETTER", "MATTERS", "best_that_holds", "holds"]
@@ -21,36 +21,36 @@ MATTERS = 0.98
 
 
 def best_that_holds(
-    inquiry: Inquiry, present: Fit, noise: Noise, trials: list[Trial]
+    engine: SelectionEngine, present: Fit, noise: Noise, trials: list[Trial]
 ) -> Fit | None:
     """The best of the short list that passes the gate, all refitted; None where none does."""
-    before = inquiry.criterion(present)
+    before = engine.criterion(present)
     for trial in sorted(trials, key=lambda t: t.criterion):
-        if trial.criterion < before - BETTER and holds(inquiry, present, trial.fit, noise):
+        if trial.criterion < before - BETTER and holds(engine, present, trial.fit, noise):
             return trial.fit
     return None
 
 
 def holds(
-    inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise, matters: float = MATTERS
+    engine: SelectionEngine, present: Fit, grown: Fit, noise: Noise, matters: float = MATTERS
 ) -> bool:
     """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
 
     An effect that shows in few blocks, such as those of one kind of move, cannot be certain by
     rank; that it pays for itself in every single group, none of which it was fitted on, can.
     """
-    problem = inquiry.problem
-    blocks = inquiry.blocks
-    before = held_out(problem, present, noise, blocks)
-    after = held_out(problem, grown, noise, blocks)
-    groups = inquiry.folds(grown, noise)
-    gain = held_out(problem, present, noise, groups) - held_out(problem, grown, noise, groups)
-    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _added(present, grown))
+    regression = engine.regression
+    blocks = regression.blocks
+    before = held_out(regression, present, noise, blocks)
+    after = held_out(regression, grown, noise, blocks)
+    groups = engine.folds(grown, noise)
+    gain = held_out(regression, present, noise, groups) - held_out(regression, grown, noise, groups)
+    pays = engine.grouped(groups) and bool(np.min(gain) > engine.price * _added(present, grown))
     if np.sum(before - after) <= 0 or (confidence(before, after) > _GATE_LEVEL and not pays):
         return False
-    was = held_out_rms(problem, present, noise, groups)
-    now = held_out_rms(problem, grown, noise, groups)
-    ratios = [now[output] / was[output] for output in problem.dataset.outputs]
+    was = held_out_rms(regression, present, noise, groups)
+    now = held_out_rms(regression, grown, noise, groups)
+    ratios = [now[output] / was[output] for output in regression.outputs]
     # What is certain and changes nothing, such as a clock a millisecond off, is not worth a name.
     return bool(np.sum(gain) > 0 and min(ratios) < matters and max(ratios) < _NO_WORSE)
 

@@ -1,35 +1,25 @@
-"""One inquiry: a problem, its candidates, and the moves of a search among hypotheses."""
+"""Selection engine: a regression, its candidates, and the operations of stepwise selection.
+
+The engine fits, scores and compares hypotheses of any regression. How the noise is estimated,
+how lack of fit is tested and which folds are held out depends on the data: the implementations
+are :class:`~winchkit.diagnosis.selection.time_series.TimeSeriesSelection` for a winch's runs and
+:class:`~winchkit.diagnosis.robot.engine.PoseSelection` for a robot's poses.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.cross_validation import (
-    Folds,
-    blocks_of,
-    extrapolation,
-    five_blocks,
-    groups_of,
-    held_out_rms,
-)
-from winchkit.diagnosis.regression.discretization import without_rounding
+from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.gls import Fit, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import (
-    Noise,
-    Presence,
-    noise_from_repeats,
-    noise_saturated,
-    presence,
-)
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.candidates import missing_needs
+from winchkit.diagnosis.regression.noise import Noise, Presence
 from winchkit.diagnosis.selection.initial_states import rests_on_states
 from winchkit.diagnosis.selection.pairs import Couple, couples
 from winchkit.diagnosis.selection.scores import Projected, Score, score, worthless
@@ -45,8 +35,8 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
-    "Inquiry",
     "Last",
+    "SelectionEngine",
     "Trial",
     "admissible",
     "best_of_each",
@@ -112,7 +102,6 @@ class Last(Generic[Answer]):
         return self._kept[2]
 
 
-_UNSURE = 0.2
 _WILD = 1.0
 """Of what the differences round: more of it is not rounding."""
 
@@ -126,14 +115,25 @@ class Trial:
     """Whitened squares and the price of all added degrees of freedom: lower is better."""
 
 
-class Inquiry:
-    """What stays the same through a search: data, candidates, folds, the model it began with."""
+class SelectionEngine(ABC):
+    """Candidates, signatures and comparisons that stay the same through a selection.
 
-    loads_are_chosen = True
-    """Whether a next run may hang another load, which shows how a rope's law bends."""
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    begin
+        Initial model: the profile's own effects.
+    candidates
+        Effects that may be added.
+    """
 
-    def __init__(self, problem: Problem, begin: Hypothesis, candidates: Iterable[Effect]) -> None:
-        self.problem = problem
+    regression: Regression
+
+    def __init__(
+        self, regression: Regression, begin: Hypothesis, candidates: Iterable[Effect]
+    ) -> None:
+        self.regression = regression
         self.begin = begin
         self.given = len(begin.terms)
         self._candidates = tuple(candidates)
@@ -142,111 +142,81 @@ class Inquiry:
         self._last_projected: Last[Projected] = Last()
         self.signatures = self._signatures(begin)
 
+    @abstractmethod
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+        """Noise estimate beside a fitted model.
+
+        Parameters
+        ----------
+        residual
+            Measured minus predicted, shape (n_rows,).
+        jacobian
+            Derivative of the prediction by the unknowns, shape (n_rows, n_unknowns).
+        states
+            Number of initial states, which are the last unknowns.
+        """
+
+    @abstractmethod
+    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+        """Held-out rms error of every output that a user reads, SI."""
+
+    @abstractmethod
+    def _choose_folds(self, fitted: Fit, noise: Noise) -> Folds:
+        """Folds for leave-group-out cross-validation of a fit."""
+
+    @abstractmethod
+    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> Presence:
+        """F test of the residual against the noise, band by band."""
+
+    def folds(self, fitted: Fit, noise: Noise) -> Folds:
+        """Folds for leave-group-out cross-validation of a fit; the last answer is kept."""
+        return self._last_folds.of(fitted, noise, lambda: self._choose_folds(fitted, noise))
+
+    def presence(self, present: Fit, noise: Noise) -> Presence:
+        """Lack-of-fit test of a fit; the last answer is kept."""
+        return self._last_presence.of(
+            present, noise, lambda: self._test_lack_of_fit(present, noise)
+        )
+
+    @property
+    def price(self) -> float:
+        """Reduction of χ² required per parameter: ln n, as in the BIC."""
+        return float(np.log(self.regression.n_observations))
+
+    def grouped(self, folds: Folds) -> bool:
+        """Whether folds are whole groups of programme and load, two at least."""
+        return folds is self.regression.groups and len(set(self.regression.group_of_run)) > 1
+
     def _signatures(self, present: Hypothesis) -> Signatures:
         there = {t.effect.id for t in self.begin.terms if not t.effect.repeatable}
         absent = (effect for effect in self._candidates if effect.id not in there)
-        return signatures(self.problem, present, absent)
+        return signatures(self.regression, present, absent)
 
     def look_again(self, present: Hypothesis) -> None:
         """Draw the signatures anew beside a grown model: a lag acts on what is there."""
         self._last_projected = Last()
-        grown = redrawn(self.problem, present, self.signatures)
+        grown = redrawn(self.regression, present, self.signatures)
         if grown is None:
             del self.signatures  # Both at once would be the most memory of a whole diagnosis.
             grown = self._signatures(present)
         self.signatures = grown
 
-    @property
-    def price(self) -> float:
-        """Whitened squares that one degree of freedom must save."""
-        return float(np.log(self.problem.rows))
-
-    @cached_property
-    def blocks(self) -> Folds:
-        """Blocks of time for gates and comparisons."""
-        return blocks_of(self.problem)
-
-    @cached_property
-    def groups(self) -> Folds:
-        """Whole groups of programme and load, to be held out."""
-        return groups_of(self.problem)
-
-    def folds(self, fitted: Fit, noise: Noise) -> Folds:
-        """What to hold out for a fit: whole groups, or blocks where groups would not tell.
-
-        With few groups, say two loads, one may be what determines an unknown: a prediction that
-        rests on little fails whether or not the effect is there.
-        """
-
-        def compute() -> Folds:
-            unsure = extrapolation(self.problem, fitted, noise, self.groups) > _UNSURE
-            return self._five_blocks if unsure else self.groups
-
-        return self._last_folds.of(fitted, noise, compute)
-
-    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
-        """Held-out error of every output that a user reads, rms in SI."""
-        return held_out_rms(self.problem, fitted, noise, folds)
-
-    def lacking(self, effect: Effect) -> list[str]:
-        """Parts and channels without which these data cannot show an effect, in words."""
-        return missing_needs(effect, self.problem)
-
-    def grouped(self, folds: Folds) -> bool:
-        """Whether folds are whole groups of programme and load, two at least."""
-        return folds is self.groups and len(self.problem.dataset.repeats) > 1
-
-    @cached_property
-    def _five_blocks(self) -> Folds:
-        return five_blocks(self.problem)
-
-    @property
-    def _known(self) -> Array:
-        """Signatures that may differ between repeats for a reason that is measured."""
-        warm = [
-            index
-            for atom in self.signatures.atoms
-            if "temperature" in atom.effect.needs
-            for index in range(atom.columns.start, atom.columns.stop)
-        ]
-        return self.signatures.columns[:, warm]
-
-    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
-        """Noise under a present model, from repeats where there are any.
-
-        The last ``states`` columns of ``jacobian`` are by unknowns that each run has for itself.
-        """
-        if self.problem.dataset.repeated:
-            own = jacobian[:, jacobian.shape[1] - states :]
-            return noise_from_repeats(self.problem, residual, self._known, own)
-        columns = np.hstack([jacobian, self.signatures.columns])
-        return noise_saturated(self.problem, residual, columns)
-
     def settle(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
         """Fit, with the noise re-estimated from what the fit leaves."""
         states = sum(len(begun) for begun in start.starts)
         if noise is None:
-            vector = self.problem.vector(start)
-            jacobian = self.problem.jacobian(vector, start)
-            noise = self.noise(self.problem.residual(start), jacobian, states)
-        first = fit(self.problem, start, noise.weight(self.problem))
+            vector = self.regression.vector(start)
+            jacobian = self.regression.jacobian(vector, start)
+            noise = self.noise(self.regression.residual(start), jacobian, states)
+        first = fit(self.regression, start, noise.weight(self.regression))
         noise = self.noise(first.residual, first.jacobian, states)
-        return fit(self.problem, first.hypothesis, noise.weight(self.problem)), noise
-
-    def presence(self, present: Fit, noise: Noise) -> Presence:
-        """Whether a fit leaves more than noise, and more than sampling may have rounded."""
-
-        def compute() -> Presence:
-            left = without_rounding(self.problem, present, noise.weight(self.problem))
-            return presence(self.problem, left, present.jacobian, noise)
-
-        return self._last_presence.of(present, noise, compute)
+        return fit(self.regression, first.hypothesis, noise.weight(self.regression)), noise
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
         """Signatures with a fit's unknowns projected out."""
 
         def compute() -> Projected:
-            return Projected(self.problem, self.signatures, present.jacobian, noise)
+            return Projected(self.regression, self.signatures, present.jacobian, noise)
 
         return self._last_projected.of(present, noise, compute)
 
@@ -256,8 +226,8 @@ class Inquiry:
 
     def every_score(self, present: Fit, noise: Noise) -> list[Score]:
         """The same at every point of their grids."""
-        ranked = score(self.projected(present, noise), present.residual, self.problem.rows)
-        return admissible(ranked, present.hypothesis, self.problem.rows)
+        ranked = score(self.projected(present, noise), present.residual, self.regression.n_rows)
+        return admissible(ranked, present.hypothesis, self.regression.n_rows)
 
     def couples(self, present: Fit, noise: Noise) -> list[Couple]:
         """Pairs of candidates that pay beside a fit, best first."""
@@ -276,7 +246,7 @@ class Inquiry:
 
         Of a series it takes as many coefficients as pay, each added to what was fitted before.
         """
-        effect, weight = item.atom.effect, noise.weight(self.problem)
+        effect, weight = item.atom.effect, noise.weight(self.regression)
         hypothesis = present.hypothesis
         for index in reversed(range(self.given, len(hypothesis.terms))):
             if hypothesis.terms[index].effect.id in effect.contains:
@@ -285,13 +255,13 @@ class Inquiry:
         for law in by_coefficients(effect):
             if best is None:
                 own = replace(item, atom=item.atom.of_law(law))
-                places = placed(self.problem, hypothesis, present, own, weight)
+                places = placed(self.regression, hypothesis, present, own, weight)
                 terms = [Term(law, values) for values in places]
-                starts = [hypothesis.with_term(term, self.problem.runs) for term in terms]
+                starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
                 starts += [anew for start in starts for anew in self._less_rounded(start)]
             else:
                 starts = [best.fit.hypothesis.with_law(law)]
-            fitted = fit_from(self.problem, starts, weight)
+            fitted = fit_from(self.regression, starts, weight)
             longer = Trial(fitted, self._price_of(fitted, hypothesis, present, noise))
             if best is not None and not longer.criterion < best.criterion:
                 break
@@ -304,7 +274,11 @@ class Inquiry:
         Without the loop that was there all the time the rounding stood for a part of it, and a
         loop fitted from there turns around too late for good.
         """
-        wild = self.problem.rounds and bool(start.nuisances) and abs(start.nuisances[-1]) > _WILD
+        wild = (
+            self.regression.fits_discretization
+            and bool(start.nuisances)
+            and abs(start.nuisances[-1]) > _WILD
+        )
         if not wild or not start.terms[-1].effect.memory:
             return []
         return [replace(start, nuisances=(*start.nuisances[:-1], 0.0))]
@@ -322,13 +296,15 @@ class Inquiry:
         """Whether the last term explains mainly by the states in which the runs began."""
         if not fitted.hypothesis.starts[-1]:
             return False
-        weight = noise.weight(self.problem)
-        return rests_on_states(self.problem, self.refit(without, noise), fitted, weight, self.price)
+        weight = noise.weight(self.regression)
+        return rests_on_states(
+            self.regression, self.refit(without, noise), fitted, weight, self.price
+        )
 
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """Fit a hypothesis under a given noise."""
-        return fit(self.problem, hypothesis, noise.weight(self.problem))
+        return fit(self.regression, hypothesis, noise.weight(self.regression))
 
     def held(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """A hypothesis as it is, fitted no further."""
-        return fit(self.problem, hypothesis, noise.weight(self.problem), 0)
+        return fit(self.regression, hypothesis, noise.weight(self.regression), 0)

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
@@ -22,7 +22,9 @@ __all__ = ["rests_on_states"]
 _BY_ITSELF = 0.5
 
 
-def rests_on_states(problem: Problem, base: Fit, fitted: Fit, weight: Array, price: float) -> bool:
+def rests_on_states(
+    regression: Regression, base: Fit, fitted: Fit, weight: Array, price: float
+) -> bool:
     """Whether the last term of a fit, which ``base`` lacks, needs its states too much.
 
     It does not where it explains half of what it does from rest in every run, and no less than a
@@ -31,10 +33,10 @@ def rests_on_states(problem: Problem, base: Fit, fitted: Fit, weight: Array, pri
     """
     known, left = base.jacobian * weight[:, None], base.residual * weight
     gain = base.cost - fitted.cost
-    column = _beyond(known, _from_rest(problem, fitted.hypothesis) * weight)
+    column = _beyond(known, _from_rest(regression, fitted.hypothesis) * weight)
     alone = (column @ left) ** 2 / max(float(column @ column), 1e-300)
     by_itself = bool(alone >= _BY_ITSELF * gain)
-    levels = _levels(problem, fitted.hypothesis)
+    levels = _levels(regression, fitted.hypothesis)
     if levels is None:
         return not by_itself
     flat = _beyond(np.column_stack([known, levels * weight[:, None]]), left)
@@ -45,13 +47,15 @@ def rests_on_states(problem: Problem, base: Fit, fitted: Fit, weight: Array, pri
     return float(flat @ flat) - fitted.cost < price * owed
 
 
-def _from_rest(problem: Problem, hypothesis: Hypothesis) -> Array:
+def _from_rest(regression: Regression, hypothesis: Hypothesis) -> Array:
     """What the last term adds where every run begins at rest, rows."""
     rested = replace(hypothesis, starts=(*hypothesis.starts[:-1], ()))
-    return problem.change(rested) - problem.change(hypothesis.without(len(hypothesis.terms) - 1))
+    return regression.change(rested) - regression.change(
+        hypothesis.without(len(hypothesis.terms) - 1)
+    )
 
 
-def _levels(problem: Problem, hypothesis: Hypothesis) -> Array | None:
+def _levels(regression: Regression, hypothesis: Hypothesis) -> Array | None:
     """What the last term's states explain if nothing moves within a run, (rows, runs).
 
     None for an effect without a time constant: how far it moved is not a matter of time.
@@ -62,7 +66,7 @@ def _levels(problem: Problem, hypothesis: Hypothesis) -> Array | None:
         return None
     still = Term(term.effect, {**term.values, **slow})
     frozen = replace(hypothesis, terms=(*hypothesis.terms[:-1], still))
-    return problem.jacobian(problem.vector(frozen), frozen)[:, -len(start) :]
+    return regression.jacobian(regression.vector(frozen), frozen)[:, -len(start) :]
 
 
 def _beyond(columns: Array, vector: Array) -> Array:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.selection.signatures import Atom, Signatures, pieces
 
 __all__ = ["Projected", "Score", "chance_level", "score", "worthless"]
@@ -40,12 +40,14 @@ class Score:
 class Projected:
     """Signatures with the present model's unknowns projected out, under one noise."""
 
-    def __init__(self, problem: Problem, found: Signatures, jacobian: Array, noise: Noise) -> None:
+    def __init__(
+        self, regression: Regression, found: Signatures, jacobian: Array, noise: Noise
+    ) -> None:
         self.found = found
         self._jacobian = jacobian
-        self._weight2 = noise.weight(problem) ** 2
+        self._weight2 = noise.weight(regression) ** 2
         self._freedom = noise.freedom
-        self._cross, self._normal = _cross(problem, jacobian, found.columns)
+        self._cross, self._normal = _cross(regression, jacobian, found.columns)
         self._share = share = 1 / noise.power
         cross, normal, gram = (
             np.tensordot(share, part, axes=1) for part in (self._cross, self._normal, found.gram)
@@ -117,11 +119,11 @@ def _projected(gram: Array, cross: Array, normal: Array, through: Array) -> Arra
     return np.asarray(gram + mixed + mixed.T + through.T @ normal @ through)
 
 
-def _cross(problem: Problem, jacobian: Array, columns: Array) -> tuple[Array, Array]:
+def _cross(regression: Regression, jacobian: Array, columns: Array) -> tuple[Array, Array]:
     """Per band: inner products of unknowns with columns, and among unknowns."""
-    count, q = len(problem.bands), jacobian.shape[1]
+    count, q = len(regression.bands), jacobian.shape[1]
     cross, normal = np.zeros((count, q, columns.shape[1])), np.zeros((count, q, q))
-    for band, rows in pieces(problem):
+    for band, rows in pieces(regression):
         cross[band] += jacobian[rows].T @ columns[rows]
         normal[band] += jacobian[rows].T @ jacobian[rows]
     return cross, normal

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.selection.candidates import points
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
@@ -63,10 +63,12 @@ class Signatures:
 class _Canvas:
     """Some outputs beside a present model, into whose rows columns are drawn."""
 
-    def __init__(self, problem: Problem, present: Hypothesis, outputs: Collection[str]) -> None:
-        self._problem = problem
+    def __init__(
+        self, regression: Regression, present: Hypothesis, outputs: Collection[str]
+    ) -> None:
+        self._regression = regression
         self._present = present
-        self._here = problem.change(present, outputs)
+        self._here = regression.change(present, outputs)
 
     def draw(self, column: Array, term: Term, outputs: Collection[str]) -> bool:
         """Write what some of the outputs gain from a term, rows; tells whether they do.
@@ -75,9 +77,11 @@ class _Canvas:
         """
         if not outputs:
             return False
-        there = self._problem.change(self._present.with_term(term, self._problem.runs), outputs)
+        there = self._regression.change(
+            self._present.with_term(term, self._regression.n_runs), outputs
+        )
         size = 0.0
-        for rows in self._problem.rows_of(outputs):
+        for rows in self._regression.rows_of(outputs):
             np.subtract(there[rows], self._here[rows], out=column[rows])
             size += float(column[rows] @ column[rows])
         if not np.isfinite(size):
@@ -85,15 +89,17 @@ class _Canvas:
         return 0.0 < size < np.inf
 
 
-def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect]) -> Signatures:
+def signatures(
+    regression: Regression, present: Hypothesis, effects: Iterable[Effect]
+) -> Signatures:
     """Columns and inner products of every candidate among ``effects`` beside a present model."""
-    outputs = problem.dataset.outputs
-    canvas = _Canvas(problem, present, outputs)
-    tried = list(points(problem, effects))
+    outputs = regression.outputs
+    canvas = _Canvas(regression, present, outputs)
+    tried = list(points(regression, effects))
     atoms: list[Atom] = []
     silent: list[tuple[Effect, dict[str, float]]] = []
     # One column after another in memory: thousands of rows each, written and read whole.
-    columns, count = np.empty((sum(len(secants) for *_, secants in tried), problem.rows)), 0
+    columns, count = np.empty((sum(len(secants) for *_, secants in tried), regression.n_rows)), 0
     for effect, shape, secants in tried:
         own = []
         for secant in secants:
@@ -106,12 +112,12 @@ def signatures(problem: Problem, present: Hypothesis, effects: Iterable[Effect])
         if own:
             atoms.append(Atom(effect, shape, slice(count - len(own), count), tuple(own)))
     kept = columns[:count].T
-    gram = np.zeros((len(problem.bands), count, count))
-    _multiply(gram, problem, kept, outputs)
+    gram = np.zeros((len(regression.bands), count, count))
+    _multiply(gram, regression, kept, outputs)
     return Signatures(tuple(atoms), kept, gram, present, tuple(silent))
 
 
-def redrawn(problem: Problem, present: Hypothesis, found: Signatures) -> Signatures | None:
+def redrawn(regression: Regression, present: Hypothesis, found: Signatures) -> Signatures | None:
     """The same signatures beside a grown model, in the same memory; ``found`` is used up.
 
     Drawn anew is only what lies on the way to an output which changed terms touch: a lag acts on
@@ -119,35 +125,37 @@ def redrawn(problem: Problem, present: Hypothesis, found: Signatures) -> Signatu
     """
     changed = [t for t in present.terms if t not in found.beside.terms]
     changed += [t for t in found.beside.terms if t not in present.terms]
-    touched = {output for term in changed for output in problem.outputs_of(term.effect.stage)}
-    canvas, spare = _Canvas(problem, present, touched), np.empty(problem.rows)
+    touched = {output for term in changed for output in regression.outputs_of(term.effect.stage)}
+    canvas, spare = _Canvas(regression, present, touched), np.empty(regression.n_rows)
     for effect, values in found.silent:
-        reached = touched & problem.outputs_of(effect.stage)
+        reached = touched & regression.outputs_of(effect.stage)
         if canvas.draw(spare, Term(effect, values), reached):
             return None
     for atom in found.atoms:
-        reached = touched & problem.outputs_of(atom.effect.stage)
+        reached = touched & regression.outputs_of(atom.effect.stage)
         for index, secant in enumerate(atom.secants, atom.columns.start):
             term = Term(atom.effect, {**atom.effect.null, **atom.shape, **secant})
             canvas.draw(found.columns[:, index], term, reached)
-    _multiply(found.gram, problem, found.columns, touched)
+    _multiply(found.gram, regression, found.columns, touched)
     return replace(found, beside=present)
 
 
-def _multiply(gram: Array, problem: Problem, columns: Array, outputs: Collection[str]) -> None:
+def _multiply(
+    gram: Array, regression: Regression, columns: Array, outputs: Collection[str]
+) -> None:
     """Inner products per noise band of some outputs, into (bands, p, p)."""
-    for band, (output, _, _) in enumerate(problem.bands):
+    for band, (output, _, _) in enumerate(regression.bands):
         if output in outputs:
             gram[band] = 0.0
-    for band, rows in pieces(problem):
-        if problem.bands[band][0] in outputs:
+    for band, rows in pieces(regression):
+        if regression.bands[band][0] in outputs:
             gram[band] += columns[rows].T @ columns[rows]
 
 
-def pieces(problem: Problem) -> Iterator[tuple[int, slice]]:
+def pieces(regression: Regression) -> Iterator[tuple[int, slice]]:
     """Runs of rows that lie in one noise band, with its number."""
-    for segment in problem.segments:
-        ids = problem.band_of_row[segment.rows]
+    for segment in regression.segments:
+        ids = regression.band_of_row[segment.rows]
         edges = np.flatnonzero(np.diff(ids, prepend=-1, append=-1))
         for low, high in pairwise(edges.tolist()):
             yield int(ids[low]), slice(segment.rows.start + low, segment.rows.start + high)

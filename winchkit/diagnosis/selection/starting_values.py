@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.selection.scores import Score
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
@@ -94,7 +94,7 @@ _HALVINGS = 7
 
 
 def placed(
-    problem: Problem, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array
+    regression: Regression, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array
 ) -> list[dict[str, float]]:
     """Where fits begin; a moment is first sought between the points of its grid.
 
@@ -105,12 +105,12 @@ def placed(
     if not places or len(begun) > 1:
         return begun
     place, values = places[0], begun[0]
-    here = problem.change(hypothesis)
+    here = regression.change(hypothesis)
     residual, jacobian = present.residual * weight, present.jacobian * weight[:, None]
 
     def gain(at: float) -> float:
         term = Term(item.atom.effect, {**values, place.name: at})
-        column = problem.change(hypothesis.with_term(term, problem.runs)) - here
+        column = regression.change(hypothesis.with_term(term, regression.n_runs)) - here
         column = column * weight
         column = column - jacobian @ np.linalg.lstsq(jacobian, column)[0]
         size = float(column @ column)

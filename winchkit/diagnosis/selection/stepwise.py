@@ -10,7 +10,7 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import Noise, Presence
 from winchkit.diagnosis.selection.acceptance import BETTER, best_that_holds, holds
-from winchkit.diagnosis.selection.engine import Inquiry, Trial
+from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.diagnosis.selection.exchange import recoupled
 from winchkit.diagnosis.selection.scores import Score, chance_level
 from winchkit.diagnosis.selection.starting_values import elsewhere
@@ -54,19 +54,19 @@ class Found:
     """Score that noise alone reaches in one case of a hundred."""
 
 
-def search(inquiry: Inquiry) -> Found:
+def search(engine: SelectionEngine) -> Found:
     """Grow the model while something is missing and an effect holds out of sample."""
-    begin, begin_noise = inquiry.settle(inquiry.begin)
-    begin_presence = inquiry.presence(begin, begin_noise)
-    begin_scores = inquiry.scores(begin, begin_noise)
-    threshold = _threshold(inquiry, begin, begin_noise)
-    reached, noise, tried = _grown(inquiry, begin, begin_noise, begin_scores, threshold)
-    final, noise = _without_the_doubtful(inquiry, reached, noise)
-    presence = inquiry.presence(final, noise)
-    grew = len(final.hypothesis.terms) > inquiry.given
+    begin, begin_noise = engine.settle(engine.begin)
+    begin_presence = engine.presence(begin, begin_noise)
+    begin_scores = engine.scores(begin, begin_noise)
+    threshold = _threshold(engine, begin, begin_noise)
+    reached, noise, tried = _grown(engine, begin, begin_noise, begin_scores, threshold)
+    final, noise = _without_the_doubtful(engine, reached, noise)
+    presence = engine.presence(final, noise)
+    grew = len(final.hypothesis.terms) > engine.given
     alarmed = grew or _missing(begin_presence, begin_scores, threshold)
     if alarmed and not tried:
-        tried = _fits(_short_list(inquiry, begin, begin_noise, begin_scores))
+        tried = _fits(_short_list(engine, begin, begin_noise, begin_scores))
     return Found(
         begin=begin,
         begin_noise=begin_noise,
@@ -76,7 +76,7 @@ def search(inquiry: Inquiry) -> Found:
         final=final,
         noise=noise,
         presence=presence,
-        still=_missing(presence, inquiry.scores(final, noise), threshold),
+        still=_missing(presence, engine.scores(final, noise), threshold),
         scores=tuple(begin_scores),
         tried=tried if alarmed else (),
         threshold=threshold,
@@ -84,50 +84,50 @@ def search(inquiry: Inquiry) -> Found:
 
 
 def _grown(
-    inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score], threshold: float
+    engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score], threshold: float
 ) -> tuple[Fit, Noise, tuple[Fit, ...]]:
     """The model with all that holds, its noise, and the candidates that were tried first."""
     tried: tuple[Fit, ...] = ()
     for _ in range(_MOST_STEPS):
         grown = None
         if scores and scores[0].value > threshold:
-            trials = _short_list(inquiry, present, noise, scores)
+            trials = _short_list(engine, present, noise, scores)
             tried = tried or _fits(trials)
-            grown = best_that_holds(inquiry, present, noise, trials)
-        grown = grown or _coupled(inquiry, present, noise)
+            grown = best_that_holds(engine, present, noise, trials)
+        grown = grown or _coupled(engine, present, noise)
         if grown is None:
             break
-        inquiry.look_again(grown.hypothesis)
-        present, noise = inquiry.settle(grown.hypothesis, noise)
-        present, noise = _reconsider(inquiry, present, noise)
-        scores = inquiry.scores(present, noise)
+        engine.look_again(grown.hypothesis)
+        present, noise = engine.settle(grown.hypothesis, noise)
+        present, noise = _reconsider(engine, present, noise)
+        scores = engine.scores(present, noise)
     return present, noise, tried
 
 
-def _threshold(inquiry: Inquiry, present: Fit, noise: Noise) -> float:
+def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
     """Score that noise alone reaches in one case of a hundred."""
-    chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
+    chance = chance_level(engine.projected(present, noise), engine.regression.n_rows)
     return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
 
 
-def without_term(inquiry: Inquiry, found: Found, index: int) -> Found:
+def without_term(engine: SelectionEngine, found: Found, index: int) -> Found:
     """The same search as if it had ended without one of its additions."""
-    return _ended(inquiry, found, found.final.hypothesis.without(index))
+    return _ended(engine, found, found.final.hypothesis.without(index))
 
 
-def with_a_pair(inquiry: Inquiry, found: Found) -> Found | None:
+def with_a_pair(engine: SelectionEngine, found: Found) -> Found | None:
     """The same search with a pair in the place of its only addition; None where none is better."""
-    if len(found.final.hypothesis.terms) != inquiry.given + 1:
+    if len(found.final.hypothesis.terms) != engine.given + 1:
         return None
-    better = _exchanged(inquiry, found.final, found.noise, found.begin)
-    return None if better is None else _ended(inquiry, found, better.hypothesis)
+    better = _exchanged(engine, found.final, found.noise, found.begin)
+    return None if better is None else _ended(engine, found, better.hypothesis)
 
 
-def _ended(inquiry: Inquiry, found: Found, hypothesis: Hypothesis) -> Found:
+def _ended(engine: SelectionEngine, found: Found, hypothesis: Hypothesis) -> Found:
     """A search as if it had ended with this hypothesis."""
-    present, noise = inquiry.settle(hypothesis, found.noise)
-    presence = inquiry.presence(present, noise)
-    still = _missing(presence, inquiry.scores(present, noise), found.threshold)
+    present, noise = engine.settle(hypothesis, found.noise)
+    presence = engine.presence(present, noise)
+    still = _missing(presence, engine.scores(present, noise), found.threshold)
     return replace(found, final=present, noise=noise, presence=presence, still=still)
 
 
@@ -142,52 +142,54 @@ def _missing(presence: Presence, scores: list[Score], threshold: float) -> bool:
     return bool(scores) and scores[0].value > threshold
 
 
-def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> list[Trial]:
+def _short_list(
+    engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score]
+) -> list[Trial]:
     """The candidates that score best, each fitted beside the present terms, in their order."""
     listed = [item for item in scores if item.value > 0][:_SHORT_LIST]
-    return [inquiry.trial(present, item, noise) for item in listed]
+    return [engine.trial(present, item, noise) for item in listed]
 
 
-def _coupled(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit | None:
+def _coupled(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
     In exchange for one of the first additions, or to begin with in outputs that no addition acts
     on: pairs upon what is there already would piece together what nobody knows.
     """
-    added = len(present.hypothesis.terms) - inquiry.given
-    if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
+    added = len(present.hypothesis.terms) - engine.given
+    if not engine.presence(present, noise).p_value < _PRESENCE_LEVEL:
         return None
-    better = _exchanged(inquiry, present, noise, present) if 0 < added <= _EXCHANGED else None
-    if better is not None or _acts_on_what_lacks(inquiry, present, noise):
+    better = _exchanged(engine, present, noise, present) if 0 < added <= _EXCHANGED else None
+    if better is not None or _acts_on_what_lacks(engine, present, noise):
         return better
-    pairs = inquiry.couples(present, noise)
+    pairs = engine.couples(present, noise)
     # Two may also fail alone since each is wrong where the other acts: a drag one way only.
     best = [pair for pair in pairs if pair.hidden][:_COUPLES]
     best += [pair for pair in pairs[:_COUPLES] if not pair.hidden]
     trials = [
-        inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise)
+        engine.trial(engine.trial(present, a, noise).fit, b, noise)
         for a, b in (pair.scores for pair in best)
     ]
-    return best_that_holds(inquiry, present, noise, trials)
+    return best_that_holds(engine, present, noise, trials)
 
 
-def _acts_on_what_lacks(inquiry: Inquiry, present: Fit, noise: Noise) -> bool:
+def _acts_on_what_lacks(engine: SelectionEngine, present: Fit, noise: Noise) -> bool:
     """Whether an addition acts on an output in which something is missing still."""
-    problem = inquiry.problem
-    rejected = np.flatnonzero(inquiry.presence(present, noise).rejected).tolist()
-    lacking = {problem.bands[band][0] for band in rejected}
-    added = present.hypothesis.terms[inquiry.given :]
-    return any(problem.outputs_of(term.effect.stage) & lacking for term in added)
+    regression = engine.regression
+    rejected = np.flatnonzero(engine.presence(present, noise).rejected).tolist()
+    lacking = {regression.bands[band][0] for band in rejected}
+    added = present.hypothesis.terms[engine.given :]
+    return any(regression.outputs_of(term.effect.stage) & lacking for term in added)
 
 
-def _exchanged(inquiry: Inquiry, present: Fit, noise: Noise, against: Fit) -> Fit | None:
+def _exchanged(engine: SelectionEngine, present: Fit, noise: Noise, against: Fit) -> Fit | None:
     """A better pair in the place of one addition, that holds against another fit; or None.
 
     It need not lower an error by much: where something is missing, one effect may nearly do what
     two did, with other values.
     """
-    better = recoupled(inquiry, present, noise, 1)
-    if better is present or not holds(inquiry, against, better, noise, matters=1.0):
+    better = recoupled(engine, present, noise, 1)
+    if better is present or not holds(engine, against, better, noise, matters=1.0):
         return None
     return better
 
@@ -196,7 +198,7 @@ def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
     return tuple(trial.fit for trial in trials)
 
 
-def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def _reconsider(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
     """Drop what is no longer needed, and replace what another effect explains better.
 
     Again while that changes anything: the first of two effects may have stood for both, and what
@@ -204,25 +206,25 @@ def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Nois
     """
     for _ in range(_RECONSIDERED):
         before = present.labels
-        present = _replaced(inquiry, _without_the_needless(inquiry, present, noise), noise)
-        present = recoupled(inquiry, present, noise, 2)
-        present = _without_the_needless(inquiry, present, noise)
-        if present.labels == before or len(present.hypothesis.terms) < inquiry.given + 2:
+        present = _replaced(engine, _without_the_needless(engine, present, noise), noise)
+        present = recoupled(engine, present, noise, 2)
+        present = _without_the_needless(engine, present, noise)
+        if present.labels == before or len(present.hypothesis.terms) < engine.given + 2:
             break
-    return inquiry.settle(present.hypothesis, noise)
+    return engine.settle(present.hypothesis, noise)
 
 
-def _replaced(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
+def _replaced(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
     """With every addition replaced by the best of its rivals that fits better."""
-    for index in range(inquiry.given, len(present.hypothesis.terms)):
+    for index in range(engine.given, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
             break  # A rival stood for two.
         own = present.hypothesis.terms[index]
-        base = inquiry.refit(present.hypothesis.without(index), noise)
-        rivals = _rivals_of(own, inquiry.scores(base, noise))
-        trials = [inquiry.trial(base, item, noise) for item in rivals]
+        base = engine.refit(present.hypothesis.without(index), noise)
+        rivals = _rivals_of(own, engine.scores(base, noise))
+        trials = [engine.trial(base, item, noise) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
-        if best is not None and best.criterion < inquiry.criterion(present) - BETTER:
+        if best is not None and best.criterion < engine.criterion(present) - BETTER:
             present = best.fit
     return present
 
@@ -243,21 +245,21 @@ def _another(item: Score, own: Term) -> bool:
     return item.atom.effect.id != own.effect.id or elsewhere(own, item.atom.shape)
 
 
-def _without_the_doubtful(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def _without_the_doubtful(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
     """Drop additions that explain less than what is still missing: they may only imitate it."""
-    left = inquiry.presence(present, noise)
+    left = engine.presence(present, noise)
     missing = float(np.sum(np.maximum(left.excess, 0.0)[left.rejected]))
     doubtful = present
-    for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
-        without = inquiry.refit(present.hypothesis.without(index), noise)
+    for index in reversed(range(engine.given, len(present.hypothesis.terms))):
+        without = engine.refit(present.hypothesis.without(index), noise)
         if without.cost - present.cost < missing:
-            doubtful = inquiry.refit(doubtful.hypothesis.without(index), noise)
-    return (present, noise) if doubtful is present else inquiry.settle(doubtful.hypothesis, noise)
+            doubtful = engine.refit(doubtful.hypothesis.without(index), noise)
+    return (present, noise) if doubtful is present else engine.settle(doubtful.hypothesis, noise)
 
 
-def _without_the_needless(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
-    for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
-        without = inquiry.refit(present.hypothesis.without(index), noise)
-        if inquiry.criterion(without) < inquiry.criterion(present):
+def _without_the_needless(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
+    for index in reversed(range(engine.given, len(present.hypothesis.terms))):
+        without = engine.refit(present.hypothesis.without(index), noise)
+        if engine.criterion(without) < engine.criterion(present):
             present = without
     return present

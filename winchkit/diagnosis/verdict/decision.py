@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from winchkit.diagnosis.compare import signal_rms
-from winchkit.diagnosis.regression.cross_validation import Folds, held_out_rms
+from winchkit.diagnosis.regression.base import Folds, Regression
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.residuals.error_statistics import Skirt
 from winchkit.diagnosis.results import OutputFit, Verdict
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import Found
 from winchkit.diagnosis.selection.weighting import weighed
 from winchkit.model.stages import OUTPUT_UNITS
@@ -44,43 +43,43 @@ class Judgement:
     notes: tuple[str, ...]
 
 
-def judge(inquiry: Inquiry, found: Found) -> Judgement:
+def judge(engine: SelectionEngine, found: Found) -> Judgement:
     """Decide the verdict; while more than a trace is unexplained no addition is named.
 
     A name would be a guess then: something outside the catalogue is often imitated by an effect
     inside it. The candidates stay, and a note says what came closest.
     """
-    share = _unexplained(inquiry, found)
-    folds = _folds(inquiry, found)
+    share = _unexplained(engine, found)
+    folds = _folds(engine, found)
     outputs = output_fits(
-        inquiry, (found.begin, found.begin_noise), (found.final, found.noise), folds
+        engine, (found.begin, found.begin_noise), (found.final, found.noise), folds
     )
     verdict = _verdict(found, outputs, share)
-    added = found.final.labels[inquiry.given :]
+    added = found.final.labels[engine.given :]
     # Nothing but the effect itself explains nearly all of what is far above the noise.
     nearly = share < _TRACE and found.noise.from_repeats
     if verdict == "explained" or nearly or not added:
         return Judgement(verdict, share, outputs, found, ())
     note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
-    return withheld(inquiry, found, share, note)
+    return withheld(engine, found, share, note)
 
 
-def withheld(inquiry: Inquiry, found: Found, share: float, note: str) -> Judgement:
+def withheld(engine: SelectionEngine, found: Found, share: float, note: str) -> Judgement:
     """The judgement that names nothing, though something was found; with the reason in words."""
     verdict: Verdict = "unknown" if share > _HALF else "partly"
     shown = replace(found, final=found.begin, noise=found.begin_noise)
     before = (found.begin, found.begin_noise)
-    return Judgement(verdict, share, output_fits(inquiry, before, before), shown, (note,))
+    return Judgement(verdict, share, output_fits(engine, before, before), shown, (note,))
 
 
-def by_best_weights(inquiry: Inquiry, judgement: Judgement) -> Judgement:
+def by_best_weights(engine: SelectionEngine, judgement: Judgement) -> Judgement:
     """The same judgement with values by the weights that predict best."""
     shown = judgement.shown
-    best = weighed(inquiry, shown.final, shown.noise)
+    best = weighed(engine, shown.final, shown.noise)
     if best.fit is shown.final:
         return judgement
     before, after = (shown.begin, shown.begin_noise), (best.fit, best.noise)
-    outputs = output_fits(inquiry, before, after, _folds(inquiry, shown))
+    outputs = output_fits(engine, before, after, _folds(engine, shown))
     return replace(
         judgement,
         outputs=outputs,
@@ -89,17 +88,17 @@ def by_best_weights(inquiry: Inquiry, judgement: Judgement) -> Judgement:
     )
 
 
-def _unexplained(inquiry: Inquiry, found: Found) -> float:
+def _unexplained(engine: SelectionEngine, found: Found) -> float:
     """Share of the excess over the noise that the final model leaves, in sample or held out."""
     if not found.alarmed:
         return 0.0
-    folds = _folds(inquiry, found)
+    folds = _folds(engine, found)
     held = [
-        held_out_rms(inquiry.problem, fitted, found.noise, folds)
+        held_out_rms(engine.regression, fitted, found.noise, folds)
         for fitted in (found.begin, found.final)
     ]
     # Where the bands hold nothing more, what an output is over its noise may be chance.
-    chance = {} if found.still else found.noise.uncertainty(inquiry.problem)
+    chance = {} if found.still else found.noise.uncertainty(engine.regression)
     squares = [
         sum(
             max(0.0, (rms[o] / noise) ** 2 - 1 - chance.get(o, 0.0))
@@ -117,9 +116,9 @@ def _unexplained(inquiry: Inquiry, found: Found) -> float:
     return min(1.0, left)
 
 
-def _folds(inquiry: Inquiry, found: Found) -> Folds:
+def _folds(engine: SelectionEngine, found: Found) -> Folds:
     """Whole groups while something is left: an imitation fails there. Else what tells."""
-    return inquiry.groups if found.still else inquiry.folds(found.final, found.noise)
+    return engine.regression.groups if found.still else engine.folds(found.final, found.noise)
 
 
 def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
@@ -142,25 +141,25 @@ def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Ve
 
 
 def output_fits(
-    inquiry: Inquiry,
+    engine: SelectionEngine,
     begin: tuple[Fit, Noise],
     final: tuple[Fit, Noise],
     folds: Folds | None = None,
 ) -> dict[str, OutputFit]:
     """Every output before and after, in sample and held out, beside its noise."""
-    problem, folds = inquiry.problem, folds or inquiry.folds(*final)
-    before, after = _rms(problem, begin[0]), _rms(problem, final[0])
-    held_before = held_out_rms(problem, *begin, folds)
-    held_after = held_out_rms(problem, *final, folds)
-    noise, skirt = final[1], Skirt(problem.dataset)
+    regression, folds = engine.regression, folds or engine.folds(*final)
+    before, after = _rms(regression, begin[0]), _rms(regression, final[0])
+    held_before = held_out_rms(regression, *begin, folds)
+    held_after = held_out_rms(regression, *final, folds)
+    noise, skirt = final[1], Skirt(regression)
     beyond = skirt.residual(begin[0].hypothesis), skirt.residual(final[0].hypothesis)
     noise_beyond = skirt.noise(final[0].hypothesis)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         output: OutputFit(
             unit=OUTPUT_UNITS[output],
-            band=next(s.band.cut_off for s in problem.segments if s.output == output),
-            signal_rms=signal_rms(problem.dataset, output),
+            band=next(s.band.cut_off for s in regression.segments if s.output == output),
+            signal_rms=regression.signal_rms(output),
             rms_before=_with(before[output], beyond[0].get(output)),
             rms_after=_with(after[output], beyond[1].get(output)),
             heldout_rms_before=_with(held_before[output], beyond[0].get(output)),
@@ -168,7 +167,7 @@ def output_fits(
             noise_rms=_with(noise.rms[output], noise_beyond.get(output)),
             noise_source=source,
         )
-        for output in problem.dataset.outputs
+        for output in regression.outputs
     }
 
 
@@ -177,10 +176,10 @@ def _with(rms: float, beyond: float | None) -> float:
     return float(np.hypot(rms, np.sqrt(beyond or 0.0)))
 
 
-def _rms(problem: Problem, fitted: Fit) -> dict[str, float]:
+def _rms(regression: Regression, fitted: Fit) -> dict[str, float]:
     out = {}
-    for output in problem.dataset.outputs:
-        own = [s for s in problem.segments if s.output == output]
+    for output in regression.outputs:
+        own = [s for s in regression.segments if s.output == output]
         total = sum(float(np.sum(fitted.residual[s.rows] ** 2)) for s in own)
-        out[output] = float(np.sqrt(total / problem.samples(output)))
+        out[output] = float(np.sqrt(total / regression.n_samples(output)))
     return out

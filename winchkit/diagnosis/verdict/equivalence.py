@@ -12,7 +12,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.cross_validation import held_out
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise, orthonormal
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.exchange import Exchange
 from winchkit.diagnosis.selection.scores import Projected
 from winchkit.diagnosis.selection.signatures import Atom
@@ -33,22 +33,22 @@ _MATTERS = 0.02
 """Share of the effect, rms: a bend that is less makes no difference to anyone."""
 
 
-def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Effect) -> bool:
+def is_unseen(engine: SelectionEngine, final: Fit, noise: Noise, index: int, rival: Effect) -> bool:
     """Whether a richer ``rival`` of the term at ``index``, in its usual shape and as large as
     that, would differ from it, though by less than the noise."""
-    atom = _usual(inquiry, rival)
+    atom = _usual(engine, rival)
     if atom is None:
         return False
-    problem, weight = inquiry.problem, noise.weight(inquiry.problem)
+    regression, weight = engine.regression, noise.weight(engine.regression)
     hypothesis = final.hypothesis
     without = hypothesis.without(index)
-    here = problem.change(without)
-    own = (problem.change(hypothesis) - here) * weight
+    here = regression.change(without)
+    own = (regression.change(hypothesis) - here) * weight
     explained = orthonormal(final.jacobian * weight[:, None])
     differs = False
     for secant in atom.secants:
         values = {**rival.null, **atom.shape, **secant}
-        column = problem.change(without.with_term(Term(rival, values), problem.runs)) - here
+        column = regression.change(without.with_term(Term(rival, values), regression.n_runs)) - here
         column = column * weight
         size = float(column @ column)
         column = column * (float(column @ own) / size) if size else column
@@ -60,9 +60,9 @@ def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Eff
     return differs
 
 
-def _usual(inquiry: Inquiry, effect: Effect) -> Atom | None:
+def _usual(engine: SelectionEngine, effect: Effect) -> Atom | None:
     """The candidate's point of its grid that is nearest to its usual shape."""
-    atoms = [a for a in inquiry.signatures.atoms if a.effect.id == effect.id]
+    atoms = [a for a in engine.signatures.atoms if a.effect.id == effect.id]
     usual = {p.name: p.typical for p in Coordinates(effect).shapes}
 
     def away(atom: Atom) -> float:
@@ -94,9 +94,9 @@ class Confusion:
     """Angle between its signature and each rival's, rad."""
 
 
-def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Confusion:
+def confusion_of(engine: SelectionEngine, final: Fit, noise: Noise, index: int) -> Confusion:
     """Refit the final model with each rival in place of one term, and compare block by block."""
-    place = Exchange(inquiry, final, noise, index)
+    place = Exchange(engine, final, noise, index)
     own, base, scores = place.own, place.base, place.scores
     mine = next((s.gain for s in scores if s.atom.effect.id == own.effect.id), 0.0)
     freedom = Coordinates(own.effect).freedom
@@ -106,8 +106,8 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
         if s.atom.effect.id != own.effect.id and s.gain > mine - max(_NEAR, 0.1 * mine)
     ][:_RIVALS]
     rivals += [s for s in scores if _drifts_alike(s.atom.effect, own.effect) and s not in rivals]
-    blocks = inquiry.blocks
-    ours = held_out(inquiry.problem, final, noise, blocks)
+    blocks = engine.regression.blocks
+    ours = held_out(engine.regression, final, noise, blocks)
     members: list[tuple[int, float, Term]] = [(freedom, final.cost, own)]
     for rival in rivals:
         trial = place.trial(rival, final.cost + _ALIKE)
@@ -118,15 +118,15 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
             continue
         term = fitted.hypothesis.terms[-1]
         size = Coordinates(term.effect).freedom
-        counted = _richer(inquiry, final, noise, index, fitted)
+        counted = _richer(engine, final, noise, index, fitted)
         if counted is None:
-            theirs = held_out(inquiry.problem, fitted, noise, blocks)
+            theirs = held_out(engine.regression, fitted, noise, blocks)
             alike = fitted.cost < final.cost + _ALIKE
             counted = alike or _flip_chance(theirs - ours) > _LEVEL
-        if counted or _stands_for(inquiry, fitted, final, base, index):
+        if counted or _stands_for(engine, fitted, final, base, index):
             members.append((size, fitted.cost, term))
     ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
-    projected = inquiry.projected(base, noise)
+    projected = engine.projected(base, noise)
     angles = {
         term.effect.id: _angle(projected, own.effect.id, term.effect.id)
         for term in ordered
@@ -135,7 +135,9 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
     return Confusion(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
 
 
-def _richer(inquiry: Inquiry, final: Fit, noise: Noise, index: int, fitted: Fit) -> bool | None:
+def _richer(
+    engine: SelectionEngine, final: Fit, noise: Noise, index: int, fitted: Fit
+) -> bool | None:
     """Whether a rival with more numbers counts; None where it has no more, or is kindred.
 
     A carded one that explains as much counts: creep beside a drift with temperature, a guide whose
@@ -147,14 +149,14 @@ def _richer(inquiry: Inquiry, final: Fit, noise: Noise, index: int, fitted: Fit)
     if more > 0 and _carded(rival, own) and not rival.nested_with(own):
         return fitted.cost < final.cost + _ALIKE
     if more > 0 and not _kindred(rival, own):
-        bent = inquiry.loads_are_chosen and own.id in rival.contains
+        bent = engine.regression.has_known_loads and own.id in rival.contains
         return _leant_to(final, fitted, more) or (
-            bent and is_unseen(inquiry, final, noise, index, rival)
+            bent and is_unseen(engine, final, noise, index, rival)
         )
     return None
 
 
-def _stands_for(inquiry: Inquiry, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:
+def _stands_for(engine: SelectionEngine, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:
     """Whether a simpler law of the family is what the runs show, as far as they get.
 
     A Stribeck curve whose extra never falls within the runs is a dry friction that is not quite
@@ -162,7 +164,7 @@ def _stands_for(inquiry: Inquiry, fitted: Fit, final: Fit, base: Fit, index: int
     """
     own, rival = final.hypothesis.terms[index], fitted.hypothesis.terms[-1].effect
     shown = own.effect.visible
-    if shown is None or any(shown(at, own.values) for at in inquiry.problem.dataset.motions):
+    if shown is None or any(shown(at, own.values) for at in engine.regression.motions):
         return False
     simpler = Coordinates(rival).freedom < Coordinates(own.effect).freedom
     related = bool(own.effect.family) and rival.family == own.effect.family

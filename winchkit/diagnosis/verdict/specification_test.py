@@ -9,12 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.discretization import rounded
 from winchkit.diagnosis.regression.noise import orthonormal
 from winchkit.diagnosis.regression.projection import gain
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import Found, with_a_pair, without_term
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.decision import Judgement, judge, withheld
 from winchkit.diagnosis.verdict.spline_alternatives import Columns, curves
 from winchkit.effects.parametrization import Coordinates
@@ -60,14 +59,14 @@ class Beside:
 
 
 def best_curve(
-    problem: Problem, beside: Beside, outputs: Sequence[str], price: float
+    regression: TimeSeriesRegression, beside: Beside, outputs: Sequence[str], price: float
 ) -> Curve | None:
     """The curve that pays best, among those that show in one of ``outputs``.
 
     ``price`` is what each of its numbers must save.
     """
     best: Curve | None = None
-    for place, variable, laws, columns in curves(problem, outputs):
+    for place, variable, laws, columns in curves(regression, outputs):
         hats = _inner_products(beside, columns, len(laws[0][0]))
         pays = max(hats.gain(law) - price * freedom for law, freedom in laws)
         if best is None or pays > best.pays:
@@ -112,56 +111,56 @@ _SLIGHT_OF_MORE = 2e-4
 """The same where more is certainly missing."""
 
 
-def judge_and_doubt(inquiry: Inquiry, found: Found) -> Judgement:
+def judge_and_doubt(engine: TimeSeriesSelection, found: Found) -> Judgement:
     """The judgement of what was found, less the names that a nameless curve beats.
 
     All additions are doubted together, then each beside the others. One that is beaten is
     dropped, or gives way to a pair; where too much is then left, nothing is named. Without
     repeats something unknown is always left, and a doubt of one addition is told only.
     """
-    judgement = judge(inquiry, found)
-    doubt = Doubt(inquiry, found)
+    judgement = judge(engine, found)
+    doubt = Doubt(engine, found)
     if judgement.shown is not found or not doubt.added:
         return judgement
     terms = doubt.terms
     if curve := doubt.beaten(doubt.added):
-        pair = with_a_pair(inquiry, found)
+        pair = with_a_pair(engine, found)
         if pair is not None:
-            return judge_and_doubt(inquiry, pair)
-        return withheld(inquiry, found, 1.0, _words(terms, terms, curve))
+            return judge_and_doubt(engine, pair)
+        return withheld(engine, found, 1.0, _words(terms, terms, curve))
     for index in reversed(doubt.added) if len(terms) > 1 else ():
         curve = doubt.beaten([index])
         if curve and found.noise.from_repeats:
             return _less(doubt, index, curve)
         if curve:
-            note = f"{_over(curve)} would explain more than {terms[index - inquiry.given].label}"
+            note = f"{_over(curve)} would explain more than {terms[index - engine.given].label}"
             judgement = replace(judgement, notes=(*judgement.notes, note))
     return judgement
 
 
 def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
     """The judgement without a beaten addition, or without any name where it is needed."""
-    inquiry, found = doubt.inquiry, doubt.found
+    engine, found = doubt.engine, doubt.found
     doubted = found.final.hypothesis.terms[index : index + 1]
-    without = judge_and_doubt(inquiry, without_term(inquiry, found, index))
-    if without.shown.final.labels[inquiry.given :]:
+    without = judge_and_doubt(engine, without_term(engine, found, index))
+    if without.shown.final.labels[engine.given :]:
         return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
     share = doubt.taken([index]) / doubt.taken(doubt.added)
-    return withheld(inquiry, found, min(1.0, share), _words(doubt.terms, doubted, curve))
+    return withheld(engine, found, min(1.0, share), _words(doubt.terms, doubted, curve))
 
 
 class Doubt:
     """What a search found, and what is left of the data without some of it."""
 
-    def __init__(self, inquiry: Inquiry, found: Found) -> None:
-        self.inquiry = inquiry
+    def __init__(self, engine: TimeSeriesSelection, found: Found) -> None:
+        self.engine = engine
         self.found = found
-        self.added = range(inquiry.given, len(found.final.hypothesis.terms))
-        self.terms = found.final.hypothesis.terms[inquiry.given :]
+        self.added = range(engine.given, len(found.final.hypothesis.terms))
+        self.terms = found.final.hypothesis.terms[engine.given :]
 
     @cached_property
     def _rounding(self) -> Array:
-        return rounded(self.inquiry.problem, self.found.final.hypothesis)[:, None]
+        return self.engine.regression.discretization_error(self.found.final.hypothesis)[:, None]
 
     def beside(self, indices: Sequence[int], *, rounding: bool = True) -> Beside:
         """What is left without some terms, the others free about where they are.
@@ -169,16 +168,16 @@ class Doubt:
         Not fitted anew: a lag that stands in for a lost friction is far from where both are right.
         With ``rounding`` what sampling may have rounded is free as well.
         """
-        problem, final = self.inquiry.problem, self.found.final
+        regression, final = self.engine.regression, self.found.final
         hypothesis = final.hypothesis
         others, own = hypothesis, np.zeros(len(final.vector), dtype=bool)
         for index in sorted(indices, reverse=True):
-            own |= problem.unknowns_of(index, hypothesis)
+            own |= regression.unknowns_of(index, hypothesis)
             others = others.without(index)
-        lost = problem.change(hypothesis) - problem.change(others) if indices else 0.0
+        lost = regression.change(hypothesis) - regression.change(others) if indices else 0.0
         free = final.jacobian[:, ~own]
         free = np.hstack([free, self._rounding]) if rounding else free
-        return Beside(final.residual + lost, free, self.found.noise.weight(problem))
+        return Beside(final.residual + lost, free, self.found.noise.weight(regression))
 
     def taken(self, indices: Sequence[int]) -> float:
         """Whitened squares that terms take beside the others."""
@@ -192,17 +191,17 @@ class Doubt:
         return self._beaten(indices, rounding=True)
 
     def _beaten(self, indices: Sequence[int], *, rounding: bool) -> Curve | None:
-        inquiry, hypothesis = self.inquiry, self.found.final.hypothesis
+        engine, hypothesis = self.engine, self.found.final.hypothesis
         effects = [hypothesis.terms[index].effect for index in indices]
         beside = self.beside(indices, rounding=rounding)
         taken = beside.cost - self.beside((), rounding=rounding).cost
         # The states in which runs begin are no numbers of a law, and cost it nothing here.
-        pays = taken - inquiry.price * sum(Coordinates(effect).freedom for effect in effects)
+        pays = taken - engine.price * sum(Coordinates(effect).freedom for effect in effects)
         outputs = sorted({output for effect in effects for output in effect.outputs})
-        curve = best_curve(inquiry.problem, beside, outputs, inquiry.price)
+        curve = best_curve(engine.regression, beside, outputs, engine.price)
         # What is certainly there is no chance deviation of the right formula.
         slight = _SLIGHT_OF_MORE if self.found.still else _SLIGHT
-        margin = inquiry.price + slight * taken
+        margin = engine.price + slight * taken
         return curve if curve and curve.pays > pays + margin else None
 
 
