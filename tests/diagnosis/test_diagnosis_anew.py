@@ -21,7 +21,7 @@ def test_a_slip_that_came_to_rest_at_another_moment_is_found_where_it_was() -> N
     late = term("length-time-offset", delay=0.01)
     engine = engine_for([term("encoder-slip", step=0.01, time=14.7), late], RIDE)
     runs = engine.regression.n_runs
-    wrong = engine.begin.with_term(term("encoder-slip", step=0.008, time=20.5), runs)
+    wrong = engine.initial_model.with_term(term("encoder-slip", step=0.008, time=20.5), runs)
     present, noise = engine.settle(wrong.with_term(late, runs))
     stuck = present.hypothesis.terms[0].values["time"]
     assert abs(stuck - 14.7) > 1.0
@@ -40,7 +40,7 @@ def test_what_stood_for_two_is_fitted_beside_the_second() -> None:
     )
     engine = engine_for(hidden, RIDE)
     alone = term("cable-creep", creep_stiffness=2e5, time_constant=20.0)
-    present, noise = engine.settle(engine.begin.with_term(alone, engine.regression.n_runs))
+    present, noise = engine.settle(engine.initial_model.with_term(alone, engine.regression.n_runs))
     terms = {t.label: t.values for t in recoupled(engine, present, noise, 1).hypothesis.terms}
     assert set(terms) == {"cable-creep", "encoder-slip"}
     assert terms["encoder-slip"]["time"] == pytest.approx(14.7, abs=0.1)
@@ -56,7 +56,7 @@ def test_a_stribeck_speed_that_no_run_passes_stands_beside_coulombs_friction(
     )
     wide = term("motor-stribeck", torque=0.1, stribeck_speed=share * fastest)
     engine = engine_for([wide], RIDE)
-    present, noise = engine.settle(engine.begin.with_term(wide, engine.regression.n_runs))
+    present, noise = engine.settle(engine.initial_model.with_term(wide, engine.regression.n_runs))
     told = confusion_of(engine, present, noise, 0).effects
     assert "motor-stribeck" in told
     assert ("motor-coulomb" not in told) is alone
@@ -79,7 +79,7 @@ def test_signatures_beside_a_grown_model_are_those_that_are_drawn_anew() -> None
     ):
         engine = engine_for([], RIDE)
         before = {name: column.copy() for name, column in columns_of(engine.signatures).items()}
-        present = engine.begin.with_term(grown, engine.regression.n_runs)
+        present = engine.initial_model.with_term(grown, engine.regression.n_runs)
         again = redrawn(engine.regression, present, engine.signatures)
         assert again is not None
         told, wanted = columns_of(again), columns_of(engine._signatures(present))
@@ -106,5 +106,5 @@ def test_a_candidate_that_had_no_signature_and_has_one_now_has_all_drawn_anew(
     engine = engine_for([], RIDE)
     lag = CATALOGUE["cell-lag"]
     silent = replace(engine.signatures, silent=((lag, {"time_constant": 0.05}),))
-    present = engine.begin.with_term(grown, engine.regression.n_runs)
+    present = engine.initial_model.with_term(grown, engine.regression.n_runs)
     assert (redrawn(engine.regression, present, silent) is None) is anew

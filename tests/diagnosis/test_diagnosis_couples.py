@@ -18,7 +18,7 @@ HIDDEN = (term("cell-gain", gain_error=-0.05), term("cell-offset", offset=0.05 *
 
 def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
     engine = engine_for(HIDDEN, RIDE, MASSES)
-    present, noise = engine.settle(engine.begin)
+    present, noise = engine.settle(engine.initial_model)
     scores = engine.every_score(present, noise)
     alone = {s.atom.effect.id: s.gain for s in best_of_each(scores)}
     projected = engine.projected(present, noise)
@@ -31,7 +31,7 @@ def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
 
 def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() -> None:
     engine = engine_for(HIDDEN, RIDE, MASSES)
-    present, noise = engine.settle(engine.begin)
+    present, noise = engine.settle(engine.initial_model)
     grown = _coupled(engine, present, noise)
     assert grown is not None
     assert set(grown.labels) == {"cell-gain", "cell-offset"}
@@ -58,7 +58,7 @@ ONE_WAY = (
 def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term, ...]) -> None:
     """Also beside an effect that acts on the length only, where these two do nothing."""
     engine = engine_for((*ONE_WAY, *also), RIDE, MASSES)
-    start = engine.begin
+    start = engine.initial_model
     for own in also:
         start = start.with_term(own, engine.regression.n_runs)
     present, noise = engine.settle(start)
@@ -71,7 +71,7 @@ def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term
 
 def test_pairs_are_not_pieced_together_upon_what_acts_on_the_same_output() -> None:
     engine = engine_for(ONE_WAY, RIDE, MASSES)
-    start = engine.begin
+    start = engine.initial_model
     for own in (
         term("motor-coulomb", torque=1e-3),
         term("cell-gain", gain_error=1e-4),
@@ -89,7 +89,7 @@ def test_one_of_two_that_stands_for_a_pair_is_exchanged_for_it() -> None:
         term("cell-offset", offset=0.05 * 20 * 9.80665),
     )
     engine = engine_for(hidden, RIDE, MASSES)
-    start = engine.begin
+    start = engine.initial_model
     for own in (hidden[0], term("motor-coulomb-asymmetry", offset=1e-3)):
         start = start.with_term(own, engine.regression.n_runs)
     grown = _coupled(engine, *engine.settle(start))

@@ -22,7 +22,7 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
         term("cable-creep", creep_stiffness=7e5, time_constant=20.0),
     )
     engine = engine_for(hidden, ONE_WAY)
-    start = engine.begin
+    start = engine.initial_model
     for own in hidden:
         start = start.with_term(own, engine.regression.n_runs)
     final, noise = engine.settle(start)
@@ -34,7 +34,7 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
 def test_held_as_it_is_a_hypothesis_keeps_its_values() -> None:
     creep = term("cable-creep", creep_stiffness=7e5, time_constant=20.0)
     engine = engine_for([creep], ONE_WAY)
-    begin, noise = engine.settle(engine.begin)
+    begin, noise = engine.settle(engine.initial_model)
     other = begin.hypothesis.with_term(
         term("cable-creep", creep_stiffness=1e6, time_constant=5.0), engine.regression.n_runs
     )

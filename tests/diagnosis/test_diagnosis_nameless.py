@@ -14,7 +14,7 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.selection.stepwise import Found, search
+from winchkit.diagnosis.selection.stepwise import SelectionResult, search
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.specification_test import (
     Beside,
@@ -61,8 +61,8 @@ def test_a_gain_is_what_least_squares_takes(seed: int, free: int, width: int) ->
 
     def squares(columns: Array) -> float:
         columns = columns * weight[:, None]
-        found = np.linalg.lstsq(columns, residual * weight, rcond=None)[0]
-        return float(np.sum((residual * weight - columns @ found) ** 2))
+        result = np.linalg.lstsq(columns, residual * weight, rcond=None)[0]
+        return float(np.sum((residual * weight - columns @ result) ** 2))
 
     assert beside.cost == pytest.approx(squares(jacobian))
     together = squares(np.hstack([jacobian, hats.T @ law]))
@@ -113,17 +113,17 @@ def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
 
 def test_a_square_drag_is_not_called_viscous() -> None:
     answer = diagnose(driven(drag=12.0), GROOVED)
-    found = answer.diagnosis
-    assert found.verdict in {"unknown", "partly"}
-    assert not found.steps
-    assert any(place.variable == "speed" for place in found.where)
+    result = answer.diagnosis
+    assert result.verdict in {"unknown", "partly"}
+    assert not result.steps
+    assert any(place.variable == "speed" for place in result.where)
 
 
 def test_a_viscous_drag_keeps_its_name() -> None:
     hidden = (term("pulley-viscous", viscosity=6.0),)
-    found = diagnose(driven(hidden), GROOVED).diagnosis
-    assert found.verdict == "explained"
-    assert [step.effects for step in found.steps] == [("pulley-viscous",)]
+    result = diagnose(driven(hidden), GROOVED).diagnosis
+    assert result.verdict == "explained"
+    assert [step.effects for step in result.steps] == [("pulley-viscous",)]
 
 
 def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name() -> None:
@@ -134,17 +134,28 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
         bent = run["cable_length"] + 1.5e-5 * far**3
         runs.append(with_channel(run, "cable_length", bent, "m"))
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    begin, noise = engine.settle(engine.begin)
-    hypothesis = begin.hypothesis
+    initial_model, noise = engine.settle(engine.initial_model)
+    hypothesis = initial_model.hypothesis
     for added in (term("motor-coulomb", torque=0.05), term("gear-ratio", ratio_error=1e-5)):
         hypothesis = hypothesis.with_term(added, engine.regression.n_runs)
     final, noise = engine.settle(hypothesis, noise)
     presence = engine.presence(final, noise)
-    begun = engine.presence(begin, noise)
-    found = Found(
-        begin, noise, begun, True, final.hypothesis, final, noise, presence, False, (), (), 0.0
+    begun = engine.presence(initial_model, noise)
+    result = SelectionResult(
+        initial_model,
+        noise,
+        begun,
+        True,
+        final.hypothesis,
+        final,
+        noise,
+        presence,
+        False,
+        (),
+        (),
+        0.0,
     )
-    judged = judge_and_doubt(engine, found)
+    judged = judge_and_doubt(engine, result)
     assert judged.verdict == "explained"
     assert judged.shown.final.labels == ("motor-coulomb",)
     (note,) = judged.notes
@@ -153,7 +164,7 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
 
 
 @cache
-def rubbed() -> tuple[TimeSeriesSelection, Found]:
+def rubbed() -> tuple[TimeSeriesSelection, SelectionResult]:
     """A search that found dry friction of the motor."""
     engine = selection_engine(
         prepare(driven((term("motor-coulomb", torque=0.05),)), GROOVED), CATALOGUE
@@ -162,19 +173,19 @@ def rubbed() -> tuple[TimeSeriesSelection, Found]:
 
 
 def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
-    engine, found = rubbed()
-    doubt = Doubt(engine, found)
+    engine, result = rubbed()
+    doubt = Doubt(engine, result)
     whole = doubt.beside(())
-    assert 0.99 * found.final.cost < whole.cost <= found.final.cost * (1 + 1e-9)
+    assert 0.99 * result.final.cost < whole.cost <= result.final.cost * (1 + 1e-9)
     without = doubt.beside([0])
-    refitted = engine.refit(found.final.hypothesis.without(0), found.noise)
+    refitted = engine.refit(result.final.hypothesis.without(0), result.noise)
     # What sampling may have rounded is taken out of the one and not of the other.
     assert 0.95 * refitted.cost < without.cost <= refitted.cost * (1 + 1e-9)
 
 
 def test_curves_are_sought_only_where_the_names_act() -> None:
-    engine, found = rubbed()
-    beside = Doubt(engine, found).beside([0])
+    engine, result = rubbed()
+    beside = Doubt(engine, result).beside([0])
     curve = best_curve(engine.regression, beside, ["motor_torque"], engine.price)
     assert curve is not None
     assert curve.place in {"motor_torque", "rope force"}

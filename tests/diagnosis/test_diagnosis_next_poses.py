@@ -104,7 +104,7 @@ def test_the_power_is_that_of_all_rows_at_once(flat: tuple[Path, Path]) -> None:
     profile, run = flat
     answer = diagnose_robot([read_run(run)], read_robot(profile))
     (pair,) = pairs_of(answer.sets)
-    regression, final = answer.engine.regression, answer.found.final.hypothesis
+    regression, final = answer.engine.regression, answer.result.final.hypothesis
     whole = separation(regression, *pair, dict.fromkeys(regression.dataset.outputs, 1.0))
     offers = pose_offers(regression, final, [pair], [APART], count=3)
     assert offers[0].so_far[0] == pytest.approx(power_of(whole), abs=0.01)

@@ -175,7 +175,7 @@ def smallest(noise: float, masses: tuple[float, ...] = (10.0,)) -> dict[str, Det
         for seed in range(2)
     ]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    present, known = engine.settle(engine.begin)
+    present, known = engine.settle(engine.initial_model)
     scores = tuple(engine.scores(present, known))
     chance = chance_level(engine.projected(present, known), engine.regression.n_rows)
     threshold = float(np.quantile(chance, 0.99))
@@ -197,9 +197,11 @@ def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
     item = smallest(1.0)[effect]
     regression = engine.regression
     shown = regression.change(
-        engine.begin.with_term(term(effect, **{item.parameter: item.smallest}), regression.n_runs)
+        engine.initial_model.with_term(
+            term(effect, **{item.parameter: item.smallest}), regression.n_runs
+        )
     )
-    present, known = engine.settle(engine.begin)
+    present, known = engine.settle(engine.initial_model)
     weight = known.weight(regression)
     other = present.jacobian * weight[:, None]
     left = shown * weight
@@ -222,7 +224,7 @@ def test_chance_stays_what_chance_can_reach(encoder: float) -> None:
     """Of 40 candidates with one to three unknowns: gains of χ² less their price."""
     runs = [made(seed, ride=RIDE, encoder=encoder) for seed in range(2)]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = engine.settle(engine.begin)
+    present, noise = engine.settle(engine.initial_model)
     chance = chance_level(engine.projected(present, noise), engine.regression.n_rows)
     assert np.all(np.diff(chance) >= 0)
     assert np.median(chance) < 10
@@ -239,6 +241,6 @@ def test_a_size_that_is_said_to_show_is_found() -> None:
             for seed in range(2)
         ]
         engine = selection_engine(prepare(runs, GROOVED), [CATALOGUE["motor-coulomb"]])
-        present, noise = engine.settle(engine.begin)
+        present, noise = engine.settle(engine.initial_model)
         found += engine.scores(present, noise)[0].value > 0
     assert found >= 8

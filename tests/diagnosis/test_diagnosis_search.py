@@ -20,7 +20,7 @@ def test_what_would_help_only_with_the_wrong_sign_gains_nothing() -> None:
         for seed in range(2)
     ]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = engine.settle(engine.begin)
+    present, noise = engine.settle(engine.initial_model)
     told = {score.atom.effect.id: score for score in engine.scores(present, noise)}
     rotor = told["rotor-inertia"]
     assert rotor.gain == 0.0
@@ -41,7 +41,7 @@ def test_the_right_sign_gains() -> None:
         for seed in range(2)
     ]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = engine.settle(engine.begin)
+    present, noise = engine.settle(engine.initial_model)
     best = engine.scores(present, noise)[0]
     assert best.atom.effect.id == "rotor-inertia"
     assert np.all(best.amplitudes > 0.0)

@@ -27,7 +27,7 @@ def dataset_of(load_mass: float | None) -> Dataset:
 
 def with_play(dataset: Dataset) -> Hypothesis:
     engine = selection_engine(dataset, CATALOGUE)
-    return engine.begin.with_term(PLAY, engine.regression.n_runs)
+    return engine.initial_model.with_term(PLAY, engine.regression.n_runs)
 
 
 @pytest.mark.parametrize("load_mass", [10.0, None], ids=["weight", "measured"])

@@ -46,7 +46,9 @@ def rides(added: list[Array], **friction: float) -> list[Run]:
 
 def with_friction(runs: list[Run]) -> tuple[TimeSeriesSelection, Fit, Noise]:
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    start = engine.begin.with_term(term("motor-coulomb", torque=FRICTION), engine.regression.n_runs)
+    start = engine.initial_model.with_term(
+        term("motor-coulomb", torque=FRICTION), engine.regression.n_runs
+    )
     return engine, *engine.settle(start)
 
 

@@ -144,13 +144,13 @@ def test_what_was_found_leaves_three_hundredths_on_another_file(
     found: WinchAnswer, profile: WinchProfile
 ) -> None:
     """The files differ by 2.0 % that no function of the motion explains."""
-    terms = found.found.final.hypothesis.terms
+    terms = found.result.final.hypothesis.terms
     assert error_on_test(Line(profile, modifiers_of(terms))) < 0.030
 
 
 def test_without_friction_even_a_refitted_model_misses_a_sixth(profile: WinchProfile) -> None:
     engine = selection_engine(prepare([run_of("train")], profile), load_catalogue())
-    fitted, _ = engine.settle(engine.begin)
+    fitted, _ = engine.settle(engine.initial_model)
     error = error_on_test(Line(profile, modifiers_of(fitted.hypothesis.terms)))
     assert 0.16 < error < 0.20
 

@@ -32,7 +32,7 @@ from winchkit.schema.read import read_winch
 def saying(diagnosis: Diagnosis) -> WinchAnswer:
     """A real answer with another diagnosis."""
     real = answer_of("demo-adequate")
-    return WinchAnswer(real.engine, real.found, diagnosis)
+    return WinchAnswer(real.engine, real.result, diagnosis)
 
 
 @pytest.mark.parametrize("bench", ["demo-elastic-rope", "demo-adequate", "five-cornered-drum"])

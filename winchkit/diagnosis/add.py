@@ -88,7 +88,7 @@ class Grown:
     """An addition with everything behind it, for reports."""
 
     regression: TimeSeriesRegression
-    begin: Fit
+    initial_model: Fit
     """The effects that the profile had, refitted."""
     final: Fit
     """With the new one."""
@@ -130,32 +130,32 @@ def grow(
         raise UsageError(
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
-    (begin, noise), (final, final_noise) = _fitted(engine, effect_id)
+    (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
     calm = calmed(dataset, final.hypothesis)
     if calm is not None:
         engine = selection_engine(calm, candidates)
-        (begin, noise), (final, final_noise) = _fitted(engine, effect_id)
+        (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
     best = weighed(engine, final, final_noise)
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
-    outputs = output_fits(engine, (begin, noise), (best.fit, best.noise))
+    outputs = output_fits(engine, (initial_model, noise), (best.fit, best.noise))
     terms = tuple(estimates(engine.regression, best.fit, spread))
     notes = (*engine.regression.dataset.notes, *best.notes)
-    return Grown(engine.regression, begin, best.fit, Addition(outputs, terms, notes))
+    return Grown(engine.regression, initial_model, best.fit, Addition(outputs, terms, notes))
 
 
 def _fitted(
     engine: TimeSeriesSelection, effect_id: str
 ) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:
     """The profile as it is, and with the effect, each with its noise."""
-    begin, noise = engine.settle(engine.begin)
-    trials = [engine.trial(begin, item, noise) for item in _atoms(engine, effect_id, noise)]
+    initial_model, noise = engine.settle(engine.initial_model)
+    trials = [engine.trial(initial_model, item, noise) for item in _atoms(engine, effect_id, noise)]
     if not trials:
         raise UsageError(
             f"effect '{effect_id}' changes nothing that these runs measured, or gives no number "
             "there"
         )
     best = min(trials, key=lambda trial: trial.fit.cost)
-    return (begin, noise), engine.settle(best.fit.hypothesis, noise)
+    return (initial_model, noise), engine.settle(best.fit.hypothesis, noise)
 
 
 def _placed(effect: Effect, dataset: Dataset) -> Effect:
@@ -171,9 +171,9 @@ def _placed(effect: Effect, dataset: Dataset) -> Effect:
 
 def _atoms(engine: TimeSeriesSelection, effect_id: str, noise: Noise) -> list[Score]:
     """Points of an effect's shape grid that fit best."""
-    begin = engine.refit(engine.begin, noise)
-    projected = engine.projected(begin, noise)
-    ranked = score(projected, begin.residual, engine.regression.n_rows)
+    initial_model = engine.refit(engine.initial_model, noise)
+    projected = engine.projected(initial_model, noise)
+    ranked = score(projected, initial_model.residual, engine.regression.n_rows)
     return [item for item in ranked if item.atom.effect.id == effect_id][:_STARTS]
 
 
@@ -206,15 +206,15 @@ def remove(
     engine = selection_engine(
         prepare(runs, profile, band, thin=True), catalogue or load_catalogue()
     )
-    begin, noise = engine.settle(engine.begin)
-    terms = begin.hypothesis.terms
+    initial_model, noise = engine.settle(engine.initial_model)
+    terms = initial_model.hypothesis.terms
     there = [index for index, term in enumerate(terms) if term.effect.id == effect_id]
     if not there:
         has = ", ".join(term.label for term in terms) or "none"
         raise UsageError(f"profile '{profile.name}' has no effect '{effect_id}'; it has {has}")
-    best = weighed(engine, *engine.settle(begin.hypothesis.without(there[-1])))
+    best = weighed(engine, *engine.settle(initial_model.hypothesis.without(there[-1])))
     # Judged by the noise of the better model: without the effect its trace would pass for noise.
-    outputs = output_fits(engine, (begin, noise), (best.fit, noise))
+    outputs = output_fits(engine, (initial_model, noise), (best.fit, noise))
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     left = tuple(estimates(engine.regression, best.fit, spread))
     notes = (*engine.regression.dataset.notes, *best.notes)

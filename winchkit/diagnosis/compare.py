@@ -56,7 +56,7 @@ def compared(
 ) -> Compared:
     """As :func:`compare`, with the residual that the figures were taken from."""
     regression = TimeSeriesRegression(prepare(runs, profile, band, skirt=WHOLE_FILTER))
-    start = begin_hypothesis(profile, catalogue, regression)
+    start = initial_hypothesis(profile, catalogue, regression)
     residual = regression.residual(start)
     offset = None
     if regression.fits_offset:
@@ -87,7 +87,7 @@ def compared(
     )
 
 
-def begin_hypothesis(
+def initial_hypothesis(
     profile: WinchProfile, catalogue: Catalogue | None, regression: TimeSeriesRegression
 ) -> Hypothesis:
     """The profile's own effects at their file values."""

@@ -7,7 +7,7 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from winchkit.diagnosis.compare import begin_hypothesis
+from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.design.detectability import Bar, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
@@ -28,7 +28,7 @@ from winchkit.diagnosis.results import (
     Where,
 )
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.stepwise import Found, search
+from winchkit.diagnosis.selection.stepwise import SelectionResult, search
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.decision import Judgement, by_best_weights
 from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
@@ -65,7 +65,7 @@ class Answer:
     ----------
     engine
         Engine of the last selection.
-    found
+    result
         Result of the selection, without withheld additions.
     diagnosis
         What is printed.
@@ -80,13 +80,13 @@ class Answer:
     def __init__(
         self,
         engine: SelectionEngine,
-        found: Found,
+        result: SelectionResult,
         diagnosis: Diagnosis,
         sets: Sequence[Confusion] = (),
         pairs: Sequence[tuple[Term, Term]] = (),
     ) -> None:
         self.engine = engine
-        self.found = found
+        self.result = result
         self.diagnosis = diagnosis
         self.sets = tuple(sets)
         self.pairs = tuple(pairs)
@@ -94,7 +94,7 @@ class Answer:
     @property
     def bar(self) -> Bar:
         """Reduction of χ² that an effect needs to be named."""
-        return Bar(self.engine.price, self.found.threshold)
+        return Bar(self.engine.price, self.result.threshold)
 
     @property
     def filed(self) -> SelectionEngine:
@@ -110,12 +110,12 @@ class WinchAnswer(Answer):
     def __init__(
         self,
         engine: TimeSeriesSelection,
-        found: Found,
+        result: SelectionResult,
         diagnosis: Diagnosis,
         sets: Sequence[Confusion] = (),
         pairs: Sequence[tuple[Term, Term]] = (),
     ) -> None:
-        super().__init__(engine, found, diagnosis, sets, pairs)
+        super().__init__(engine, result, diagnosis, sets, pairs)
 
 
 def silent(what: str, share: float) -> None:
@@ -143,23 +143,23 @@ def diagnose(
     told("drawing the candidates", 0.2)
     engine = selection_engine(dataset, catalogue)
     told("searching", 0.4)
-    found = search(engine)
-    calm = calmed(dataset, found.reached)
+    result = search(engine)
+    calm = calmed(dataset, result.last_model)
     if calm is not None:
         told("searching again without the jerks", 0.6)
         engine = selection_engine(calm, catalogue)
-        found = search(engine)
+        result = search(engine)
     told("naming", 0.8)
-    return _answer(engine, found)
+    return _answer(engine, result)
 
 
-def _answer(engine: TimeSeriesSelection, found: Found) -> WinchAnswer:
+def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
     """Everything that is said of what a search found."""
-    judgement = judge_and_doubt(engine, found)
+    judgement = judge_and_doubt(engine, result)
     shown = judgement.shown
-    added = range(engine.given, len(shown.final.hypothesis.terms))
+    added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
     sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
-    pairs = pairs_of(sets or _closest(engine, found, judgement))
+    pairs = pairs_of(sets or _closest(engine, result, judgement))
     if sets:
         judgement = by_best_weights(engine, judgement)
         shown = judgement.shown
@@ -167,11 +167,11 @@ def _answer(engine: TimeSeriesSelection, found: Found) -> WinchAnswer:
         verdict=judgement.verdict,
         outputs=judgement.outputs,
         steps=steps_of(engine, shown, sets) if sets else (),
-        candidates=candidates_of(engine, found),
-        detectable=detectable(found.scores, Bar(engine.price, found.threshold)),
+        candidates=candidates_of(engine, result),
+        detectable=detectable(result.scores, Bar(engine.price, result.threshold)),
         unexplained_share=judgement.share,
-        where=_where(engine.regression, found) if judgement.verdict in _LOCATED else (),
-        next_runs=next_runs(engine.regression, pairs, found.noise.rms),
+        where=_where(engine.regression, result) if judgement.verdict in _LOCATED else (),
+        next_runs=next_runs(engine.regression, pairs, result.noise.rms),
         notes=(
             *engine.regression.dataset.notes,
             *what_runs_cannot_show(engine.regression),
@@ -181,32 +181,38 @@ def _answer(engine: TimeSeriesSelection, found: Found) -> WinchAnswer:
     return WinchAnswer(engine, shown, diagnosis, sets, pairs)
 
 
-def _closest(engine: TimeSeriesSelection, found: Found, judgement: Judgement) -> list[Confusion]:
+def _closest(
+    engine: TimeSeriesSelection, result: SelectionResult, judgement: Judgement
+) -> list[Confusion]:
     """What came closest and may not be named yet, with its rivals: a next run can begin there.
 
     Not for an unknown: what resembles something outside the catalogue leads astray.
     """
     if judgement.verdict != "partly":
         return []
-    added = range(engine.given, len(found.final.hypothesis.terms))
-    return [confusion_of(engine, found.final, found.noise, index) for index in added]
+    added = range(engine.n_initial_terms, len(result.final.hypothesis.terms))
+    return [confusion_of(engine, result.final, result.noise, index) for index in added]
 
 
 def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelection:
     """An inquiry that begins with the effects that the profile already has."""
     regression = TimeSeriesRegression(dataset)
-    begin = begin_hypothesis(dataset.profile, catalogue, regression)
-    return TimeSeriesSelection(regression, begin, catalogue)
+    initial_model = initial_hypothesis(dataset.profile, catalogue, regression)
+    return TimeSeriesSelection(regression, initial_model, catalogue)
 
 
-def steps_of(engine: SelectionEngine, found: Found, sets: Sequence[Confusion]) -> tuple[Step, ...]:
+def steps_of(
+    engine: SelectionEngine, result: SelectionResult, sets: Sequence[Confusion]
+) -> tuple[Step, ...]:
     """Every addition with its confusion set, values and held-out gain."""
-    final, noise = found.final, found.noise
+    final, noise = result.final, result.noise
     gains = _gains(engine, final, noise)
     spread = spread_of(engine.regression, final, noise, engine.regression.blocks)
     own = estimates(engine.regression, final, spread)
     out = []
-    for confusion, gain, (term, values) in zip(sets, gains, own[engine.given :], strict=True):
+    for confusion, gain, (term, values) in zip(
+        sets, gains, own[engine.n_initial_terms :], strict=True
+    ):
         parameters = {term.effect.id: values} | {
             rival.effect.id: _values_only(rival.effect.id, confusion)
             for rival in confusion.terms
@@ -234,7 +240,7 @@ def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:
     """Held-out gain of each step in the order in which the model grew."""
     hypothesis = final.hypothesis
     squares, folds = [], engine.folds(final, noise)
-    for count in range(engine.given, len(hypothesis.terms) + 1):
+    for count in range(engine.n_initial_terms, len(hypothesis.terms) + 1):
         partial = Hypothesis(
             hypothesis.terms[:count], hypothesis.nuisances, hypothesis.starts[:count]
         )
@@ -243,26 +249,26 @@ def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:
     return [1 - after / before for before, after in pairwise(squares)]
 
 
-def candidates_of(engine: SelectionEngine, found: Found) -> tuple[Candidate, ...]:
+def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[Candidate, ...]:
     """Every candidate with its score, the strongest with what it would leave held out."""
     out = []
-    folds = engine.folds(found.final, found.noise)
-    for item, fitted in zip_longest(found.scores, found.tried):
+    folds = engine.folds(result.final, result.noise)
+    for item, fitted in zip_longest(result.scores, result.tried):
         rms: dict[str, float] = {}
         if fitted is not None:
-            rms = engine.held_out_errors(fitted, found.begin_noise, folds)
+            rms = engine.held_out_errors(fitted, result.initial_noise, folds)
         out.append(Candidate(item.atom.effect.id, item.value, rms))
     return tuple(out)
 
 
-def _where(regression: TimeSeriesRegression, found: Found) -> tuple[Where, ...]:
+def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[Where, ...]:
     """Where the rest lives: angles with an order, other variables, and the loudest band.
 
     The rest beside what came closest; where that left nothing, yet may not be named, all of it.
     """
-    fitted, presence = found.final, found.presence
-    if not found.still:
-        fitted, presence = found.begin, found.begin_presence
+    fitted, presence = result.final, result.presence
+    if not result.lack_of_fit:
+        fitted, presence = result.initial_model, result.initial_presence
     places = [*harmonics(regression, fitted.residual), *follows(regression, fitted.residual)]
     out = [Where(f.output, f.variable, f.share, f.order) for f in places]
     excess = presence.excess

@@ -32,7 +32,7 @@ def report_json(answer: Answer) -> dict[str, Any]:
         "sentence": sentence(diagnosis),
         "would_change": changes_text(diagnosis),
         "not_looked_for": [{"effect": e, "needs": list(needs)} for e, needs in unseen(answer)],
-        "evidence_of_noise": max(answer.found.threshold, 0.0),
+        "evidence_of_noise": max(answer.result.threshold, 0.0),
         "waterfall": None if ladder is None else _waterfall(ladder),
         **drawn,
     }
@@ -55,9 +55,9 @@ def _states(
     answer: WinchAnswer, drawn: Callable[[TimeSeriesRegression, Array], list[Any]]
 ) -> dict[str, Any]:
     """What is drawn of the residual before, and after where something was named."""
-    found, regression = answer.found, answer.engine.regression
+    found, regression = answer.result, answer.engine.regression
     after = drawn(regression, found.final.residual) if answer.diagnosis.steps else None
-    return {"before": drawn(regression, found.begin.residual), "after": after}
+    return {"before": drawn(regression, found.initial_model.residual), "after": after}
 
 
 def _curves(regression: TimeSeriesRegression, residual: Array) -> list[Any]:

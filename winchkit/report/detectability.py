@@ -36,8 +36,8 @@ class Visible:
 
 def effects_of(answer: Answer) -> dict[str, Effect]:
     """Every effect that a diagnosis tried or has, by id."""
-    tried = {score.atom.effect.id: score.atom.effect for score in answer.found.scores}
-    present = {t.effect.id: t.effect for t in answer.found.final.hypothesis.terms}
+    tried = {score.atom.effect.id: score.atom.effect for score in answer.result.scores}
+    present = {t.effect.id: t.effect for t in answer.result.final.hypothesis.terms}
     return tried | present
 
 

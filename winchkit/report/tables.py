@@ -154,7 +154,7 @@ def candidates(answer: Answer) -> Markup:
     rows = [_candidate(candidate, scales) for candidate in ranked]
     caption = (
         "Evidence: whitened squares that an effect saves, less the price of its freedom; noise "
-        f"alone reaches {significant(max(answer.found.threshold, 0.0), 2)} once in a hundred "
+        f"alone reaches {significant(max(answer.result.threshold, 0.0), 2)} once in a hundred "
         "cases. The held-out error is that with this effect alone, where its evidence earned a fit."
     )
     return _shortened(caption, head, rows, "more, with less evidence")

@@ -194,7 +194,7 @@ def _plan_winch(
     answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
     regression, pairs = answer.engine.regression, answer.pairs
     room = seen(regression.dataset) if limits is None else allowed(regression.dataset, limits)
-    noise = answer.found.noise.rms
+    noise = answer.result.noise.rms
     found = offers(regression, pairs, noise, list(catalogue), bar=answer.bar, room=room)
     if output:
         path = Path(output)

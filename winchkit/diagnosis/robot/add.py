@@ -93,21 +93,23 @@ def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
 
 def _added(study: Study, effect: Effect) -> RobotGrown:
     engine = study.as_filed()
-    begin, noise = engine.settle(engine.begin)
-    scores = [s for s in engine.scores(begin, noise) if s.atom.effect.id == effect.id]
+    initial_model, noise = engine.settle(engine.initial_model)
+    scores = [s for s in engine.scores(initial_model, noise) if s.atom.effect.id == effect.id]
     if not scores:
         raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
-    final: Fit = engine.trial(begin, scores[0], noise).fit
+    final: Fit = engine.trial(initial_model, scores[0], noise).fit
     regression = engine.regression
     before, after = (
-        Shown(regression, fit, noise, engine.regression.groups) for fit in (begin, final)
+        Shown(regression, fit, noise, engine.regression.groups) for fit in (initial_model, final)
     )
     spread = spread_of(regression, final, noise, engine.regression.blocks)
     own = {term.effect.id for term in declared_terms(study.dataset.robot, study.catalogue)}
     found = estimates(regression, final, spread)
     # What a line's winch brings along is refitted beside it and stays in the winch's own profile.
     terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
-    was, now = (errors_of(regression, regression.at(fit.hypothesis)) for fit in (begin, final))
+    was, now = (
+        errors_of(regression, regression.at(fit.hypothesis)) for fit in (initial_model, final)
+    )
     addition = Addition(figures(before, after, study.noise), terms, study.dataset.notes)
     return RobotGrown(regression, (was, now), addition)
 
@@ -133,15 +135,15 @@ def remove_from_robot(
         raise UsageError(f"robot '{profile.name}' has no effect '{effect_id}'; it has {has}")
     study = study_of(runs, profile, catalogue)
     engine = study.as_filed()
-    begin, noise = engine.settle(engine.begin)
-    hypothesis = begin.hypothesis
+    initial_model, noise = engine.settle(engine.initial_model)
+    hypothesis = initial_model.hypothesis
     for index in reversed(range(len(hypothesis.terms))):
         if hypothesis.terms[index].effect.id in gone:
             hypothesis = hypothesis.without(index)
     final, _ = engine.settle(hypothesis)
     regression = engine.regression
     before, after = (
-        Shown(regression, fit, noise, engine.regression.groups) for fit in (begin, final)
+        Shown(regression, fit, noise, engine.regression.groups) for fit in (initial_model, final)
     )
     found = estimates(
         regression, final, spread_of(regression, final, noise, engine.regression.blocks)

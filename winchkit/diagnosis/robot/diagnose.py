@@ -30,7 +30,7 @@ from winchkit.diagnosis.robot.pose_design import next_pose_runs
 from winchkit.diagnosis.robot.preparation import Study, fitted_to, study_of
 from winchkit.diagnosis.robot.prior import Believed
 from winchkit.diagnosis.robot.regression import PoseRegression
-from winchkit.diagnosis.selection.stepwise import Found, search
+from winchkit.diagnosis.selection.stepwise import SelectionResult, search
 from winchkit.diagnosis.verdict.decision import Judgement, judge
 from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -73,7 +73,7 @@ class Seen:
     engine: PoseSelection
     filed: PoseSelection
     """Takes the geometry as the profile has it; the same where that was not let go."""
-    found: Found
+    result: SelectionResult
     judgement: Judgement
 
     @property
@@ -82,9 +82,9 @@ class Seen:
         return self.engine is not self.filed
 
     @cached_property
-    def begin(self) -> Shown:
+    def initial_model(self) -> Shown:
         """The profile's own effects fitted, the geometry as filed."""
-        first, noise = self.filed.settle(self.filed.begin)
+        first, noise = self.filed.settle(self.filed.initial_model)
         return Shown(self.filed.regression, first, noise, self.filed.regression.groups)
 
     @cached_property
@@ -96,11 +96,11 @@ class Seen:
     @cached_property
     def errors(self) -> tuple[Errors, Errors]:
         """Of both, at every pose."""
-        begin, final = (
+        initial_model, final = (
             errors_of(s.regression, s.regression.at(s.fit.hypothesis))
-            for s in (self.begin, self.final)
+            for s in (self.initial_model, self.final)
         )
-        return begin, final
+        return initial_model, final
 
     @property
     def rest(self) -> tuple[PoseRegression, Errors]:
@@ -111,7 +111,7 @@ class Seen:
         before, after = self.errors
         falls = [rms(name, after[name]) / rms(name, before[name]) for name in after]
         if self.refitted and (min(falls) > _FAR_OFF or max(falls) > _NO_WORSE):
-            return self.begin.regression, before
+            return self.initial_model.regression, before
         return self.final.regression, after
 
 
@@ -119,10 +119,10 @@ def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
     """What was found, in words, figures and places; ``geometry`` is how that was taken."""
     engine, judgement, study = seen.engine, seen.judgement, seen.study
     shown, verdict = judgement.shown, judgement.verdict
-    added = range(engine.given, len(shown.final.hypothesis.terms))
+    added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
     sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
     steps = tuple(map(plain_step, steps_of(engine, shown, sets))) if sets else ()
-    outputs = figures(seen.begin, seen.final, study.noise)
+    outputs = figures(seen.initial_model, seen.final, study.noise)
     if seen.refitted and verdict in ("adequate", "explained"):
         verdict = "explained"
         steps = (_geometry_step(engine, shown, outputs["cable_length"]), *steps)
@@ -130,10 +130,10 @@ def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
         verdict=verdict,
         outputs=outputs,
         steps=steps,
-        candidates=candidates_of(engine, seen.found),
-        detectable=detectable(seen.found.scores, Bar(engine.price, seen.found.threshold)),
+        candidates=candidates_of(engine, seen.result),
+        detectable=detectable(seen.result.scores, Bar(engine.price, seen.result.threshold)),
         unexplained_share=judgement.share,
-        where=_places(seen) if seen.found.still else (),
+        where=_places(seen) if seen.result.lack_of_fit else (),
         next_runs=next_pose_runs(engine.regression, shown.final.hypothesis, pairs_of(sets)),
         notes=(*study.dataset.notes, *what_poses_cannot_show(study), *judgement.notes),
         geometry=geometry,
@@ -143,12 +143,12 @@ def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
 
 def _places(seen: Seen) -> tuple[Where, ...]:
     """Where the rest lives, the largest share first."""
-    found = follows_of(*seen.rest)
-    places = [Where(f.output, f.variable, f.share, line=f.line) for f in found]
+    result = follows_of(*seen.rest)
+    places = [Where(f.output, f.variable, f.share, line=f.line) for f in result]
     return tuple(sorted(places, key=lambda w: -w.share)[:_WHERE])
 
 
-def _geometry_step(engine: PoseSelection, shown: Found, output: OutputFit) -> Step:
+def _geometry_step(engine: PoseSelection, shown: SelectionResult, output: OutputFit) -> Step:
     """All of the geometry, as one addition that no few numbers can replace."""
     regression = engine.regression
     believed = regression.standing.believed
@@ -191,23 +191,25 @@ def diagnose_robot(
     filed = study.as_filed()
     if _beyond_few(study, filed):
         return _concluded(study, study.let_go(), filed)
-    found = search(filed)
-    if added := found.final.hypothesis.terms[filed.given :]:
+    result = search(filed)
+    if added := result.final.hypothesis.terms[filed.n_initial_terms :]:
         # Poses placed by ropes that contradict each other turn, and tensions there look unbalanced.
         filed = study.as_filed(added[:1])
-        found = search(filed)
-    judgement = judge(filed, found)
-    if judgement.verdict in ("adequate", "explained") and not _geometry_is_off(study, filed, found):
-        return answer_of(Seen(study, filed, filed, found, judgement), "file")
+        result = search(filed)
+    judgement = judge(filed, result)
+    if judgement.verdict in ("adequate", "explained") and not _geometry_is_off(
+        study, filed, result
+    ):
+        return answer_of(Seen(study, filed, filed, result, judgement), "file")
     return _concluded(study, study.let_go(), filed)
 
 
 def _beyond_few(study: Study, filed: PoseSelection) -> bool:
     """Whether the whole geometry explains far more than any single effect does."""
-    gain = _gain_of_geometry(study, filed, filed.begin)
+    gain = _gain_of_geometry(study, filed, filed.initial_model)
     if not _is_real(study, gain):
         return False
-    present, noise = filed.settle(filed.begin)
+    present, noise = filed.settle(filed.initial_model)
     best = max((s.gain for s in filed.scores(present, noise)), default=0.0)
     return best < _ONE_OF_FEW * gain
 
@@ -224,13 +226,13 @@ def _gain_of_geometry(study: Study, filed: PoseSelection, model: Hypothesis) -> 
 
 def _concluded(study: Study, engine: PoseSelection, filed: PoseSelection) -> RobotAnswer:
     """With the geometry let go."""
-    found = search(engine)
-    return answer_of(Seen(study, engine, filed, found, judge(engine, found)), "refitted")
+    result = search(engine)
+    return answer_of(Seen(study, engine, filed, result, judge(engine, result)), "refitted")
 
 
-def _geometry_is_off(study: Study, filed: PoseSelection, found: Found) -> bool:
+def _geometry_is_off(study: Study, filed: PoseSelection, result: SelectionResult) -> bool:
     """Whether the geometry as a whole would explain more of what is left than chance does."""
-    return _is_real(study, _gain_of_geometry(study, filed, found.final.hypothesis))
+    return _is_real(study, _gain_of_geometry(study, filed, result.final.hypothesis))
 
 
 def _is_real(study: Study, gain: float) -> bool:

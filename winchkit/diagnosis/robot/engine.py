@@ -28,7 +28,7 @@ class PoseSelection(SelectionEngine):
     ----------
     regression
         The poses and the model.
-    begin
+    initial_model
         Initial model: the profile's own effects.
     candidates
         Effects that may be added, each at its places.
@@ -41,12 +41,12 @@ class PoseSelection(SelectionEngine):
     def __init__(
         self,
         regression: PoseRegression,
-        begin: Hypothesis,
+        initial_model: Hypothesis,
         candidates: Iterable[Effect],
         noise: PoseNoise,
     ) -> None:
         self.pose_noise = noise
-        super().__init__(regression, begin, candidates)
+        super().__init__(regression, initial_model, candidates)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Unit variance: rows are whitened with the variance components."""

@@ -76,12 +76,12 @@ def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     return out
 
 
-def figures(begin: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit]:
+def figures(initial_model: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit]:
     """Every output before and after; a position's rms is of its distance."""
     before, after = (
-        errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (begin, final)
+        errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (initial_model, final)
     )
-    held_before, held_after = held_out_rms(begin), held_out_rms(final)
+    held_before, held_after = held_out_rms(initial_model), held_out_rms(final)
     least = noise_rms(final.regression, noise)
     signal = signals(final.regression)
     source = "repeats" if noise.from_repeats else "saturated fit"

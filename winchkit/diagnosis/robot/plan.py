@@ -102,7 +102,7 @@ class PosePlan:
 
 def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
     """Kinds of poses, tried on the model that a diagnosis came to; the most telling first."""
-    regression, final = answer.engine.regression, answer.found.final.hypothesis
+    regression, final = answer.engine.regression, answer.result.final.hypothesis
     pairs = tuple(pairs_of(answer.sets))
     hidden = _hidden(answer)
     questions: list[Question] = [*pairs, *((term, None) for term in hidden)]
@@ -127,8 +127,8 @@ def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
     Of those on one line each, the line where it shows least.
     """
     faint: dict[str, tuple[float, Term]] = {}
-    there = {term.effect.id for term in answer.found.final.hypothesis.terms}
-    for score in answer.found.scores:
+    there = {term.effect.id for term in answer.result.final.hypothesis.terms}
+    for score in answer.result.scores:
         effect = score.atom.effect
         seen = answer.bar.power(score.strength, score.atom.freedom) >= _SURE
         if not score.strength > 0 or seen or effect.id in there:

@@ -243,13 +243,13 @@ def pose_offers(
     tried = [(kind, seen, pose) for kind, seen, pose in tried if len(seen)]
     wide = _with_all(regression, tried)
     parts = [_information(wide, final, question) for question in questions]
-    begin = len(regression.dataset.measured)
-    base = [part[-1] + part[:begin].sum(axis=0) for part in parts]
+    initial_model = len(regression.dataset.measured)
+    base = [part[-1] + part[:initial_model].sum(axis=0) for part in parts]
     so_far = _powers([float(_left_over(own)) for own in base], needed)
     out = []
     for kind, seen, pose in tried:
-        own = slice(begin, begin + len(seen))
-        begin = own.stop
+        own = slice(initial_model, initial_model + len(seen))
+        initial_model = own.stop
         chosen, strength = _chosen([part[own] for part in parts], base, needed, count)
         at = Pose(pose.position[chosen], pose.rotation[chosen])
         powers = _powers(strength, needed)

@@ -184,8 +184,8 @@ class Study:
         terms = (*self.own, *beside)
         standing, terms = settled(self.dataset, terms, self.noise.sigma, believed)
         regression = PoseRegression(standing)
-        begin = begun(terms[: len(self.own)])
-        return PoseSelection(regression, begin, self.candidates, self.noise)
+        initial_model = begun(terms[: len(self.own)])
+        return PoseSelection(regression, initial_model, self.candidates, self.noise)
 
     def as_filed(self, beside: tuple[Term, ...] = ()) -> PoseSelection:
         """With the numbers of the file, as sure as its calibration left them."""
@@ -203,7 +203,7 @@ class Study:
         linear in between.
         """
         engine = self.let_go()
-        present, noise = engine.settle(engine.begin)
+        present, noise = engine.settle(engine.initial_model)
         listed = [s for s in engine.scores(present, noise) if s.value > 0][:_SHORT_LIST]
         trials = [engine.trial(present, item, noise) for item in listed]
         best = min(trials, key=lambda t: t.criterion, default=None)

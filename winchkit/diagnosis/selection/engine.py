@@ -122,7 +122,7 @@ class SelectionEngine(ABC):
     ----------
     regression
         The data and the model.
-    begin
+    initial_model
         Initial model: the profile's own effects.
     candidates
         Effects that may be added.
@@ -131,16 +131,16 @@ class SelectionEngine(ABC):
     regression: Regression
 
     def __init__(
-        self, regression: Regression, begin: Hypothesis, candidates: Iterable[Effect]
+        self, regression: Regression, initial_model: Hypothesis, candidates: Iterable[Effect]
     ) -> None:
         self.regression = regression
-        self.begin = begin
-        self.given = len(begin.terms)
+        self.initial_model = initial_model
+        self.n_initial_terms = len(initial_model.terms)
         self._candidates = tuple(candidates)
         self._last_folds: Last[Folds] = Last()
         self._last_presence: Last[Presence] = Last()
         self._last_projected: Last[Projected] = Last()
-        self.signatures = self._signatures(begin)
+        self.signatures = self._signatures(initial_model)
 
     @abstractmethod
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
@@ -188,7 +188,7 @@ class SelectionEngine(ABC):
         return folds is self.regression.groups and len(set(self.regression.group_of_run)) > 1
 
     def _signatures(self, present: Hypothesis) -> Signatures:
-        there = {t.effect.id for t in self.begin.terms if not t.effect.repeatable}
+        there = {t.effect.id for t in self.initial_model.terms if not t.effect.repeatable}
         absent = (effect for effect in self._candidates if effect.id not in there)
         return signatures(self.regression, present, absent)
 
@@ -236,9 +236,9 @@ class SelectionEngine(ABC):
 
     def criterion(self, fitted: Fit) -> float:
         """Whitened squares and the price of everything that was added."""
-        added = fitted.hypothesis.terms[self.given :]
+        added = fitted.hypothesis.terms[self.n_initial_terms :]
         freedom = sum(Coordinates(term.effect).freedom for term in added)
-        states = sum(len(start) for start in fitted.hypothesis.starts[self.given :])
+        states = sum(len(start) for start in fitted.hypothesis.starts[self.n_initial_terms :])
         return fitted.cost + self.price * (freedom + states)
 
     def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
@@ -248,7 +248,7 @@ class SelectionEngine(ABC):
         """
         effect, weight = item.atom.effect, noise.weight(self.regression)
         hypothesis = present.hypothesis
-        for index in reversed(range(self.given, len(hypothesis.terms))):
+        for index in reversed(range(self.n_initial_terms, len(hypothesis.terms))):
             if hypothesis.terms[index].effect.id in effect.contains:
                 hypothesis = hypothesis.without(index)
         best: Trial | None = None

@@ -74,7 +74,7 @@ _MOST = 3
 
 def recoupled(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:
     """The present fit, or the best with a better pair in the place of ``exchanged`` additions."""
-    added = range(engine.given, len(present.hypothesis.terms))
+    added = range(engine.n_initial_terms, len(present.hypothesis.terms))
     if not 0 < len(added) <= _MOST:
         return present  # So many stand for something that no pair is.
     # An exchange for more than was there is dear to try: as often, whatever may be exchanged.

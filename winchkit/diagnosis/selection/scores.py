@@ -41,27 +41,28 @@ class Projected:
     """Signatures with the present model's unknowns projected out, under one noise."""
 
     def __init__(
-        self, regression: Regression, found: Signatures, jacobian: Array, noise: Noise
+        self, regression: Regression, signatures: Signatures, jacobian: Array, noise: Noise
     ) -> None:
-        self.found = found
+        self.signatures = signatures
         self._jacobian = jacobian
         self._weight2 = noise.weight(regression) ** 2
         self._freedom = noise.freedom
-        self._cross, self._normal = _cross(regression, jacobian, found.columns)
+        self._cross, self._normal = _cross(regression, jacobian, signatures.columns)
         self._share = share = 1 / noise.power
         cross, normal, gram = (
-            np.tensordot(share, part, axes=1) for part in (self._cross, self._normal, found.gram)
+            np.tensordot(share, part, axes=1)
+            for part in (self._cross, self._normal, signatures.gram)
         )
         self._through = -np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ cross
         self.inner = _projected(gram, cross, normal, self._through)
         """Inner products of the whitened, projected columns, (p, p)."""
-        plain = np.einsum("b,bii->i", share, found.gram)
-        self._roots = [self._root(atom, plain) for atom in found.atoms]
+        plain = np.einsum("b,bii->i", share, signatures.gram)
+        self._roots = [self._root(atom, plain) for atom in signatures.atoms]
 
     def products(self, residual: Array) -> Array:
         """Inner products of the whitened residual with the projected columns, (p,)."""
         weighted = residual * self._weight2
-        own = self.found.columns.T @ weighted
+        own = self.signatures.columns.T @ weighted
         return np.asarray(own + self._through.T @ (self._jacobian.T @ weighted))
 
     def gains(self, products: Array) -> Array:
@@ -69,19 +70,19 @@ class Projected:
         return np.array(
             [
                 np.sum((root.T @ products[atom.columns]) ** 2, axis=0)
-                for atom, root in zip(self.found.atoms, self._roots, strict=True)
+                for atom, root in zip(self.signatures.atoms, self._roots, strict=True)
             ]
         )
 
     def amplitudes(self, index: int, products: Array) -> Array:
         """Amplitudes of one atom in units of its secants."""
         root = self._roots[index]
-        atom = self.found.atoms[index]
+        atom = self.signatures.atoms[index]
         return np.asarray(root @ (root.T @ products[atom.columns]))
 
     def strength(self, index: int) -> float:
         """λ for one usual size of an atom; zero where it cannot be identified."""
-        first = self.found.atoms[index].columns.start
+        first = self.signatures.atoms[index].columns.start
         return float(self.inner[first, first]) if self._roots[index].shape[1] else 0.0
 
     def simulated(self, samples: int = _SIMULATIONS) -> Array:
@@ -89,7 +90,7 @@ class Projected:
         random = np.random.default_rng(0)
         out = np.zeros((len(self.inner), samples))
         bands = zip(
-            self._share, self.found.gram, self._cross, self._normal, self._freedom, strict=True
+            self._share, self.signatures.gram, self._cross, self._normal, self._freedom, strict=True
         )
         for share, gram, cross, normal, freedom in bands:
             part = share * _projected(gram, cross, normal, self._through)
@@ -134,7 +135,7 @@ def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
     products = projected.products(residual)
     out = []
     for index, gain in enumerate(projected.gains(products).tolist()):
-        atom = projected.found.atoms[index]
+        atom = projected.signatures.atoms[index]
         value = gain - atom.freedom * float(np.log(rows))
         strength = projected.strength(index)
         out.append(Score(atom, gain, value, projected.amplitudes(index, products), strength))
@@ -149,7 +150,7 @@ def worthless(item: Score, rows: int) -> Score:
 
 def chance_level(projected: Projected, rows: int) -> Array:
     """Largest score over all atoms that noise alone gives, simulated, sorted; (samples,)."""
-    atoms = projected.found.atoms
+    atoms = projected.signatures.atoms
     if not atoms:
         return np.zeros(1)
     price = np.array([atom.freedom * np.log(rows) for atom in atoms])

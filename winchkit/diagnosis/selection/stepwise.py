@@ -30,21 +30,21 @@ _SCORE_LEVEL = 0.99
 
 
 @dataclass(frozen=True)
-class Found:
+class SelectionResult:
     """Where a search ended."""
 
-    begin: Fit
+    initial_model: Fit
     """The model it began with, fitted."""
-    begin_noise: Noise
-    begin_presence: Presence
-    alarmed: bool
+    initial_noise: Noise
+    initial_presence: Presence
+    lack_of_fit_at_start: bool
     """Whether anything beyond noise was there at the start."""
-    reached: Hypothesis
+    last_model: Hypothesis
     """The final model with additions that were dropped since they may only imitate something."""
     final: Fit
     noise: Noise
     presence: Presence
-    still: bool
+    lack_of_fit: bool
     """Whether anything beyond noise is left at the end."""
     scores: tuple[Score, ...]
     """Of all candidates at the start, best first."""
@@ -54,31 +54,33 @@ class Found:
     """Score that noise alone reaches in one case of a hundred."""
 
 
-def search(engine: SelectionEngine) -> Found:
+def search(engine: SelectionEngine) -> SelectionResult:
     """Grow the model while something is missing and an effect holds out of sample."""
-    begin, begin_noise = engine.settle(engine.begin)
-    begin_presence = engine.presence(begin, begin_noise)
-    begin_scores = engine.scores(begin, begin_noise)
-    threshold = _threshold(engine, begin, begin_noise)
-    reached, noise, tried = _grown(engine, begin, begin_noise, begin_scores, threshold)
-    final, noise = _without_the_doubtful(engine, reached, noise)
+    initial_model, initial_noise = engine.settle(engine.initial_model)
+    initial_presence = engine.presence(initial_model, initial_noise)
+    initial_scores = engine.scores(initial_model, initial_noise)
+    threshold = _threshold(engine, initial_model, initial_noise)
+    last_model, noise, tried = _grown(
+        engine, initial_model, initial_noise, initial_scores, threshold
+    )
+    final, noise = _without_the_doubtful(engine, last_model, noise)
     presence = engine.presence(final, noise)
-    grew = len(final.hypothesis.terms) > engine.given
-    alarmed = grew or _missing(begin_presence, begin_scores, threshold)
-    if alarmed and not tried:
-        tried = _fits(_short_list(engine, begin, begin_noise, begin_scores))
-    return Found(
-        begin=begin,
-        begin_noise=begin_noise,
-        begin_presence=begin_presence,
-        alarmed=alarmed,
-        reached=reached.hypothesis,
+    grew = len(final.hypothesis.terms) > engine.n_initial_terms
+    lack_of_fit_at_start = grew or _missing(initial_presence, initial_scores, threshold)
+    if lack_of_fit_at_start and not tried:
+        tried = _fits(_short_list(engine, initial_model, initial_noise, initial_scores))
+    return SelectionResult(
+        initial_model=initial_model,
+        initial_noise=initial_noise,
+        initial_presence=initial_presence,
+        lack_of_fit_at_start=lack_of_fit_at_start,
+        last_model=last_model.hypothesis,
         final=final,
         noise=noise,
         presence=presence,
-        still=_missing(presence, engine.scores(final, noise), threshold),
-        scores=tuple(begin_scores),
-        tried=tried if alarmed else (),
+        lack_of_fit=_missing(presence, engine.scores(final, noise), threshold),
+        scores=tuple(initial_scores),
+        tried=tried if lack_of_fit_at_start else (),
         threshold=threshold,
     )
 
@@ -110,25 +112,27 @@ def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
     return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
 
 
-def without_term(engine: SelectionEngine, found: Found, index: int) -> Found:
+def without_term(engine: SelectionEngine, result: SelectionResult, index: int) -> SelectionResult:
     """The same search as if it had ended without one of its additions."""
-    return _ended(engine, found, found.final.hypothesis.without(index))
+    return _ended(engine, result, result.final.hypothesis.without(index))
 
 
-def with_a_pair(engine: SelectionEngine, found: Found) -> Found | None:
+def with_a_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResult | None:
     """The same search with a pair in the place of its only addition; None where none is better."""
-    if len(found.final.hypothesis.terms) != engine.given + 1:
+    if len(result.final.hypothesis.terms) != engine.n_initial_terms + 1:
         return None
-    better = _exchanged(engine, found.final, found.noise, found.begin)
-    return None if better is None else _ended(engine, found, better.hypothesis)
+    better = _exchanged(engine, result.final, result.noise, result.initial_model)
+    return None if better is None else _ended(engine, result, better.hypothesis)
 
 
-def _ended(engine: SelectionEngine, found: Found, hypothesis: Hypothesis) -> Found:
+def _ended(
+    engine: SelectionEngine, result: SelectionResult, hypothesis: Hypothesis
+) -> SelectionResult:
     """A search as if it had ended with this hypothesis."""
-    present, noise = engine.settle(hypothesis, found.noise)
+    present, noise = engine.settle(hypothesis, result.noise)
     presence = engine.presence(present, noise)
-    still = _missing(presence, engine.scores(present, noise), found.threshold)
-    return replace(found, final=present, noise=noise, presence=presence, still=still)
+    lack_of_fit = _missing(presence, engine.scores(present, noise), result.threshold)
+    return replace(result, final=present, noise=noise, presence=presence, lack_of_fit=lack_of_fit)
 
 
 def _missing(presence: Presence, scores: list[Score], threshold: float) -> bool:
@@ -156,7 +160,7 @@ def _coupled(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
     In exchange for one of the first additions, or to begin with in outputs that no addition acts
     on: pairs upon what is there already would piece together what nobody knows.
     """
-    added = len(present.hypothesis.terms) - engine.given
+    added = len(present.hypothesis.terms) - engine.n_initial_terms
     if not engine.presence(present, noise).p_value < _PRESENCE_LEVEL:
         return None
     better = _exchanged(engine, present, noise, present) if 0 < added <= _EXCHANGED else None
@@ -178,7 +182,7 @@ def _acts_on_what_lacks(engine: SelectionEngine, present: Fit, noise: Noise) -> 
     regression = engine.regression
     rejected = np.flatnonzero(engine.presence(present, noise).rejected).tolist()
     lacking = {regression.bands[band][0] for band in rejected}
-    added = present.hypothesis.terms[engine.given :]
+    added = present.hypothesis.terms[engine.n_initial_terms :]
     return any(regression.outputs_of(term.effect.stage) & lacking for term in added)
 
 
@@ -209,14 +213,14 @@ def _reconsider(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fi
         present = _replaced(engine, _without_the_needless(engine, present, noise), noise)
         present = recoupled(engine, present, noise, 2)
         present = _without_the_needless(engine, present, noise)
-        if present.labels == before or len(present.hypothesis.terms) < engine.given + 2:
+        if present.labels == before or len(present.hypothesis.terms) < engine.n_initial_terms + 2:
             break
     return engine.settle(present.hypothesis, noise)
 
 
 def _replaced(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
     """With every addition replaced by the best of its rivals that fits better."""
-    for index in range(engine.given, len(present.hypothesis.terms)):
+    for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
             break  # A rival stood for two.
         own = present.hypothesis.terms[index]
@@ -250,7 +254,7 @@ def _without_the_doubtful(engine: SelectionEngine, present: Fit, noise: Noise) -
     left = engine.presence(present, noise)
     missing = float(np.sum(np.maximum(left.excess, 0.0)[left.rejected]))
     doubtful = present
-    for index in reversed(range(engine.given, len(present.hypothesis.terms))):
+    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = engine.refit(present.hypothesis.without(index), noise)
         if without.cost - present.cost < missing:
             doubtful = engine.refit(doubtful.hypothesis.without(index), noise)
@@ -258,7 +262,7 @@ def _without_the_doubtful(engine: SelectionEngine, present: Fit, noise: Noise) -
 
 
 def _without_the_needless(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
-    for index in reversed(range(engine.given, len(present.hypothesis.terms))):
+    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = engine.refit(present.hypothesis.without(index), noise)
         if engine.criterion(without) < engine.criterion(present):
             present = without

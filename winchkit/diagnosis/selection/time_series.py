@@ -35,7 +35,7 @@ class TimeSeriesSelection(SelectionEngine):
     ----------
     regression
         The runs and the model.
-    begin
+    initial_model
         Initial model: the profile's own effects.
     candidates
         Effects that may be added.
@@ -44,9 +44,12 @@ class TimeSeriesSelection(SelectionEngine):
     regression: TimeSeriesRegression
 
     def __init__(
-        self, regression: TimeSeriesRegression, begin: Hypothesis, candidates: Iterable[Effect]
+        self,
+        regression: TimeSeriesRegression,
+        initial_model: Hypothesis,
+        candidates: Iterable[Effect],
     ) -> None:
-        super().__init__(regression, begin, candidates)
+        super().__init__(regression, initial_model, candidates)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Noise from the contrasts of repeats; without repeats from the saturated model."""

@@ -14,7 +14,7 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.residuals.error_statistics import Skirt
 from winchkit.diagnosis.results import OutputFit, Verdict
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.stepwise import Found
+from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.selection.weighting import weighed
 from winchkit.model.stages import OUTPUT_UNITS
 
@@ -38,37 +38,39 @@ class Judgement:
     share: float
     """Of the excess over the noise, what is left unexplained."""
     outputs: Mapping[str, OutputFit]
-    shown: Found
+    shown: SelectionResult
     """What was found, without the additions that may not be named."""
     notes: tuple[str, ...]
 
 
-def judge(engine: SelectionEngine, found: Found) -> Judgement:
+def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     """Decide the verdict; while more than a trace is unexplained no addition is named.
 
     A name would be a guess then: something outside the catalogue is often imitated by an effect
     inside it. The candidates stay, and a note says what came closest.
     """
-    share = _unexplained(engine, found)
-    folds = _folds(engine, found)
+    share = _unexplained(engine, result)
+    folds = _folds(engine, result)
     outputs = output_fits(
-        engine, (found.begin, found.begin_noise), (found.final, found.noise), folds
+        engine, (result.initial_model, result.initial_noise), (result.final, result.noise), folds
     )
-    verdict = _verdict(found, outputs, share)
-    added = found.final.labels[engine.given :]
+    verdict = _verdict(result, outputs, share)
+    added = result.final.labels[engine.n_initial_terms :]
     # Nothing but the effect itself explains nearly all of what is far above the noise.
-    nearly = share < _TRACE and found.noise.from_repeats
+    nearly = share < _TRACE and result.noise.from_repeats
     if verdict == "explained" or nearly or not added:
-        return Judgement(verdict, share, outputs, found, ())
+        return Judgement(verdict, share, outputs, result, ())
     note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
-    return withheld(engine, found, share, note)
+    return withheld(engine, result, share, note)
 
 
-def withheld(engine: SelectionEngine, found: Found, share: float, note: str) -> Judgement:
+def withheld(
+    engine: SelectionEngine, result: SelectionResult, share: float, note: str
+) -> Judgement:
     """The judgement that names nothing, though something was found; with the reason in words."""
     verdict: Verdict = "unknown" if share > _HALF else "partly"
-    shown = replace(found, final=found.begin, noise=found.begin_noise)
-    before = (found.begin, found.begin_noise)
+    shown = replace(result, final=result.initial_model, noise=result.initial_noise)
+    before = (result.initial_model, result.initial_noise)
     return Judgement(verdict, share, output_fits(engine, before, before), shown, (note,))
 
 
@@ -78,7 +80,7 @@ def by_best_weights(engine: SelectionEngine, judgement: Judgement) -> Judgement:
     best = weighed(engine, shown.final, shown.noise)
     if best.fit is shown.final:
         return judgement
-    before, after = (shown.begin, shown.begin_noise), (best.fit, best.noise)
+    before, after = (shown.initial_model, shown.initial_noise), (best.fit, best.noise)
     outputs = output_fits(engine, before, after, _folds(engine, shown))
     return replace(
         judgement,
@@ -88,46 +90,48 @@ def by_best_weights(engine: SelectionEngine, judgement: Judgement) -> Judgement:
     )
 
 
-def _unexplained(engine: SelectionEngine, found: Found) -> float:
+def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     """Share of the excess over the noise that the final model leaves, in sample or held out."""
-    if not found.alarmed:
+    if not result.lack_of_fit_at_start:
         return 0.0
-    folds = _folds(engine, found)
+    folds = _folds(engine, result)
     held = [
-        held_out_rms(engine.regression, fitted, found.noise, folds)
-        for fitted in (found.begin, found.final)
+        held_out_rms(engine.regression, fitted, result.noise, folds)
+        for fitted in (result.initial_model, result.final)
     ]
     # Where the bands hold nothing more, what an output is over its noise may be chance.
-    chance = {} if found.still else found.noise.uncertainty(engine.regression)
+    chance = {} if result.lack_of_fit else result.noise.uncertainty(engine.regression)
     squares = [
         sum(
             max(0.0, (rms[o] / noise) ** 2 - 1 - chance.get(o, 0.0))
-            for o, noise in found.noise.rms.items()
+            for o, noise in result.noise.rms.items()
         )
         for rms in held
     ]
     left = squares[1] / squares[0] if squares[0] > 0 else 0.0
-    if found.noise.from_repeats:
+    if result.noise.from_repeats:
         # Both in units of the final noise, so that a re-estimated noise does not shift the share.
-        scale = found.begin_noise.power / found.noise.power
-        before = float(np.sum(np.maximum(found.begin_presence.excess * scale, 0.0)))
-        after = float(np.sum(np.maximum(found.presence.excess, 0.0)[found.presence.rejected]))
+        scale = result.initial_noise.power / result.noise.power
+        before = float(np.sum(np.maximum(result.initial_presence.excess * scale, 0.0)))
+        after = float(np.sum(np.maximum(result.presence.excess, 0.0)[result.presence.rejected]))
         left = max(left if left > _GENERALISES else 0.0, after / before if before > 0 else 0.0)
     return min(1.0, left)
 
 
-def _folds(engine: SelectionEngine, found: Found) -> Folds:
+def _folds(engine: SelectionEngine, result: SelectionResult) -> Folds:
     """Whole groups while something is left: an imitation fails there. Else what tells."""
-    return engine.regression.groups if found.still else engine.folds(found.final, found.noise)
+    return (
+        engine.regression.groups if result.lack_of_fit else engine.folds(result.final, result.noise)
+    )
 
 
-def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
-    if not found.alarmed:
+def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
+    if not result.lack_of_fit_at_start:
         return "adequate"
-    grown = len(found.final.hypothesis.terms) > len(found.begin.hypothesis.terms)
+    grown = len(result.final.hypothesis.terms) > len(result.initial_model.hypothesis.terms)
     if not grown or share > _HALF:
         return "unknown"
-    if not found.still or not found.noise.from_repeats:
+    if not result.lack_of_fit or not result.noise.from_repeats:
         return "explained" if share < _GENERALISES else "partly"
     # A trace below the noise, such as a load that bounces on its rope, is told but changes nothing.
     over = max(
@@ -135,24 +139,24 @@ def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Ve
         for fitted in outputs.values()
     )
     # What imitates something unknown leaves as much; where the trace is certain it must be small.
-    trace = _DOUBTFUL_TRACE if found.presence.p_value > _DOUBTFUL else _TRACE
+    trace = _DOUBTFUL_TRACE if result.presence.p_value > _DOUBTFUL else _TRACE
     allowed = trace if over < _AT_NOISE else _NEGLIGIBLE if over < _NEAR_NOISE else 0.0
     return "explained" if share < allowed else "partly"
 
 
 def output_fits(
     engine: SelectionEngine,
-    begin: tuple[Fit, Noise],
+    initial_model: tuple[Fit, Noise],
     final: tuple[Fit, Noise],
     folds: Folds | None = None,
 ) -> dict[str, OutputFit]:
     """Every output before and after, in sample and held out, beside its noise."""
     regression, folds = engine.regression, folds or engine.folds(*final)
-    before, after = _rms(regression, begin[0]), _rms(regression, final[0])
-    held_before = held_out_rms(regression, *begin, folds)
+    before, after = _rms(regression, initial_model[0]), _rms(regression, final[0])
+    held_before = held_out_rms(regression, *initial_model, folds)
     held_after = held_out_rms(regression, *final, folds)
     noise, skirt = final[1], Skirt(regression)
-    beyond = skirt.residual(begin[0].hypothesis), skirt.residual(final[0].hypothesis)
+    beyond = skirt.residual(initial_model[0].hypothesis), skirt.residual(final[0].hypothesis)
     noise_beyond = skirt.noise(final[0].hypothesis)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {

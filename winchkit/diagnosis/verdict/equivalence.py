@@ -208,7 +208,7 @@ def _flip_chance(worse: Array) -> float:
 def _angle(projected: Projected, first: str, second: str) -> float:
     """Smallest angle between the whitened, projected signatures of two effects, rad."""
     best = 0.0
-    atoms = projected.found.atoms
+    atoms = projected.signatures.atoms
     for a in (atom for atom in atoms if atom.effect.id == first):
         for b in (atom for atom in atoms if atom.effect.id == second):
             best = max(best, _cosine(projected.inner, a.columns, b.columns))

@@ -12,7 +12,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.noise import orthonormal
 from winchkit.diagnosis.regression.projection import gain
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.selection.stepwise import Found, with_a_pair, without_term
+from winchkit.diagnosis.selection.stepwise import SelectionResult, with_a_pair, without_term
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.decision import Judgement, judge, withheld
 from winchkit.diagnosis.verdict.spline_alternatives import Columns, curves
@@ -111,56 +111,56 @@ _SLIGHT_OF_MORE = 2e-4
 """The same where more is certainly missing."""
 
 
-def judge_and_doubt(engine: TimeSeriesSelection, found: Found) -> Judgement:
+def judge_and_doubt(engine: TimeSeriesSelection, result: SelectionResult) -> Judgement:
     """The judgement of what was found, less the names that a nameless curve beats.
 
     All additions are doubted together, then each beside the others. One that is beaten is
     dropped, or gives way to a pair; where too much is then left, nothing is named. Without
     repeats something unknown is always left, and a doubt of one addition is told only.
     """
-    judgement = judge(engine, found)
-    doubt = Doubt(engine, found)
-    if judgement.shown is not found or not doubt.added:
+    judgement = judge(engine, result)
+    doubt = Doubt(engine, result)
+    if judgement.shown is not result or not doubt.added:
         return judgement
     terms = doubt.terms
     if curve := doubt.beaten(doubt.added):
-        pair = with_a_pair(engine, found)
+        pair = with_a_pair(engine, result)
         if pair is not None:
             return judge_and_doubt(engine, pair)
-        return withheld(engine, found, 1.0, _words(terms, terms, curve))
+        return withheld(engine, result, 1.0, _words(terms, terms, curve))
     for index in reversed(doubt.added) if len(terms) > 1 else ():
         curve = doubt.beaten([index])
-        if curve and found.noise.from_repeats:
+        if curve and result.noise.from_repeats:
             return _less(doubt, index, curve)
         if curve:
-            note = f"{_over(curve)} would explain more than {terms[index - engine.given].label}"
+            note = f"{_over(curve)} would explain more than {terms[index - engine.n_initial_terms].label}"
             judgement = replace(judgement, notes=(*judgement.notes, note))
     return judgement
 
 
 def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
     """The judgement without a beaten addition, or without any name where it is needed."""
-    engine, found = doubt.engine, doubt.found
-    doubted = found.final.hypothesis.terms[index : index + 1]
-    without = judge_and_doubt(engine, without_term(engine, found, index))
-    if without.shown.final.labels[engine.given :]:
+    engine, result = doubt.engine, doubt.result
+    doubted = result.final.hypothesis.terms[index : index + 1]
+    without = judge_and_doubt(engine, without_term(engine, result, index))
+    if without.shown.final.labels[engine.n_initial_terms :]:
         return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
     share = doubt.taken([index]) / doubt.taken(doubt.added)
-    return withheld(engine, found, min(1.0, share), _words(doubt.terms, doubted, curve))
+    return withheld(engine, result, min(1.0, share), _words(doubt.terms, doubted, curve))
 
 
 class Doubt:
     """What a search found, and what is left of the data without some of it."""
 
-    def __init__(self, engine: TimeSeriesSelection, found: Found) -> None:
+    def __init__(self, engine: TimeSeriesSelection, result: SelectionResult) -> None:
         self.engine = engine
-        self.found = found
-        self.added = range(engine.given, len(found.final.hypothesis.terms))
-        self.terms = found.final.hypothesis.terms[engine.given :]
+        self.result = result
+        self.added = range(engine.n_initial_terms, len(result.final.hypothesis.terms))
+        self.terms = result.final.hypothesis.terms[engine.n_initial_terms :]
 
     @cached_property
     def _rounding(self) -> Array:
-        return self.engine.regression.discretization_error(self.found.final.hypothesis)[:, None]
+        return self.engine.regression.discretization_error(self.result.final.hypothesis)[:, None]
 
     def beside(self, indices: Sequence[int], *, rounding: bool = True) -> Beside:
         """What is left without some terms, the others free about where they are.
@@ -168,7 +168,7 @@ class Doubt:
         Not fitted anew: a lag that stands in for a lost friction is far from where both are right.
         With ``rounding`` what sampling may have rounded is free as well.
         """
-        regression, final = self.engine.regression, self.found.final
+        regression, final = self.engine.regression, self.result.final
         hypothesis = final.hypothesis
         others, own = hypothesis, np.zeros(len(final.vector), dtype=bool)
         for index in sorted(indices, reverse=True):
@@ -177,7 +177,7 @@ class Doubt:
         lost = regression.change(hypothesis) - regression.change(others) if indices else 0.0
         free = final.jacobian[:, ~own]
         free = np.hstack([free, self._rounding]) if rounding else free
-        return Beside(final.residual + lost, free, self.found.noise.weight(regression))
+        return Beside(final.residual + lost, free, self.result.noise.weight(regression))
 
     def taken(self, indices: Sequence[int]) -> float:
         """Whitened squares that terms take beside the others."""
@@ -191,7 +191,7 @@ class Doubt:
         return self._beaten(indices, rounding=True)
 
     def _beaten(self, indices: Sequence[int], *, rounding: bool) -> Curve | None:
-        engine, hypothesis = self.engine, self.found.final.hypothesis
+        engine, hypothesis = self.engine, self.result.final.hypothesis
         effects = [hypothesis.terms[index].effect for index in indices]
         beside = self.beside(indices, rounding=rounding)
         taken = beside.cost - self.beside((), rounding=rounding).cost
@@ -200,7 +200,7 @@ class Doubt:
         outputs = sorted({output for effect in effects for output in effect.outputs})
         curve = best_curve(engine.regression, beside, outputs, engine.price)
         # What is certainly there is no chance deviation of the right formula.
-        slight = _SLIGHT_OF_MORE if self.found.still else _SLIGHT
+        slight = _SLIGHT_OF_MORE if self.result.lack_of_fit else _SLIGHT
         margin = engine.price + slight * taken
         return curve if curve and curve.pays > pays + margin else None
 

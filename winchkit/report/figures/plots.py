@@ -138,15 +138,15 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves) -> Plot:
     recordings = regression.dataset.recordings
     share = max(2, _POINTS // len(curves.runs))
     parts: list[tuple[Array, list[Array]]] = []
-    marks, begin = [], 0.0
+    marks, initial_model = [], 0.0
     for position, run in enumerate(curves.runs):
         time = recordings[run].signals.time - recordings[run].signals.time[0]
-        marks.append({"at": _number(begin), "name": recordings[run].name})
+        marks.append({"at": _number(initial_model), "name": recordings[run].name})
         lines = [curves.before[position]]
         if curves.after is not None:
             lines.append(curves.after[position])
-        parts.append(thin(begin + time, lines, share))
-        begin += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
+        parts.append(thin(initial_model + time, lines, share))
+        initial_model += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
     x = np.concatenate([part[0] for part in parts])
     lines = [np.concatenate([part[1][i] for part in parts]) for i in range(len(parts[0][1]))]
     name = OUTPUT_NAMES.get(curves.output, curves.output)

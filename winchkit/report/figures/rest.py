@@ -31,7 +31,7 @@ def rest_of(answer: Answer, where: Where) -> tuple[Array, Array]:
         trace = trace_over(regression, over, errors)
         return trace.means(trace.before)
     assert isinstance(answer, WinchAnswer)
-    curve = curve_of(answer.engine.regression, answer.found.final.residual, over)
+    curve = curve_of(answer.engine.regression, answer.result.final.residual, over)
     return curve.x, curve.mean
 
 

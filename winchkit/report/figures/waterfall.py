@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.stepwise import Found
+from winchkit.diagnosis.selection.stepwise import SelectionResult
 
 __all__ = ["GEOMETRY_NAME", "Waterfall", "waterfall_of"]
 
@@ -33,12 +33,12 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
     diagnosis, engine, filed = answer.diagnosis, answer.engine, answer.filed
     if not diagnosis.steps:
         return None
-    whole = answer.found.final.hypothesis
-    added = tuple(range(engine.given, len(whole.terms)))
+    whole = answer.result.final.hypothesis
+    added = tuple(range(engine.n_initial_terms, len(whole.terms)))
     names = [whole.terms[index].label for index in added]
     before = {o: fit.heldout_rms_before for o, fit in diagnosis.outputs.items()}
     after = {o: fit.heldout_rms_after for o, fit in diagnosis.outputs.items()}
-    ladder = _Ladder(engine, answer.found, {added: after})
+    ladder = _Ladder(engine, answer.result, {added: after})
     rungs: list[tuple[str, Mapping[str, float]]] = [("profile as it is", before)]
     first: dict[str, Mapping[str, float]] = {}
     last: dict[str, Mapping[str, float]] = {}
@@ -46,7 +46,7 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
         ladder.known[()] = before
         plain = ladder
     else:
-        plain = _Ladder(filed, answer.found, {(): before})
+        plain = _Ladder(filed, answer.result, {(): before})
         rungs.append((f"+ {GEOMETRY_NAME}", ladder.error()))
         first[GEOMETRY_NAME], last[GEOMETRY_NAME] = ladder.error(), plain.error(*added)
     rungs += [(f"+ {name}", ladder.error(*added[: n + 1])) for n, name in enumerate(names)]
@@ -61,16 +61,16 @@ class _Ladder:
     """Held-out errors of one inquiry's model with some of the terms found."""
 
     engine: SelectionEngine
-    found: Found
+    result: SelectionResult
     known: dict[tuple[int, ...], Mapping[str, float]]
 
     def error(self, *terms: int) -> Mapping[str, float]:
         """With what the profile has and these additions, refitted."""
         if terms not in self.known:
-            engine, noise = self.engine, self.found.noise
-            kept = _only(self.found.final.hypothesis, (*range(engine.given), *terms))
+            engine, noise = self.engine, self.result.noise
+            kept = _only(self.result.final.hypothesis, (*range(engine.n_initial_terms), *terms))
             fitted = engine.refit(kept, noise)
-            folds = engine.folds(self.found.final, noise)
+            folds = engine.folds(self.result.final, noise)
             self.known[terms] = engine.held_out_errors(fitted, noise, folds)
         return self.known[terms]
 

@@ -46,10 +46,10 @@ def report_html(
 
 def residuals_of(answer: WinchAnswer) -> Residuals:
     """What the page of a diagnosis draws; an ``after`` only where something was named."""
-    diagnosis, found = answer.diagnosis, answer.found
+    diagnosis, found = answer.diagnosis, answer.result
     return Residuals(
         answer.engine.regression,
-        found.begin.residual,
+        found.initial_model.residual,
         found.final.residual if diagnosis.steps else None,
         {name: output.noise_rms for name, output in diagnosis.outputs.items()},
     )
@@ -73,7 +73,9 @@ def addition_html(
 ) -> str:
     """The page of an addition; ``better`` is the profile that was written, the rest as above."""
     noise = {name: output.noise_rms for name, output in grown.addition.outputs.items()}
-    residuals = Residuals(grown.regression, grown.begin.residual, grown.final.residual, noise)
+    residuals = Residuals(
+        grown.regression, grown.initial_model.residual, grown.final.residual, noise
+    )
     plots = plots_of(residuals)
     figures = _figures(residuals, plots, moved_outputs(grown.addition.outputs))
     command = Command(grown.regression.dataset, profile, options)
