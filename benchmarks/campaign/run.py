@@ -38,7 +38,7 @@ def answer(case: Case) -> Score:
         # A refusal of good files is an answer too, a wrong one.
         return refused(case, str(error), time.perf_counter() - begun)
     seconds = time.perf_counter() - begun
-    p_value = answer.result.presence.p_value
+    p_value = answer.result.lack_of_fit_test.p_value
     return score(case, answer.diagnosis.to_json(), p_value, seconds)
 
 

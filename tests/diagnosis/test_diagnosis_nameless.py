@@ -139,8 +139,8 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
     for added in (term("motor-coulomb", torque=0.05), term("gear-ratio", ratio_error=1e-5)):
         hypothesis = hypothesis.with_term(added, engine.regression.n_runs)
     final, noise = engine.settle(hypothesis, noise)
-    presence = engine.presence(final, noise)
-    begun = engine.presence(initial_model, noise)
+    lack_of_fit_test = engine.lack_of_fit_test(final, noise)
+    begun = engine.lack_of_fit_test(initial_model, noise)
     result = SelectionResult(
         initial_model,
         noise,
@@ -149,7 +149,7 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
         final.hypothesis,
         final,
         noise,
-        presence,
+        lack_of_fit_test,
         False,
         (),
         (),

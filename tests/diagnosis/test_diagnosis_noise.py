@@ -12,13 +12,8 @@ from scipy.stats import kstest
 
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import (
-    Noise,
-    Presence,
-    noise_from_repeats,
-    noise_saturated,
-    presence,
-)
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 
 RIDE = Ride(samples=300)
@@ -51,9 +46,9 @@ def estimated(regression: TimeSeriesRegression, known: Array | None = None) -> N
     )
 
 
-def judged(regression: TimeSeriesRegression) -> tuple[Presence, Noise]:
+def judged(regression: TimeSeriesRegression) -> tuple[LackOfFitTest, Noise]:
     found, noise = fitted(regression), estimated(regression)
-    return presence(regression, found.residual, found.jacobian, noise), noise
+    return lack_of_fit_test(regression, found.residual, found.jacobian, noise), noise
 
 
 def power_in_bands(regression: TimeSeriesRegression, of_row: Array) -> Array:
@@ -130,7 +125,7 @@ def test_a_wave_that_repeats_is_there_and_where_it_is(frequency: float) -> None:
     regression = length_problem(runs, RIDE)
     found, noise = judged(regression)
     assert found.p_value < 1e-3
-    loudest = int(np.argmax(found.excess))
+    loudest = int(np.argmax(found.excess_power))
     assert found.rejected[loudest]
     for band in np.flatnonzero(found.rejected):
         _, low, high = regression.bands[band]
@@ -195,7 +190,7 @@ def test_without_repeats_noise_is_what_no_effect_explains() -> None:
     noise = noise_saturated(regression, residual, columns)
     assert not noise.from_repeats
     assert noise.rms["cable_length"] == pytest.approx(SIZE, rel=0.06)
-    quiet = presence(regression, residual, columns, noise)
+    quiet = lack_of_fit_test(regression, residual, columns, noise)
     assert np.isnan(quiet.p_value)
     assert not quiet.rejected.any()
 

@@ -22,7 +22,7 @@ from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Compared", "begin_hypothesis", "compare", "compared"]
+__all__ = ["Compared", "compare", "compared", "initial_hypothesis"]
 
 
 @dataclass(frozen=True)

@@ -266,16 +266,16 @@ def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[W
 
     The rest beside what came closest; where that left nothing, yet may not be named, all of it.
     """
-    fitted, presence = result.final, result.presence
+    fitted, lack_of_fit_test = result.final, result.lack_of_fit_test
     if not result.lack_of_fit:
-        fitted, presence = result.initial_model, result.initial_presence
+        fitted, lack_of_fit_test = result.initial_model, result.initial_lack_of_fit_test
     places = [*harmonics(regression, fitted.residual), *follows(regression, fitted.residual)]
     out = [Where(f.output, f.variable, f.share, f.order) for f in places]
-    excess = presence.excess
-    if excess.size and excess.max() > 0:
-        loudest = int(np.argmax(excess))
+    excess_power = lack_of_fit_test.excess_power
+    if excess_power.size and excess_power.max() > 0:
+        loudest = int(np.argmax(excess_power))
         output, low, high = regression.bands[loudest]
         middle = low if not np.isfinite(high) else (low + high) / 2
-        share = float(excess[loudest] / np.sum(np.maximum(excess, 0)))
+        share = float(excess_power[loudest] / np.sum(np.maximum(excess_power, 0)))
         out.append(Where(output, "time", share, frequency=middle))
     return tuple(sorted(out, key=lambda w: -w.share)[:_WHERE])

@@ -104,7 +104,7 @@ def _tell_each(
         each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, told=told)
         for name, answer in each:
             found[name], said[name] = answer.diagnosis, _said(answer, as_json)
-            present[name] = answer.result.presence.p_value
+            present[name] = answer.result.lack_of_fit_test.p_value
             if html:
                 own = _page(answer, f"{title}, {name}", replace(asked, winch=name))
                 save_page(str(Path(html).with_name(pages[name])), own)

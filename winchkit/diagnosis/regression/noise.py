@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
-from scipy.stats import f as f_distribution
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
@@ -21,12 +20,12 @@ from winchkit.diagnosis.regression.base import Regression
 
 __all__ = [
     "Noise",
-    "Presence",
     "noise_from_repeats",
     "noise_saturated",
     "orthonormal",
-    "presence",
+    "replicate_contrasts",
     "replicate_rms",
+    "sums_per_band",
 ]
 
 _KNOWN_DIFFERENCES = 6
@@ -56,7 +55,7 @@ class Noise:
 
         Coloured noise has few independent values: most of its power is in its lowest bands.
         """
-        rows = _sums(np.ones(regression.n_rows), regression.band_of_row, len(self.power))
+        rows = sums_per_band(np.ones(regression.n_rows), regression.band_of_row, len(self.power))
         total, spread = self.power * rows, (self.power * rows) ** 2
         out = {}
         for output in self.rms:
@@ -67,19 +66,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class Presence:
-    """Whether the residual holds more than noise, and in which bands."""
-
-    p_value: float
-    """After Bonferroni over all bands; NaN without repeats."""
-    excess: Array
-    """Power beyond the noise, in units of one coefficient's noise power, (bands,)."""
-    rejected: NDArray[np.bool_]
-    """Bands in which noise alone is refused at 5 % over all."""
-
-
-@dataclass(frozen=True)
-class _Split:
+class ReplicateContrasts:
     """One vector over all repeats: differences and means with their bands."""
 
     difference: Array
@@ -97,9 +84,9 @@ def noise_from_repeats(
     projected out where they are noticeable. ``own`` (rows, m) are derivatives by unknowns that
     each run has for itself: as much of a difference as they may have taken is no noise's lack.
     """
-    split = _split(regression, residual)
+    split = replicate_contrasts(regression, residual)
     count = len(regression.bands)
-    freedom = _sums(np.ones_like(split.difference), split.difference_band, count)
+    freedom = sums_per_band(np.ones_like(split.difference), split.difference_band, count)
     power = _power(regression, split.difference, split.difference_band, freedom)
     whole = freedom
     taken = _differences(regression, own)
@@ -112,7 +99,7 @@ def noise_from_repeats(
             basis = orthonormal(np.hstack([basis, taken * weight[:, None]]))
         whitened = split.difference * weight
         left = (whitened - basis @ (basis.T @ whitened)) / weight
-        freedom = whole - _sums(np.sum(basis**2, axis=1), split.difference_band, count)
+        freedom = whole - sums_per_band(np.sum(basis**2, axis=1), split.difference_band, count)
         power = _power(regression, left, split.difference_band, np.maximum(freedom, 1.0))
     power, freedom = _smooth(regression, power, np.maximum(freedom, 0.1))
     return Noise(power, freedom, _rms(regression, power), from_repeats=True)
@@ -127,36 +114,16 @@ def noise_saturated(regression: Regression, residual: Array, columns: Array) -> 
     """
     count = len(regression.bands)
     bands = regression.band_of_row
-    total = _sums(np.ones(regression.n_rows), bands, count)
+    total = sums_per_band(np.ones(regression.n_rows), bands, count)
     power = _even(regression, residual)
     for _ in range(_REWEIGHTED):
         weight = 1 / np.sqrt(power[bands])
         basis = orthonormal(columns * weight[:, None], _fewest_rows(regression) // _ROWS_EACH)
         whitened = residual * weight
         left = (whitened - basis @ (basis.T @ whitened)) / weight
-        freedom = np.maximum(total - _sums(np.sum(basis**2, axis=1), bands, count), 1.0)
+        freedom = np.maximum(total - sums_per_band(np.sum(basis**2, axis=1), bands, count), 1.0)
         power = _power(regression, left, bands, freedom)
     return Noise(power, freedom, _rms(regression, power), from_repeats=False)
-
-
-def presence(regression: Regression, residual: Array, jacobian: Array, noise: Noise) -> Presence:
-    """F test of the repeats' mean against the noise, band by band."""
-    count = len(regression.bands)
-    if not noise.from_repeats:
-        nothing = np.zeros(count)
-        return Presence(float("nan"), nothing, nothing.astype(bool))
-    split = _split(regression, residual)
-    total = _sums(split.mean**2, split.mean_band, count)
-    freedom = _sums(np.ones_like(split.mean), split.mean_band, count)
-    basis = orthonormal(jacobian * noise.weight(regression)[:, None])
-    # Each fitted unknown takes one degree of freedom from where it has leverage.
-    taken = _sums(np.sum(basis**2, axis=1), regression.band_of_row, count)
-    freedom = np.maximum(freedom - taken, 1.0)
-    ratio = total / freedom / noise.power
-    p = np.asarray(f_distribution.sf(ratio, freedom, noise.freedom))
-    tested = max(count, 1)
-    worst = float(min(1.0, p.min() * tested)) if count else 1.0
-    return Presence(worst, total / noise.power - freedom, p * tested < 0.05)
 
 
 def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
@@ -177,7 +144,7 @@ def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
     return {o: float(np.sqrt(np.mean(np.concatenate(parts)))) for o, parts in squares.items()}
 
 
-def _split(regression: Regression, rows: Array) -> _Split:
+def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContrasts:
     """Differences and means of repeats, transformed anew on their common samples."""
     times = dict(
         zip(((s.run, s.output) for s in regression.segments), regression.in_time(rows), strict=True)
@@ -207,7 +174,7 @@ def _split(regression: Regression, rows: Array) -> _Split:
             bands[0].append(np.tile(ids, len(spectra)))
             parts[1].append(np.asarray(dct(mean, type=2, norm="ortho"))[kept])
             bands[1].append(ids)
-    return _Split(
+    return ReplicateContrasts(
         np.concatenate(parts[0]),
         np.concatenate(bands[0]),
         np.concatenate(parts[1]),
@@ -229,14 +196,14 @@ def _differences(regression: Regression, columns: Array | None) -> Array:
     """What of columns differs between repeats, (differences, m)."""
     if columns is None or not columns.size:
         return np.zeros((0, 0))
-    return np.array([_split(regression, column).difference for column in columns.T]).T
+    return np.array([replicate_contrasts(regression, column).difference for column in columns.T]).T
 
 
 def _noticeable(regression: Regression, known: Array, weight: Array) -> Array:
     """Orthonormal directions in which known signatures differ between repeats."""
     different = []
     for column in known.T:
-        split = _split(regression, column)
+        split = replicate_contrasts(regression, column)
         whitened = split.difference * weight
         mean = split.mean / np.sqrt(_nearest(weight, split))
         if whitened @ whitened > _NOTICEABLE * float(mean @ mean):
@@ -247,7 +214,7 @@ def _noticeable(regression: Regression, known: Array, weight: Array) -> Array:
     return np.asarray(left[:, :_KNOWN_DIFFERENCES][:, size[:_KNOWN_DIFFERENCES] > 0.1])
 
 
-def _nearest(weight: Array, split: _Split) -> Array:
+def _nearest(weight: Array, split: ReplicateContrasts) -> Array:
     """Noise power of the mean's rows, from that of the differences' bands."""
     count = int(max(split.mean_band.max(), split.difference_band.max())) + 1
     power = np.ones(count)
@@ -280,7 +247,8 @@ def orthonormal(columns: Array, most: int | None = None) -> Array:
     return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
 
 
-def _sums(values: Array, bands: NDArray[np.intp], count: int) -> Array:
+def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
+    """Sums of values per noise band, shape (count,)."""
     return np.asarray(np.bincount(bands, weights=values, minlength=count))
 
 
@@ -305,7 +273,7 @@ def _even(regression: Regression, residual: Array) -> Array:
 
 def _power(regression: Regression, values: Array, bands: NDArray[np.intp], freedom: Array) -> Array:
     """Mean square per band; noise-free data get a floor far below what instruments resolve."""
-    power = _sums(values**2, bands, len(freedom)) / np.maximum(freedom, 1.0)
+    power = sums_per_band(values**2, bands, len(freedom)) / np.maximum(freedom, 1.0)
     return np.maximum(power, regression.power_floor)
 
 

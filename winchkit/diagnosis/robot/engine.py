@@ -11,7 +11,8 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise, Presence
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
+from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.robot.errors import Shown, held_out_rms
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
@@ -67,13 +68,13 @@ class PoseSelection(SelectionEngine):
         """Groups of poses: every unknown is common to all of them."""
         return self.regression.groups
 
-    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> Presence:
+    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
         """F test of the residual sum of squares against the variance from repeated poses."""
         regression = self.regression
         count = len(regression.bands)
         if not noise.from_repeats:
             nothing = np.zeros(count)
-            return Presence(float("nan"), nothing, nothing.astype(bool))
+            return LackOfFitTest(float("nan"), nothing, nothing.astype(bool))
         bands, real = regression.band_of_row, regression.pose_of_row >= 0
         left, _ = np.linalg.qr(_independent(present.jacobian))
         taken = np.bincount(bands[real], np.sum(left**2, axis=1)[real], count)
@@ -81,7 +82,7 @@ class PoseSelection(SelectionEngine):
         freedom = np.maximum(np.bincount(bands[real], minlength=count) - taken, 1.0)
         p = np.asarray(f_distribution.sf(total / freedom, freedom, noise.freedom))
         worst = float(min(1.0, p.min() * count))
-        return Presence(worst, total - freedom, p * count < 0.05)
+        return LackOfFitTest(worst, total - freedom, p * count < 0.05)
 
 
 def _independent(columns: Array) -> Array:

@@ -19,7 +19,8 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.gls import Fit, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise, Presence
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
+from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.initial_states import rests_on_states
 from winchkit.diagnosis.selection.pairs import Couple, couples
 from winchkit.diagnosis.selection.scores import Projected, Score, score, worthless
@@ -138,7 +139,7 @@ class SelectionEngine(ABC):
         self.n_initial_terms = len(initial_model.terms)
         self._candidates = tuple(candidates)
         self._last_folds: Last[Folds] = Last()
-        self._last_presence: Last[Presence] = Last()
+        self._last_lack_of_fit_test: Last[LackOfFitTest] = Last()
         self._last_projected: Last[Projected] = Last()
         self.signatures = self._signatures(initial_model)
 
@@ -165,16 +166,16 @@ class SelectionEngine(ABC):
         """Folds for leave-group-out cross-validation of a fit."""
 
     @abstractmethod
-    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> Presence:
+    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
         """F test of the residual against the noise, band by band."""
 
     def folds(self, fitted: Fit, noise: Noise) -> Folds:
         """Folds for leave-group-out cross-validation of a fit; the last answer is kept."""
         return self._last_folds.of(fitted, noise, lambda: self._choose_folds(fitted, noise))
 
-    def presence(self, present: Fit, noise: Noise) -> Presence:
+    def lack_of_fit_test(self, present: Fit, noise: Noise) -> LackOfFitTest:
         """Lack-of-fit test of a fit; the last answer is kept."""
-        return self._last_presence.of(
+        return self._last_lack_of_fit_test.of(
             present, noise, lambda: self._test_lack_of_fit(present, noise)
         )
 

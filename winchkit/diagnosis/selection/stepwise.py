@@ -8,7 +8,8 @@ import numpy as np
 
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise, Presence
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
+from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.acceptance import BETTER, best_that_holds, holds
 from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.diagnosis.selection.exchange import recoupled
@@ -16,7 +17,7 @@ from winchkit.diagnosis.selection.scores import Score, chance_level
 from winchkit.diagnosis.selection.starting_values import elsewhere
 from winchkit.effects.term import Term
 
-__all__ = ["Found", "search", "with_a_pair", "without_term"]
+__all__ = ["SelectionResult", "search", "with_a_pair", "without_term"]
 
 _MOST_STEPS = 6
 _SHORT_LIST = 5
@@ -25,7 +26,7 @@ _RECONSIDERED = 3
 _EXCHANGED = 2
 """Additions of which one may be exchanged for a pair."""
 _COUPLES = 3
-_PRESENCE_LEVEL = 0.02
+_LACK_OF_FIT_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
 
 
@@ -36,14 +37,14 @@ class SelectionResult:
     initial_model: Fit
     """The model it began with, fitted."""
     initial_noise: Noise
-    initial_presence: Presence
+    initial_lack_of_fit_test: LackOfFitTest
     lack_of_fit_at_start: bool
     """Whether anything beyond noise was there at the start."""
     last_model: Hypothesis
     """The final model with additions that were dropped since they may only imitate something."""
     final: Fit
     noise: Noise
-    presence: Presence
+    lack_of_fit_test: LackOfFitTest
     lack_of_fit: bool
     """Whether anything beyond noise is left at the end."""
     scores: tuple[Score, ...]
@@ -57,28 +58,30 @@ class SelectionResult:
 def search(engine: SelectionEngine) -> SelectionResult:
     """Grow the model while something is missing and an effect holds out of sample."""
     initial_model, initial_noise = engine.settle(engine.initial_model)
-    initial_presence = engine.presence(initial_model, initial_noise)
+    initial_lack_of_fit_test = engine.lack_of_fit_test(initial_model, initial_noise)
     initial_scores = engine.scores(initial_model, initial_noise)
     threshold = _threshold(engine, initial_model, initial_noise)
     last_model, noise, tried = _grown(
         engine, initial_model, initial_noise, initial_scores, threshold
     )
     final, noise = _without_the_doubtful(engine, last_model, noise)
-    presence = engine.presence(final, noise)
+    lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
-    lack_of_fit_at_start = grew or _missing(initial_presence, initial_scores, threshold)
+    lack_of_fit_at_start = grew or _has_lack_of_fit(
+        initial_lack_of_fit_test, initial_scores, threshold
+    )
     if lack_of_fit_at_start and not tried:
         tried = _fits(_short_list(engine, initial_model, initial_noise, initial_scores))
     return SelectionResult(
         initial_model=initial_model,
         initial_noise=initial_noise,
-        initial_presence=initial_presence,
+        initial_lack_of_fit_test=initial_lack_of_fit_test,
         lack_of_fit_at_start=lack_of_fit_at_start,
         last_model=last_model.hypothesis,
         final=final,
         noise=noise,
-        presence=presence,
-        lack_of_fit=_missing(presence, engine.scores(final, noise), threshold),
+        lack_of_fit_test=lack_of_fit_test,
+        lack_of_fit=_has_lack_of_fit(lack_of_fit_test, engine.scores(final, noise), threshold),
         scores=tuple(initial_scores),
         tried=tried if lack_of_fit_at_start else (),
         threshold=threshold,
@@ -130,19 +133,29 @@ def _ended(
 ) -> SelectionResult:
     """A search as if it had ended with this hypothesis."""
     present, noise = engine.settle(hypothesis, result.noise)
-    presence = engine.presence(present, noise)
-    lack_of_fit = _missing(presence, engine.scores(present, noise), result.threshold)
-    return replace(result, final=present, noise=noise, presence=presence, lack_of_fit=lack_of_fit)
+    lack_of_fit_test = engine.lack_of_fit_test(present, noise)
+    lack_of_fit = _has_lack_of_fit(
+        lack_of_fit_test, engine.scores(present, noise), result.threshold
+    )
+    return replace(
+        result,
+        final=present,
+        noise=noise,
+        lack_of_fit_test=lack_of_fit_test,
+        lack_of_fit=lack_of_fit,
+    )
 
 
-def _missing(presence: Presence, scores: list[Score], threshold: float) -> bool:
+def _has_lack_of_fit(
+    lack_of_fit_test: LackOfFitTest, scores: list[Score], threshold: float
+) -> bool:
     """Whether the residual holds more than noise.
 
     With repeats that is measured. A high score of an effect that then fails out of sample is no
     evidence beside it; without repeats it is all there is.
     """
-    if np.isfinite(presence.p_value):
-        return presence.p_value < _PRESENCE_LEVEL
+    if np.isfinite(lack_of_fit_test.p_value):
+        return lack_of_fit_test.p_value < _LACK_OF_FIT_LEVEL
     return bool(scores) and scores[0].value > threshold
 
 
@@ -161,7 +174,7 @@ def _coupled(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
     on: pairs upon what is there already would piece together what nobody knows.
     """
     added = len(present.hypothesis.terms) - engine.n_initial_terms
-    if not engine.presence(present, noise).p_value < _PRESENCE_LEVEL:
+    if not engine.lack_of_fit_test(present, noise).p_value < _LACK_OF_FIT_LEVEL:
         return None
     better = _exchanged(engine, present, noise, present) if 0 < added <= _EXCHANGED else None
     if better is not None or _acts_on_what_lacks(engine, present, noise):
@@ -180,7 +193,7 @@ def _coupled(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
 def _acts_on_what_lacks(engine: SelectionEngine, present: Fit, noise: Noise) -> bool:
     """Whether an addition acts on an output in which something is missing still."""
     regression = engine.regression
-    rejected = np.flatnonzero(engine.presence(present, noise).rejected).tolist()
+    rejected = np.flatnonzero(engine.lack_of_fit_test(present, noise).rejected).tolist()
     lacking = {regression.bands[band][0] for band in rejected}
     added = present.hypothesis.terms[engine.n_initial_terms :]
     return any(regression.outputs_of(term.effect.stage) & lacking for term in added)
@@ -251,8 +264,8 @@ def _another(item: Score, own: Term) -> bool:
 
 def _without_the_doubtful(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
     """Drop additions that explain less than what is still missing: they may only imitate it."""
-    left = engine.presence(present, noise)
-    missing = float(np.sum(np.maximum(left.excess, 0.0)[left.rejected]))
+    left = engine.lack_of_fit_test(present, noise)
+    missing = float(np.sum(np.maximum(left.excess_power, 0.0)[left.rejected]))
     doubtful = present
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = engine.refit(present.hypothesis.without(index), noise)

@@ -12,13 +12,8 @@ from winchkit.diagnosis.regression.cross_validation import extrapolation, held_o
 from winchkit.diagnosis.regression.discretization import without_discretization_error
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import (
-    Noise,
-    Presence,
-    noise_from_repeats,
-    noise_saturated,
-    presence,
-)
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.effects.effect import Effect
@@ -73,10 +68,10 @@ class TimeSeriesSelection(SelectionEngine):
         largest = extrapolation(self.regression, fitted, noise, groups)
         return self.regression.five_blocks if largest > _LARGEST_EXTRAPOLATION else groups
 
-    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> Presence:
+    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
         """F test of the residual without the part that the discretisation error explains."""
         left = without_discretization_error(self.regression, present, noise.weight(self.regression))
-        return presence(self.regression, left, present.jacobian, noise)
+        return lack_of_fit_test(self.regression, left, present.jacobian, noise)
 
     @property
     def _thermal_signatures(self) -> Array:

@@ -112,8 +112,16 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     if result.noise.from_repeats:
         # Both in units of the final noise, so that a re-estimated noise does not shift the share.
         scale = result.initial_noise.power / result.noise.power
-        before = float(np.sum(np.maximum(result.initial_presence.excess * scale, 0.0)))
-        after = float(np.sum(np.maximum(result.presence.excess, 0.0)[result.presence.rejected]))
+        before = float(
+            np.sum(np.maximum(result.initial_lack_of_fit_test.excess_power * scale, 0.0))
+        )
+        after = float(
+            np.sum(
+                np.maximum(result.lack_of_fit_test.excess_power, 0.0)[
+                    result.lack_of_fit_test.rejected
+                ]
+            )
+        )
         left = max(left if left > _GENERALISES else 0.0, after / before if before > 0 else 0.0)
     return min(1.0, left)
 
@@ -139,7 +147,7 @@ def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: f
         for fitted in outputs.values()
     )
     # What imitates something unknown leaves as much; where the trace is certain it must be small.
-    trace = _DOUBTFUL_TRACE if result.presence.p_value > _DOUBTFUL else _TRACE
+    trace = _DOUBTFUL_TRACE if result.lack_of_fit_test.p_value > _DOUBTFUL else _TRACE
     allowed = trace if over < _AT_NOISE else _NEGLIGIBLE if over < _NEAR_NOISE else 0.0
     return "explained" if share < allowed else "partly"
 

@@ -133,7 +133,8 @@ def judge_and_doubt(engine: TimeSeriesSelection, result: SelectionResult) -> Jud
         if curve and result.noise.from_repeats:
             return _less(doubt, index, curve)
         if curve:
-            note = f"{_over(curve)} would explain more than {terms[index - engine.n_initial_terms].label}"
+            label = terms[index - engine.n_initial_terms].label
+            note = f"{_over(curve)} would explain more than {label}"
             judgement = replace(judgement, notes=(*judgement.notes, note))
     return judgement
 
