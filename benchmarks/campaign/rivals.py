@@ -80,7 +80,7 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
     columns = whole[:, 1 + nuisances :]
     length = np.sqrt(np.sum(columns**2, axis=0))
     columns = columns / np.maximum(length, _NOTHING)
-    atoms = engine.signatures.atoms
+    atoms = engine.signatures.candidates
     effects = [""] * columns.shape[1]
     for atom in atoms:
         for index in range(atom.columns.start, atom.columns.stop):

@@ -65,9 +65,9 @@ def test_a_stribeck_speed_that_no_run_passes_stands_beside_coulombs_friction(
 def columns_of(found: Signatures) -> dict[str, np.ndarray]:
     """By effect and the values of a usual size."""
     return {
-        f"{atom.effect.id} {atom.shape} {secant}": found.columns[:, index]
-        for atom in found.atoms
-        for index, secant in enumerate(atom.secants, atom.columns.start)
+        f"{candidate.effect.id} {candidate.shape} {usual_step}": found.columns[:, index]
+        for candidate in found.candidates
+        for index, usual_step in enumerate(candidate.usual_steps, candidate.columns.start)
     }
 
 
@@ -105,6 +105,6 @@ def test_a_candidate_that_had_no_signature_and_has_one_now_has_all_drawn_anew(
 ) -> None:
     engine = engine_for([], RIDE)
     lag = CATALOGUE["cell-lag"]
-    silent = replace(engine.signatures, silent=((lag, {"time_constant": 0.05}),))
+    silent = replace(engine.signatures, without_signature=((lag, {"time_constant": 0.05}),))
     present = engine.initial_model.with_term(grown, engine.regression.n_runs)
     assert (redrawn(engine.regression, present, silent) is None) is anew

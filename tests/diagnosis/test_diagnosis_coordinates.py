@@ -55,8 +55,8 @@ def test_usual_sizes_are_near_one_and_within_bounds(effect: Effect) -> None:
     coordinates = Coordinates(effect)
     low, high = coordinates.bounds()
     assert np.all(low <= high)
-    for secant in coordinates.secants():
-        x = coordinates.vector({**effect.null, **secant})
+    for usual_step in coordinates.usual_steps():
+        x = coordinates.vector({**effect.null, **usual_step})
         assert np.all((low <= x) & (x <= high))
         assert 0.01 <= np.abs(x[: len(coordinates.amplitudes)]).max() <= 100
 

@@ -21,7 +21,7 @@ def test_what_would_help_only_with_the_wrong_sign_gains_nothing() -> None:
     ]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
     present, noise = engine.settle(engine.initial_model)
-    told = {score.atom.effect.id: score for score in engine.scores(present, noise)}
+    told = {score.candidate.effect.id: score for score in engine.scores(present, noise)}
     rotor = told["rotor-inertia"]
     assert rotor.gain == 0.0
     assert rotor.value < 0.0
@@ -43,5 +43,5 @@ def test_the_right_sign_gains() -> None:
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
     present, noise = engine.settle(engine.initial_model)
     best = engine.scores(present, noise)[0]
-    assert best.atom.effect.id == "rotor-inertia"
+    assert best.candidate.effect.id == "rotor-inertia"
     assert np.all(best.amplitudes > 0.0)

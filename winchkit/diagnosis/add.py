@@ -148,7 +148,10 @@ def _fitted(
 ) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:
     """The profile as it is, and with the effect, each with its noise."""
     initial_model, noise = engine.settle(engine.initial_model)
-    trials = [engine.trial(initial_model, item, noise) for item in _atoms(engine, effect_id, noise)]
+    trials = [
+        engine.trial(initial_model, item, noise)
+        for item in _candidates_of(engine, effect_id, noise)
+    ]
     if not trials:
         raise UsageError(
             f"effect '{effect_id}' changes nothing that these runs measured, or gives no number "
@@ -169,12 +172,12 @@ def _placed(effect: Effect, dataset: Dataset) -> Effect:
     return placed(effect, min(float(x.min()) for x in ranges), max(float(x.max()) for x in ranges))
 
 
-def _atoms(engine: TimeSeriesSelection, effect_id: str, noise: Noise) -> list[Score]:
+def _candidates_of(engine: TimeSeriesSelection, effect_id: str, noise: Noise) -> list[Score]:
     """Points of an effect's shape grid that fit best."""
     initial_model = engine.refit(engine.initial_model, noise)
     projected = engine.projected(initial_model, noise)
     ranked = score(projected, initial_model.residual, engine.regression.n_rows)
-    return [item for item in ranked if item.atom.effect.id == effect_id][:_STARTS]
+    return [item for item in ranked if item.candidate.effect.id == effect_id][:_STARTS]
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import follows, harmonics
 from winchkit.diagnosis.results import (
-    Candidate,
+    CandidateScore,
     Diagnosis,
     Estimate,
     Step,
@@ -249,7 +249,7 @@ def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:
     return [1 - after / before for before, after in pairwise(squares)]
 
 
-def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[Candidate, ...]:
+def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[CandidateScore, ...]:
     """Every candidate with its score, the strongest with what it would leave held out."""
     out = []
     folds = engine.folds(result.final, result.noise)
@@ -257,7 +257,7 @@ def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[Can
         rms: dict[str, float] = {}
         if fitted is not None:
             rms = engine.held_out_errors(fitted, result.initial_noise, folds)
-        out.append(Candidate(item.atom.effect.id, item.value, rms))
+        out.append(CandidateScore(item.candidate.effect.id, item.value, rms))
     return tuple(out)
 
 

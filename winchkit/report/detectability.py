@@ -36,7 +36,7 @@ class Visible:
 
 def effects_of(answer: Answer) -> dict[str, Effect]:
     """Every effect that a diagnosis tried or has, by id."""
-    tried = {score.atom.effect.id: score.atom.effect for score in answer.result.scores}
+    tried = {score.candidate.effect.id: score.candidate.effect for score in answer.result.scores}
     present = {t.effect.id: t.effect for t in answer.result.final.hypothesis.terms}
     return tried | present
 

@@ -41,20 +41,22 @@ def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
     """
     out = []
     for item in scores:
-        effect = item.atom.effect
+        effect = item.candidate.effect
         if item.strength <= 0:
             continue
-        size = (np.sqrt(bar.squares(item.atom.freedom)) + _POWER_QUANTILE) / np.sqrt(item.strength)
-        secant = item.atom.secants[0]
-        name = next(iter(secant))
+        size = (np.sqrt(bar.squares(item.candidate.freedom)) + _POWER_QUANTILE) / np.sqrt(
+            item.strength
+        )
+        usual_step = item.candidate.usual_steps[0]
+        name = next(iter(usual_step))
         parameter = effect.parameter(name)
         if effect.polar and name == effect.polar[0]:
-            value = size * secant[name]
+            value = size * usual_step[name]
         else:
             coordinates = Coordinates(effect)
-            base = {**effect.null, **item.atom.shape}
+            base = {**effect.null, **item.candidate.shape}
             null = coordinates.vector(base)
-            moved = null + size * (coordinates.vector({**base, **secant}) - null)
+            moved = null + size * (coordinates.vector({**base, **usual_step}) - null)
             low, high = coordinates.bounds()
             if np.any((moved < low) | (moved > high)):
                 value = float("nan")

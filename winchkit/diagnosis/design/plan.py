@@ -185,6 +185,6 @@ def _usual(effects: Sequence[Effect], regression: TimeSeriesRegression) -> list[
         if regression.missing_needs(effect):
             continue
         shape = next(iter(Coordinates(effect).grid()))
-        secant = next(iter(Coordinates(effect).secants()))
-        out.append(Term(effect, {**effect.null, **shape, **secant}))
+        usual_step = next(iter(Coordinates(effect).usual_steps()))
+        out.append(Term(effect, {**effect.null, **shape, **usual_step}))
     return out

@@ -94,7 +94,7 @@ def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
 def _added(study: Study, effect: Effect) -> RobotGrown:
     engine = study.as_filed()
     initial_model, noise = engine.settle(engine.initial_model)
-    scores = [s for s in engine.scores(initial_model, noise) if s.atom.effect.id == effect.id]
+    scores = [s for s in engine.scores(initial_model, noise) if s.candidate.effect.id == effect.id]
     if not scores:
         raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
     final: Fit = engine.trial(initial_model, scores[0], noise).fit

@@ -129,13 +129,13 @@ def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
     faint: dict[str, tuple[float, Term]] = {}
     there = {term.effect.id for term in answer.result.final.hypothesis.terms}
     for score in answer.result.scores:
-        effect = score.atom.effect
-        seen = answer.bar.power(score.strength, score.atom.freedom) >= _SURE
+        effect = score.candidate.effect
+        seen = answer.bar.power(score.strength, score.candidate.freedom) >= _SURE
         if not score.strength > 0 or seen or effect.id in there:
             continue
         known = faint.get(base_of(effect))
         if known is None or score.strength < known[0]:
-            values = {**usual_values(effect), **score.atom.shape}
+            values = {**usual_values(effect), **score.candidate.shape}
             faint[base_of(effect)] = score.strength, Term(effect, values)
     ranked = sorted(faint.values(), key=lambda item: -item[0])[:_MOST]
     return tuple(term for _, term in ranked)

@@ -136,8 +136,8 @@ def _columns(
     for effect in candidates:
         coordinates = Coordinates(effect)
         shape = coordinates.grid()[0]
-        for secant in coordinates.secants():
-            term = Term(effect, {**effect.null, **shape, **secant})
+        for usual_step in coordinates.usual_steps():
+            term = Term(effect, {**effect.null, **shape, **usual_step})
             there = regression.residuals((*own, term))
             if base_of(effect) not in _BALANCING and "tension" in there:
                 there["tension"] = here["tension"]

@@ -22,4 +22,4 @@ def points(regression: Regression, effects: Iterable[Effect]) -> Iterator[Point]
         coordinates = Coordinates(effect)
         for shape in coordinates.grid():
             if regression.excites(shape):
-                yield effect, shape, coordinates.secants()
+                yield effect, shape, coordinates.usual_steps()

@@ -51,14 +51,14 @@ def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[
     """
     signed = [item if _possible(item) else worthless(item, rows) for item in ranked]
     signed.sort(key=lambda item: -item.value)
-    return [item for item in signed if not _stands_there(item.atom.effect, item, present)]
+    return [item for item in signed if not _stands_there(item.candidate.effect, item, present)]
 
 
 def best_of_each(scores: Sequence[Score]) -> list[Score]:
     """The best point of each effect's grid, in the order in which they come."""
     first: dict[str, Score] = {}
     for item in scores:
-        first.setdefault(item.atom.effect.id, item)
+        first.setdefault(item.candidate.effect.id, item)
     return list(first.values())
 
 
@@ -70,7 +70,7 @@ def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
         if term.effect.id == effect.id:
             orders = [p.name for p in effect.parameters if p.whole]
             if not effect.repeatable or all(
-                term.values[name] == item.atom.shape.get(name) for name in orders
+                term.values[name] == item.candidate.shape.get(name) for name in orders
             ):
                 return True
     return False
@@ -78,10 +78,10 @@ def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
 
 def _possible(item: Score) -> bool:
     """Whether the amplitudes that fit best are within an effect's bounds at all."""
-    coordinates = Coordinates(item.atom.effect)
-    if item.atom.effect.probes:
+    coordinates = Coordinates(item.candidate.effect)
+    if item.candidate.effect.probes:
         return True
-    base = {**item.atom.effect.null, **item.atom.shape}
+    base = {**item.candidate.effect.null, **item.candidate.shape}
     amplitudes = slice(len(coordinates.amplitudes))
     begun = coordinates.vector(starting_values(item)[0])[amplitudes]
     return bool(np.any(begun != coordinates.vector(base)[amplitudes]))
@@ -247,7 +247,7 @@ class SelectionEngine(ABC):
 
         Of a series it takes as many coefficients as pay, each added to what was fitted before.
         """
-        effect, weight = item.atom.effect, noise.weight(self.regression)
+        effect, weight = item.candidate.effect, noise.weight(self.regression)
         hypothesis = present.hypothesis
         for index in reversed(range(self.n_initial_terms, len(hypothesis.terms))):
             if hypothesis.terms[index].effect.id in effect.contains:
@@ -255,7 +255,7 @@ class SelectionEngine(ABC):
         best: Trial | None = None
         for law in by_coefficients(effect):
             if best is None:
-                own = replace(item, atom=item.atom.of_law(law))
+                own = replace(item, candidate=item.candidate.with_law(law))
                 places = placed(self.regression, hypothesis, present, own, weight)
                 terms = [Term(law, values) for values in places]
                 starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]

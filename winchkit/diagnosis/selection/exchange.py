@@ -48,7 +48,7 @@ class Exchange:
         basis = orthonormal(whitened)
         least = held.cost - float(np.sum((basis.T @ residual) ** 2))
         scores = self._engine.scores(held, self._noise)
-        return held, least, {item.atom.effect.id: item for item in scores}
+        return held, least, {item.candidate.effect.id: item for item in scores}
 
     def trial(self, rival: Score, enough: float) -> Trial:
         """A rival in the term's place.
@@ -60,7 +60,7 @@ class Exchange:
         if found.fit.cost < enough or not self._others.terms:
             return found
         held, least, scores = self._held
-        beside = scores.get(rival.atom.effect.id)
+        beside = scores.get(rival.candidate.effect.id)
         nearly = enough + _NEARLY * (self.base.cost - enough)
         if beside is None or least - beside.gain > nearly:
             return found
@@ -101,7 +101,7 @@ def _better(
     ]
     for pair in promising[:tried]:
         # Newcomers first: what stood for both alone would keep the values that it had.
-        first, second = sorted(pair.scores, key=lambda item: item.atom.effect.id in leave)
+        first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in leave)
         trial = engine.trial(engine.trial(base, first, noise).fit, second, noise)
         if trial.criterion < engine.criterion(present) - BETTER:
             return trial.fit

@@ -38,7 +38,7 @@ class Couple:
     @property
     def ids(self) -> set[str]:
         """Names of the two."""
-        return {item.atom.effect.id for item in self.scores}
+        return {item.candidate.effect.id for item in self.scores}
 
     @property
     def hidden(self) -> bool:
@@ -55,12 +55,12 @@ def couples(
     """
     alone: dict[str, float] = {}
     for item in scores:
-        alone[item.atom.effect.id] = max(item.gain, alone.get(item.atom.effect.id, 0.0))
+        alone[item.candidate.effect.id] = max(item.gain, alone.get(item.candidate.effect.id, 0.0))
     found: dict[frozenset[str], Couple] = {}
     pairs = _pairs(scores)
     for pair, taken in zip(pairs, _together(projected, residual, pairs), strict=True):
-        first, second = (item.atom.effect.id for item in pair)
-        pays = taken - price * sum(item.atom.freedom for item in pair)
+        first, second = (item.candidate.effect.id for item in pair)
+        pays = taken - price * sum(item.candidate.freedom for item in pair)
         ids = frozenset((first, second))
         if pays > 0 and (ids not in found or pays > found[ids].pays):
             found[ids] = Couple(pair, taken, pays, alone[first] + alone[second])
@@ -72,8 +72,8 @@ def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:
     return [
         (first, second)
         for first, second in combinations(scores, 2)
-        if first.atom.effect.id != second.atom.effect.id
-        and not first.atom.effect.nested_with(second.atom.effect)
+        if first.candidate.effect.id != second.candidate.effect.id
+        and not first.candidate.effect.nested_with(second.candidate.effect)
     ]
 
 
@@ -84,7 +84,7 @@ def _together(
     products = projected.products(residual)
     size = np.sqrt(np.maximum(np.diag(projected.inner), 1e-300))
     inner, products = projected.inner / np.outer(size, size), products / size
-    columns = [np.r_[a.atom.columns, b.atom.columns] for a, b in pairs]
+    columns = [np.r_[a.candidate.columns, b.candidate.columns] for a, b in pairs]
     counts = np.array([len(own) for own in columns], dtype=int)
     out = np.zeros(len(pairs))
     for count in np.unique(counts):

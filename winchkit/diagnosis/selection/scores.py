@@ -13,7 +13,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.selection.signatures import Atom, Signatures, pieces
+from winchkit.diagnosis.selection.signatures import Candidate, Signatures, pieces
 
 __all__ = ["Projected", "Score", "chance_level", "score", "worthless"]
 
@@ -27,7 +27,7 @@ _ROUNDING = 1e-9
 class Score:
     """How much of the residual's whitened squares an atom would take, and its chance level."""
 
-    atom: Atom
+    candidate: Candidate
     gain: float
     value: float
     """Gain less the price of its degrees of freedom."""
@@ -57,7 +57,7 @@ class Projected:
         self.inner = _projected(gram, cross, normal, self._through)
         """Inner products of the whitened, projected columns, (p, p)."""
         plain = np.einsum("b,bii->i", share, signatures.gram)
-        self._roots = [self._root(atom, plain) for atom in signatures.atoms]
+        self._roots = [self._root(candidate, plain) for candidate in signatures.candidates]
 
     def products(self, residual: Array) -> Array:
         """Inner products of the whitened residual with the projected columns, (p,)."""
@@ -69,20 +69,20 @@ class Projected:
         """Whitened squares that each atom takes; products (p,) or (p, samples)."""
         return np.array(
             [
-                np.sum((root.T @ products[atom.columns]) ** 2, axis=0)
-                for atom, root in zip(self.signatures.atoms, self._roots, strict=True)
+                np.sum((root.T @ products[candidate.columns]) ** 2, axis=0)
+                for candidate, root in zip(self.signatures.candidates, self._roots, strict=True)
             ]
         )
 
     def amplitudes(self, index: int, products: Array) -> Array:
         """Amplitudes of one atom in units of its secants."""
         root = self._roots[index]
-        atom = self.signatures.atoms[index]
-        return np.asarray(root @ (root.T @ products[atom.columns]))
+        candidate = self.signatures.candidates[index]
+        return np.asarray(root @ (root.T @ products[candidate.columns]))
 
     def strength(self, index: int) -> float:
         """λ for one usual size of an atom; zero where it cannot be identified."""
-        first = self.signatures.atoms[index].columns.start
+        first = self.signatures.candidates[index].columns.start
         return float(self.inner[first, first]) if self._roots[index].shape[1] else 0.0
 
     def simulated(self, samples: int = _SIMULATIONS) -> Array:
@@ -102,13 +102,13 @@ class Projected:
             out += (vectors * np.sqrt(np.maximum(values, 0.0))) @ (vectors.T @ noise)
         return out
 
-    def _root(self, atom: Atom, plain: Array) -> Array:
+    def _root(self, candidate: Candidate, plain: Array) -> Array:
         """R with R Rᵀ the inverse of an atom's inner products, where they can be identified."""
-        inner = self.inner[atom.columns, atom.columns]
-        if np.max(plain[atom.columns]) < _ROUNDING:
+        inner = self.inner[candidate.columns, candidate.columns]
+        if np.max(plain[candidate.columns]) < _ROUNDING:
             # What a usual size moves by less than rounding would let chance reach any level.
             return np.zeros((len(inner), 0))
-        size = np.sqrt(np.maximum(plain[atom.columns], _NOTHING))
+        size = np.sqrt(np.maximum(plain[candidate.columns], _NOTHING))
         values, vectors = np.linalg.eigh(inner / np.outer(size, size))
         kept = values > _UNIDENTIFIABLE
         return np.asarray((vectors[:, kept] / np.sqrt(values[kept])) / size[:, None])
@@ -135,24 +135,24 @@ def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
     products = projected.products(residual)
     out = []
     for index, gain in enumerate(projected.gains(products).tolist()):
-        atom = projected.signatures.atoms[index]
-        value = gain - atom.freedom * float(np.log(rows))
+        candidate = projected.signatures.candidates[index]
+        value = gain - candidate.freedom * float(np.log(rows))
         strength = projected.strength(index)
-        out.append(Score(atom, gain, value, projected.amplitudes(index, products), strength))
+        out.append(Score(candidate, gain, value, projected.amplitudes(index, products), strength))
     return sorted(out, key=lambda s: -s.value)
 
 
 def worthless(item: Score, rows: int) -> Score:
     """The score of an atom that takes nothing of the residual."""
-    value = -item.atom.freedom * float(np.log(rows))
+    value = -item.candidate.freedom * float(np.log(rows))
     return replace(item, gain=0.0, value=value, amplitudes=np.zeros_like(item.amplitudes))
 
 
 def chance_level(projected: Projected, rows: int) -> Array:
     """Largest score over all atoms that noise alone gives, simulated, sorted; (samples,)."""
-    atoms = projected.signatures.atoms
-    if not atoms:
+    candidates = projected.signatures.candidates
+    if not candidates:
         return np.zeros(1)
-    price = np.array([atom.freedom * np.log(rows) for atom in atoms])
+    price = np.array([candidate.freedom * np.log(rows) for candidate in candidates])
     gains = projected.gains(projected.simulated())
     return np.asarray(np.sort((gains - price[:, None]).max(axis=0)))

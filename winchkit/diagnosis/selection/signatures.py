@@ -21,42 +21,44 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["Atom", "Signatures", "pieces", "redrawn", "signatures"]
+__all__ = ["Candidate", "Signatures", "pieces", "redrawn", "signatures"]
 
 
 @dataclass(frozen=True)
-class Atom:
+class Candidate:
     """One effect at one point of its shape grid: its columns, and where a fit would start."""
 
     effect: Effect
     shape: dict[str, float]
     columns: slice
-    secants: tuple[dict[str, float], ...]
+    usual_steps: tuple[dict[str, float], ...]
 
     @property
     def freedom(self) -> int:
         """Degrees of freedom that choosing it costs."""
         return Coordinates(self.effect).freedom
 
-    def of_law(self, law: Effect) -> Atom:
+    def with_law(self, law: Effect) -> Candidate:
         """The same of a law with fewer coefficients, begun where these alone say so."""
         fixed = {p.name for p in law.parameters if p.role == "fixed"}
-        secants = tuple(secant for secant in self.secants if not fixed & secant.keys())
-        return replace(self, effect=law, secants=secants)
+        usual_steps = tuple(
+            usual_step for usual_step in self.usual_steps if not fixed & usual_step.keys()
+        )
+        return replace(self, effect=law, usual_steps=usual_steps)
 
 
 @dataclass(frozen=True)
 class Signatures:
     """Columns of all candidates, and their inner products per noise band."""
 
-    atoms: tuple[Atom, ...]
+    candidates: tuple[Candidate, ...]
     columns: Array
     """(rows, p)."""
     gram: Array
     """(bands, p, p)."""
     beside: Hypothesis
     """The present model that they were drawn beside."""
-    silent: tuple[tuple[Effect, dict[str, float]], ...] = ()
+    without_signature: tuple[tuple[Effect, dict[str, float]], ...] = ()
     """Effects with values at which they changed nothing there, and so have no column."""
 
 
@@ -96,25 +98,28 @@ def signatures(
     outputs = regression.outputs
     canvas = _Canvas(regression, present, outputs)
     tried = list(points(regression, effects))
-    atoms: list[Atom] = []
-    silent: list[tuple[Effect, dict[str, float]]] = []
+    candidates: list[Candidate] = []
+    without_signature: list[tuple[Effect, dict[str, float]]] = []
     # One column after another in memory: thousands of rows each, written and read whole.
-    columns, count = np.empty((sum(len(secants) for *_, secants in tried), regression.n_rows)), 0
-    for effect, shape, secants in tried:
+    columns, count = (
+        np.empty((sum(len(usual_steps) for *_, usual_steps in tried), regression.n_rows)),
+        0,
+    )
+    for effect, shape, usual_steps in tried:
         own = []
-        for secant in secants:
-            values = {**effect.null, **shape, **secant}
+        for usual_step in usual_steps:
+            values = {**effect.null, **shape, **usual_step}
             if canvas.draw(columns[count], Term(effect, values), outputs):
-                own.append(secant)
+                own.append(usual_step)
                 count += 1
             else:
-                silent.append((effect, values))
+                without_signature.append((effect, values))
         if own:
-            atoms.append(Atom(effect, shape, slice(count - len(own), count), tuple(own)))
+            candidates.append(Candidate(effect, shape, slice(count - len(own), count), tuple(own)))
     kept = columns[:count].T
     gram = np.zeros((len(regression.bands), count, count))
     _multiply(gram, regression, kept, outputs)
-    return Signatures(tuple(atoms), kept, gram, present, tuple(silent))
+    return Signatures(tuple(candidates), kept, gram, present, tuple(without_signature))
 
 
 def redrawn(regression: Regression, present: Hypothesis, found: Signatures) -> Signatures | None:
@@ -127,14 +132,16 @@ def redrawn(regression: Regression, present: Hypothesis, found: Signatures) -> S
     changed += [t for t in found.beside.terms if t not in present.terms]
     touched = {output for term in changed for output in regression.outputs_of(term.effect.stage)}
     canvas, spare = _Canvas(regression, present, touched), np.empty(regression.n_rows)
-    for effect, values in found.silent:
+    for effect, values in found.without_signature:
         reached = touched & regression.outputs_of(effect.stage)
         if canvas.draw(spare, Term(effect, values), reached):
             return None
-    for atom in found.atoms:
-        reached = touched & regression.outputs_of(atom.effect.stage)
-        for index, secant in enumerate(atom.secants, atom.columns.start):
-            term = Term(atom.effect, {**atom.effect.null, **atom.shape, **secant})
+    for candidate in found.candidates:
+        reached = touched & regression.outputs_of(candidate.effect.stage)
+        for index, usual_step in enumerate(candidate.usual_steps, candidate.columns.start):
+            term = Term(
+                candidate.effect, {**candidate.effect.null, **candidate.shape, **usual_step}
+            )
             canvas.draw(found.columns[:, index], term, reached)
     _multiply(found.gram, regression, found.columns, touched)
     return replace(found, beside=present)

@@ -75,11 +75,11 @@ def elsewhere(term: Term, shape: Mapping[str, float]) -> bool:
 
 def starting_values(item: Score) -> list[dict[str, float]]:
     """Values at which fits of an atom begin: its linear amplitudes within bounds, or its probes."""
-    atom = item.atom
-    coordinates = Coordinates(atom.effect)
-    base = {**atom.effect.null, **atom.shape}
-    usual = [{**base, **secant} for secant in atom.secants]
-    if atom.effect.probes:
+    candidate = item.candidate
+    coordinates = Coordinates(candidate.effect)
+    base = {**candidate.effect.null, **candidate.shape}
+    usual = [{**base, **usual_step} for usual_step in candidate.usual_steps]
+    if candidate.effect.probes:
         return usual
     null = coordinates.vector(base)
     vector = null + sum(
@@ -101,7 +101,7 @@ def placed(
     A step far from its moment has no gradient towards it, but its gain rises all the way.
     """
     begun = starting_values(item)
-    places = [p for p in Coordinates(item.atom.effect).shapes if p.grid and p.low == 0.0]
+    places = [p for p in Coordinates(item.candidate.effect).shapes if p.grid and p.low == 0.0]
     if not places or len(begun) > 1:
         return begun
     place, values = places[0], begun[0]
@@ -109,7 +109,7 @@ def placed(
     residual, jacobian = present.residual * weight, present.jacobian * weight[:, None]
 
     def gain(at: float) -> float:
-        term = Term(item.atom.effect, {**values, place.name: at})
+        term = Term(item.candidate.effect, {**values, place.name: at})
         column = regression.change(hypothesis.with_term(term, regression.n_runs)) - here
         column = column * weight
         column = column - jacobian @ np.linalg.lstsq(jacobian, column)[0]

@@ -253,13 +253,13 @@ def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
     """
     others = [item for item in scores if item.value > 0 and _another(item, own)]
     best = others[:_RIVALS]
-    simpler = {name for item in best for name in item.atom.effect.contains}
-    return best + [item for item in others[_RIVALS:] if item.atom.effect.id in simpler]
+    simpler = {name for item in best for name in item.candidate.effect.contains}
+    return best + [item for item in others[_RIVALS:] if item.candidate.effect.id in simpler]
 
 
 def _another(item: Score, own: Term) -> bool:
     """Whether a candidate is another effect than a term, or the same from another place."""
-    return item.atom.effect.id != own.effect.id or elsewhere(own, item.atom.shape)
+    return item.candidate.effect.id != own.effect.id or elsewhere(own, item.candidate.shape)
 
 
 def _without_the_doubtful(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:

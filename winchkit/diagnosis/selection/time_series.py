@@ -78,8 +78,8 @@ class TimeSeriesSelection(SelectionEngine):
         """Signatures that may differ between repeats because the temperature does."""
         thermal = [
             index
-            for atom in self.signatures.atoms
-            if "temperature" in atom.effect.needs
-            for index in range(atom.columns.start, atom.columns.stop)
+            for candidate in self.signatures.candidates
+            if "temperature" in candidate.effect.needs
+            for index in range(candidate.columns.start, candidate.columns.stop)
         ]
         return self.signatures.columns[:, thermal]

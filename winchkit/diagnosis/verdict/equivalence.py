@@ -15,7 +15,7 @@ from winchkit.diagnosis.regression.noise import Noise, orthonormal
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.exchange import Exchange
 from winchkit.diagnosis.selection.scores import Projected
-from winchkit.diagnosis.selection.signatures import Atom
+from winchkit.diagnosis.selection.signatures import Candidate
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -36,8 +36,8 @@ _MATTERS = 0.02
 def is_unseen(engine: SelectionEngine, final: Fit, noise: Noise, index: int, rival: Effect) -> bool:
     """Whether a richer ``rival`` of the term at ``index``, in its usual shape and as large as
     that, would differ from it, though by less than the noise."""
-    atom = _usual(engine, rival)
-    if atom is None:
+    candidate = _usual(engine, rival)
+    if candidate is None:
         return False
     regression, weight = engine.regression, noise.weight(engine.regression)
     hypothesis = final.hypothesis
@@ -46,8 +46,8 @@ def is_unseen(engine: SelectionEngine, final: Fit, noise: Noise, index: int, riv
     own = (regression.change(hypothesis) - here) * weight
     explained = orthonormal(final.jacobian * weight[:, None])
     differs = False
-    for secant in atom.secants:
-        values = {**rival.null, **atom.shape, **secant}
+    for usual_step in candidate.usual_steps:
+        values = {**rival.null, **candidate.shape, **usual_step}
         column = regression.change(without.with_term(Term(rival, values), regression.n_runs)) - here
         column = column * weight
         size = float(column @ column)
@@ -60,16 +60,16 @@ def is_unseen(engine: SelectionEngine, final: Fit, noise: Noise, index: int, riv
     return differs
 
 
-def _usual(engine: SelectionEngine, effect: Effect) -> Atom | None:
+def _usual(engine: SelectionEngine, effect: Effect) -> Candidate | None:
     """The candidate's point of its grid that is nearest to its usual shape."""
-    atoms = [a for a in engine.signatures.atoms if a.effect.id == effect.id]
+    candidates = [a for a in engine.signatures.candidates if a.effect.id == effect.id]
     usual = {p.name: p.typical for p in Coordinates(effect).shapes}
 
-    def away(atom: Atom) -> float:
-        places = [(x, usual[name]) for name, x in atom.shape.items() if usual.get(name)]
+    def away(candidate: Candidate) -> float:
+        places = [(x, usual[name]) for name, x in candidate.shape.items() if usual.get(name)]
         return float(sum(abs(np.log(x / typical)) for x, typical in places))
 
-    return min(atoms, key=away, default=None)
+    return min(candidates, key=away, default=None)
 
 
 _RIVALS = 6
@@ -98,14 +98,16 @@ def confusion_of(engine: SelectionEngine, final: Fit, noise: Noise, index: int) 
     """Refit the final model with each rival in place of one term, and compare block by block."""
     place = Exchange(engine, final, noise, index)
     own, base, scores = place.own, place.base, place.scores
-    mine = next((s.gain for s in scores if s.atom.effect.id == own.effect.id), 0.0)
+    mine = next((s.gain for s in scores if s.candidate.effect.id == own.effect.id), 0.0)
     freedom = Coordinates(own.effect).freedom
     rivals = [
         s
         for s in scores
-        if s.atom.effect.id != own.effect.id and s.gain > mine - max(_NEAR, 0.1 * mine)
+        if s.candidate.effect.id != own.effect.id and s.gain > mine - max(_NEAR, 0.1 * mine)
     ][:_RIVALS]
-    rivals += [s for s in scores if _drifts_alike(s.atom.effect, own.effect) and s not in rivals]
+    rivals += [
+        s for s in scores if _drifts_alike(s.candidate.effect, own.effect) and s not in rivals
+    ]
     blocks = engine.regression.blocks
     ours = held_out(engine.regression, final, noise, blocks)
     members: list[tuple[int, float, Term]] = [(freedom, final.cost, own)]
@@ -208,9 +210,9 @@ def _flip_chance(worse: Array) -> float:
 def _angle(projected: Projected, first: str, second: str) -> float:
     """Smallest angle between the whitened, projected signatures of two effects, rad."""
     best = 0.0
-    atoms = projected.signatures.atoms
-    for a in (atom for atom in atoms if atom.effect.id == first):
-        for b in (atom for atom in atoms if atom.effect.id == second):
+    candidates = projected.signatures.candidates
+    for a in (candidate for candidate in candidates if candidate.effect.id == first):
+        for b in (candidate for candidate in candidates if candidate.effect.id == second):
             best = max(best, _cosine(projected.inner, a.columns, b.columns))
     return float(np.arccos(min(1.0, best)))
 
