@@ -20,13 +20,13 @@ def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
     engine = engine_for(HIDDEN, RIDE, MASSES)
     present, noise = engine.settle(engine.initial_model)
     scores = engine.every_score(present, noise)
-    alone = {s.candidate.effect.id: s.gain for s in best_of_each(scores)}
+    alone = {s.candidate.effect.id: s.explained_ss for s in best_of_each(scores)}
     projected = engine.projected(present, noise)
-    pairs = couples(projected, present.residual, scores, engine.price)
+    pairs = couples(projected, present.residual, scores, engine.penalty_per_parameter)
     named = [{item.candidate.effect.id for item in pair.scores} for pair in pairs if pair.hidden]
     assert {"cell-gain", "cell-offset"} in named
-    assert alone["cell-offset"] < 0.5 * present.cost
-    assert [pair.pays for pair in pairs] == sorted((p.pays for p in pairs), reverse=True)
+    assert alone["cell-offset"] < 0.5 * present.chi_square
+    assert [pair.net_gain for pair in pairs] == sorted((p.net_gain for p in pairs), reverse=True)
 
 
 def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() -> None:

@@ -40,4 +40,4 @@ def test_held_as_it_is_a_hypothesis_keeps_its_values() -> None:
     )
     held = engine.held(other, noise)
     assert held.vector == pytest.approx(engine.regression.vector(other))
-    assert engine.refit(other, noise).cost < held.cost
+    assert engine.refit(other, noise).chi_square < held.chi_square

@@ -37,10 +37,10 @@ def problem_of(terms: tuple[Term, ...]) -> tuple[TimeSeriesRegression, np.ndarra
         for seed in range(2)
     ]
     regression = TimeSeriesRegression(prepare(runs, GROOVED))
-    weight = np.empty(regression.n_rows)
+    inverse_sigma = np.empty(regression.n_rows)
     for segment in regression.segments:
-        weight[segment.rows] = 1 / NOISE[segment.output]
-    return regression, weight
+        inverse_sigma[segment.rows] = 1 / NOISE[segment.output]
+    return regression, inverse_sigma
 
 
 def test_a_fit_walks_along_a_bent_valley() -> None:
@@ -49,13 +49,15 @@ def test_a_fit_walks_along_a_bent_valley() -> None:
     aside = term("guide-offset", offset=-0.09, mismatch=0.005)
     runs = [made(seed, profile, (aside,), ride=Ride(samples=800)) for seed in range(4)]
     regression = TimeSeriesRegression(prepare(runs, profile))
-    weight = np.concatenate(
+    inverse_sigma = np.concatenate(
         [np.full(s.rows.stop - s.rows.start, 1 / NOISE[s.output]) for s in regression.segments]
     )
-    best = fit(regression, Hypothesis().with_term(aside, regression.n_runs), weight)
+    best = fit(regression, Hypothesis().with_term(aside, regression.n_runs), inverse_sigma)
     begun = [Term(aside.effect, aside.effect.null | probe) for probe in aside.effect.probes]
-    found = [fit(regression, Hypothesis().with_term(b, regression.n_runs), weight) for b in begun]
-    assert min(f.cost for f in found) == pytest.approx(best.cost, abs=1.0)
+    found = [
+        fit(regression, Hypothesis().with_term(b, regression.n_runs), inverse_sigma) for b in begun
+    ]
+    assert min(f.chi_square for f in found) == pytest.approx(best.chi_square, abs=1.0)
 
 
 def from_usual(terms: tuple[Term, ...], regression: TimeSeriesRegression) -> Hypothesis:
@@ -74,12 +76,12 @@ def from_usual(terms: tuple[Term, ...], regression: TimeSeriesRegression) -> Hyp
 
 @pytest.mark.parametrize("name", TRUE)
 def test_a_fit_is_where_a_general_solver_ends(name: str) -> None:
-    regression, weight = problem_of(TRUE[name])
+    regression, inverse_sigma = problem_of(TRUE[name])
     start = from_usual(TRUE[name], regression)
-    ours = fit(regression, start, weight)
+    ours = fit(regression, start, inverse_sigma)
     low, high = regression.bounds(start)
     theirs = least_squares(
-        lambda x: regression.residual(regression.hypothesis(x, start)) * weight,
+        lambda x: regression.residual(regression.hypothesis(x, start)) * inverse_sigma,
         np.clip(regression.vector(start), low, high),
         bounds=(low, high),
         x_scale="jac",
@@ -88,18 +90,18 @@ def test_a_fit_is_where_a_general_solver_ends(name: str) -> None:
         gtol=1e-12,
         max_nfev=60,
     )
-    assert ours.freedom == len(theirs.x)
+    assert ours.n_unknowns == len(theirs.x)
     # Within a hundredth of what noise alone moves the sum of squares by.
-    assert ours.cost == pytest.approx(2 * theirs.cost, abs=0.05)
+    assert ours.chi_square == pytest.approx(2 * theirs.chi_square, abs=0.05)
     curvature = np.sqrt(np.diag(np.linalg.pinv(theirs.jac.T @ theirs.jac)))
     assert np.all(np.abs(ours.vector - theirs.x) < 0.25 * curvature + 1e-9)
-    assert ours.cost == pytest.approx(regression.n_rows, rel=0.15)
+    assert ours.chi_square == pytest.approx(regression.n_rows, rel=0.15)
 
 
 @pytest.mark.parametrize("name", ["one", "stiffness", "three", "wave"])
 def test_a_fit_finds_the_truth(name: str) -> None:
-    regression, weight = problem_of(TRUE[name])
-    found = fit(regression, from_usual(TRUE[name], regression), weight)
+    regression, inverse_sigma = problem_of(TRUE[name])
+    found = fit(regression, from_usual(TRUE[name], regression), inverse_sigma)
     for true, got in zip(TRUE[name], found.hypothesis.terms, strict=True):
         for parameter in true.effect.parameters:
             if parameter.role == "amplitude":
@@ -109,36 +111,36 @@ def test_a_fit_finds_the_truth(name: str) -> None:
 
 
 def test_a_fit_carries_its_own_residual_and_derivative() -> None:
-    regression, weight = problem_of(TRUE["three"])
-    found = fit(regression, from_usual(TRUE["three"], regression), weight)
+    regression, inverse_sigma = problem_of(TRUE["three"])
+    found = fit(regression, from_usual(TRUE["three"], regression), inverse_sigma)
     assert np.allclose(found.residual, regression.residual(found.hypothesis))
-    assert found.cost == pytest.approx(float(np.sum((found.residual * weight) ** 2)))
+    assert found.chi_square == pytest.approx(float(np.sum((found.residual * inverse_sigma) ** 2)))
     assert found.labels == ("cable-elongation-linear", "motor-coulomb", "cell-gain")
     assert np.allclose(regression.vector(found.hypothesis), found.vector, rtol=1e-6)
-    gradient = (found.jacobian * weight[:, None]).T @ (found.residual * weight)
-    size = np.sqrt(np.sum((found.jacobian * weight[:, None]) ** 2, axis=0))
+    gradient = (found.jacobian * inverse_sigma[:, None]).T @ (found.residual * inverse_sigma)
+    size = np.sqrt(np.sum((found.jacobian * inverse_sigma[:, None]) ** 2, axis=0))
     assert np.all(np.abs(gradient / size) < 0.5)
 
 
 def test_bounds_are_kept() -> None:
     """Data that ask for a rope that shortens under load get one that does not stretch."""
     backwards = (term("cable-elongation-linear", axial_stiffness=2e5),)
-    regression, weight = problem_of(())
+    regression, inverse_sigma = problem_of(())
     stretch = regression.change(Hypothesis().with_term(backwards[0], regression.n_runs))
     regression.nominal_residual = regression.nominal_residual - stretch
-    found = fit(regression, Hypothesis().with_term(backwards[0], regression.n_runs), weight)
+    found = fit(regression, Hypothesis().with_term(backwards[0], regression.n_runs), inverse_sigma)
     assert found.hypothesis.terms[0].values["axial_stiffness"] > 1e9
 
 
 def test_unknowns_that_cannot_be_told_apart_stay_small() -> None:
     """A radius and a ratio do the same on a grooved drum: no kilometres are invented."""
     terms = (term("drum-radius", radius_error=3e-4), term("gear-ratio", ratio_error=0.0))
-    regression, weight = problem_of((terms[0],))
+    regression, inverse_sigma = problem_of((terms[0],))
     start = Hypothesis()
     for item in terms:
         start = start.with_term(Term(item.effect, item.effect.null), regression.n_runs)
-    found = fit(regression, start, weight)
-    assert found.cost == pytest.approx(regression.n_rows, rel=0.15)
+    found = fit(regression, start, inverse_sigma)
+    assert found.chi_square == pytest.approx(regression.n_rows, rel=0.15)
     assert abs(found.hypothesis.terms[0].values["radius_error"]) < 1e-3
 
 

@@ -50,7 +50,7 @@ def fitted(regression: TimeSeriesRegression, *terms: Term) -> Fit:
     start = Hypothesis()
     for item in terms:
         start = start.with_term(item, regression.n_runs)
-    return fit(regression, start, even(regression).weight(regression))
+    return fit(regression, start, even(regression).inverse_sigma(regression))
 
 
 def in_time(regression: TimeSeriesRegression, rows: Array) -> Array:
@@ -61,9 +61,9 @@ def left_out(
     regression: TimeSeriesRegression, found: Fit, folds: Folds
 ) -> list[tuple[Array, Array]]:
     """Per fold its whitened residual under unknowns solved from the other folds, and their step."""
-    weight = even(regression).weight(regression)
-    residual = in_time(regression, found.residual * weight)
-    columns = np.column_stack([in_time(regression, c * weight) for c in found.jacobian.T])
+    inverse_sigma = even(regression).inverse_sigma(regression)
+    residual = in_time(regression, found.residual * inverse_sigma)
+    columns = np.column_stack([in_time(regression, c * inverse_sigma) for c in found.jacobian.T])
     fold = np.concatenate(folds.of)
     out = []
     for index in range(folds.count):
@@ -108,9 +108,9 @@ def test_the_held_out_error_is_that_of_the_same_fits_in_the_outputs_units() -> N
 def test_held_out_errors_are_larger_than_fitted_ones() -> None:
     regression = problem_of(())
     found, noise = fitted(regression, GAIN, DRAG), even(regression)
-    weight = noise.weight(regression)
-    assert held_out(regression, found, noise, regression.blocks).sum() > found.cost
-    assert found.cost == pytest.approx(float(np.sum((found.residual * weight) ** 2)))
+    inverse_sigma = noise.inverse_sigma(regression)
+    assert held_out(regression, found, noise, regression.blocks).sum() > found.chi_square
+    assert found.chi_square == pytest.approx(float(np.sum((found.residual * inverse_sigma) ** 2)))
 
 
 def test_an_effect_that_is_there_holds_and_one_that_is_not_does_not() -> None:

@@ -52,19 +52,19 @@ def driven(hidden: tuple[Term, ...] = (), drag: float = 0.0) -> list[Run]:
 def test_a_gain_is_what_least_squares_takes(seed: int, free: int, width: int) -> None:
     random = np.random.default_rng(seed)
     jacobian, hats = random.standard_normal((60, free)), random.standard_normal((20, 60))
-    residual, weight = random.standard_normal(60), np.exp(random.standard_normal(60))
+    residual, inverse_sigma = random.standard_normal(60), np.exp(random.standard_normal(60))
     law = random.standard_normal((20, width))
-    beside = Beside(residual, jacobian, weight)
-    whitened = hats * weight
+    beside = Beside(residual, jacobian, inverse_sigma)
+    whitened = hats * inverse_sigma
     left = whitened - (whitened @ beside.explained) @ beside.explained.T
-    gain = _Hats(whitened @ whitened.T, left @ left.T, left @ beside.residual).gain(law)
+    gain = _Hats(whitened @ whitened.T, left @ left.T, left @ beside.residual).explained_ss(law)
 
     def squares(columns: Array) -> float:
-        columns = columns * weight[:, None]
-        result = np.linalg.lstsq(columns, residual * weight, rcond=None)[0]
-        return float(np.sum((residual * weight - columns @ result) ** 2))
+        columns = columns * inverse_sigma[:, None]
+        result = np.linalg.lstsq(columns, residual * inverse_sigma, rcond=None)[0]
+        return float(np.sum((residual * inverse_sigma - columns @ result) ** 2))
 
-    assert beside.cost == pytest.approx(squares(jacobian))
+    assert beside.chi_square == pytest.approx(squares(jacobian))
     together = squares(np.hstack([jacobian, hats.T @ law]))
     assert gain == pytest.approx(squares(jacobian) - together, rel=1e-6, abs=1e-9)
 
@@ -72,12 +72,12 @@ def test_a_gain_is_what_least_squares_takes(seed: int, free: int, width: int) ->
 def test_what_the_model_explains_whole_leaves_curves_nothing() -> None:
     """Rounding of a column that is there already must not be blown up into evidence."""
     random = np.random.default_rng(1)
-    hats, weight = random.standard_normal((20, 80)), np.ones(80)
+    hats, inverse_sigma = random.standard_normal((20, 80)), np.ones(80)
     residual = random.standard_normal(80)
-    beside = Beside(residual, hats[:1].T, weight)
+    beside = Beside(residual, hats[:1].T, inverse_sigma)
     left = hats - (hats @ beside.explained) @ beside.explained.T
     only = np.eye(20)[:, :1]
-    assert _Hats(hats @ hats.T, left @ left.T, left @ beside.residual).gain(only) == 0.0
+    assert _Hats(hats @ hats.T, left @ left.T, left @ beside.residual).explained_ss(only) == 0.0
 
 
 def test_hats_add_up_to_one_and_draw_straight_lines() -> None:
@@ -87,7 +87,7 @@ def test_hats_add_up_to_one_and_draw_straight_lines() -> None:
     assert hats.sum(axis=0) == pytest.approx(np.ones(101))
     assert knots @ hats == pytest.approx(values)
     laws = laws_over(knots, "speed", level=False)
-    assert all(law.shape[0] == 20 and freedom >= 1 for law, freedom in laws)
+    assert all(law.shape[0] == 20 and n_parameters >= 1 for law, n_parameters in laws)
 
 
 def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
@@ -176,17 +176,17 @@ def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
     engine, result = rubbed()
     doubt = Doubt(engine, result)
     whole = doubt.beside(())
-    assert 0.99 * result.final.cost < whole.cost <= result.final.cost * (1 + 1e-9)
+    assert 0.99 * result.final.chi_square < whole.chi_square <= result.final.chi_square * (1 + 1e-9)
     without = doubt.beside([0])
     refitted = engine.refit(result.final.hypothesis.without(0), result.noise)
     # What sampling may have rounded is taken out of the one and not of the other.
-    assert 0.95 * refitted.cost < without.cost <= refitted.cost * (1 + 1e-9)
+    assert 0.95 * refitted.chi_square < without.chi_square <= refitted.chi_square * (1 + 1e-9)
 
 
 def test_curves_are_sought_only_where_the_names_act() -> None:
     engine, result = rubbed()
     beside = Doubt(engine, result).beside([0])
-    curve = best_curve(engine.regression, beside, ["motor_torque"], engine.price)
+    curve = best_curve(engine.regression, beside, ["motor_torque"], engine.penalty_per_parameter)
     assert curve is not None
     assert curve.place in {"motor_torque", "rope force"}
-    assert best_curve(engine.regression, beside, [], engine.price) is None
+    assert best_curve(engine.regression, beside, [], engine.penalty_per_parameter) is None

@@ -62,9 +62,9 @@ def test_white_noise_is_recovered_in_every_band() -> None:
     regression = length_problem([white(random, 4000) for _ in range(4)], ride)
     noise = estimated(regression)
     assert noise.from_repeats
-    assert noise.freedom.sum() > 0.9 * 3 * 4000
+    assert noise.dof.sum() > 0.9 * 3 * 4000
     assert noise.rms["cable_length"] == pytest.approx(SIZE, rel=0.03)
-    off = (noise.power / SIZE**2 - 1) / np.sqrt(2 / noise.freedom)
+    off = (noise.power / SIZE**2 - 1) / np.sqrt(2 / noise.dof)
     assert np.all(np.abs(off) < 4.0)
 
 
@@ -78,7 +78,7 @@ def test_coloured_noise_is_recovered_in_every_band() -> None:
     omega = np.pi * np.arange(count) / count
     spectrum = SIZE**2 / (1 - 2 * pole * np.cos(omega) + pole**2)
     expected = power_in_bands(regression, np.tile(spectrum, regression.n_runs))
-    off = (noise.power / expected - 1) / np.sqrt(2 / noise.freedom)
+    off = (noise.power / expected - 1) / np.sqrt(2 / noise.dof)
     assert np.all(np.abs(off) < 4.0)
     assert noise.power.max() > 50 * noise.power.min()
     assert noise.rms["cable_length"] == pytest.approx(SIZE / np.sqrt(1 - pole**2), rel=0.1)

@@ -25,7 +25,7 @@ from winchkit.diagnosis.selection.scores import chance_level
 RIDE = Ride(samples=400)
 ROPE = term("cable-elongation-linear", axial_stiffness=3e5)
 FRAME = term("frame-compliance", stiffness=1.2e5)
-BAR = Bar(price=9.0, threshold=3.0)
+BAR = Bar(penalty_per_parameter=9.0, threshold=3.0)
 NAMES = {kind.name for kind in KINDS}
 
 
@@ -179,7 +179,7 @@ def smallest(noise: float, masses: tuple[float, ...] = (10.0,)) -> dict[str, Det
     scores = tuple(engine.scores(present, known))
     chance = chance_level(engine.projected(present, known), engine.regression.n_rows)
     threshold = float(np.quantile(chance, 0.99))
-    return {d.effect: d for d in detectable(scores, Bar(engine.price, threshold))}
+    return {d.effect: d for d in detectable(scores, Bar(engine.penalty_per_parameter, threshold))}
 
 
 def test_half_the_noise_shows_half_the_size() -> None:
@@ -202,13 +202,13 @@ def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
         )
     )
     present, known = engine.settle(engine.initial_model)
-    weight = known.weight(regression)
-    other = present.jacobian * weight[:, None]
-    left = shown * weight
+    inverse_sigma = known.inverse_sigma(regression)
+    other = present.jacobian * inverse_sigma[:, None]
+    left = shown * inverse_sigma
     if other.shape[1]:
         left = left - other @ np.linalg.lstsq(other, left, rcond=None)[0]
     chance = chance_level(engine.projected(present, known), regression.n_rows)
-    needed = max(0.0, float(np.quantile(chance, 0.99))) + engine.price
+    needed = max(0.0, float(np.quantile(chance, 0.99))) + engine.penalty_per_parameter
     assert np.sqrt(left @ left) == pytest.approx(np.sqrt(needed) + norm.ppf(0.9), rel=0.02)
 
 
@@ -242,5 +242,5 @@ def test_a_size_that_is_said_to_show_is_found() -> None:
         ]
         engine = selection_engine(prepare(runs, GROOVED), [CATALOGUE["motor-coulomb"]])
         present, noise = engine.settle(engine.initial_model)
-        found += engine.scores(present, noise)[0].value > 0
+        found += engine.scores(present, noise)[0].net_gain > 0
     assert found >= 8

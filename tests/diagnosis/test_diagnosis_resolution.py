@@ -53,7 +53,7 @@ def fitted(terms: tuple[Term, ...], every: int = FINER) -> tuple[TimeSeriesRegre
         start = start.with_term(item, 4)
     first = fit(regression, start, np.ones(regression.n_rows))
     noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
-    return regression, fit(regression, start, noise.weight(regression)), noise
+    return regression, fit(regression, start, noise.inverse_sigma(regression)), noise
 
 
 def test_an_inertia_that_differences_round_is_held_by_its_interval() -> None:
@@ -62,7 +62,7 @@ def test_an_inertia_that_differences_round_is_held_by_its_interval() -> None:
         regression, found, spread_of(regression, found, noise, regression.blocks)
     )
     inertia = values["inertia"]
-    whitened = found.jacobian * noise.weight(regression)[:, None]
+    whitened = found.jacobian * noise.inverse_sigma(regression)[:, None]
     at = regression.nuisance_columns.shape[1]
     likelihood = float(np.sqrt(np.linalg.inv(whitened.T @ whitened)[at, at])) * 1e-4
     # Differences over samples this coarse round the acceleration: the value is wrong for certain,
@@ -76,9 +76,9 @@ def test_an_inertia_that_differences_round_is_held_by_its_interval() -> None:
 
 def test_what_rounding_leaves_is_taken_out_of_the_residual() -> None:
     regression, found, noise = fitted((INERTIA,))
-    weight = noise.weight(regression)
-    left = without_discretization_error(regression, found, weight)
-    before, after = (float(np.sum((r * weight) ** 2)) for r in (found.residual, left))
+    inverse_sigma = noise.inverse_sigma(regression)
+    left = without_discretization_error(regression, found, inverse_sigma)
+    before, after = (float(np.sum((r * inverse_sigma) ** 2)) for r in (found.residual, left))
     rows = regression.n_rows
     assert before > 1.2 * rows
     assert after < before - 0.5 * (before - rows)
@@ -105,5 +105,5 @@ def test_nothing_is_rounded_without_an_effect() -> None:
     regression, found, noise = fitted(())
     assert not regression.discretization_error(found.hypothesis).any()
     assert without_discretization_error(
-        regression, found, noise.weight(regression)
+        regression, found, noise.inverse_sigma(regression)
     ) == pytest.approx(found.residual)

@@ -23,11 +23,11 @@ def test_what_would_help_only_with_the_wrong_sign_gains_nothing() -> None:
     present, noise = engine.settle(engine.initial_model)
     told = {score.candidate.effect.id: score for score in engine.scores(present, noise)}
     rotor = told["rotor-inertia"]
-    assert rotor.gain == 0.0
-    assert rotor.value < 0.0
+    assert rotor.explained_ss == 0.0
+    assert rotor.net_gain < 0.0
     assert not rotor.amplitudes.any()
     # It is still listed, and the list is still sorted.
-    values = [score.value for score in engine.scores(present, noise)]
+    values = [score.net_gain for score in engine.scores(present, noise)]
     assert values == sorted(values, reverse=True)
     found = diagnose(runs, GROOVED).diagnosis
     assert all("rotor-inertia" not in step.effects for step in found.steps)

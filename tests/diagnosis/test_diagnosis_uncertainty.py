@@ -54,7 +54,7 @@ def test_two_deviations_hold_the_truth_in_95_of_100_cases(
         )
         first = fit(regression, start, np.ones(regression.n_rows))
         noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
-        found = fit(regression, start, noise.weight(regression))
+        found = fit(regression, start, noise.inverse_sigma(regression))
         spread = spread_of(regression, found, noise, blocks)
         ((_, values),) = estimates(regression, found, spread)
         off.append(values["gain_error"].value - 0.01)
@@ -80,7 +80,7 @@ def test_estimates_have_values_units_and_deviations_in_files_terms() -> None:
         start = start.with_term(item, 4)
     first = fit(regression, start, np.ones(regression.n_rows))
     noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
-    found = fit(regression, start, noise.weight(regression))
+    found = fit(regression, start, noise.inverse_sigma(regression))
     spread = spread_of(regression, found, noise, regression.blocks)
     (rope, stretch), (cell, gain) = estimates(regression, found, spread)
     assert (rope.effect.id, cell.effect.id) == ("cable-elongation-linear", "cell-gain")
@@ -98,7 +98,7 @@ def test_estimates_have_values_units_and_deviations_in_files_terms() -> None:
 def _settled(regression: TimeSeriesRegression, start: Hypothesis) -> tuple[Fit, Noise]:
     first = fit(regression, start, np.ones(regression.n_rows))
     noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
-    return fit(regression, start, noise.weight(regression)), noise
+    return fit(regression, start, noise.inverse_sigma(regression)), noise
 
 
 def test_ends_are_where_a_full_refit_rises_by_the_wanted_squares() -> None:
@@ -107,10 +107,12 @@ def test_ends_are_where_a_full_refit_rises_by_the_wanted_squares() -> None:
     runs = [made(seed, GROOVED, (friction,), {"motor_torque": 6e-3}, ride=RIDE) for seed in (1, 2)]
     regression = TimeSeriesRegression(prepare(runs, GROOVED))
     found, noise = _settled(regression, Hypothesis().with_term(friction, 2))
-    weight = noise.weight(regression)
-    whitened = found.jacobian * weight[:, None]
+    inverse_sigma = noise.inverse_sigma(regression)
+    whitened = found.jacobian * inverse_sigma[:, None]
     covariance = np.linalg.inv(whitened.T @ whitened)
-    low, high = profile_ends(regression, found, weight, covariance, np.full(len(covariance), 1.96))
+    low, high = profile_ends(
+        regression, found, inverse_sigma, covariance, np.full(len(covariance), 1.96)
+    )
 
     def risen(index: int, at: float) -> float:
         others = np.arange(len(found.vector)) != index
@@ -118,10 +120,12 @@ def test_ends_are_where_a_full_refit_rises_by_the_wanted_squares() -> None:
         def residual(free: Array) -> Array:
             vector = found.vector.copy()
             vector[index], vector[others] = at, free
-            return regression.residual(regression.hypothesis(vector, found.hypothesis)) * weight
+            return (
+                regression.residual(regression.hypothesis(vector, found.hypothesis)) * inverse_sigma
+            )
 
         best = least_squares(residual, found.vector[others], x_scale="jac")
-        return 2 * float(best.cost) - found.cost
+        return 2 * float(best.chi_square) - found.chi_square
 
     first = regression.nuisance_columns.shape[1]
     for index in range(first, len(found.vector)):
@@ -170,7 +174,7 @@ def test_what_no_output_shows_is_unknown_and_raises_no_warning() -> None:
     start = Hypothesis().with_term(play, 2)
     first = fit(regression, start, np.ones(regression.n_rows))
     known = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
-    found = fit(regression, start, known.weight(regression))
+    found = fit(regression, start, known.inverse_sigma(regression))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         spread = spread_of(regression, found, known, regression.blocks)

@@ -157,7 +157,7 @@ def _fitted(
             f"effect '{effect_id}' changes nothing that these runs measured, or gives no number "
             "there"
         )
-    best = min(trials, key=lambda trial: trial.fit.cost)
+    best = min(trials, key=lambda trial: trial.fit.chi_square)
     return (initial_model, noise), engine.settle(best.fit.hypothesis, noise)
 
 

@@ -94,7 +94,7 @@ class Answer:
     @property
     def bar(self) -> Bar:
         """Reduction of χ² that an effect needs to be named."""
-        return Bar(self.engine.price, self.result.threshold)
+        return Bar(self.engine.penalty_per_parameter, self.result.threshold)
 
     @property
     def filed(self) -> SelectionEngine:
@@ -168,7 +168,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
         outputs=judgement.outputs,
         steps=steps_of(engine, shown, sets) if sets else (),
         candidates=candidates_of(engine, result),
-        detectable=detectable(result.scores, Bar(engine.price, result.threshold)),
+        detectable=detectable(result.scores, Bar(engine.penalty_per_parameter, result.threshold)),
         unexplained_share=judgement.share,
         where=_where(engine.regression, result) if judgement.verdict in _LOCATED else (),
         next_runs=next_runs(engine.regression, pairs, result.noise.rms),
@@ -257,7 +257,7 @@ def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[Can
         rms: dict[str, float] = {}
         if fitted is not None:
             rms = engine.held_out_errors(fitted, result.initial_noise, folds)
-        out.append(CandidateScore(item.candidate.effect.id, item.value, rms))
+        out.append(CandidateScore(item.candidate.effect.id, item.net_gain, rms))
     return tuple(out)
 
 

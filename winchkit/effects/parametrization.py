@@ -59,7 +59,7 @@ class Coordinates:
         return tuple(p.name for p in self._fitted)
 
     @property
-    def freedom(self) -> int:
+    def n_parameters(self) -> int:
         """Degrees of freedom, a scanned order included."""
         return len(self) + sum(p.whole for p in self.effect.parameters)
 

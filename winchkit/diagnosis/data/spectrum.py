@@ -108,7 +108,7 @@ def narrow_edges(frequency: Array) -> Array:
     return np.array([-np.inf, *inner.tolist(), np.inf])
 
 
-def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
+def smoothed(power: Array, dof: Array) -> tuple[Array, Array]:
     """A spectrum whose logarithm bends slowly from band to band, and its degrees of freedom.
 
     Low bands hold few coefficients, and the noise of instruments has no lines there: penalised
@@ -117,10 +117,10 @@ def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
     """
     count = len(power)
     if count < 3:
-        return power, freedom
+        return power, dof
     bend = np.diff(np.eye(count), 2, axis=0)
     stiff = bend.T @ bend / _BEND**2
-    weight = np.diag(np.maximum(freedom, 1e-6) / 2)
+    weight = np.diag(np.maximum(dof, 1e-6) / 2)
     level = np.log(power)
     eta = np.linalg.solve(weight + stiff, weight @ level)
     for _ in range(_ITERATIONS):

@@ -20,18 +20,18 @@ _POWER_QUANTILE = 1.2816
 class Bar:
     """What an effect must bring to be named."""
 
-    price: float
+    penalty_per_parameter: float
     """Whitened squares that one degree of freedom must save."""
     threshold: float
     """What noise alone may score beyond that."""
 
-    def squares(self, freedom: int) -> float:
+    def squares(self, n_parameters: int) -> float:
         """Whitened squares that an effect of so many unknowns must take."""
-        return max(self.threshold, 0.0) + self.price * freedom
+        return max(self.threshold, 0.0) + self.penalty_per_parameter * n_parameters
 
-    def power(self, strength: float, freedom: int) -> float:
+    def power(self, strength: float, n_parameters: int) -> float:
         """Chance that an effect of noncentrality λ takes as much."""
-        return power_of(strength, self.squares(freedom))
+        return power_of(strength, self.squares(n_parameters))
 
 
 def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
@@ -42,10 +42,10 @@ def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
     out = []
     for item in scores:
         effect = item.candidate.effect
-        if item.strength <= 0:
+        if item.noncentrality <= 0:
             continue
-        size = (np.sqrt(bar.squares(item.candidate.freedom)) + _POWER_QUANTILE) / np.sqrt(
-            item.strength
+        size = (np.sqrt(bar.squares(item.candidate.n_parameters)) + _POWER_QUANTILE) / np.sqrt(
+            item.noncentrality
         )
         usual_step = item.candidate.usual_steps[0]
         name = next(iter(usual_step))

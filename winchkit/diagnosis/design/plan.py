@@ -114,7 +114,7 @@ def offers(
 
 def _sees(bar: Bar, term: Term, strength: float) -> bool:
     """Whether an effect of noncentrality λ would most probably be named."""
-    return bar.power(strength, Coordinates(term.effect).freedom) >= _SURE
+    return bar.power(strength, Coordinates(term.effect).n_parameters) >= _SURE
 
 
 def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list[tuple[Term, Term]]:

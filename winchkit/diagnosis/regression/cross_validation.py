@@ -38,7 +38,7 @@ def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) 
     whitened rows say.
     """
     shared = _shared(fit)
-    columns = _in_time(regression, shared * noise.weight(regression)[:, None])
+    columns = _in_time(regression, shared * noise.inverse_sigma(regression)[:, None])
     plain = _in_time(regression, shared)
     fold = np.concatenate(folds.of)
     output = np.concatenate([np.full(s.band.count, s.output) for s in regression.segments])
@@ -63,9 +63,9 @@ def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Ar
 
     The state in which a run began is its own, whatever is left out.
     """
-    weight = noise.weight(regression)
-    residual = np.concatenate(regression.in_time(fit.residual * weight))
-    columns = _in_time(regression, _shared(fit) * weight[:, None])
+    inverse_sigma = noise.inverse_sigma(regression)
+    residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
+    columns = _in_time(regression, _shared(fit) * inverse_sigma[:, None])
     fold = np.concatenate(folds.of)
     left = _left_out(residual, columns, fold, folds.count)
     return np.asarray(np.bincount(fold, weights=left**2, minlength=folds.count), dtype=float)
@@ -73,18 +73,18 @@ def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Ar
 
 def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
     """Change of the unknowns when each fold is left out, linearised; (folds, unknowns)."""
-    weight = noise.weight(regression)
-    residual = np.concatenate(regression.in_time(fit.residual * weight))
-    columns = _in_time(regression, fit.jacobian * weight[:, None])
+    inverse_sigma = noise.inverse_sigma(regression)
+    residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
+    columns = _in_time(regression, fit.jacobian * inverse_sigma[:, None])
     return _steps(residual, columns, np.concatenate(folds.of), folds.count)
 
 
 def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
     """Held-out error per output, rms in SI."""
-    weight = noise.weight(regression)
-    white = np.concatenate(regression.in_time(fit.residual * weight))
+    inverse_sigma = noise.inverse_sigma(regression)
+    white = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
     shared = _shared(fit)
-    columns = _in_time(regression, shared * weight[:, None])
+    columns = _in_time(regression, shared * inverse_sigma[:, None])
     steps = _steps(white, columns, np.concatenate(folds.of), folds.count)
     plain = np.concatenate(regression.in_time(fit.residual))
     plain_columns = _in_time(regression, shared)

@@ -52,15 +52,15 @@ def discretization_error(
     return out
 
 
-def without_discretization_error(regression: Regression, fit: Fit, weight: Array) -> Array:
+def without_discretization_error(regression: Regression, fit: Fit, inverse_sigma: Array) -> Array:
     """A fit's residual without the part, between none and all, that rounding explains, rows."""
     column = regression.discretization_error(fit.hypothesis)
-    across = _beside(fit.jacobian * weight[:, None], column * weight)
+    across = _beside(fit.jacobian * inverse_sigma[:, None], column * inverse_sigma)
     size = float(across @ across)
     if not size:
         return fit.residual
-    share = float(np.clip(across @ (fit.residual * weight) / size, 0.0, 1.0))
-    return fit.residual - share * across / weight
+    share = float(np.clip(across @ (fit.residual * inverse_sigma) / size, 0.0, 1.0))
+    return fit.residual - share * across / inverse_sigma
 
 
 def _beside(present: Array, column: Array) -> Array:
@@ -124,7 +124,7 @@ def _sharper(recording: Recording, line: Line) -> Array:
     hanging = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
     assert hanging.load is not None
     assert hanging.rounding is not None
-    weight = hanging.load - hanging.load.mean()
-    size = float(weight @ weight)
-    mass = float(weight @ tension) / size if size else 0.0
+    inverse_sigma = hanging.load - hanging.load.mean()
+    size = float(inverse_sigma @ inverse_sigma)
+    mass = float(inverse_sigma @ tension) / size if size else 0.0
     return -mass * hanging.rounding / 12

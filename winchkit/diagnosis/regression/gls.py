@@ -35,9 +35,9 @@ class Fit:
     """Unwhitened, rows."""
     jacobian: Array
     """Of the prediction, unwhitened, (rows, unknowns)."""
-    cost: float
+    chi_square: float
     """Sum of whitened squares."""
-    freedom: int
+    n_unknowns: int
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -45,7 +45,9 @@ class Fit:
         return tuple(term.label for term in self.hypothesis.terms)
 
 
-def fit(regression: Regression, start: Hypothesis, weight: Array, most: int | None = None) -> Fit:
+def fit(
+    regression: Regression, start: Hypothesis, inverse_sigma: Array, most: int | None = None
+) -> Fit:
     """Fit all unknowns from ``start``; ``weight`` is 1/σ per row. Bounds are kept.
 
     ``most`` is how many steps it may take, by default as many as are worth walking.
@@ -54,21 +56,21 @@ def fit(regression: Regression, start: Hypothesis, weight: Array, most: int | No
     low, high = regression.bounds(start)
     x = np.clip(x, low, high)
     residual = regression.residual(regression.hypothesis(x, start))
-    cost = _cost(residual, weight)
+    chi_square = _chi_square(residual, inverse_sigma)
     damping = 1e-6
     jacobian = regression.jacobian(x, start)
     for _ in range((_iterations(start) if most is None else most) if len(x) else 0):
         step, promised = _step(
-            jacobian * weight[:, None], residual * weight, damping, x, (low, high)
+            jacobian * inverse_sigma[:, None], residual * inverse_sigma, damping, x, (low, high)
         )
         if promised < _ENOUGH:
             break
         trial = np.clip(x + step, low, high)
         there = regression.residual(regression.hypothesis(trial, start))
-        new = _cost(there, weight)
-        if new < cost:
-            gained = cost - new
-            x, residual, cost, damping = trial, there, new, damping / 10
+        new = _chi_square(there, inverse_sigma)
+        if new < chi_square:
+            gained = chi_square - new
+            x, residual, chi_square, damping = trial, there, new, damping / 10
             jacobian = regression.jacobian(x, start)
             if gained < _ENOUGH:
                 break
@@ -77,16 +79,19 @@ def fit(regression: Regression, start: Hypothesis, weight: Array, most: int | No
             if damping > 1e6:
                 break
     fitted = regression.hypothesis(x, start)
-    return Fit(fitted, x, residual, jacobian, cost, len(x))
+    return Fit(fitted, x, residual, jacobian, chi_square, len(x))
 
 
-def fit_from(regression: Regression, starts: Sequence[Hypothesis], weight: Array) -> Fit:
+def fit_from(regression: Regression, starts: Sequence[Hypothesis], inverse_sigma: Array) -> Fit:
     """The best fit from several starts; after a first look only from the most promising ones."""
     if len(starts) > _PROMISING:
-        looked = [fit(regression, start, weight, _LOOK) for start in starts]
-        looked.sort(key=lambda fitted: fitted.cost)
+        looked = [fit(regression, start, inverse_sigma, _LOOK) for start in starts]
+        looked.sort(key=lambda fitted: fitted.chi_square)
         starts = [fitted.hypothesis for fitted in looked[:_PROMISING]]
-    return min((fit(regression, start, weight) for start in starts), key=lambda fitted: fitted.cost)
+    return min(
+        (fit(regression, start, inverse_sigma) for start in starts),
+        key=lambda fitted: fitted.chi_square,
+    )
 
 
 def _iterations(start: Hypothesis) -> int:
@@ -98,8 +103,8 @@ def _iterations(start: Hypothesis) -> int:
     return _PATIENT if start.terms and start.terms[-1].effect.probes else _ITERATIONS
 
 
-def _cost(residual: Array, weight: Array) -> float:
-    whitened = residual * weight
+def _chi_square(residual: Array, inverse_sigma: Array) -> float:
+    whitened = residual * inverse_sigma
     return float(whitened @ whitened)
 
 

@@ -40,7 +40,7 @@ _FARTHEST = 4.0
 
 
 def profile_ends(
-    regression: Regression, fit: Fit, weight: Array, covariance: Array, reach: Array
+    regression: Regression, fit: Fit, inverse_sigma: Array, covariance: Array, reach: Array
 ) -> tuple[Array, Array]:
     """Where the whitened squares have risen by ``reach``² with all else refitted; two (unknowns,).
 
@@ -55,7 +55,7 @@ def profile_ends(
     states = sum(len(start) for start in fit.hypothesis.starts)
     for index in range(first, len(fit.vector) - states):
         if deviation[index] > 0.0:
-            walk = _Walk(regression, fit, weight, covariance, index)
+            walk = _Walk(regression, fit, inverse_sigma, covariance, index)
             low[index] = fit.vector[index] - walk.length(-1.0, reach[index])
             high[index] = fit.vector[index] + walk.length(1.0, reach[index])
     return np.clip(low, *bounds), np.clip(high, *bounds)
@@ -65,13 +65,18 @@ class _Walk:
     """Away from a fit along one unknown, the others following."""
 
     def __init__(
-        self, regression: Regression, fit: Fit, weight: Array, covariance: Array, index: int
+        self, regression: Regression, fit: Fit, inverse_sigma: Array, covariance: Array, index: int
     ) -> None:
-        self._regression, self._fit, self._weight, self._index = regression, fit, weight, index
+        self._regression, self._fit, self._inverse_sigma, self._index = (
+            regression,
+            fit,
+            inverse_sigma,
+            index,
+        )
         self._deviation = float(np.sqrt(covariance[index, index]))
         self._along = covariance[:, index] / covariance[index, index]
         others = np.arange(len(covariance)) != index
-        whitened = fit.jacobian[:, others] * weight[:, None]
+        whitened = fit.jacobian[:, others] * inverse_sigma[:, None]
         normal = np.linalg.pinv(whitened.T @ whitened, rcond=1e-12, hermitian=True)
         self._others, self._whitened, self._normal = others, whitened, normal
         self._bounds = regression.bounds(fit.hypothesis)
@@ -95,17 +100,20 @@ class _Walk:
         low, high = self._bounds
         vector = np.clip(self._fit.vector + moved * self._along, low, high)
         residual = self._residual(vector)
-        risen = float(residual @ residual) - self._fit.cost
+        risen = float(residual @ residual) - self._fit.chi_square
         if risen < (1 + _LINEAR) * wanted:
             return risen
         step = np.zeros_like(vector)
         step[self._others] = self._normal @ (self._whitened.T @ residual)
         corrected = self._residual(np.clip(vector + step, low, high))
-        return min(risen, float(corrected @ corrected) - self._fit.cost)
+        return min(risen, float(corrected @ corrected) - self._fit.chi_square)
 
     def _residual(self, vector: Array) -> Array:
         like = self._fit.hypothesis
-        return self._regression.residual(self._regression.hypothesis(vector, like)) * self._weight
+        return (
+            self._regression.residual(self._regression.hypothesis(vector, like))
+            * self._inverse_sigma
+        )
 
 
 _95 = 1.959964
@@ -128,8 +136,8 @@ class Spread:
 
 def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
     """Standard deviations and 95 % intervals of every unknown."""
-    weight = noise.weight(regression)
-    whitened = fit.jacobian * weight[:, None]
+    inverse_sigma = noise.inverse_sigma(regression)
+    whitened = fit.jacobian * inverse_sigma[:, None]
     normal = whitened.T @ whitened
     covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -137,13 +145,15 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
     unknown = (statistical > _NOTHING) | (np.diag(normal) == 0.0)
     covariance[unknown] = covariance[:, unknown] = likelihood[unknown] = 0.0
     statistical[unknown] = _NOTHING
-    shift = covariance @ (whitened.T @ (regression.discretization_error(fit.hypothesis) * weight))
-    contradiction = _contradiction(regression, whitened, fit.residual * weight, covariance)
+    shift = covariance @ (
+        whitened.T @ (regression.discretization_error(fit.hypothesis) * inverse_sigma)
+    )
+    contradiction = _contradiction(regression, whitened, fit.residual * inverse_sigma, covariance)
     systematic = np.hypot(shift, contradiction)
     wider = np.divide(
         statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
     )
-    low, high = profile_ends(regression, fit, weight, covariance, _95 * wider)
+    low, high = profile_ends(regression, fit, inverse_sigma, covariance, _95 * wider)
     below, above = (
         np.where(unknown, _NOTHING, way) for way in (fit.vector - low, high - fit.vector)
     )

@@ -53,13 +53,13 @@ def lack_of_fit_test(
         return LackOfFitTest(float("nan"), nothing, nothing.astype(bool))
     split = replicate_contrasts(regression, residual)
     total = sums_per_band(split.mean**2, split.mean_band, count)
-    freedom = sums_per_band(np.ones_like(split.mean), split.mean_band, count)
-    basis = orthonormal(jacobian * noise.weight(regression)[:, None])
+    dof = sums_per_band(np.ones_like(split.mean), split.mean_band, count)
+    basis = orthonormal(jacobian * noise.inverse_sigma(regression)[:, None])
     # Each fitted unknown takes one degree of freedom from where it has leverage.
     taken = sums_per_band(np.sum(basis**2, axis=1), regression.band_of_row, count)
-    freedom = np.maximum(freedom - taken, 1.0)
-    ratio = total / freedom / noise.power
-    p = np.asarray(f_distribution.sf(ratio, freedom, noise.freedom))
+    dof = np.maximum(dof - taken, 1.0)
+    ratio = total / dof / noise.power
+    p = np.asarray(f_distribution.sf(ratio, dof, noise.dof))
     tested = max(count, 1)
     worst = float(min(1.0, p.min() * tested)) if count else 1.0
-    return LackOfFitTest(worst, total / noise.power - freedom, p * tested < 0.05)
+    return LackOfFitTest(worst, total / noise.power - dof, p * tested < 0.05)

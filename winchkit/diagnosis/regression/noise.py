@@ -40,13 +40,13 @@ class Noise:
 
     power: Array
     """Variance of a coefficient, (bands,)."""
-    freedom: Array
+    dof: Array
     """Degrees of freedom of each estimate, (bands,)."""
     rms: dict[str, float]
     """Per output, in time, SI."""
     from_repeats: bool
 
-    def weight(self, regression: Regression) -> Array:
+    def inverse_sigma(self, regression: Regression) -> Array:
         """1/σ of every row."""
         return np.asarray(1 / np.sqrt(self.power[regression.band_of_row]))
 
@@ -60,7 +60,7 @@ class Noise:
         out = {}
         for output in self.rms:
             own = np.array([band[0] == output for band in regression.bands])
-            variance = 2 * np.sum((spread * (1 / self.freedom + 1 / np.maximum(rows, 1.0)))[own])
+            variance = 2 * np.sum((spread * (1 / self.dof + 1 / np.maximum(rows, 1.0)))[own])
             out[output] = float(2 * np.sqrt(variance) / np.sum(total[own]))
         return out
 
@@ -86,23 +86,23 @@ def noise_from_repeats(
     """
     split = replicate_contrasts(regression, residual)
     count = len(regression.bands)
-    freedom = sums_per_band(np.ones_like(split.difference), split.difference_band, count)
-    power = _power(regression, split.difference, split.difference_band, freedom)
-    whole = freedom
+    dof = sums_per_band(np.ones_like(split.difference), split.difference_band, count)
+    power = _power(regression, split.difference, split.difference_band, dof)
+    whole = dof
     taken = _differences(regression, own)
     for _ in range(_REWEIGHTED if known.size or taken.size else 0):
         # What differs for a known reason made the first weights: they are drawn anew without it.
-        weight = 1 / np.sqrt(_smooth(regression, power, np.maximum(freedom, 0.1))[0])
-        weight = weight[split.difference_band]
-        basis = _noticeable(regression, known, weight)
+        inverse_sigma = 1 / np.sqrt(_smooth(regression, power, np.maximum(dof, 0.1))[0])
+        inverse_sigma = inverse_sigma[split.difference_band]
+        basis = _noticeable(regression, known, inverse_sigma)
         if taken.size:
-            basis = orthonormal(np.hstack([basis, taken * weight[:, None]]))
-        whitened = split.difference * weight
-        left = (whitened - basis @ (basis.T @ whitened)) / weight
-        freedom = whole - sums_per_band(np.sum(basis**2, axis=1), split.difference_band, count)
-        power = _power(regression, left, split.difference_band, np.maximum(freedom, 1.0))
-    power, freedom = _smooth(regression, power, np.maximum(freedom, 0.1))
-    return Noise(power, freedom, _rms(regression, power), from_repeats=True)
+            basis = orthonormal(np.hstack([basis, taken * inverse_sigma[:, None]]))
+        whitened = split.difference * inverse_sigma
+        left = (whitened - basis @ (basis.T @ whitened)) / inverse_sigma
+        dof = whole - sums_per_band(np.sum(basis**2, axis=1), split.difference_band, count)
+        power = _power(regression, left, split.difference_band, np.maximum(dof, 1.0))
+    power, dof = _smooth(regression, power, np.maximum(dof, 0.1))
+    return Noise(power, dof, _rms(regression, power), from_repeats=True)
 
 
 def noise_saturated(regression: Regression, residual: Array, columns: Array) -> Noise:
@@ -117,13 +117,15 @@ def noise_saturated(regression: Regression, residual: Array, columns: Array) -> 
     total = sums_per_band(np.ones(regression.n_rows), bands, count)
     power = _even(regression, residual)
     for _ in range(_REWEIGHTED):
-        weight = 1 / np.sqrt(power[bands])
-        basis = orthonormal(columns * weight[:, None], _fewest_rows(regression) // _ROWS_EACH)
-        whitened = residual * weight
-        left = (whitened - basis @ (basis.T @ whitened)) / weight
-        freedom = np.maximum(total - sums_per_band(np.sum(basis**2, axis=1), bands, count), 1.0)
-        power = _power(regression, left, bands, freedom)
-    return Noise(power, freedom, _rms(regression, power), from_repeats=False)
+        inverse_sigma = 1 / np.sqrt(power[bands])
+        basis = orthonormal(
+            columns * inverse_sigma[:, None], _fewest_rows(regression) // _ROWS_EACH
+        )
+        whitened = residual * inverse_sigma
+        left = (whitened - basis @ (basis.T @ whitened)) / inverse_sigma
+        dof = np.maximum(total - sums_per_band(np.sum(basis**2, axis=1), bands, count), 1.0)
+        power = _power(regression, left, bands, dof)
+    return Noise(power, dof, _rms(regression, power), from_repeats=False)
 
 
 def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
@@ -199,26 +201,26 @@ def _differences(regression: Regression, columns: Array | None) -> Array:
     return np.array([replicate_contrasts(regression, column).difference for column in columns.T]).T
 
 
-def _noticeable(regression: Regression, known: Array, weight: Array) -> Array:
+def _noticeable(regression: Regression, known: Array, inverse_sigma: Array) -> Array:
     """Orthonormal directions in which known signatures differ between repeats."""
     different = []
     for column in known.T:
         split = replicate_contrasts(regression, column)
-        whitened = split.difference * weight
-        mean = split.mean / np.sqrt(_nearest(weight, split))
+        whitened = split.difference * inverse_sigma
+        mean = split.mean / np.sqrt(_nearest(inverse_sigma, split))
         if whitened @ whitened > _NOTICEABLE * float(mean @ mean):
             different.append(whitened / np.sqrt(whitened @ whitened))
     if not different:
-        return np.zeros((len(weight), 0))
+        return np.zeros((len(inverse_sigma), 0))
     left, size, _ = np.linalg.svd(np.array(different).T, full_matrices=False)
     return np.asarray(left[:, :_KNOWN_DIFFERENCES][:, size[:_KNOWN_DIFFERENCES] > 0.1])
 
 
-def _nearest(weight: Array, split: ReplicateContrasts) -> Array:
+def _nearest(inverse_sigma: Array, split: ReplicateContrasts) -> Array:
     """Noise power of the mean's rows, from that of the differences' bands."""
     count = int(max(split.mean_band.max(), split.difference_band.max())) + 1
     power = np.ones(count)
-    power[split.difference_band] = 1 / weight**2
+    power[split.difference_band] = 1 / inverse_sigma**2
     return power[split.mean_band]
 
 
@@ -252,13 +254,13 @@ def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
     return np.asarray(np.bincount(bands, weights=values, minlength=count))
 
 
-def _smooth(regression: Regression, power: Array, freedom: Array) -> tuple[Array, Array]:
+def _smooth(regression: Regression, power: Array, dof: Array) -> tuple[Array, Array]:
     """Every output's spectrum smoothed over its bands."""
-    power, freedom = power.copy(), freedom.copy()
+    power, dof = power.copy(), dof.copy()
     for output in regression.outputs:
         own = np.array([band[0] == output for band in regression.bands])
-        power[own], freedom[own] = smoothed(power[own], freedom[own])
-    return power, freedom
+        power[own], dof[own] = smoothed(power[own], dof[own])
+    return power, dof
 
 
 def _even(regression: Regression, residual: Array) -> Array:
@@ -271,9 +273,9 @@ def _even(regression: Regression, residual: Array) -> Array:
     return np.maximum(out, regression.power_floor)
 
 
-def _power(regression: Regression, values: Array, bands: NDArray[np.intp], freedom: Array) -> Array:
+def _power(regression: Regression, values: Array, bands: NDArray[np.intp], dof: Array) -> Array:
     """Mean square per band; noise-free data get a floor far below what instruments resolve."""
-    power = sums_per_band(values**2, bands, len(freedom)) / np.maximum(freedom, 1.0)
+    power = sums_per_band(values**2, bands, len(dof)) / np.maximum(dof, 1.0)
     return np.maximum(power, regression.power_floor)
 
 

@@ -131,7 +131,9 @@ def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
         outputs=outputs,
         steps=steps,
         candidates=candidates_of(engine, seen.result),
-        detectable=detectable(seen.result.scores, Bar(engine.price, seen.result.threshold)),
+        detectable=detectable(
+            seen.result.scores, Bar(engine.penalty_per_parameter, seen.result.threshold)
+        ),
         unexplained_share=judgement.share,
         where=_places(seen) if seen.result.lack_of_fit else (),
         next_runs=next_pose_runs(engine.regression, shown.final.hypothesis, pairs_of(sets)),
@@ -210,7 +212,7 @@ def _beyond_few(study: Study, filed: PoseSelection) -> bool:
     if not _is_real(study, gain):
         return False
     present, noise = filed.settle(filed.initial_model)
-    best = max((s.gain for s in filed.scores(present, noise)), default=0.0)
+    best = max((s.explained_ss for s in filed.scores(present, noise)), default=0.0)
     return best < _ONE_OF_FEW * gain
 
 
@@ -220,8 +222,8 @@ def _gain_of_geometry(study: Study, filed: PoseSelection, model: Hypothesis) -> 
     wide = PoseRegression(replace(standing, believed=_from(study.prior, standing.believed)))
     hypothesis = replace(model, nuisances=())
     before = filed.regression
-    cost = fit(before, hypothesis, np.ones(before.n_rows)).cost
-    return cost - fit(wide, hypothesis, np.ones(wide.n_rows)).cost
+    chi_square = fit(before, hypothesis, np.ones(before.n_rows)).chi_square
+    return chi_square - fit(wide, hypothesis, np.ones(wide.n_rows)).chi_square
 
 
 def _concluded(study: Study, engine: PoseSelection, filed: PoseSelection) -> RobotAnswer:
@@ -238,8 +240,8 @@ def _geometry_is_off(study: Study, filed: PoseSelection, result: SelectionResult
 def _is_real(study: Study, gain: float) -> bool:
     """F test of the whitened squares that the geometry takes."""
     count = len(study.prior)
-    freedom = study.noise.freedom.get("cable_length", 1.0)
-    level = float(f_distribution.isf(_GEOMETRY_LEVEL, count, max(freedom, 1.0)))
+    dof = study.noise.dof.get("cable_length", 1.0)
+    level = float(f_distribution.isf(_GEOMETRY_LEVEL, count, max(dof, 1.0)))
     return gain / count > level
 
 

@@ -52,10 +52,10 @@ class PoseSelection(SelectionEngine):
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Unit variance: rows are whitened with the variance components."""
         bands = self.regression.bands
-        freedom = np.array([self.pose_noise.freedom.get(output, 1.0) for output, _, _ in bands])
+        dof = np.array([self.pose_noise.dof.get(output, 1.0) for output, _, _ in bands])
         return Noise(
             power=np.ones(len(bands)),
-            freedom=np.maximum(freedom, 1.0),
+            dof=np.maximum(dof, 1.0),
             rms=dict.fromkeys(self.regression.outputs, 1.0),
             from_repeats=self.pose_noise.from_repeats,
         )
@@ -79,10 +79,10 @@ class PoseSelection(SelectionEngine):
         left, _ = np.linalg.qr(_independent(present.jacobian))
         taken = np.bincount(bands[real], np.sum(left**2, axis=1)[real], count)
         total = np.bincount(bands[real], present.residual[real] ** 2, count)
-        freedom = np.maximum(np.bincount(bands[real], minlength=count) - taken, 1.0)
-        p = np.asarray(f_distribution.sf(total / freedom, freedom, noise.freedom))
+        dof = np.maximum(np.bincount(bands[real], minlength=count) - taken, 1.0)
+        p = np.asarray(f_distribution.sf(total / dof, dof, noise.dof))
         worst = float(min(1.0, p.min() * count))
-        return LackOfFitTest(worst, total - freedom, p * count < 0.05)
+        return LackOfFitTest(worst, total - dof, p * count < 0.05)
 
 
 def _independent(columns: Array) -> Array:

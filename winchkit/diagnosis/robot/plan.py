@@ -107,7 +107,7 @@ def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
     hidden = _hidden(answer)
     questions: list[Question] = [*pairs, *((term, None) for term in hidden)]
     many, bar = len(pairs), answer.bar
-    needed = [APART] * many + [bar.squares(Coordinates(t.effect).freedom) for t in hidden]
+    needed = [APART] * many + [bar.squares(Coordinates(t.effect).n_parameters) for t in hidden]
     offers = pose_offers(regression, final, questions, needed, count) if questions else []
 
     def worth(offer: PoseOffer) -> tuple[float, ...]:
@@ -130,12 +130,12 @@ def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
     there = {term.effect.id for term in answer.result.final.hypothesis.terms}
     for score in answer.result.scores:
         effect = score.candidate.effect
-        seen = answer.bar.power(score.strength, score.candidate.freedom) >= _SURE
-        if not score.strength > 0 or seen or effect.id in there:
+        seen = answer.bar.power(score.noncentrality, score.candidate.n_parameters) >= _SURE
+        if not score.noncentrality > 0 or seen or effect.id in there:
             continue
         known = faint.get(base_of(effect))
-        if known is None or score.strength < known[0]:
+        if known is None or score.noncentrality < known[0]:
             values = {**usual_values(effect), **score.candidate.shape}
-            faint[base_of(effect)] = score.strength, Term(effect, values)
+            faint[base_of(effect)] = score.noncentrality, Term(effect, values)
     ranked = sorted(faint.values(), key=lambda item: -item[0])[:_MOST]
     return tuple(term for _, term in ranked)

@@ -204,7 +204,7 @@ class Study:
         """
         engine = self.let_go()
         present, noise = engine.settle(engine.initial_model)
-        listed = [s for s in engine.scores(present, noise) if s.value > 0][:_SHORT_LIST]
+        listed = [s for s in engine.scores(present, noise) if s.net_gain > 0][:_SHORT_LIST]
         trials = [engine.trial(present, item, noise) for item in listed]
         best = min(trials, key=lambda t: t.criterion, default=None)
         if best is None or best.criterion > engine.criterion(present):

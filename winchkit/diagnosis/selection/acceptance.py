@@ -45,7 +45,9 @@ def holds(
     after = held_out(regression, grown, noise, blocks)
     groups = engine.folds(grown, noise)
     gain = held_out(regression, present, noise, groups) - held_out(regression, grown, noise, groups)
-    pays = engine.grouped(groups) and bool(np.min(gain) > engine.price * _added(present, grown))
+    pays = engine.grouped(groups) and bool(
+        np.min(gain) > engine.penalty_per_parameter * _added(present, grown)
+    )
     if np.sum(before - after) <= 0 or (confidence(before, after) > _GATE_LEVEL and not pays):
         return False
     was = held_out_rms(regression, present, noise, groups)
@@ -58,7 +60,7 @@ def holds(
 def _added(present: Fit, grown: Fit) -> int:
     """Degrees of freedom that a grown model has more than the present model, one at least."""
     after, before = (
-        sum(Coordinates(term.effect).freedom for term in fitted.hypothesis.terms)
+        sum(Coordinates(term.effect).n_parameters for term in fitted.hypothesis.terms)
         for fitted in (grown, present)
     )
     return max(1, after - before)

@@ -50,7 +50,7 @@ def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[
     What would help only with the wrong sign, such as an inertia below zero, gains nothing.
     """
     signed = [item if _possible(item) else worthless(item, rows) for item in ranked]
-    signed.sort(key=lambda item: -item.value)
+    signed.sort(key=lambda item: -item.net_gain)
     return [item for item in signed if not _stands_there(item.candidate.effect, item, present)]
 
 
@@ -180,7 +180,7 @@ class SelectionEngine(ABC):
         )
 
     @property
-    def price(self) -> float:
+    def penalty_per_parameter(self) -> float:
         """Reduction of χ² required per parameter: ln n, as in the BIC."""
         return float(np.log(self.regression.n_observations))
 
@@ -209,9 +209,9 @@ class SelectionEngine(ABC):
             vector = self.regression.vector(start)
             jacobian = self.regression.jacobian(vector, start)
             noise = self.noise(self.regression.residual(start), jacobian, states)
-        first = fit(self.regression, start, noise.weight(self.regression))
+        first = fit(self.regression, start, noise.inverse_sigma(self.regression))
         noise = self.noise(first.residual, first.jacobian, states)
-        return fit(self.regression, first.hypothesis, noise.weight(self.regression)), noise
+        return fit(self.regression, first.hypothesis, noise.inverse_sigma(self.regression)), noise
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
         """Signatures with a fit's unknowns projected out."""
@@ -233,21 +233,23 @@ class SelectionEngine(ABC):
     def couples(self, present: Fit, noise: Noise) -> list[Couple]:
         """Pairs of candidates that pay beside a fit, best first."""
         scores = self.every_score(present, noise)
-        return couples(self.projected(present, noise), present.residual, scores, self.price)
+        return couples(
+            self.projected(present, noise), present.residual, scores, self.penalty_per_parameter
+        )
 
     def criterion(self, fitted: Fit) -> float:
         """Whitened squares and the price of everything that was added."""
         added = fitted.hypothesis.terms[self.n_initial_terms :]
-        freedom = sum(Coordinates(term.effect).freedom for term in added)
+        n_parameters = sum(Coordinates(term.effect).n_parameters for term in added)
         states = sum(len(start) for start in fitted.hypothesis.starts[self.n_initial_terms :])
-        return fitted.cost + self.price * (freedom + states)
+        return fitted.chi_square + self.penalty_per_parameter * (n_parameters + states)
 
     def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
         """Fit a candidate beside the present terms; those that it contains give way to it.
 
         Of a series it takes as many coefficients as pay, each added to what was fitted before.
         """
-        effect, weight = item.candidate.effect, noise.weight(self.regression)
+        effect, inverse_sigma = item.candidate.effect, noise.inverse_sigma(self.regression)
         hypothesis = present.hypothesis
         for index in reversed(range(self.n_initial_terms, len(hypothesis.terms))):
             if hypothesis.terms[index].effect.id in effect.contains:
@@ -256,14 +258,14 @@ class SelectionEngine(ABC):
         for law in by_coefficients(effect):
             if best is None:
                 own = replace(item, candidate=item.candidate.with_law(law))
-                places = placed(self.regression, hypothesis, present, own, weight)
+                places = placed(self.regression, hypothesis, present, own, inverse_sigma)
                 terms = [Term(law, values) for values in places]
                 starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
                 starts += [anew for start in starts for anew in self._less_rounded(start)]
             else:
                 starts = [best.fit.hypothesis.with_law(law)]
-            fitted = fit_from(self.regression, starts, weight)
-            longer = Trial(fitted, self._price_of(fitted, hypothesis, present, noise))
+            fitted = fit_from(self.regression, starts, inverse_sigma)
+            longer = Trial(fitted, self._criterion_of_trial(fitted, hypothesis, present, noise))
             if best is not None and not longer.criterion < best.criterion:
                 break
             best = longer if np.isfinite(longer.criterion) else best
@@ -284,28 +286,34 @@ class SelectionEngine(ABC):
             return []
         return [replace(start, nuisances=(*start.nuisances[:-1], 0.0))]
 
-    def _price_of(self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise) -> float:
+    def _criterion_of_trial(
+        self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise
+    ) -> float:
         """The criterion of a trial; infinite where its last term is not what it is called."""
-        price = self.criterion(fitted)
+        criterion = self.criterion(fitted)
         if in_disguise(fitted.hypothesis.terms[-1]) or (
-            price < self.criterion(present) and self._rests_on_states(without, fitted, noise)
+            criterion < self.criterion(present) and self._rests_on_states(without, fitted, noise)
         ):
-            price = np.inf
-        return float(price)
+            criterion = np.inf
+        return float(criterion)
 
     def _rests_on_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
         """Whether the last term explains mainly by the states in which the runs began."""
         if not fitted.hypothesis.starts[-1]:
             return False
-        weight = noise.weight(self.regression)
+        inverse_sigma = noise.inverse_sigma(self.regression)
         return rests_on_states(
-            self.regression, self.refit(without, noise), fitted, weight, self.price
+            self.regression,
+            self.refit(without, noise),
+            fitted,
+            inverse_sigma,
+            self.penalty_per_parameter,
         )
 
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """Fit a hypothesis under a given noise."""
-        return fit(self.regression, hypothesis, noise.weight(self.regression))
+        return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression))
 
     def held(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """A hypothesis as it is, fitted no further."""
-        return fit(self.regression, hypothesis, noise.weight(self.regression), 0)
+        return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression), 0)

@@ -43,10 +43,10 @@ class Exchange:
     def _held(self) -> tuple[Fit, float, dict[str, Score]]:
         """The others as they stand beside the term; the least squares about there; the scores."""
         held = self._engine.held(self._others, self._noise)
-        weight = self._noise.weight(self._engine.regression)
-        whitened, residual = held.jacobian * weight[:, None], held.residual * weight
+        inverse_sigma = self._noise.inverse_sigma(self._engine.regression)
+        whitened, residual = held.jacobian * inverse_sigma[:, None], held.residual * inverse_sigma
         basis = orthonormal(whitened)
-        least = held.cost - float(np.sum((basis.T @ residual) ** 2))
+        least = held.chi_square - float(np.sum((basis.T @ residual) ** 2))
         scores = self._engine.scores(held, self._noise)
         return held, least, {item.candidate.effect.id: item for item in scores}
 
@@ -57,15 +57,15 @@ class Exchange:
         others as they stand.
         """
         found = self._engine.trial(self.base, rival, self._noise)
-        if found.fit.cost < enough or not self._others.terms:
+        if found.fit.chi_square < enough or not self._others.terms:
             return found
         held, least, scores = self._held
         beside = scores.get(rival.candidate.effect.id)
-        nearly = enough + _NEARLY * (self.base.cost - enough)
-        if beside is None or least - beside.gain > nearly:
+        nearly = enough + _NEARLY * (self.base.chi_square - enough)
+        if beside is None or least - beside.explained_ss > nearly:
             return found
         again = self._engine.trial(held, beside, self._noise)
-        return min(found, again, key=lambda trial: (trial.criterion, trial.fit.cost))
+        return min(found, again, key=lambda trial: (trial.criterion, trial.fit.chi_square))
 
 
 _TRIED = 2
@@ -97,7 +97,7 @@ def _better(
     pays = engine.criterion(base) - engine.criterion(present) + BETTER
     leave = {present.hypothesis.terms[index].effect.id for index in indices}
     promising = [
-        pair for pair in engine.couples(base, noise) if pair.pays > pays and pair.ids != leave
+        pair for pair in engine.couples(base, noise) if pair.net_gain > pays and pair.ids != leave
     ]
     for pair in promising[:tried]:
         # Newcomers first: what stood for both alone would keep the values that it had.

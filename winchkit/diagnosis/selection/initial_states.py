@@ -23,7 +23,11 @@ _BY_ITSELF = 0.5
 
 
 def rests_on_states(
-    regression: Regression, base: Fit, fitted: Fit, weight: Array, price: float
+    regression: Regression,
+    base: Fit,
+    fitted: Fit,
+    inverse_sigma: Array,
+    penalty_per_parameter: float,
 ) -> bool:
     """Whether the last term of a fit, which ``base`` lacks, needs its states too much.
 
@@ -31,20 +35,20 @@ def rests_on_states(
     level per run would: a ramp from zero is three quarters level. Nor, as on a bench under a load
     that hangs for long, where it pays for all its numbers by more than levels do.
     """
-    known, left = base.jacobian * weight[:, None], base.residual * weight
-    gain = base.cost - fitted.cost
-    column = _beyond(known, _from_rest(regression, fitted.hypothesis) * weight)
+    known, left = base.jacobian * inverse_sigma[:, None], base.residual * inverse_sigma
+    gain = base.chi_square - fitted.chi_square
+    column = _beyond(known, _from_rest(regression, fitted.hypothesis) * inverse_sigma)
     alone = (column @ left) ** 2 / max(float(column @ column), 1e-300)
     by_itself = bool(alone >= _BY_ITSELF * gain)
     levels = _levels(regression, fitted.hypothesis)
     if levels is None:
         return not by_itself
-    flat = _beyond(np.column_stack([known, levels * weight[:, None]]), left)
+    flat = _beyond(np.column_stack([known, levels * inverse_sigma[:, None]]), left)
     if by_itself and alone >= left @ left - flat @ flat:
         return False
     hypothesis = fitted.hypothesis
-    owed = Coordinates(hypothesis.terms[-1].effect).freedom + len(hypothesis.starts[-1])
-    return float(flat @ flat) - fitted.cost < price * owed
+    owed = Coordinates(hypothesis.terms[-1].effect).n_parameters + len(hypothesis.starts[-1])
+    return float(flat @ flat) - fitted.chi_square < penalty_per_parameter * owed
 
 
 def _from_rest(regression: Regression, hypothesis: Hypothesis) -> Array:

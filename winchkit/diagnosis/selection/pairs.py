@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.projection import gains
+from winchkit.diagnosis.regression.projection import explained_ss_of_sets
 from winchkit.diagnosis.selection.scores import Projected, Score
 
 __all__ = ["Couple", "couples"]
@@ -28,11 +28,11 @@ class Couple:
     """Two candidates side by side."""
 
     scores: tuple[Score, Score]
-    taken: float
+    explained_ss: float
     """Whitened squares."""
-    pays: float
+    net_gain: float
     """The same less the price of their degrees of freedom."""
-    alone: float
+    single_gain: float
     """Whitened squares that the two take one at a time, each at the best point of its grid."""
 
     @property
@@ -43,28 +43,34 @@ class Couple:
     @property
     def hidden(self) -> bool:
         """Whether they take far more together than the one and the other."""
-        return self.taken > _TOGETHER * self.alone
+        return self.explained_ss > _TOGETHER * self.single_gain
 
 
 def couples(
-    projected: Projected, residual: Array, scores: Sequence[Score], price: float
+    projected: Projected, residual: Array, scores: Sequence[Score], penalty_per_parameter: float
 ) -> list[Couple]:
     """Pairs of candidates that pay, best first, each at the best points of its two grids.
 
     ``scores`` are of all points; ``price`` is what a degree of freedom must save.
     """
-    alone: dict[str, float] = {}
+    single_gain: dict[str, float] = {}
     for item in scores:
-        alone[item.candidate.effect.id] = max(item.gain, alone.get(item.candidate.effect.id, 0.0))
+        single_gain[item.candidate.effect.id] = max(
+            item.explained_ss, single_gain.get(item.candidate.effect.id, 0.0)
+        )
     found: dict[frozenset[str], Couple] = {}
     pairs = _pairs(scores)
-    for pair, taken in zip(pairs, _together(projected, residual, pairs), strict=True):
+    for pair, explained_ss in zip(pairs, _together(projected, residual, pairs), strict=True):
         first, second = (item.candidate.effect.id for item in pair)
-        pays = taken - price * sum(item.candidate.freedom for item in pair)
+        net_gain = explained_ss - penalty_per_parameter * sum(
+            item.candidate.n_parameters for item in pair
+        )
         ids = frozenset((first, second))
-        if pays > 0 and (ids not in found or pays > found[ids].pays):
-            found[ids] = Couple(pair, taken, pays, alone[first] + alone[second])
-    return sorted(found.values(), key=lambda couple: -couple.pays)
+        if net_gain > 0 and (ids not in found or net_gain > found[ids].net_gain):
+            found[ids] = Couple(
+                pair, explained_ss, net_gain, single_gain[first] + single_gain[second]
+            )
+    return sorted(found.values(), key=lambda couple: -couple.net_gain)
 
 
 def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:
@@ -90,5 +96,7 @@ def _together(
     for count in np.unique(counts):
         alike = np.flatnonzero(counts == count)
         own = np.array([columns[index] for index in alike])
-        out[alike] = gains(inner[own[:, :, None], own[:, None, :]], products[own], _UNIDENTIFIABLE)
+        out[alike] = explained_ss_of_sets(
+            inner[own[:, :, None], own[:, None, :]], products[own], _UNIDENTIFIABLE
+        )
     return list(map(float, out))

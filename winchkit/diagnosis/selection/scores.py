@@ -28,12 +28,12 @@ class Score:
     """How much of the residual's whitened squares an atom would take, and its chance level."""
 
     candidate: Candidate
-    gain: float
-    value: float
+    explained_ss: float
+    net_gain: float
     """Gain less the price of its degrees of freedom."""
     amplitudes: Array
     """In units of the secants."""
-    strength: float
+    noncentrality: float
     """λ for one usual size: noncentrality of its whitened, projected signature."""
 
 
@@ -45,8 +45,8 @@ class Projected:
     ) -> None:
         self.signatures = signatures
         self._jacobian = jacobian
-        self._weight2 = noise.weight(regression) ** 2
-        self._freedom = noise.freedom
+        self._inverse_variance = noise.inverse_sigma(regression) ** 2
+        self._dof = noise.dof
         self._cross, self._normal = _cross(regression, jacobian, signatures.columns)
         self._share = share = 1 / noise.power
         cross, normal, gram = (
@@ -61,11 +61,11 @@ class Projected:
 
     def products(self, residual: Array) -> Array:
         """Inner products of the whitened residual with the projected columns, (p,)."""
-        weighted = residual * self._weight2
+        weighted = residual * self._inverse_variance
         own = self.signatures.columns.T @ weighted
         return np.asarray(own + self._through.T @ (self._jacobian.T @ weighted))
 
-    def gains(self, products: Array) -> Array:
+    def explained_ss(self, products: Array) -> Array:
         """Whitened squares that each atom takes; products (p,) or (p, samples)."""
         return np.array(
             [
@@ -80,7 +80,7 @@ class Projected:
         candidate = self.signatures.candidates[index]
         return np.asarray(root @ (root.T @ products[candidate.columns]))
 
-    def strength(self, index: int) -> float:
+    def noncentrality(self, index: int) -> float:
         """λ for one usual size of an atom; zero where it cannot be identified."""
         first = self.signatures.candidates[index].columns.start
         return float(self.inner[first, first]) if self._roots[index].shape[1] else 0.0
@@ -90,13 +90,13 @@ class Projected:
         random = np.random.default_rng(0)
         out = np.zeros((len(self.inner), samples))
         bands = zip(
-            self._share, self.signatures.gram, self._cross, self._normal, self._freedom, strict=True
+            self._share, self.signatures.gram, self._cross, self._normal, self._dof, strict=True
         )
-        for share, gram, cross, normal, freedom in bands:
+        for share, gram, cross, normal, n_parameters in bands:
             part = share * _projected(gram, cross, normal, self._through)
             # No Cholesky factor: what the present model explains whole is left with rounding only.
             values, vectors = np.linalg.eigh(part)
-            factor = np.sqrt(freedom / random.chisquare(freedom, samples))
+            factor = np.sqrt(n_parameters / random.chisquare(n_parameters, samples))
             noise = random.standard_normal((len(part), samples)) * factor
             # The symmetric root: the same draws whichever way rounding turns the vectors.
             out += (vectors * np.sqrt(np.maximum(values, 0.0))) @ (vectors.T @ noise)
@@ -134,18 +134,28 @@ def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
     """Scores of all atoms, best first: gain less (degrees of freedom) · ln(rows)."""
     products = projected.products(residual)
     out = []
-    for index, gain in enumerate(projected.gains(products).tolist()):
+    for index, explained_ss in enumerate(projected.explained_ss(products).tolist()):
         candidate = projected.signatures.candidates[index]
-        value = gain - candidate.freedom * float(np.log(rows))
-        strength = projected.strength(index)
-        out.append(Score(candidate, gain, value, projected.amplitudes(index, products), strength))
-    return sorted(out, key=lambda s: -s.value)
+        net_gain = explained_ss - candidate.n_parameters * float(np.log(rows))
+        noncentrality = projected.noncentrality(index)
+        out.append(
+            Score(
+                candidate,
+                explained_ss,
+                net_gain,
+                projected.amplitudes(index, products),
+                noncentrality,
+            )
+        )
+    return sorted(out, key=lambda s: -s.net_gain)
 
 
 def worthless(item: Score, rows: int) -> Score:
     """The score of an atom that takes nothing of the residual."""
-    value = -item.candidate.freedom * float(np.log(rows))
-    return replace(item, gain=0.0, value=value, amplitudes=np.zeros_like(item.amplitudes))
+    net_gain = -item.candidate.n_parameters * float(np.log(rows))
+    return replace(
+        item, explained_ss=0.0, net_gain=net_gain, amplitudes=np.zeros_like(item.amplitudes)
+    )
 
 
 def chance_level(projected: Projected, rows: int) -> Array:
@@ -153,6 +163,8 @@ def chance_level(projected: Projected, rows: int) -> Array:
     candidates = projected.signatures.candidates
     if not candidates:
         return np.zeros(1)
-    price = np.array([candidate.freedom * np.log(rows) for candidate in candidates])
-    gains = projected.gains(projected.simulated())
-    return np.asarray(np.sort((gains - price[:, None]).max(axis=0)))
+    penalty_per_parameter = np.array(
+        [candidate.n_parameters * np.log(rows) for candidate in candidates]
+    )
+    explained_ss = projected.explained_ss(projected.simulated())
+    return np.asarray(np.sort((explained_ss - penalty_per_parameter[:, None]).max(axis=0)))

@@ -34,9 +34,9 @@ class Candidate:
     usual_steps: tuple[dict[str, float], ...]
 
     @property
-    def freedom(self) -> int:
+    def n_parameters(self) -> int:
         """Degrees of freedom that choosing it costs."""
-        return Coordinates(self.effect).freedom
+        return Coordinates(self.effect).n_parameters
 
     def with_law(self, law: Effect) -> Candidate:
         """The same of a law with fewer coefficients, begun where these alone say so."""

@@ -94,7 +94,7 @@ _HALVINGS = 7
 
 
 def placed(
-    regression: Regression, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array
+    regression: Regression, hypothesis: Hypothesis, present: Fit, item: Score, inverse_sigma: Array
 ) -> list[dict[str, float]]:
     """Where fits begin; a moment is first sought between the points of its grid.
 
@@ -106,12 +106,12 @@ def placed(
         return begun
     place, values = places[0], begun[0]
     here = regression.change(hypothesis)
-    residual, jacobian = present.residual * weight, present.jacobian * weight[:, None]
+    residual, jacobian = present.residual * inverse_sigma, present.jacobian * inverse_sigma[:, None]
 
     def gain(at: float) -> float:
         term = Term(item.candidate.effect, {**values, place.name: at})
         column = regression.change(hypothesis.with_term(term, regression.n_runs)) - here
-        column = column * weight
+        column = column * inverse_sigma
         column = column - jacobian @ np.linalg.lstsq(jacobian, column)[0]
         size = float(column @ column)
         return float((column @ residual) ** 2) / size if size else 0.0

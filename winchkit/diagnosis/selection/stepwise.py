@@ -95,7 +95,7 @@ def _grown(
     tried: tuple[Fit, ...] = ()
     for _ in range(_MOST_STEPS):
         grown = None
-        if scores and scores[0].value > threshold:
+        if scores and scores[0].net_gain > threshold:
             trials = _short_list(engine, present, noise, scores)
             tried = tried or _fits(trials)
             grown = best_that_holds(engine, present, noise, trials)
@@ -156,14 +156,14 @@ def _has_lack_of_fit(
     """
     if np.isfinite(lack_of_fit_test.p_value):
         return lack_of_fit_test.p_value < _LACK_OF_FIT_LEVEL
-    return bool(scores) and scores[0].value > threshold
+    return bool(scores) and scores[0].net_gain > threshold
 
 
 def _short_list(
     engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score]
 ) -> list[Trial]:
     """The candidates that score best, each fitted beside the present terms, in their order."""
-    listed = [item for item in scores if item.value > 0][:_SHORT_LIST]
+    listed = [item for item in scores if item.net_gain > 0][:_SHORT_LIST]
     return [engine.trial(present, item, noise) for item in listed]
 
 
@@ -251,7 +251,7 @@ def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
 
     Before it is fitted a law with more numbers looks better than the simple one that it contains.
     """
-    others = [item for item in scores if item.value > 0 and _another(item, own)]
+    others = [item for item in scores if item.net_gain > 0 and _another(item, own)]
     best = others[:_RIVALS]
     simpler = {name for item in best for name in item.candidate.effect.contains}
     return best + [item for item in others[_RIVALS:] if item.candidate.effect.id in simpler]
@@ -269,7 +269,7 @@ def _without_the_doubtful(engine: SelectionEngine, present: Fit, noise: Noise) -
     doubtful = present
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = engine.refit(present.hypothesis.without(index), noise)
-        if without.cost - present.cost < missing:
+        if without.chi_square - present.chi_square < missing:
             doubtful = engine.refit(doubtful.hypothesis.without(index), noise)
     return (present, noise) if doubtful is present else engine.settle(doubtful.hypothesis, noise)
 

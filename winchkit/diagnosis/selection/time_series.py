@@ -70,7 +70,9 @@ class TimeSeriesSelection(SelectionEngine):
 
     def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
         """F test of the residual without the part that the discretisation error explains."""
-        left = without_discretization_error(self.regression, present, noise.weight(self.regression))
+        left = without_discretization_error(
+            self.regression, present, noise.inverse_sigma(self.regression)
+        )
         return lack_of_fit_test(self.regression, left, present.jacobian, noise)
 
     @property

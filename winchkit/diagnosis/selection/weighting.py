@@ -47,7 +47,7 @@ def weighed(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Weighed:
 
     def evenly(outputs: Collection[str]) -> tuple[Fit, Noise, dict[str, float]]:
         even = _even(regression, noise, outputs)
-        refitted = fit(regression, fitted.hypothesis, even.weight(regression))
+        refitted = fit(regression, fitted.hypothesis, even.inverse_sigma(regression))
         now = held_out_rms(regression, refitted, even, folds)
         return refitted, even, {o: now[o] / was[o] for o in was if was[o]}
 

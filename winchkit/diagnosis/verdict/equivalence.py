@@ -39,17 +39,17 @@ def is_unseen(engine: SelectionEngine, final: Fit, noise: Noise, index: int, riv
     candidate = _usual(engine, rival)
     if candidate is None:
         return False
-    regression, weight = engine.regression, noise.weight(engine.regression)
+    regression, inverse_sigma = engine.regression, noise.inverse_sigma(engine.regression)
     hypothesis = final.hypothesis
     without = hypothesis.without(index)
     here = regression.change(without)
-    own = (regression.change(hypothesis) - here) * weight
-    explained = orthonormal(final.jacobian * weight[:, None])
+    own = (regression.change(hypothesis) - here) * inverse_sigma
+    explained = orthonormal(final.jacobian * inverse_sigma[:, None])
     differs = False
     for usual_step in candidate.usual_steps:
         values = {**rival.null, **candidate.shape, **usual_step}
         column = regression.change(without.with_term(Term(rival, values), regression.n_runs)) - here
-        column = column * weight
+        column = column * inverse_sigma
         size = float(column @ column)
         column = column * (float(column @ own) / size) if size else column
         left = column - explained @ (explained.T @ column)
@@ -98,35 +98,35 @@ def confusion_of(engine: SelectionEngine, final: Fit, noise: Noise, index: int) 
     """Refit the final model with each rival in place of one term, and compare block by block."""
     place = Exchange(engine, final, noise, index)
     own, base, scores = place.own, place.base, place.scores
-    mine = next((s.gain for s in scores if s.candidate.effect.id == own.effect.id), 0.0)
-    freedom = Coordinates(own.effect).freedom
+    mine = next((s.explained_ss for s in scores if s.candidate.effect.id == own.effect.id), 0.0)
+    n_parameters = Coordinates(own.effect).n_parameters
     rivals = [
         s
         for s in scores
-        if s.candidate.effect.id != own.effect.id and s.gain > mine - max(_NEAR, 0.1 * mine)
+        if s.candidate.effect.id != own.effect.id and s.explained_ss > mine - max(_NEAR, 0.1 * mine)
     ][:_RIVALS]
     rivals += [
         s for s in scores if _drifts_alike(s.candidate.effect, own.effect) and s not in rivals
     ]
     blocks = engine.regression.blocks
     ours = held_out(engine.regression, final, noise, blocks)
-    members: list[tuple[int, float, Term]] = [(freedom, final.cost, own)]
+    members: list[tuple[int, float, Term]] = [(n_parameters, final.chi_square, own)]
     for rival in rivals:
-        trial = place.trial(rival, final.cost + _ALIKE)
+        trial = place.trial(rival, final.chi_square + _ALIKE)
         fitted = trial.fit
         if not np.isfinite(trial.criterion):
             continue
-        if base.cost - fitted.cost < _SHARE * (base.cost - final.cost):
+        if base.chi_square - fitted.chi_square < _SHARE * (base.chi_square - final.chi_square):
             continue
         term = fitted.hypothesis.terms[-1]
-        size = Coordinates(term.effect).freedom
+        size = Coordinates(term.effect).n_parameters
         counted = _richer(engine, final, noise, index, fitted)
         if counted is None:
             theirs = held_out(engine.regression, fitted, noise, blocks)
-            alike = fitted.cost < final.cost + _ALIKE
+            alike = fitted.chi_square < final.chi_square + _ALIKE
             counted = alike or _flip_chance(theirs - ours) > _LEVEL
         if counted or _stands_for(engine, fitted, final, base, index):
-            members.append((size, fitted.cost, term))
+            members.append((size, fitted.chi_square, term))
     ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
     projected = engine.projected(base, noise)
     angles = {
@@ -147,9 +147,9 @@ def _richer(
     apart, and no run yet.
     """
     own, rival = final.hypothesis.terms[index].effect, fitted.hypothesis.terms[-1].effect
-    more = Coordinates(rival).freedom - Coordinates(own).freedom
+    more = Coordinates(rival).n_parameters - Coordinates(own).n_parameters
     if more > 0 and _carded(rival, own) and not rival.nested_with(own):
-        return fitted.cost < final.cost + _ALIKE
+        return fitted.chi_square < final.chi_square + _ALIKE
     if more > 0 and not _kindred(rival, own):
         bent = engine.regression.has_known_loads and own.id in rival.contains
         return _leant_to(final, fitted, more) or (
@@ -168,9 +168,13 @@ def _stands_for(engine: SelectionEngine, fitted: Fit, final: Fit, base: Fit, ind
     shown = own.effect.visible
     if shown is None or any(shown(at, own.values) for at in engine.regression.motions):
         return False
-    simpler = Coordinates(rival).freedom < Coordinates(own.effect).freedom
+    simpler = Coordinates(rival).n_parameters < Coordinates(own.effect).n_parameters
     related = bool(own.effect.family) and rival.family == own.effect.family
-    return simpler and related and base.cost - fitted.cost > _NEARLY * (base.cost - final.cost)
+    return (
+        simpler
+        and related
+        and base.chi_square - fitted.chi_square > _NEARLY * (base.chi_square - final.chi_square)
+    )
 
 
 def _kindred(rival: Effect, own: Effect) -> bool:
@@ -191,7 +195,7 @@ def _leant_to(simple: Fit, rich: Fit, more: int) -> bool:
     """
     states = [sum(len(start) for start in f.hypothesis.starts) for f in (simple, rich)]
     unknowns = max(1, more + states[1] - states[0])
-    return bool(chi2.sf(simple.cost - rich.cost, unknowns) < _LEVEL)
+    return bool(chi2.sf(simple.chi_square - rich.chi_square, unknowns) < _LEVEL)
 
 
 def _drifts_alike(rival: Effect, own: Effect) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.noise import orthonormal
-from winchkit.diagnosis.regression.projection import gain
+from winchkit.diagnosis.regression.projection import explained_ss
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, with_a_pair, without_term
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
@@ -38,28 +38,31 @@ class Curve:
     place: str
     """Output that it is added to, or ``rope force`` or ``winding``, which show in several."""
     variable: str
-    pays: float
+    net_gain: float
     """Whitened squares that it takes, less the price of its numbers."""
 
 
 class Beside:
     """A whitened residual beside which curves are tried, and what explains a part of it."""
 
-    def __init__(self, residual: Array, jacobian: Array, weight: Array) -> None:
+    def __init__(self, residual: Array, jacobian: Array, inverse_sigma: Array) -> None:
         """``residual`` (rows,) with unknowns of derivative ``jacobian`` (rows, k) still free."""
-        self.weight = weight
-        self.explained = orthonormal(jacobian * weight[:, None])
-        whitened = residual * weight
+        self.inverse_sigma = inverse_sigma
+        self.explained = orthonormal(jacobian * inverse_sigma[:, None])
+        whitened = residual * inverse_sigma
         self.residual = whitened - self.explained @ (self.explained.T @ whitened)
 
     @property
-    def cost(self) -> float:
+    def chi_square(self) -> float:
         """Whitened squares that are left."""
         return float(self.residual @ self.residual)
 
 
 def best_curve(
-    regression: TimeSeriesRegression, beside: Beside, outputs: Sequence[str], price: float
+    regression: TimeSeriesRegression,
+    beside: Beside,
+    outputs: Sequence[str],
+    penalty_per_parameter: float,
 ) -> Curve | None:
     """The curve that pays best, among those that show in one of ``outputs``.
 
@@ -68,9 +71,12 @@ def best_curve(
     best: Curve | None = None
     for place, variable, laws, columns in curves(regression, outputs):
         hats = _inner_products(beside, columns, len(laws[0][0]))
-        pays = max(hats.gain(law) - price * freedom for law, freedom in laws)
-        if best is None or pays > best.pays:
-            best = Curve(place, variable, pays)
+        net_gain = max(
+            hats.explained_ss(law) - penalty_per_parameter * n_parameters
+            for law, n_parameters in laws
+        )
+        if best is None or net_gain > best.net_gain:
+            best = Curve(place, variable, net_gain)
     return best
 
 
@@ -85,12 +91,12 @@ class _Hats:
     products: Array
     """With the residual, (hats,)."""
 
-    def gain(self, law: Array) -> float:
+    def explained_ss(self, law: Array) -> float:
         """Whitened squares that a law of hats, (hats, k), takes."""
         size = np.sqrt(np.maximum(np.diag(law.T @ self.plain @ law), _NOTHING))
         inner = law.T @ self.inner @ law / np.outer(size, size)
         # Measured by what they were: of what a fit explains whole only rounding is left.
-        return gain(inner, (law.T @ self.products) / size, _UNIDENTIFIABLE)
+        return explained_ss(inner, (law.T @ self.products) / size, _UNIDENTIFIABLE)
 
 
 def _inner_products(beside: Beside, columns: Columns, count: int) -> _Hats:
@@ -98,7 +104,7 @@ def _inner_products(beside: Beside, columns: Columns, count: int) -> _Hats:
     plain, products = np.zeros((count, count)), np.zeros(count)
     through = np.zeros((count, beside.explained.shape[1]))
     for rows, signal in columns:
-        whitened = signal * beside.weight[rows]
+        whitened = signal * beside.inverse_sigma[rows]
         plain += whitened @ whitened.T
         through += whitened @ beside.explained[rows]
         products += whitened @ beside.residual[rows]
@@ -146,7 +152,7 @@ def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
     without = judge_and_doubt(engine, without_term(engine, result, index))
     if without.shown.final.labels[engine.n_initial_terms :]:
         return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
-    share = doubt.taken([index]) / doubt.taken(doubt.added)
+    share = doubt.explained_ss([index]) / doubt.explained_ss(doubt.added)
     return withheld(engine, result, min(1.0, share), _words(doubt.terms, doubted, curve))
 
 
@@ -178,11 +184,11 @@ class Doubt:
         lost = regression.change(hypothesis) - regression.change(others) if indices else 0.0
         free = final.jacobian[:, ~own]
         free = np.hstack([free, self._rounding]) if rounding else free
-        return Beside(final.residual + lost, free, self.result.noise.weight(regression))
+        return Beside(final.residual + lost, free, self.result.noise.inverse_sigma(regression))
 
-    def taken(self, indices: Sequence[int]) -> float:
+    def explained_ss(self, indices: Sequence[int]) -> float:
         """Whitened squares that terms take beside the others."""
-        return self.beside(indices).cost - self.beside(()).cost
+        return self.beside(indices).chi_square - self.beside(()).chi_square
 
     def beaten(self, indices: Sequence[int]) -> Curve | None:
         """A curve that pays better than terms do, if there is one."""
@@ -195,15 +201,17 @@ class Doubt:
         engine, hypothesis = self.engine, self.result.final.hypothesis
         effects = [hypothesis.terms[index].effect for index in indices]
         beside = self.beside(indices, rounding=rounding)
-        taken = beside.cost - self.beside((), rounding=rounding).cost
+        explained_ss = beside.chi_square - self.beside((), rounding=rounding).chi_square
         # The states in which runs begin are no numbers of a law, and cost it nothing here.
-        pays = taken - engine.price * sum(Coordinates(effect).freedom for effect in effects)
+        net_gain = explained_ss - engine.penalty_per_parameter * sum(
+            Coordinates(effect).n_parameters for effect in effects
+        )
         outputs = sorted({output for effect in effects for output in effect.outputs})
-        curve = best_curve(engine.regression, beside, outputs, engine.price)
+        curve = best_curve(engine.regression, beside, outputs, engine.penalty_per_parameter)
         # What is certainly there is no chance deviation of the right formula.
         slight = _SLIGHT_OF_MORE if self.result.lack_of_fit else _SLIGHT
-        margin = engine.price + slight * taken
-        return curve if curve and curve.pays > pays + margin else None
+        margin = engine.penalty_per_parameter + slight * explained_ss
+        return curve if curve and curve.net_gain > net_gain + margin else None
 
 
 def _words(terms: Sequence[Term], doubted: Sequence[Term], curve: Curve) -> str:
