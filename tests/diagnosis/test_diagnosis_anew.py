@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from diagnosis_runs import CATALOGUE, Ride, engine_for, term
 
-from winchkit.diagnosis.selection.exchange import recoupled
-from winchkit.diagnosis.selection.signatures import Signatures, redrawn
-from winchkit.diagnosis.selection.stepwise import _replaced
+from winchkit.diagnosis.selection.exchange import pair_exchange
+from winchkit.diagnosis.selection.signatures import Signatures, updated_signatures
+from winchkit.diagnosis.selection.stepwise import _exchanged_terms
 from winchkit.diagnosis.verdict.equivalence import confusion_of
 from winchkit.effects.term import Term
 
@@ -22,10 +22,10 @@ def test_a_slip_that_came_to_rest_at_another_moment_is_found_where_it_was() -> N
     engine = engine_for([term("encoder-slip", step=0.01, time=14.7), late], RIDE)
     runs = engine.regression.n_runs
     wrong = engine.initial_model.with_term(term("encoder-slip", step=0.008, time=20.5), runs)
-    present, noise = engine.settle(wrong.with_term(late, runs))
+    present, noise = engine.fit_with_noise(wrong.with_term(late, runs))
     stuck = present.hypothesis.terms[0].values["time"]
     assert abs(stuck - 14.7) > 1.0
-    found = _replaced(engine, present, noise).hypothesis.terms
+    found = _exchanged_terms(engine, present, noise).hypothesis.terms
     assert sorted(t.label for t in found) == ["encoder-slip", "length-time-offset"]
     slip = next(t for t in found if t.label == "encoder-slip")
     assert slip.values["time"] == pytest.approx(14.7, abs=0.1)
@@ -40,8 +40,10 @@ def test_what_stood_for_two_is_fitted_beside_the_second() -> None:
     )
     engine = engine_for(hidden, RIDE)
     alone = term("cable-creep", creep_stiffness=2e5, time_constant=20.0)
-    present, noise = engine.settle(engine.initial_model.with_term(alone, engine.regression.n_runs))
-    terms = {t.label: t.values for t in recoupled(engine, present, noise, 1).hypothesis.terms}
+    present, noise = engine.fit_with_noise(
+        engine.initial_model.with_term(alone, engine.regression.n_runs)
+    )
+    terms = {t.label: t.values for t in pair_exchange(engine, present, noise, 1).hypothesis.terms}
     assert set(terms) == {"cable-creep", "encoder-slip"}
     assert terms["encoder-slip"]["time"] == pytest.approx(14.7, abs=0.1)
     assert terms["cable-creep"]["time_constant"] == pytest.approx(6.0, rel=0.1)
@@ -56,7 +58,9 @@ def test_a_stribeck_speed_that_no_run_passes_stands_beside_coulombs_friction(
     )
     wide = term("motor-stribeck", torque=0.1, stribeck_speed=share * fastest)
     engine = engine_for([wide], RIDE)
-    present, noise = engine.settle(engine.initial_model.with_term(wide, engine.regression.n_runs))
+    present, noise = engine.fit_with_noise(
+        engine.initial_model.with_term(wide, engine.regression.n_runs)
+    )
     told = confusion_of(engine, present, noise, 0).effects
     assert "motor-stribeck" in told
     assert ("motor-coulomb" not in told) is alone
@@ -80,7 +84,7 @@ def test_signatures_beside_a_grown_model_are_those_that_are_drawn_anew() -> None
         engine = engine_for([], RIDE)
         before = {name: column.copy() for name, column in columns_of(engine.signatures).items()}
         present = engine.initial_model.with_term(grown, engine.regression.n_runs)
-        again = redrawn(engine.regression, present, engine.signatures)
+        again = updated_signatures(engine.regression, present, engine.signatures)
         assert again is not None
         told, wanted = columns_of(again), columns_of(engine._signatures(present))
         assert set(told) == set(wanted) == set(before)
@@ -107,4 +111,4 @@ def test_a_candidate_that_had_no_signature_and_has_one_now_has_all_drawn_anew(
     lag = CATALOGUE["cell-lag"]
     silent = replace(engine.signatures, without_signature=((lag, {"time_constant": 0.05}),))
     present = engine.initial_model.with_term(grown, engine.regression.n_runs)
-    assert (redrawn(engine.regression, present, silent) is None) is anew
+    assert (updated_signatures(engine.regression, present, silent) is None) is anew

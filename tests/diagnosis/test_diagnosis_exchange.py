@@ -25,7 +25,7 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
     start = engine.initial_model
     for own in hidden:
         start = start.with_term(own, engine.regression.n_runs)
-    final, noise = engine.settle(start)
+    final, noise = engine.fit_with_noise(start)
     alone = engine.refit(final.hypothesis.without(0), noise).hypothesis.terms[0]
     assert abs(np.log(alone.values["creep_stiffness"] / 7e5)) > 1.0
     assert set(confusion_of(engine, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
@@ -34,10 +34,10 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
 def test_held_as_it_is_a_hypothesis_keeps_its_values() -> None:
     creep = term("cable-creep", creep_stiffness=7e5, time_constant=20.0)
     engine = engine_for([creep], ONE_WAY)
-    begin, noise = engine.settle(engine.initial_model)
+    begin, noise = engine.fit_with_noise(engine.initial_model)
     other = begin.hypothesis.with_term(
         term("cable-creep", creep_stiffness=1e6, time_constant=5.0), engine.regression.n_runs
     )
-    held = engine.held(other, noise)
+    held = engine.fixed(other, noise)
     assert held.vector == pytest.approx(engine.regression.vector(other))
     assert engine.refit(other, noise).chi_square < held.chi_square

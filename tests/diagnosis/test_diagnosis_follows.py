@@ -28,7 +28,7 @@ def first_followed(*physics: str) -> dict[str, str]:
     """Per output the variable that its error follows most."""
     profile = read_winch(find("profiles", "bench-spiral"))
     engine = selection_engine(prepare(recorded(*physics), profile), load_catalogue())
-    present, _ = engine.settle(engine.initial_model)
+    present, _ = engine.fit_with_noise(engine.initial_model)
     out: dict[str, str] = {}
     for found in follows(engine.regression, present.residual):
         out.setdefault(found.output, found.variable)

@@ -9,11 +9,11 @@ from diagnosis_runs import GROOVED, NOISE, Array, Ride, made, term
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.regression.cross_validation import (
     Folds,
-    confidence,
     extrapolation,
     held_out,
     held_out_rms,
     left_out_steps,
+    signed_rank_p_value,
 )
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
@@ -121,8 +121,8 @@ def test_an_effect_that_is_there_holds_and_one_that_is_not_does_not() -> None:
         for terms in ((), (GAIN,), (DRAG,))
     )
     assert true.sum() < before.sum()
-    assert confidence(before, true) < 1e-6
-    assert confidence(before, false) > 0.02
+    assert signed_rank_p_value(before, true) < 1e-6
+    assert signed_rank_p_value(before, false) > 0.02
 
 
 def test_folds_are_partitions() -> None:
@@ -166,31 +166,32 @@ class TestConfidence:
 
     def test_of_no_change_is_one(self) -> None:
         same = np.arange(1.0, 21.0)
-        assert confidence(same, same) == 1.0
+        assert signed_rank_p_value(same, same) == 1.0
 
     def test_counts_signs_and_ranks(self) -> None:
         """All of n blocks better has the chance 2⁻ⁿ, one sided."""
         before = np.full(10, 10.0)
         after = before - np.arange(1.0, 11.0)
-        assert confidence(before, after) == pytest.approx(2.0**-10)
-        assert confidence(after, before) == pytest.approx(1.0)
+        assert signed_rank_p_value(before, after) == pytest.approx(2.0**-10)
+        assert signed_rank_p_value(after, before) == pytest.approx(1.0)
 
     def test_looks_only_at_blocks_that_change(self) -> None:
         random = np.random.default_rng(1)
         before = np.full(48, 100.0)
         after = before + 1e-3 * random.standard_normal(48)
         after[:8] -= np.linspace(20, 40, 8)
-        assert confidence(before, after) == pytest.approx(2.0**-8)
+        assert signed_rank_p_value(before, after) == pytest.approx(2.0**-8)
 
     def test_of_few_blocks_is_never_small(self) -> None:
         before, after = np.full(4, 10.0), np.full(4, 1.0)
-        assert confidence(before, after) == 1.0
-        assert confidence(after, before) == 1.0
+        assert signed_rank_p_value(before, after) == 1.0
+        assert signed_rank_p_value(after, before) == 1.0
 
     def test_of_noise_is_seldom_small(self) -> None:
         random = np.random.default_rng(2)
         chances = [
-            confidence(random.chisquare(20, 48), random.chisquare(20, 48)) for _ in range(300)
+            signed_rank_p_value(random.chisquare(20, 48), random.chisquare(20, 48))
+            for _ in range(300)
         ]
         # 300 cases of 5 %: 15, and 3.8 more or less.
         assert 3 <= np.count_nonzero(np.array(chances) < 0.05) <= 28

@@ -14,7 +14,7 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.selection.stepwise import SelectionResult, search
+from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.specification_test import (
     Beside,
@@ -134,11 +134,11 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
         bent = run["cable_length"] + 1.5e-5 * far**3
         runs.append(with_channel(run, "cable_length", bent, "m"))
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    initial_model, noise = engine.settle(engine.initial_model)
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
     hypothesis = initial_model.hypothesis
     for added in (term("motor-coulomb", torque=0.05), term("gear-ratio", ratio_error=1e-5)):
         hypothesis = hypothesis.with_term(added, engine.regression.n_runs)
-    final, noise = engine.settle(hypothesis, noise)
+    final, noise = engine.fit_with_noise(hypothesis, noise)
     lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     begun = engine.lack_of_fit_test(initial_model, noise)
     result = SelectionResult(
@@ -169,7 +169,7 @@ def rubbed() -> tuple[TimeSeriesSelection, SelectionResult]:
     engine = selection_engine(
         prepare(driven((term("motor-coulomb", torque=0.05),)), GROOVED), CATALOGUE
     )
-    return engine, search(engine)
+    return engine, stepwise_selection(engine)
 
 
 def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:

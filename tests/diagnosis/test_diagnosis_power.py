@@ -20,7 +20,7 @@ from winchkit.diagnosis.design.programmes import KINDS, seen
 from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Detectable, NextRun
-from winchkit.diagnosis.selection.scores import chance_level
+from winchkit.diagnosis.selection.scores import null_maxima
 
 RIDE = Ride(samples=400)
 ROPE = term("cable-elongation-linear", axial_stiffness=3e5)
@@ -175,9 +175,9 @@ def smallest(noise: float, masses: tuple[float, ...] = (10.0,)) -> dict[str, Det
         for seed in range(2)
     ]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    present, known = engine.settle(engine.initial_model)
+    present, known = engine.fit_with_noise(engine.initial_model)
     scores = tuple(engine.scores(present, known))
-    chance = chance_level(engine.projected(present, known), engine.regression.n_rows)
+    chance = null_maxima(engine.projected(present, known), engine.regression.n_rows)
     threshold = float(np.quantile(chance, 0.99))
     return {d.effect: d for d in detectable(scores, Bar(engine.penalty_per_parameter, threshold))}
 
@@ -201,13 +201,13 @@ def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
             term(effect, **{item.parameter: item.smallest}), regression.n_runs
         )
     )
-    present, known = engine.settle(engine.initial_model)
+    present, known = engine.fit_with_noise(engine.initial_model)
     inverse_sigma = known.inverse_sigma(regression)
     other = present.jacobian * inverse_sigma[:, None]
     left = shown * inverse_sigma
     if other.shape[1]:
         left = left - other @ np.linalg.lstsq(other, left, rcond=None)[0]
-    chance = chance_level(engine.projected(present, known), regression.n_rows)
+    chance = null_maxima(engine.projected(present, known), regression.n_rows)
     needed = max(0.0, float(np.quantile(chance, 0.99))) + engine.penalty_per_parameter
     assert np.sqrt(left @ left) == pytest.approx(np.sqrt(needed) + norm.ppf(0.9), rel=0.02)
 
@@ -224,8 +224,8 @@ def test_chance_stays_what_chance_can_reach(encoder: float) -> None:
     """Of 40 candidates with one to three unknowns: gains of χ² less their price."""
     runs = [made(seed, ride=RIDE, encoder=encoder) for seed in range(2)]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = engine.settle(engine.initial_model)
-    chance = chance_level(engine.projected(present, noise), engine.regression.n_rows)
+    present, noise = engine.fit_with_noise(engine.initial_model)
+    chance = null_maxima(engine.projected(present, noise), engine.regression.n_rows)
     assert np.all(np.diff(chance) >= 0)
     assert np.median(chance) < 10
     assert np.quantile(chance, 0.99) < 100
@@ -241,6 +241,6 @@ def test_a_size_that_is_said_to_show_is_found() -> None:
             for seed in range(2)
         ]
         engine = selection_engine(prepare(runs, GROOVED), [CATALOGUE["motor-coulomb"]])
-        present, noise = engine.settle(engine.initial_model)
+        present, noise = engine.fit_with_noise(engine.initial_model)
         found += engine.scores(present, noise)[0].net_gain > 0
     assert found >= 8

@@ -20,7 +20,7 @@ def test_what_would_help_only_with_the_wrong_sign_gains_nothing() -> None:
         for seed in range(2)
     ]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = engine.settle(engine.initial_model)
+    present, noise = engine.fit_with_noise(engine.initial_model)
     told = {score.candidate.effect.id: score for score in engine.scores(present, noise)}
     rotor = told["rotor-inertia"]
     assert rotor.explained_ss == 0.0
@@ -41,7 +41,7 @@ def test_the_right_sign_gains() -> None:
         for seed in range(2)
     ]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = engine.settle(engine.initial_model)
+    present, noise = engine.fit_with_noise(engine.initial_model)
     best = engine.scores(present, noise)[0]
     assert best.candidate.effect.id == "rotor-inertia"
     assert np.all(best.amplitudes > 0.0)

@@ -130,7 +130,7 @@ def test_thinned_by_twenty_the_same_values_are_found() -> None:
     begun = Hypothesis()
     for effect in candidates:
         begun = begun.with_term(Term(effect, effect.null), regression.n_runs)
-    fitted, noise = engine.settle(begun)
+    fitted, noise = engine.fit_with_noise(begun)
     std = spread_of(regression, fitted, noise, engine.regression.blocks).std
     for index, term in enumerate(true_terms(), start=1):
         name, true = next(iter(term.values.items()))

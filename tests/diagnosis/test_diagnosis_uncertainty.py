@@ -125,7 +125,7 @@ def test_ends_are_where_a_full_refit_rises_by_the_wanted_squares() -> None:
             )
 
         best = least_squares(residual, found.vector[others], x_scale="jac")
-        return 2 * float(best.chi_square) - found.chi_square
+        return 2 * float(best.cost) - found.chi_square
 
     first = regression.nuisance_columns.shape[1]
     for index in range(first, len(found.vector)):

@@ -14,7 +14,7 @@ from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.selection.weighting import weighed
+from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.runs.run import Run
 
 RIDE = Ride(samples=3000, rate=50.0, period=12.0)
@@ -49,14 +49,14 @@ def with_friction(runs: list[Run]) -> tuple[TimeSeriesSelection, Fit, Noise]:
     start = engine.initial_model.with_term(
         term("motor-coulomb", torque=FRICTION), engine.regression.n_runs
     )
-    return engine, *engine.settle(start)
+    return engine, *engine.fit_with_noise(start)
 
 
 @pytest.mark.parametrize("size", [0.0, 0.005, 0.02])
 def test_noise_however_slow_is_weighed_as_noise(size: float) -> None:
     runs = rides([size * wander(seed) for seed in (1, 2)], torque=FRICTION)
     engine, present, noise = with_friction(runs)
-    best = weighed(engine, present, noise)
+    best = reweighted(engine, present, noise)
     assert best.fit is present
     assert best.noise is noise
     assert not best.notes
@@ -70,7 +70,7 @@ def warming_up() -> Array:
 def test_what_the_model_lacks_is_no_noise_and_values_are_the_mean() -> None:
     """Quick reversals, where the friction's width is told, would have it too small."""
     engine, present, noise = with_friction(rides([warming_up(), warming_up()]))
-    best = weighed(engine, present, noise)
+    best = reweighted(engine, present, noise)
     sign = np.tanh(RATE / 0.5)
     mean = float(sign @ warming_up() / (sign @ sign))
     by_noise, evenly = (f.hypothesis.terms[0].values["torque"] for f in (present, best.fit))
@@ -97,4 +97,4 @@ def test_measured_noise_is_believed() -> None:
     ]
     engine, present, noise = with_friction([*rides(hidden), *noisy])
     assert noise.from_repeats
-    assert weighed(engine, present, noise).fit is present
+    assert reweighted(engine, present, noise).fit is present

@@ -38,7 +38,7 @@ def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, floa
             of_winch,
             read_winch(path),
             load_catalogue(),
-            told=lambda what, share: heard.append((what, share)),
+            progress=lambda what, share: heard.append((what, share)),
         )
         ((name, found),) = each
     assert name == "A"

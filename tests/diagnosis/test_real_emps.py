@@ -150,7 +150,7 @@ def test_what_was_found_leaves_three_hundredths_on_another_file(
 
 def test_without_friction_even_a_refitted_model_misses_a_sixth(profile: WinchProfile) -> None:
     engine = selection_engine(prepare([run_of("train")], profile), load_catalogue())
-    fitted, _ = engine.settle(engine.initial_model)
+    fitted, _ = engine.fit_with_noise(engine.initial_model)
     error = error_on_test(Line(profile, modifiers_of(fitted.hypothesis.terms)))
     assert 0.16 < error < 0.20
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import selection_engine
-from winchkit.diagnosis.regression.exclusion import calmed
+from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
@@ -17,7 +17,7 @@ from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.diagnosis.selection.scores import Score, score
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.selection.weighting import weighed
+from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.diagnosis.verdict.decision import output_fits
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -131,11 +131,11 @@ def grow(
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
     (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
-    calm = calmed(dataset, final.hypothesis)
+    calm = without_impacts(dataset, final.hypothesis)
     if calm is not None:
         engine = selection_engine(calm, candidates)
         (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
-    best = weighed(engine, final, final_noise)
+    best = reweighted(engine, final, final_noise)
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     outputs = output_fits(engine, (initial_model, noise), (best.fit, best.noise))
     terms = tuple(estimates(engine.regression, best.fit, spread))
@@ -147,7 +147,7 @@ def _fitted(
     engine: TimeSeriesSelection, effect_id: str
 ) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:
     """The profile as it is, and with the effect, each with its noise."""
-    initial_model, noise = engine.settle(engine.initial_model)
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
     trials = [
         engine.trial(initial_model, item, noise)
         for item in _candidates_of(engine, effect_id, noise)
@@ -158,7 +158,7 @@ def _fitted(
             "there"
         )
     best = min(trials, key=lambda trial: trial.fit.chi_square)
-    return (initial_model, noise), engine.settle(best.fit.hypothesis, noise)
+    return (initial_model, noise), engine.fit_with_noise(best.fit.hypothesis, noise)
 
 
 def _placed(effect: Effect, dataset: Dataset) -> Effect:
@@ -209,13 +209,13 @@ def remove(
     engine = selection_engine(
         prepare(runs, profile, band, thin=True), catalogue or load_catalogue()
     )
-    initial_model, noise = engine.settle(engine.initial_model)
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
     terms = initial_model.hypothesis.terms
     there = [index for index, term in enumerate(terms) if term.effect.id == effect_id]
     if not there:
         has = ", ".join(term.label for term in terms) or "none"
         raise UsageError(f"profile '{profile.name}' has no effect '{effect_id}'; it has {has}")
-    best = weighed(engine, *engine.settle(initial_model.hypothesis.without(there[-1])))
+    best = reweighted(engine, *engine.fit_with_noise(initial_model.hypothesis.without(there[-1])))
     # Judged by the noise of the better model: without the effect its trace would pass for noise.
     outputs = output_fits(engine, (initial_model, noise), (best.fit, noise))
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)

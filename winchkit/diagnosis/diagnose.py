@@ -13,7 +13,7 @@ from winchkit.diagnosis.design.detectability import Bar, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import what_runs_cannot_show
 from winchkit.diagnosis.regression.cross_validation import held_out
-from winchkit.diagnosis.regression.exclusion import calmed
+from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
@@ -28,9 +28,9 @@ from winchkit.diagnosis.results import (
     Where,
 )
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.stepwise import SelectionResult, search
+from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.verdict.decision import Judgement, by_best_weights
+from winchkit.diagnosis.verdict.decision import Judgement, reweighted_judgement
 from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.verdict.specification_test import judge_and_doubt
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -41,12 +41,12 @@ from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = [
     "Answer",
-    "Told",
+    "ProgressCallback",
     "WinchAnswer",
     "candidates_of",
     "diagnose",
+    "no_progress",
     "selection_engine",
-    "silent",
     "steps_of",
 ]
 
@@ -54,7 +54,7 @@ _WHERE = 6
 _LOCATED = ("unknown", "partly")
 
 
-Told = Callable[[str, float], None]
+ProgressCallback = Callable[[str, float], None]
 """Hears what is begun, and the share of the work that is done."""
 
 
@@ -118,7 +118,7 @@ class WinchAnswer(Answer):
         super().__init__(engine, result, diagnosis, sets, pairs)
 
 
-def silent(what: str, share: float) -> None:
+def no_progress(what: str, share: float) -> None:
     """Tells nobody."""
 
 
@@ -129,7 +129,7 @@ def diagnose(
     band: float | None = None,
     *,
     thin: bool = True,
-    told: Told = silent,
+    progress: ProgressCallback = no_progress,
 ) -> WinchAnswer:
     """Find which effect of the catalogue the profile lacks on these runs.
 
@@ -138,18 +138,18 @@ def diagnose(
     every run, FileError for effects that do not bind.
     """
     catalogue = catalogue or load_catalogue()
-    told("reading the signals", 0.0)
+    progress("reading the signals", 0.0)
     dataset = prepare(runs, profile, band, thin=thin)
-    told("drawing the candidates", 0.2)
+    progress("drawing the candidates", 0.2)
     engine = selection_engine(dataset, catalogue)
-    told("searching", 0.4)
-    result = search(engine)
-    calm = calmed(dataset, result.last_model)
+    progress("searching", 0.4)
+    result = stepwise_selection(engine)
+    calm = without_impacts(dataset, result.last_model)
     if calm is not None:
-        told("searching again without the jerks", 0.6)
+        progress("searching again without the jerks", 0.6)
         engine = selection_engine(calm, catalogue)
-        result = search(engine)
-    told("naming", 0.8)
+        result = stepwise_selection(engine)
+    progress("naming", 0.8)
     return _answer(engine, result)
 
 
@@ -161,7 +161,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
     sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
     pairs = pairs_of(sets or _closest(engine, result, judgement))
     if sets:
-        judgement = by_best_weights(engine, judgement)
+        judgement = reweighted_judgement(engine, judgement)
         shown = judgement.shown
     diagnosis = Diagnosis(
         verdict=judgement.verdict,

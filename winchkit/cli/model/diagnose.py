@@ -73,9 +73,9 @@ def _tell_one(
     """What one winch lacks, on a page besides where that is asked."""
     from winchkit.diagnosis.diagnose import diagnose
 
-    with progress_bar() as told:
+    with progress_bar() as progress:
         own, catalogue = asked.runs(runs), asked.catalogue
-        answer = diagnose(own, declared, catalogue, asked.band, thin=thin, told=told)
+        answer = diagnose(own, declared, catalogue, asked.band, thin=thin, progress=progress)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         write_page(html, _page(answer, page_title(declared.name, runs), asked))
@@ -98,10 +98,10 @@ def _tell_each(
     found: dict[str, Diagnosis] = {}
     present: dict[str, float] = {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
-    with threads_abandoned(), progress_bar() as told:
+    with threads_abandoned(), progress_bar() as progress:
         winches = read_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
-        each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, told=told)
+        each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, progress=progress)
         for name, answer in each:
             found[name], said[name] = answer.diagnosis, _said(answer, as_json)
             present[name] = answer.result.lack_of_fit_test.p_value
@@ -127,8 +127,8 @@ def _tell_robot(
     """What a robot's model lacks, from poses."""
     from winchkit.diagnosis.robot.diagnose import diagnose_robot
 
-    with progress_bar() as told:
-        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, told)
+    with progress_bar() as progress:
+        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, progress)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         from winchkit.report.pages.robot import robot_report_html

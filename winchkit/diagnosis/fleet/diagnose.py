@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from threading import Thread
 
-from winchkit.diagnosis.diagnose import Told, WinchAnswer, diagnose, silent
+from winchkit.diagnosis.diagnose import ProgressCallback, WinchAnswer, diagnose, no_progress
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -24,7 +24,7 @@ def diagnose_each(
     band: float | None = None,
     *,
     thin: bool = True,
-    told: Told = silent,
+    progress: ProgressCallback = no_progress,
 ) -> Iterator[tuple[str, WinchAnswer]]:
     """Name and answer of every winch, in order, all against one profile.
 
@@ -37,9 +37,9 @@ def diagnose_each(
     def one(name: str) -> WinchAnswer:
         def heard(what: str, share: float) -> None:
             shares[name] = share
-            told(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
+            progress(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
 
-        answer = diagnose(winches[name], profile, catalogue, band, thin=thin, told=heard)
+        answer = diagnose(winches[name], profile, catalogue, band, thin=thin, progress=heard)
         heard("done", 1.0)
         return answer
 

@@ -18,11 +18,11 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 
 __all__ = [
-    "confidence",
     "extrapolation",
     "held_out",
     "held_out_rms",
     "left_out_steps",
+    "signed_rank_p_value",
 ]
 
 _TOUCHED = 0.02
@@ -98,7 +98,7 @@ def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -
     return {o: float(np.sqrt(total / regression.n_samples(o))) for o, total in squares.items()}
 
 
-def confidence(before: Array, after: Array) -> float:
+def signed_rank_p_value(before: Array, after: Array) -> float:
     """Chance (one-sided rank test) that per-fold squares fell from ``before`` to ``after`` by luck.
 
     Only folds that the change touches at all take part: an effect may live in a few fast ones.

@@ -40,7 +40,7 @@ def discretization_error(
     if not hypothesis.terms:
         return out
     moved = [
-        _moved(Line(dataset.profile, modifiers_of(started(hypothesis, run))), recording)
+        _changes(Line(dataset.profile, modifiers_of(started(hypothesis, run))), recording)
         for run, recording in enumerate(dataset.recordings)
     ]
     for segment in segments:
@@ -69,9 +69,9 @@ def _beside(present: Array, column: Array) -> Array:
     return np.zeros_like(left) if left @ left <= 1e-12 * float(column @ column) else left
 
 
-def _moved(line: Line, recording: Recording) -> dict[str, Array]:
+def _changes(line: Line, recording: Recording) -> dict[str, Array]:
     """By how much each output changes with a finer motion, at the samples of one run."""
-    fine = _finer(recording, line)
+    fine = _fine_motion(recording, line)
     if fine is None:
         return {}
     nominal = Line(line.profile).predict(fine)
@@ -83,7 +83,7 @@ def _moved(line: Line, recording: Recording) -> dict[str, Array]:
     }
 
 
-def _finer(recording: Recording, line: Line) -> Motion | None:
+def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     """A run's calm motion interpolated between its samples.
 
     None where derivatives are not differences of these samples: they were taken before a long run
@@ -106,7 +106,7 @@ def _finer(recording: Recording, line: Line) -> Motion | None:
     finer = line.motion(Signals(time, angle, fastest=signals.fastest))
     at = replace(
         finer.at,
-        tension=between(smooth.at.tension + _sharper(recording, line)),
+        tension=between(smooth.at.tension + _force_correction(recording, line)),
         temperature=np.interp(there, here, smooth.at.temperature),
     )
     load = None if smooth.load is None else at.tension
@@ -114,7 +114,7 @@ def _finer(recording: Recording, line: Line) -> Motion | None:
     return replace(finer, at=at, load=load, drum_tension=drum_side, load_mass=smooth.load_mass)
 
 
-def _sharper(recording: Recording, line: Line) -> Array:
+def _force_correction(recording: Recording, line: Line) -> Array:
     """What differences over a span h have rounded off the rope force, (n,).
 
     A second difference of x is its second derivative and h²/12 of the fourth. Only that part of a

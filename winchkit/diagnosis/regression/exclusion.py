@@ -17,18 +17,19 @@ from winchkit.diagnosis.data.transients import around
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.effects.term import Term
 
-__all__ = ["calmed"]
+__all__ = ["without_impacts"]
 
 _FORCES = ("tension", "motor_torque")
 _MOST = 0.25
 
 
-def calmed(dataset: Dataset, found: Hypothesis) -> Dataset | None:
+def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
     """The dataset without force and torque around such samples; None where there are none, or
     more than a quarter of all.
     """
     recordings = tuple(
-        _calmed(recording, started(found, run)) for run, recording in enumerate(dataset.recordings)
+        _without_impacts(recording, started(found, run))
+        for run, recording in enumerate(dataset.recordings)
     )
     if all(a is b for a, b in zip(recordings, dataset.recordings, strict=True)):
         return None
@@ -49,15 +50,15 @@ def _compared(recordings: Sequence[Recording]) -> int:
     return sum(int(np.count_nonzero(good)) for good in valid if good is not None)
 
 
-def _calmed(recording: Recording, terms: Sequence[Term]) -> Recording:
+def _without_impacts(recording: Recording, terms: Sequence[Term]) -> Recording:
     """Without what the terms jerk: the torque, and the tension that a weight makes of it."""
     at = recording.raw.at
     shaken = np.zeros(len(at.time), dtype=bool)
     for term in terms:
         if term.effect.shakes is not None:
             shaken |= term.effect.shakes(at, term.values)
-    weighed = recording.raw.load_mass is not None
-    left = set(_FORCES if weighed else _FORCES[1:]) & recording.valid.keys()
+    known_weight = recording.raw.load_mass is not None
+    left = set(_FORCES if known_weight else _FORCES[1:]) & recording.valid.keys()
     if not shaken.any() or not left:
         return recording
     near = around(shaken, at.time)

@@ -93,7 +93,7 @@ def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
 
 def _added(study: Study, effect: Effect) -> RobotGrown:
     engine = study.as_filed()
-    initial_model, noise = engine.settle(engine.initial_model)
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
     scores = [s for s in engine.scores(initial_model, noise) if s.candidate.effect.id == effect.id]
     if not scores:
         raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
@@ -135,12 +135,12 @@ def remove_from_robot(
         raise UsageError(f"robot '{profile.name}' has no effect '{effect_id}'; it has {has}")
     study = study_of(runs, profile, catalogue)
     engine = study.as_filed()
-    initial_model, noise = engine.settle(engine.initial_model)
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
     hypothesis = initial_model.hypothesis
     for index in reversed(range(len(hypothesis.terms))):
         if hypothesis.terms[index].effect.id in gone:
             hypothesis = hypothesis.without(index)
-    final, _ = engine.settle(hypothesis)
+    final, _ = engine.fit_with_noise(hypothesis)
     regression = engine.regression
     before, after = (
         Shown(regression, fit, noise, engine.regression.groups) for fit in (initial_model, final)

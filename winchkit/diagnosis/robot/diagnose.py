@@ -16,7 +16,13 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from winchkit.diagnosis.design.detectability import Bar, detectable
-from winchkit.diagnosis.diagnose import Answer, Told, candidates_of, silent, steps_of
+from winchkit.diagnosis.diagnose import (
+    Answer,
+    ProgressCallback,
+    candidates_of,
+    no_progress,
+    steps_of,
+)
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import spread_of
@@ -30,7 +36,7 @@ from winchkit.diagnosis.robot.pose_design import next_pose_runs
 from winchkit.diagnosis.robot.preparation import Study, fitted_to, study_of
 from winchkit.diagnosis.robot.prior import Believed
 from winchkit.diagnosis.robot.regression import PoseRegression
-from winchkit.diagnosis.selection.stepwise import SelectionResult, search
+from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.verdict.decision import Judgement, judge
 from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -84,7 +90,7 @@ class Seen:
     @cached_property
     def initial_model(self) -> Shown:
         """The profile's own effects fitted, the geometry as filed."""
-        first, noise = self.filed.settle(self.filed.initial_model)
+        first, noise = self.filed.fit_with_noise(self.filed.initial_model)
         return Shown(self.filed.regression, first, noise, self.filed.regression.groups)
 
     @cached_property
@@ -177,27 +183,27 @@ def diagnose_robot(
     runs: Sequence[Run],
     profile: RobotProfile,
     catalogue: Catalogue | None = None,
-    told: Told = silent,
+    progress: ProgressCallback = no_progress,
 ) -> RobotAnswer:
     """Find which effect of the catalogue a robot's model lacks on these poses.
 
     ``told`` hears what is begun and which share (0 to 1) of the work is about done. Raises RunError
     with every fault of every run, FileError for effects that do not bind.
     """
-    told("judging the noise", 0.0)
+    progress("judging the noise", 0.0)
     study = study_of(runs, profile, catalogue or load_catalogue())
-    told("searching", 0.4)
+    progress("searching", 0.4)
     if fitted_to(profile, runs):
         engine = study.let_go()
         return _concluded(study, engine, engine)
     filed = study.as_filed()
     if _beyond_few(study, filed):
         return _concluded(study, study.let_go(), filed)
-    result = search(filed)
+    result = stepwise_selection(filed)
     if added := result.final.hypothesis.terms[filed.n_initial_terms :]:
         # Poses placed by ropes that contradict each other turn, and tensions there look unbalanced.
         filed = study.as_filed(added[:1])
-        result = search(filed)
+        result = stepwise_selection(filed)
     judgement = judge(filed, result)
     if judgement.verdict in ("adequate", "explained") and not _geometry_is_off(
         study, filed, result
@@ -211,7 +217,7 @@ def _beyond_few(study: Study, filed: PoseSelection) -> bool:
     gain = _gain_of_geometry(study, filed, filed.initial_model)
     if not _is_real(study, gain):
         return False
-    present, noise = filed.settle(filed.initial_model)
+    present, noise = filed.fit_with_noise(filed.initial_model)
     best = max((s.explained_ss for s in filed.scores(present, noise)), default=0.0)
     return best < _ONE_OF_FEW * gain
 
@@ -228,7 +234,7 @@ def _gain_of_geometry(study: Study, filed: PoseSelection, model: Hypothesis) -> 
 
 def _concluded(study: Study, engine: PoseSelection, filed: PoseSelection) -> RobotAnswer:
     """With the geometry let go."""
-    result = search(engine)
+    result = stepwise_selection(engine)
     return answer_of(Seen(study, engine, filed, result, judge(engine, result)), "refitted")
 
 

@@ -203,7 +203,7 @@ class Study:
         linear in between.
         """
         engine = self.let_go()
-        present, noise = engine.settle(engine.initial_model)
+        present, noise = engine.fit_with_noise(engine.initial_model)
         listed = [s for s in engine.scores(present, noise) if s.net_gain > 0][:_SHORT_LIST]
         trials = [engine.trial(present, item, noise) for item in listed]
         best = min(trials, key=lambda t: t.criterion, default=None)

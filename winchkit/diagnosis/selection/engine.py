@@ -21,22 +21,22 @@ from winchkit.diagnosis.regression.gls import Fit, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.selection.initial_states import rests_on_states
-from winchkit.diagnosis.selection.pairs import Couple, couples
-from winchkit.diagnosis.selection.scores import Projected, Score, score, worthless
-from winchkit.diagnosis.selection.signatures import Signatures, redrawn, signatures
+from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
+from winchkit.diagnosis.selection.pairs import Pair, screened_pairs
+from winchkit.diagnosis.selection.scores import Projected, Score, score, zero_score
+from winchkit.diagnosis.selection.signatures import Signatures, signatures, updated_signatures
 from winchkit.diagnosis.selection.starting_values import (
-    by_coefficients,
-    in_disguise,
-    placed,
+    shape_at_bound,
+    starting_points,
     starting_values,
+    truncated_series,
 )
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
-    "Last",
+    "LastValue",
     "SelectionEngine",
     "Trial",
     "admissible",
@@ -49,9 +49,9 @@ def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[
 
     What would help only with the wrong sign, such as an inertia below zero, gains nothing.
     """
-    signed = [item if _possible(item) else worthless(item, rows) for item in ranked]
+    signed = [item if _is_feasible(item) else zero_score(item, rows) for item in ranked]
     signed.sort(key=lambda item: -item.net_gain)
-    return [item for item in signed if not _stands_there(item.candidate.effect, item, present)]
+    return [item for item in signed if not _is_present(item.candidate.effect, item, present)]
 
 
 def best_of_each(scores: Sequence[Score]) -> list[Score]:
@@ -62,7 +62,7 @@ def best_of_each(scores: Sequence[Score]) -> list[Score]:
     return list(first.values())
 
 
-def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
+def _is_present(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
     """Whether the effect, or one that contains it, is in the hypothesis already."""
     for term in hypothesis.terms:
         if effect.id in term.effect.contains:
@@ -76,7 +76,7 @@ def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
     return False
 
 
-def _possible(item: Score) -> bool:
+def _is_feasible(item: Score) -> bool:
     """Whether the amplitudes that fit best are within an effect's bounds at all."""
     coordinates = Coordinates(item.candidate.effect)
     if item.candidate.effect.probes:
@@ -90,7 +90,7 @@ def _possible(item: Score) -> bool:
 Answer = TypeVar("Answer")
 
 
-class Last(Generic[Answer]):
+class LastValue(Generic[Answer]):
     """Answers for a fit and a noise; the very same objects get the answer of the last time."""
 
     def __init__(self) -> None:
@@ -138,9 +138,9 @@ class SelectionEngine(ABC):
         self.initial_model = initial_model
         self.n_initial_terms = len(initial_model.terms)
         self._candidates = tuple(candidates)
-        self._last_folds: Last[Folds] = Last()
-        self._last_lack_of_fit_test: Last[LackOfFitTest] = Last()
-        self._last_projected: Last[Projected] = Last()
+        self._last_folds: LastValue[Folds] = LastValue()
+        self._last_lack_of_fit_test: LastValue[LackOfFitTest] = LastValue()
+        self._last_projected: LastValue[Projected] = LastValue()
         self.signatures = self._signatures(initial_model)
 
     @abstractmethod
@@ -193,16 +193,16 @@ class SelectionEngine(ABC):
         absent = (effect for effect in self._candidates if effect.id not in there)
         return signatures(self.regression, present, absent)
 
-    def look_again(self, present: Hypothesis) -> None:
+    def update_signatures(self, present: Hypothesis) -> None:
         """Draw the signatures anew beside a grown model: a lag acts on what is there."""
-        self._last_projected = Last()
-        grown = redrawn(self.regression, present, self.signatures)
+        self._last_projected = LastValue()
+        grown = updated_signatures(self.regression, present, self.signatures)
         if grown is None:
             del self.signatures  # Both at once would be the most memory of a whole diagnosis.
             grown = self._signatures(present)
         self.signatures = grown
 
-    def settle(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
+    def fit_with_noise(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
         """Fit, with the noise re-estimated from what the fit leaves."""
         states = sum(len(begun) for begun in start.starts)
         if noise is None:
@@ -223,17 +223,17 @@ class SelectionEngine(ABC):
 
     def scores(self, present: Fit, noise: Noise) -> list[Score]:
         """Candidates beside a fit, best first, one point of its grid each; none that is there."""
-        return best_of_each(self.every_score(present, noise))
+        return best_of_each(self.scores_at_all_points(present, noise))
 
-    def every_score(self, present: Fit, noise: Noise) -> list[Score]:
+    def scores_at_all_points(self, present: Fit, noise: Noise) -> list[Score]:
         """The same at every point of their grids."""
         ranked = score(self.projected(present, noise), present.residual, self.regression.n_rows)
         return admissible(ranked, present.hypothesis, self.regression.n_rows)
 
-    def couples(self, present: Fit, noise: Noise) -> list[Couple]:
+    def pairs(self, present: Fit, noise: Noise) -> list[Pair]:
         """Pairs of candidates that pay beside a fit, best first."""
-        scores = self.every_score(present, noise)
-        return couples(
+        scores = self.scores_at_all_points(present, noise)
+        return screened_pairs(
             self.projected(present, noise), present.residual, scores, self.penalty_per_parameter
         )
 
@@ -255,13 +255,13 @@ class SelectionEngine(ABC):
             if hypothesis.terms[index].effect.id in effect.contains:
                 hypothesis = hypothesis.without(index)
         best: Trial | None = None
-        for law in by_coefficients(effect):
+        for law in truncated_series(effect):
             if best is None:
                 own = replace(item, candidate=item.candidate.with_law(law))
-                places = placed(self.regression, hypothesis, present, own, inverse_sigma)
+                places = starting_points(self.regression, hypothesis, present, own, inverse_sigma)
                 terms = [Term(law, values) for values in places]
                 starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
-                starts += [anew for start in starts for anew in self._less_rounded(start)]
+                starts += [anew for start in starts for anew in self._without_discretization(start)]
             else:
                 starts = [best.fit.hypothesis.with_law(law)]
             fitted = fit_from(self.regression, starts, inverse_sigma)
@@ -271,7 +271,7 @@ class SelectionEngine(ABC):
             best = longer if np.isfinite(longer.criterion) else best
         return best or longer
 
-    def _less_rounded(self, start: Hypothesis) -> list[Hypothesis]:
+    def _without_discretization(self, start: Hypothesis) -> list[Hypothesis]:
         """The same begun as if sampling rounded nothing, where a loop is added to a wild rounding.
 
         Without the loop that was there all the time the rounding stood for a part of it, and a
@@ -291,18 +291,19 @@ class SelectionEngine(ABC):
     ) -> float:
         """The criterion of a trial; infinite where its last term is not what it is called."""
         criterion = self.criterion(fitted)
-        if in_disguise(fitted.hypothesis.terms[-1]) or (
-            criterion < self.criterion(present) and self._rests_on_states(without, fitted, noise)
+        if shape_at_bound(fitted.hypothesis.terms[-1]) or (
+            criterion < self.criterion(present)
+            and self._explained_by_initial_states(without, fitted, noise)
         ):
             criterion = np.inf
         return float(criterion)
 
-    def _rests_on_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
+    def _explained_by_initial_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
         """Whether the last term explains mainly by the states in which the runs began."""
         if not fitted.hypothesis.starts[-1]:
             return False
         inverse_sigma = noise.inverse_sigma(self.regression)
-        return rests_on_states(
+        return explained_by_initial_states(
             self.regression,
             self.refit(without, noise),
             fitted,
@@ -314,6 +315,6 @@ class SelectionEngine(ABC):
         """Fit a hypothesis under a given noise."""
         return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression))
 
-    def held(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
+    def fixed(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """A hypothesis as it is, fitted no further."""
         return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression), 0)

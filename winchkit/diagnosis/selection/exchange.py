@@ -9,13 +9,13 @@ import numpy as np
 
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise, orthonormal
-from winchkit.diagnosis.selection.acceptance import BETTER
+from winchkit.diagnosis.selection.acceptance import MIN_GAIN
 from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.diagnosis.selection.scores import Score
 
 __all__ = [
     "Exchange",
-    "recoupled",
+    "pair_exchange",
 ]
 
 _NEARLY = 0.1
@@ -42,7 +42,7 @@ class Exchange:
     @cached_property
     def _held(self) -> tuple[Fit, float, dict[str, Score]]:
         """The others as they stand beside the term; the least squares about there; the scores."""
-        held = self._engine.held(self._others, self._noise)
+        held = self._engine.fixed(self._others, self._noise)
         inverse_sigma = self._noise.inverse_sigma(self._engine.regression)
         whitened, residual = held.jacobian * inverse_sigma[:, None], held.residual * inverse_sigma
         basis = orthonormal(whitened)
@@ -72,7 +72,7 @@ _TRIED = 2
 _MOST = 3
 
 
-def recoupled(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:
+def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:
     """The present fit, or the best with a better pair in the place of ``exchanged`` additions."""
     added = range(engine.n_initial_terms, len(present.hypothesis.terms))
     if not 0 < len(added) <= _MOST:
@@ -94,15 +94,15 @@ def _better(
     for index in reversed(indices):
         hypothesis = hypothesis.without(index)
     base = engine.refit(hypothesis, noise)
-    pays = engine.criterion(base) - engine.criterion(present) + BETTER
+    pays = engine.criterion(base) - engine.criterion(present) + MIN_GAIN
     leave = {present.hypothesis.terms[index].effect.id for index in indices}
     promising = [
-        pair for pair in engine.couples(base, noise) if pair.net_gain > pays and pair.ids != leave
+        pair for pair in engine.pairs(base, noise) if pair.net_gain > pays and pair.ids != leave
     ]
     for pair in promising[:tried]:
         # Newcomers first: what stood for both alone would keep the values that it had.
         first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in leave)
         trial = engine.trial(engine.trial(base, first, noise).fit, second, noise)
-        if trial.criterion < engine.criterion(present) - BETTER:
+        if trial.criterion < engine.criterion(present) - MIN_GAIN:
             return trial.fit
     return None

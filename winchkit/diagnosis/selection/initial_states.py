@@ -17,12 +17,12 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["rests_on_states"]
+__all__ = ["explained_by_initial_states"]
 
 _BY_ITSELF = 0.5
 
 
-def rests_on_states(
+def explained_by_initial_states(
     regression: Regression,
     base: Fit,
     fitted: Fit,

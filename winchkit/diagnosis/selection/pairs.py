@@ -17,14 +17,14 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.projection import explained_ss_of_sets
 from winchkit.diagnosis.selection.scores import Projected, Score
 
-__all__ = ["Couple", "couples"]
+__all__ = ["Pair", "screened_pairs"]
 
 _TOGETHER = 1.5
 _UNIDENTIFIABLE = 1e-5
 
 
 @dataclass(frozen=True)
-class Couple:
+class Pair:
     """Two candidates side by side."""
 
     scores: tuple[Score, Score]
@@ -41,14 +41,14 @@ class Couple:
         return {item.candidate.effect.id for item in self.scores}
 
     @property
-    def hidden(self) -> bool:
+    def suppressed(self) -> bool:
         """Whether they take far more together than the one and the other."""
         return self.explained_ss > _TOGETHER * self.single_gain
 
 
-def couples(
+def screened_pairs(
     projected: Projected, residual: Array, scores: Sequence[Score], penalty_per_parameter: float
-) -> list[Couple]:
+) -> list[Pair]:
     """Pairs of candidates that pay, best first, each at the best points of its two grids.
 
     ``scores`` are of all points; ``price`` is what a degree of freedom must save.
@@ -58,16 +58,18 @@ def couples(
         single_gain[item.candidate.effect.id] = max(
             item.explained_ss, single_gain.get(item.candidate.effect.id, 0.0)
         )
-    found: dict[frozenset[str], Couple] = {}
+    found: dict[frozenset[str], Pair] = {}
     pairs = _pairs(scores)
-    for pair, explained_ss in zip(pairs, _together(projected, residual, pairs), strict=True):
+    for pair, explained_ss in zip(
+        pairs, _joint_explained_ss(projected, residual, pairs), strict=True
+    ):
         first, second = (item.candidate.effect.id for item in pair)
         net_gain = explained_ss - penalty_per_parameter * sum(
             item.candidate.n_parameters for item in pair
         )
         ids = frozenset((first, second))
         if net_gain > 0 and (ids not in found or net_gain > found[ids].net_gain):
-            found[ids] = Couple(
+            found[ids] = Pair(
                 pair, explained_ss, net_gain, single_gain[first] + single_gain[second]
             )
     return sorted(found.values(), key=lambda couple: -couple.net_gain)
@@ -83,7 +85,7 @@ def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:
     ]
 
 
-def _together(
+def _joint_explained_ss(
     projected: Projected, residual: Array, pairs: Sequence[tuple[Score, Score]]
 ) -> list[float]:
     """Whitened squares that each pair takes side by side; pairs of as many columns at once."""

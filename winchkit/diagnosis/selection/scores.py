@@ -15,7 +15,7 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.signatures import Candidate, Signatures, pieces
 
-__all__ = ["Projected", "Score", "chance_level", "score", "worthless"]
+__all__ = ["Projected", "Score", "null_maxima", "score", "zero_score"]
 
 _NOTHING = 1e-300
 _SIMULATIONS = 400
@@ -150,7 +150,7 @@ def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
     return sorted(out, key=lambda s: -s.net_gain)
 
 
-def worthless(item: Score, rows: int) -> Score:
+def zero_score(item: Score, rows: int) -> Score:
     """The score of an atom that takes nothing of the residual."""
     net_gain = -item.candidate.n_parameters * float(np.log(rows))
     return replace(
@@ -158,7 +158,7 @@ def worthless(item: Score, rows: int) -> Score:
     )
 
 
-def chance_level(projected: Projected, rows: int) -> Array:
+def null_maxima(projected: Projected, rows: int) -> Array:
     """Largest score over all atoms that noise alone gives, simulated, sorted; (samples,)."""
     candidates = projected.signatures.candidates
     if not candidates:

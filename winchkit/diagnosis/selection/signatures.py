@@ -21,7 +21,7 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["Candidate", "Signatures", "pieces", "redrawn", "signatures"]
+__all__ = ["Candidate", "Signatures", "pieces", "signatures", "updated_signatures"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Signatures:
     """(rows, p)."""
     gram: Array
     """(bands, p, p)."""
-    beside: Hypothesis
+    model: Hypothesis
     """The present model that they were drawn beside."""
     without_signature: tuple[tuple[Effect, dict[str, float]], ...] = ()
     """Effects with values at which they changed nothing there, and so have no column."""
@@ -122,14 +122,16 @@ def signatures(
     return Signatures(tuple(candidates), kept, gram, present, tuple(without_signature))
 
 
-def redrawn(regression: Regression, present: Hypothesis, found: Signatures) -> Signatures | None:
+def updated_signatures(
+    regression: Regression, present: Hypothesis, found: Signatures
+) -> Signatures | None:
     """The same signatures beside a grown model, in the same memory; ``found`` is used up.
 
     Drawn anew is only what lies on the way to an output which changed terms touch: a lag acts on
     what is there. None where an effect that had no column has one now.
     """
-    changed = [t for t in present.terms if t not in found.beside.terms]
-    changed += [t for t in found.beside.terms if t not in present.terms]
+    changed = [t for t in present.terms if t not in found.model.terms]
+    changed += [t for t in found.model.terms if t not in present.terms]
     touched = {output for term in changed for output in regression.outputs_of(term.effect.stage)}
     canvas, spare = _Canvas(regression, present, touched), np.empty(regression.n_rows)
     for effect, values in found.without_signature:
@@ -144,7 +146,7 @@ def redrawn(regression: Regression, present: Hypothesis, found: Signatures) -> S
             )
             canvas.draw(found.columns[:, index], term, reached)
     _multiply(found.gram, regression, found.columns, touched)
-    return replace(found, beside=present)
+    return replace(found, model=present)
 
 
 def _multiply(

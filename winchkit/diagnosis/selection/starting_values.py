@@ -17,16 +17,16 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
-    "by_coefficients",
-    "elsewhere",
-    "gap",
-    "in_disguise",
-    "placed",
+    "grid_spacing",
+    "other_grid_point",
+    "shape_at_bound",
+    "starting_points",
     "starting_values",
+    "truncated_series",
 ]
 
 
-def in_disguise(term: Term) -> bool:
+def shape_at_bound(term: Term) -> bool:
     """Whether a term has become another effect: a shape at its bound, values that cannot be."""
     effect = term.effect
     if effect.possible is not None and not effect.possible(term.values):
@@ -39,7 +39,7 @@ def in_disguise(term: Term) -> bool:
     return bool(np.any(ends[shapes]))
 
 
-def by_coefficients(effect: Effect) -> list[Effect]:
+def truncated_series(effect: Effect) -> list[Effect]:
     """The effect with one coefficient of its series, with two, …, with all of them.
 
     A few loads show a law's first curvature, not its third: coefficients beyond what the data
@@ -57,13 +57,13 @@ def by_coefficients(effect: Effect) -> list[Effect]:
     return out
 
 
-def gap(grid: tuple[float, ...], at: float) -> float:
+def grid_spacing(grid: tuple[float, ...], at: float) -> float:
     """Distance from a point of a grid to its farther neighbour."""
     index = grid.index(at)
     return max(abs(grid[i] - at) for i in (index - 1, index + 1) if 0 <= i < len(grid))
 
 
-def elsewhere(term: Term, shape: Mapping[str, float]) -> bool:
+def other_grid_point(term: Term, shape: Mapping[str, float]) -> bool:
     """Whether a point of a grid is another place to rest than where a fit has left a term.
 
     An order has as many places as the grid has points; a moment has one in every hold, and the
@@ -93,7 +93,7 @@ def starting_values(item: Score) -> list[dict[str, float]]:
 _HALVINGS = 7
 
 
-def placed(
+def starting_points(
     regression: Regression, hypothesis: Hypothesis, present: Fit, item: Score, inverse_sigma: Array
 ) -> list[dict[str, float]]:
     """Where fits begin; a moment is first sought between the points of its grid.
@@ -116,7 +116,7 @@ def placed(
         size = float(column @ column)
         return float((column @ residual) ** 2) / size if size else 0.0
 
-    at, step = values[place.name], gap(place.grid, values[place.name])
+    at, step = values[place.name], grid_spacing(place.grid, values[place.name])
     best = gain(at)
     for _ in range(_HALVINGS):
         step /= 2

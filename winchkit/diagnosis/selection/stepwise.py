@@ -10,14 +10,14 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.selection.acceptance import BETTER, best_that_holds, holds
+from winchkit.diagnosis.selection.acceptance import MIN_GAIN, best_accepted, is_accepted
 from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
-from winchkit.diagnosis.selection.exchange import recoupled
-from winchkit.diagnosis.selection.scores import Score, chance_level
-from winchkit.diagnosis.selection.starting_values import elsewhere
+from winchkit.diagnosis.selection.exchange import pair_exchange
+from winchkit.diagnosis.selection.scores import Score, null_maxima
+from winchkit.diagnosis.selection.starting_values import other_grid_point
 from winchkit.effects.term import Term
 
-__all__ = ["SelectionResult", "search", "with_a_pair", "without_term"]
+__all__ = ["SelectionResult", "stepwise_selection", "with_pair", "without_term"]
 
 _MOST_STEPS = 6
 _SHORT_LIST = 5
@@ -25,7 +25,7 @@ _RIVALS = 2
 _RECONSIDERED = 3
 _EXCHANGED = 2
 """Additions of which one may be exchanged for a pair."""
-_COUPLES = 3
+_PAIRS = 3
 _LACK_OF_FIT_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
 
@@ -55,16 +55,16 @@ class SelectionResult:
     """Score that noise alone reaches in one case of a hundred."""
 
 
-def search(engine: SelectionEngine) -> SelectionResult:
+def stepwise_selection(engine: SelectionEngine) -> SelectionResult:
     """Grow the model while something is missing and an effect holds out of sample."""
-    initial_model, initial_noise = engine.settle(engine.initial_model)
+    initial_model, initial_noise = engine.fit_with_noise(engine.initial_model)
     initial_lack_of_fit_test = engine.lack_of_fit_test(initial_model, initial_noise)
     initial_scores = engine.scores(initial_model, initial_noise)
     threshold = _threshold(engine, initial_model, initial_noise)
-    last_model, noise, tried = _grown(
+    last_model, noise, tried = _forward_selection(
         engine, initial_model, initial_noise, initial_scores, threshold
     )
-    final, noise = _without_the_doubtful(engine, last_model, noise)
+    final, noise = _without_doubtful_terms(engine, last_model, noise)
     lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
     lack_of_fit_at_start = grew or _has_lack_of_fit(
@@ -88,7 +88,7 @@ def search(engine: SelectionEngine) -> SelectionResult:
     )
 
 
-def _grown(
+def _forward_selection(
     engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score], threshold: float
 ) -> tuple[Fit, Noise, tuple[Fit, ...]]:
     """The model with all that holds, its noise, and the candidates that were tried first."""
@@ -98,20 +98,20 @@ def _grown(
         if scores and scores[0].net_gain > threshold:
             trials = _short_list(engine, present, noise, scores)
             tried = tried or _fits(trials)
-            grown = best_that_holds(engine, present, noise, trials)
-        grown = grown or _coupled(engine, present, noise)
+            grown = best_accepted(engine, present, noise, trials)
+        grown = grown or _best_pair(engine, present, noise)
         if grown is None:
             break
-        engine.look_again(grown.hypothesis)
-        present, noise = engine.settle(grown.hypothesis, noise)
-        present, noise = _reconsider(engine, present, noise)
+        engine.update_signatures(grown.hypothesis)
+        present, noise = engine.fit_with_noise(grown.hypothesis, noise)
+        present, noise = _exchange_and_eliminate(engine, present, noise)
         scores = engine.scores(present, noise)
     return present, noise, tried
 
 
 def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
     """Score that noise alone reaches in one case of a hundred."""
-    chance = chance_level(engine.projected(present, noise), engine.regression.n_rows)
+    chance = null_maxima(engine.projected(present, noise), engine.regression.n_rows)
     return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
 
 
@@ -120,11 +120,11 @@ def without_term(engine: SelectionEngine, result: SelectionResult, index: int) -
     return _ended(engine, result, result.final.hypothesis.without(index))
 
 
-def with_a_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResult | None:
+def with_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResult | None:
     """The same search with a pair in the place of its only addition; None where none is better."""
     if len(result.final.hypothesis.terms) != engine.n_initial_terms + 1:
         return None
-    better = _exchanged(engine, result.final, result.noise, result.initial_model)
+    better = _accepted_pair_exchange(engine, result.final, result.noise, result.initial_model)
     return None if better is None else _ended(engine, result, better.hypothesis)
 
 
@@ -132,7 +132,7 @@ def _ended(
     engine: SelectionEngine, result: SelectionResult, hypothesis: Hypothesis
 ) -> SelectionResult:
     """A search as if it had ended with this hypothesis."""
-    present, noise = engine.settle(hypothesis, result.noise)
+    present, noise = engine.fit_with_noise(hypothesis, result.noise)
     lack_of_fit_test = engine.lack_of_fit_test(present, noise)
     lack_of_fit = _has_lack_of_fit(
         lack_of_fit_test, engine.scores(present, noise), result.threshold
@@ -167,7 +167,7 @@ def _short_list(
     return [engine.trial(present, item, noise) for item in listed]
 
 
-def _coupled(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
+def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
     In exchange for one of the first additions, or to begin with in outputs that no addition acts
@@ -176,21 +176,25 @@ def _coupled(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
     added = len(present.hypothesis.terms) - engine.n_initial_terms
     if not engine.lack_of_fit_test(present, noise).p_value < _LACK_OF_FIT_LEVEL:
         return None
-    better = _exchanged(engine, present, noise, present) if 0 < added <= _EXCHANGED else None
-    if better is not None or _acts_on_what_lacks(engine, present, noise):
+    better = (
+        _accepted_pair_exchange(engine, present, noise, present)
+        if 0 < added <= _EXCHANGED
+        else None
+    )
+    if better is not None or _acts_on_unexplained_output(engine, present, noise):
         return better
-    pairs = engine.couples(present, noise)
+    pairs = engine.pairs(present, noise)
     # Two may also fail alone since each is wrong where the other acts: a drag one way only.
-    best = [pair for pair in pairs if pair.hidden][:_COUPLES]
-    best += [pair for pair in pairs[:_COUPLES] if not pair.hidden]
+    best = [pair for pair in pairs if pair.suppressed][:_PAIRS]
+    best += [pair for pair in pairs[:_PAIRS] if not pair.suppressed]
     trials = [
         engine.trial(engine.trial(present, a, noise).fit, b, noise)
         for a, b in (pair.scores for pair in best)
     ]
-    return best_that_holds(engine, present, noise, trials)
+    return best_accepted(engine, present, noise, trials)
 
 
-def _acts_on_what_lacks(engine: SelectionEngine, present: Fit, noise: Noise) -> bool:
+def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: Noise) -> bool:
     """Whether an addition acts on an output in which something is missing still."""
     regression = engine.regression
     rejected = np.flatnonzero(engine.lack_of_fit_test(present, noise).rejected).tolist()
@@ -199,14 +203,16 @@ def _acts_on_what_lacks(engine: SelectionEngine, present: Fit, noise: Noise) -> 
     return any(regression.outputs_of(term.effect.stage) & lacking for term in added)
 
 
-def _exchanged(engine: SelectionEngine, present: Fit, noise: Noise, against: Fit) -> Fit | None:
+def _accepted_pair_exchange(
+    engine: SelectionEngine, present: Fit, noise: Noise, against: Fit
+) -> Fit | None:
     """A better pair in the place of one addition, that holds against another fit; or None.
 
     It need not lower an error by much: where something is missing, one effect may nearly do what
     two did, with other values.
     """
-    better = recoupled(engine, present, noise, 1)
-    if better is present or not holds(engine, against, better, noise, matters=1.0):
+    better = pair_exchange(engine, present, noise, 1)
+    if better is present or not is_accepted(engine, against, better, noise, matters=1.0):
         return None
     return better
 
@@ -215,7 +221,9 @@ def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
     return tuple(trial.fit for trial in trials)
 
 
-def _reconsider(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def _exchange_and_eliminate(
+    engine: SelectionEngine, present: Fit, noise: Noise
+) -> tuple[Fit, Noise]:
     """Drop what is no longer needed, and replace what another effect explains better.
 
     Again while that changes anything: the first of two effects may have stood for both, and what
@@ -223,15 +231,15 @@ def _reconsider(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fi
     """
     for _ in range(_RECONSIDERED):
         before = present.labels
-        present = _replaced(engine, _without_the_needless(engine, present, noise), noise)
-        present = recoupled(engine, present, noise, 2)
-        present = _without_the_needless(engine, present, noise)
+        present = _exchanged_terms(engine, _backward_elimination(engine, present, noise), noise)
+        present = pair_exchange(engine, present, noise, 2)
+        present = _backward_elimination(engine, present, noise)
         if present.labels == before or len(present.hypothesis.terms) < engine.n_initial_terms + 2:
             break
-    return engine.settle(present.hypothesis, noise)
+    return engine.fit_with_noise(present.hypothesis, noise)
 
 
-def _replaced(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
+def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
     """With every addition replaced by the best of its rivals that fits better."""
     for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
@@ -241,7 +249,7 @@ def _replaced(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
         rivals = _rivals_of(own, engine.scores(base, noise))
         trials = [engine.trial(base, item, noise) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
-        if best is not None and best.criterion < engine.criterion(present) - BETTER:
+        if best is not None and best.criterion < engine.criterion(present) - MIN_GAIN:
             present = best.fit
     return present
 
@@ -259,10 +267,12 @@ def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
 
 def _another(item: Score, own: Term) -> bool:
     """Whether a candidate is another effect than a term, or the same from another place."""
-    return item.candidate.effect.id != own.effect.id or elsewhere(own, item.candidate.shape)
+    return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
 
 
-def _without_the_doubtful(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def _without_doubtful_terms(
+    engine: SelectionEngine, present: Fit, noise: Noise
+) -> tuple[Fit, Noise]:
     """Drop additions that explain less than what is still missing: they may only imitate it."""
     left = engine.lack_of_fit_test(present, noise)
     missing = float(np.sum(np.maximum(left.excess_power, 0.0)[left.rejected]))
@@ -271,10 +281,14 @@ def _without_the_doubtful(engine: SelectionEngine, present: Fit, noise: Noise) -
         without = engine.refit(present.hypothesis.without(index), noise)
         if without.chi_square - present.chi_square < missing:
             doubtful = engine.refit(doubtful.hypothesis.without(index), noise)
-    return (present, noise) if doubtful is present else engine.settle(doubtful.hypothesis, noise)
+    return (
+        (present, noise)
+        if doubtful is present
+        else engine.fit_with_noise(doubtful.hypothesis, noise)
+    )
 
 
-def _without_the_needless(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
+def _backward_elimination(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = engine.refit(present.hypothesis.without(index), noise)
         if engine.criterion(without) < engine.criterion(present):

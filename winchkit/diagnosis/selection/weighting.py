@@ -17,16 +17,16 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.selection.acceptance import MATTERS
+from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 
-__all__ = ["Weighed", "weighed"]
+__all__ = ["Reweighted", "reweighted"]
 
 _NO_WORSE = 1.01
 
 
 @dataclass(frozen=True)
-class Weighed:
+class Reweighted:
     """A fit by the weights that predict best, the noise of these weights, and a note if need be."""
 
     fit: Fit
@@ -34,12 +34,12 @@ class Weighed:
     notes: tuple[str, ...] = ()
 
 
-def weighed(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Weighed:
+def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted:
     """The same hypothesis with values from even weights in outputs that these predict better.
 
     Intervals under even weights are the block jackknife's, which needs no noise to be white.
     """
-    own = Weighed(fitted, noise)
+    own = Reweighted(fitted, noise)
     if noise.from_repeats or not fitted.hypothesis.terms:
         return own
     regression, folds = engine.regression, engine.folds(fitted, noise)
@@ -52,20 +52,20 @@ def weighed(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Weighed:
         return refitted, even, {o: now[o] / was[o] for o in was if was[o]}
 
     refitted, even, ratios = evenly(regression.outputs)
-    better = [output for output, ratio in ratios.items() if ratio < MATTERS]
+    better = [output for output, ratio in ratios.items() if ratio < RELEVANT_RATIO]
     if not better:
         return own
     if len(better) < len(regression.outputs):
         refitted, even, ratios = evenly(better)
     gained = 1 - max(ratios[output] for output in better)
-    if gained < 1 - MATTERS or max(ratios.values()) > _NO_WORSE:
+    if gained < 1 - RELEVANT_RATIO or max(ratios.values()) > _NO_WORSE:
         return own
     told = " and ".join(output.replace("_", " ") for output in better)
     note = (
         f"in the {told} all frequencies are weighed evenly, which predicts what was left out "
         f"{gained:.0%} better than weights by the noise: something is missing there too"
     )
-    return Weighed(refitted, even, (note,))
+    return Reweighted(refitted, even, (note,))
 
 
 def _even(regression: Regression, noise: Noise, outputs: Collection[str]) -> Noise:

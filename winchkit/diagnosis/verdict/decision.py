@@ -15,10 +15,10 @@ from winchkit.diagnosis.residuals.error_statistics import Skirt
 from winchkit.diagnosis.results import OutputFit, Verdict
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
-from winchkit.diagnosis.selection.weighting import weighed
+from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.model.stages import OUTPUT_UNITS
 
-__all__ = ["Judgement", "by_best_weights", "judge", "output_fits", "withheld"]
+__all__ = ["Judgement", "judge", "output_fits", "reweighted_judgement", "withheld"]
 
 _HALF = 0.5
 _GENERALISES = 0.15
@@ -74,10 +74,10 @@ def withheld(
     return Judgement(verdict, share, output_fits(engine, before, before), shown, (note,))
 
 
-def by_best_weights(engine: SelectionEngine, judgement: Judgement) -> Judgement:
+def reweighted_judgement(engine: SelectionEngine, judgement: Judgement) -> Judgement:
     """The same judgement with values by the weights that predict best."""
     shown = judgement.shown
-    best = weighed(engine, shown.final, shown.noise)
+    best = reweighted(engine, shown.final, shown.noise)
     if best.fit is shown.final:
         return judgement
     before, after = (shown.initial_model, shown.initial_noise), (best.fit, best.noise)

@@ -12,7 +12,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.noise import orthonormal
 from winchkit.diagnosis.regression.projection import explained_ss
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.selection.stepwise import SelectionResult, with_a_pair, without_term
+from winchkit.diagnosis.selection.stepwise import SelectionResult, with_pair, without_term
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.decision import Judgement, judge, withheld
 from winchkit.diagnosis.verdict.spline_alternatives import Columns, curves
@@ -130,7 +130,7 @@ def judge_and_doubt(engine: TimeSeriesSelection, result: SelectionResult) -> Jud
         return judgement
     terms = doubt.terms
     if curve := doubt.beaten(doubt.added):
-        pair = with_a_pair(engine, result)
+        pair = with_pair(engine, result)
         if pair is not None:
             return judge_and_doubt(engine, pair)
         return withheld(engine, result, 1.0, _words(terms, terms, curve))
