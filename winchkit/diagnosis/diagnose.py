@@ -97,7 +97,7 @@ class Answer:
         return Bar(self.engine.penalty_per_parameter, self.result.threshold)
 
     @property
-    def filed(self) -> SelectionEngine:
+    def file_engine(self) -> SelectionEngine:
         """Engine with the profile at its file values; a robot's geometry may be free later."""
         return self.engine
 

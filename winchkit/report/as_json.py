@@ -44,8 +44,8 @@ def _of_runs(answer: WinchAnswer) -> dict[str, Any]:
 
 def _of_poses(answer: RobotAnswer) -> dict[str, Any]:
     """Errors over what they followed before, beside those that are left."""
-    seen = answer.seen
-    drawn = traces(seen.final.regression, *seen.errors)
+    selection = answer.selection
+    drawn = traces(selection.final.regression, *selection.errors)
     after = [t.to_json(t.after) for t in drawn if t.after is not None]
     before = [t.to_json(t.before) for t in drawn]
     return {"residuals": {"before": before, "after": after if answer.diagnosis.steps else None}}

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
-from winchkit.diagnosis.robot.candidates import lacking, needless
-from winchkit.diagnosis.robot.errors import Errors, Shown, errors_of, figures
-from winchkit.diagnosis.robot.preparation import Study, study_of
+from winchkit.diagnosis.robot.candidates import lacking, with_needs_met
+from winchkit.diagnosis.robot.errors import Errors, FittedModel, errors_of, figures
+from winchkit.diagnosis.robot.preparation import Preparation, prepare_selection
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.effects.bind_robot import declared_terms, robot_terms
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -65,12 +65,12 @@ def grow_robot(
     effect = _placed(catalogue[effect_id], profile, line)
     if any(term.effect.id == effect.id for term in robot_terms(profile, catalogue)):
         raise UsageError(f"robot '{profile.name}' has the effect '{effect.id}' already")
-    study = study_of(runs, profile, catalogue)
-    if missing := lacking(effect, study.dataset):
+    preparation = prepare_selection(runs, profile, catalogue)
+    if missing := lacking(effect, preparation.dataset):
         raise UsageError(
             f"effect '{effect_id}' cannot be seen in these poses: without {', '.join(missing)}"
         )
-    return _added(study, needless(effect, study.dataset))
+    return _added(preparation, with_needs_met(effect, preparation.dataset))
 
 
 def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
@@ -91,8 +91,8 @@ def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
     return at_line(effect, line)
 
 
-def _added(study: Study, effect: Effect) -> RobotGrown:
-    engine = study.as_filed()
+def _added(preparation: Preparation, effect: Effect) -> RobotGrown:
+    engine = preparation.file_geometry()
     initial_model, noise = engine.fit_with_noise(engine.initial_model)
     scores = [s for s in engine.scores(initial_model, noise) if s.candidate.effect.id == effect.id]
     if not scores:
@@ -100,17 +100,20 @@ def _added(study: Study, effect: Effect) -> RobotGrown:
     final: Fit = engine.trial(initial_model, scores[0], noise).fit
     regression = engine.regression
     before, after = (
-        Shown(regression, fit, noise, engine.regression.groups) for fit in (initial_model, final)
+        FittedModel(regression, fit, noise, engine.regression.groups)
+        for fit in (initial_model, final)
     )
     spread = spread_of(regression, final, noise, engine.regression.blocks)
-    own = {term.effect.id for term in declared_terms(study.dataset.robot, study.catalogue)}
+    own = {
+        term.effect.id for term in declared_terms(preparation.dataset.robot, preparation.catalogue)
+    }
     found = estimates(regression, final, spread)
     # What a line's winch brings along is refitted beside it and stays in the winch's own profile.
     terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
     was, now = (
         errors_of(regression, regression.at(fit.hypothesis)) for fit in (initial_model, final)
     )
-    addition = Addition(figures(before, after, study.noise), terms, study.dataset.notes)
+    addition = Addition(figures(before, after, preparation.noise), terms, preparation.dataset.notes)
     return RobotGrown(regression, (was, now), addition)
 
 
@@ -133,8 +136,8 @@ def remove_from_robot(
     if not gone:
         has = ", ".join(own) or "none"
         raise UsageError(f"robot '{profile.name}' has no effect '{effect_id}'; it has {has}")
-    study = study_of(runs, profile, catalogue)
-    engine = study.as_filed()
+    preparation = prepare_selection(runs, profile, catalogue)
+    engine = preparation.file_geometry()
     initial_model, noise = engine.fit_with_noise(engine.initial_model)
     hypothesis = initial_model.hypothesis
     for index in reversed(range(len(hypothesis.terms))):
@@ -143,12 +146,13 @@ def remove_from_robot(
     final, _ = engine.fit_with_noise(hypothesis)
     regression = engine.regression
     before, after = (
-        Shown(regression, fit, noise, engine.regression.groups) for fit in (initial_model, final)
+        FittedModel(regression, fit, noise, engine.regression.groups)
+        for fit in (initial_model, final)
     )
     found = estimates(
         regression, final, spread_of(regression, final, noise, engine.regression.blocks)
     )
     # What a line's winch brings along is refitted beside them and stays in the winch's own profile.
     left = tuple(item for item in found if item[0].effect.id in own)
-    outputs = figures(before, after, study.noise)
-    return Removal(effect_id, outputs, left, study.dataset.notes)
+    outputs = figures(before, after, preparation.noise)
+    return Removal(effect_id, outputs, left, preparation.dataset.notes)

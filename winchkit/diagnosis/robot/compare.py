@@ -14,7 +14,7 @@ from winchkit.diagnosis.robot.attribution import follows_of
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
 from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
-from winchkit.diagnosis.robot.regression import PoseRegression, Standing
+from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.variance_components import START, contrasts
 from winchkit.effects.bind_robot import robot_terms, robot_with_effects
 from winchkit.effects.catalogue import Catalogue
@@ -53,7 +53,7 @@ def compared_robot(
     robot = robot_with_effects(profile, catalogue)
     equations = Equations(dataset, start_pose(dataset), robot)
     pose = placed_by(equations, robot, START)
-    regression = PoseRegression(Standing(dataset, pose, START))
+    regression = PoseRegression(LinearizationPoint(dataset, pose, START))
     errors = errors_of(regression, regression.residuals(robot_terms(profile, catalogue)))
     noise = _noise(errors, dataset)
     follows = follows_of(regression, errors)

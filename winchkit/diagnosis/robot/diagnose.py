@@ -30,11 +30,11 @@ from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step
 from winchkit.diagnosis.robot.attribution import follows_of
 from winchkit.diagnosis.robot.candidates import GEOMETRY
 from winchkit.diagnosis.robot.engine import PoseSelection
-from winchkit.diagnosis.robot.errors import Errors, Shown, errors_of, figures, rms
+from winchkit.diagnosis.robot.errors import Errors, FittedModel, errors_of, figures, rms
 from winchkit.diagnosis.robot.excitation import what_poses_cannot_show
 from winchkit.diagnosis.robot.pose_design import next_pose_runs
-from winchkit.diagnosis.robot.preparation import Study, fitted_to, study_of
-from winchkit.diagnosis.robot.prior import Believed
+from winchkit.diagnosis.robot.preparation import Preparation, calibrated_on, prepare_selection
+from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.verdict.decision import Judgement, judge
@@ -45,7 +45,7 @@ from winchkit.schema.profiles.robot import RobotProfile
 
 __all__ = [
     "RobotAnswer",
-    "Seen",
+    "RobotSelection",
     "answer_of",
     "diagnose_robot",
 ]
@@ -61,43 +61,47 @@ class RobotAnswer(Answer):
 
     engine: PoseSelection
 
-    def __init__(self, seen: Seen, sets: Sequence[Confusion], diagnosis: RobotDiagnosis) -> None:
-        super().__init__(seen.engine, seen.judgement.shown, diagnosis, sets)
-        self.seen = seen
+    def __init__(
+        self, selection: RobotSelection, sets: Sequence[Confusion], diagnosis: RobotDiagnosis
+    ) -> None:
+        super().__init__(selection.engine, selection.judgement.shown, diagnosis, sets)
+        self.selection = selection
 
     @property
-    def filed(self) -> PoseSelection:
+    def file_engine(self) -> PoseSelection:
         """Engine with the geometry at its file values."""
-        return self.seen.filed
+        return self.selection.file_engine
 
 
 @dataclass(frozen=True)
-class Seen:
+class RobotSelection:
     """Where a search in poses began and ended."""
 
-    study: Study
+    preparation: Preparation
     engine: PoseSelection
-    filed: PoseSelection
+    file_engine: PoseSelection
     """Takes the geometry as the profile has it; the same where that was not let go."""
     result: SelectionResult
     judgement: Judgement
 
     @property
-    def refitted(self) -> bool:
+    def geometry_is_free(self) -> bool:
         """Whether the geometry as filed had to be let go."""
-        return self.engine is not self.filed
+        return self.engine is not self.file_engine
 
     @cached_property
-    def initial_model(self) -> Shown:
+    def initial_model(self) -> FittedModel:
         """The profile's own effects fitted, the geometry as filed."""
-        first, noise = self.filed.fit_with_noise(self.filed.initial_model)
-        return Shown(self.filed.regression, first, noise, self.filed.regression.groups)
+        first, noise = self.file_engine.fit_with_noise(self.file_engine.initial_model)
+        return FittedModel(
+            self.file_engine.regression, first, noise, self.file_engine.regression.groups
+        )
 
     @cached_property
-    def final(self) -> Shown:
+    def final(self) -> FittedModel:
         """With all that was named."""
         shown, engine = self.judgement.shown, self.engine
-        return Shown(engine.regression, shown.final, shown.noise, engine.regression.groups)
+        return FittedModel(engine.regression, shown.final, shown.noise, engine.regression.groups)
 
     @cached_property
     def errors(self) -> tuple[Errors, Errors]:
@@ -116,42 +120,42 @@ class Seen:
         """
         before, after = self.errors
         falls = [rms(name, after[name]) / rms(name, before[name]) for name in after]
-        if self.refitted and (min(falls) > _FAR_OFF or max(falls) > _NO_WORSE):
+        if self.geometry_is_free and (min(falls) > _FAR_OFF or max(falls) > _NO_WORSE):
             return self.initial_model.regression, before
         return self.final.regression, after
 
 
-def answer_of(seen: Seen, geometry: str) -> RobotAnswer:
+def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     """What was found, in words, figures and places; ``geometry`` is how that was taken."""
-    engine, judgement, study = seen.engine, seen.judgement, seen.study
+    engine, judgement, preparation = selection.engine, selection.judgement, selection.preparation
     shown, verdict = judgement.shown, judgement.verdict
     added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
     sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
     steps = tuple(map(plain_step, steps_of(engine, shown, sets))) if sets else ()
-    outputs = figures(seen.initial_model, seen.final, study.noise)
-    if seen.refitted and verdict in ("adequate", "explained"):
+    outputs = figures(selection.initial_model, selection.final, preparation.noise)
+    if selection.geometry_is_free and verdict in ("adequate", "explained"):
         verdict = "explained"
         steps = (_geometry_step(engine, shown, outputs["cable_length"]), *steps)
     diagnosis = RobotDiagnosis(
         verdict=verdict,
         outputs=outputs,
         steps=steps,
-        candidates=candidates_of(engine, seen.result),
+        candidates=candidates_of(engine, selection.result),
         detectable=detectable(
-            seen.result.scores, Bar(engine.penalty_per_parameter, seen.result.threshold)
+            selection.result.scores, Bar(engine.penalty_per_parameter, selection.result.threshold)
         ),
         unexplained_share=judgement.share,
-        where=_places(seen) if seen.result.lack_of_fit else (),
+        where=_places(selection) if selection.result.lack_of_fit else (),
         next_runs=next_pose_runs(engine.regression, shown.final.hypothesis, pairs_of(sets)),
-        notes=(*study.dataset.notes, *what_poses_cannot_show(study), *judgement.notes),
+        notes=(*preparation.dataset.notes, *what_poses_cannot_show(preparation), *judgement.notes),
         geometry=geometry,
     )
-    return RobotAnswer(seen, sets, diagnosis)
+    return RobotAnswer(selection, sets, diagnosis)
 
 
-def _places(seen: Seen) -> tuple[Where, ...]:
+def _places(selection: RobotSelection) -> tuple[Where, ...]:
     """Where the rest lives, the largest share first."""
-    result = follows_of(*seen.rest)
+    result = follows_of(*selection.rest)
     places = [Where(f.output, f.variable, f.share, line=f.line) for f in result]
     return tuple(sorted(places, key=lambda w: -w.share)[:_WHERE])
 
@@ -159,15 +163,15 @@ def _places(seen: Seen) -> tuple[Where, ...]:
 def _geometry_step(engine: PoseSelection, shown: SelectionResult, output: OutputFit) -> Step:
     """All of the geometry, as one addition that no few numbers can replace."""
     regression = engine.regression
-    believed = regression.standing.believed
+    geometry = regression.point.geometry
     std = spread_of(regression, shown.final, shown.noise, engine.regression.blocks).std
-    first = regression.nuisance_columns.shape[1] - len(believed)
+    first = regression.nuisance_columns.shape[1] - len(geometry)
     values: dict[str, dict[str, Estimate]] = {}
-    for index, belief in enumerate(believed):
+    for index, item in enumerate(geometry):
         by = shown.final.vector[first + index]
-        unit = belief.term.effect.parameter(belief.parameter).unit
-        values.setdefault(belief.term.effect.id, {})[belief.parameter] = Estimate(
-            belief.value + float(by) * belief.std, float(std[first + index]) * belief.std, unit
+        unit = item.term.effect.parameter(item.parameter).unit
+        values.setdefault(item.term.effect.id, {})[item.parameter] = Estimate(
+            item.value + float(by) * item.std, float(std[first + index]) * item.std, unit
         )
     before, after = output.heldout_rms_before, output.heldout_rms_after
     gain = 1 - (after / before) ** 2 if before else 0.0
@@ -191,71 +195,85 @@ def diagnose_robot(
     with every fault of every run, FileError for effects that do not bind.
     """
     progress("judging the noise", 0.0)
-    study = study_of(runs, profile, catalogue or load_catalogue())
+    preparation = prepare_selection(runs, profile, catalogue or load_catalogue())
     progress("searching", 0.4)
-    if fitted_to(profile, runs):
-        engine = study.let_go()
-        return _concluded(study, engine, engine)
-    filed = study.as_filed()
-    if _beyond_few(study, filed):
-        return _concluded(study, study.let_go(), filed)
-    result = stepwise_selection(filed)
-    if added := result.final.hypothesis.terms[filed.n_initial_terms :]:
+    if calibrated_on(profile, runs):
+        engine = preparation.free_geometry()
+        return _concluded(preparation, engine, engine)
+    file_engine = preparation.file_geometry()
+    if _beyond_few(preparation, file_engine):
+        return _concluded(preparation, preparation.free_geometry(), file_engine)
+    result = stepwise_selection(file_engine)
+    if added := result.final.hypothesis.terms[file_engine.n_initial_terms :]:
         # Poses placed by ropes that contradict each other turn, and tensions there look unbalanced.
-        filed = study.as_filed(added[:1])
-        result = stepwise_selection(filed)
-    judgement = judge(filed, result)
+        file_engine = preparation.file_geometry(added[:1])
+        result = stepwise_selection(file_engine)
+    judgement = judge(file_engine, result)
     if judgement.verdict in ("adequate", "explained") and not _geometry_is_off(
-        study, filed, result
+        preparation, file_engine, result
     ):
-        return answer_of(Seen(study, filed, filed, result, judgement), "file")
-    return _concluded(study, study.let_go(), filed)
+        return answer_of(
+            RobotSelection(preparation, file_engine, file_engine, result, judgement), "file"
+        )
+    return _concluded(preparation, preparation.free_geometry(), file_engine)
 
 
-def _beyond_few(study: Study, filed: PoseSelection) -> bool:
+def _beyond_few(preparation: Preparation, file_engine: PoseSelection) -> bool:
     """Whether the whole geometry explains far more than any single effect does."""
-    gain = _gain_of_geometry(study, filed, filed.initial_model)
-    if not _is_real(study, gain):
+    gain = _gain_of_geometry(preparation, file_engine, file_engine.initial_model)
+    if not _is_real(preparation, gain):
         return False
-    present, noise = filed.fit_with_noise(filed.initial_model)
-    best = max((s.explained_ss for s in filed.scores(present, noise)), default=0.0)
+    present, noise = file_engine.fit_with_noise(file_engine.initial_model)
+    best = max((s.explained_ss for s in file_engine.scores(present, noise)), default=0.0)
     return best < _ONE_OF_FEW * gain
 
 
-def _gain_of_geometry(study: Study, filed: PoseSelection, model: Hypothesis) -> float:
+def _gain_of_geometry(
+    preparation: Preparation, file_engine: PoseSelection, model: Hypothesis
+) -> float:
     """Whitened squares that the geometry takes, beyond what its uncertainty allows it."""
-    standing = filed.regression.standing
-    wide = PoseRegression(replace(standing, believed=_from(study.prior, standing.believed)))
+    point = file_engine.regression.point
+    wide = PoseRegression(replace(point, geometry=_from(preparation.prior, point.geometry)))
     hypothesis = replace(model, nuisances=())
-    before = filed.regression
+    before = file_engine.regression
     chi_square = fit(before, hypothesis, np.ones(before.n_rows)).chi_square
     return chi_square - fit(wide, hypothesis, np.ones(wide.n_rows)).chi_square
 
 
-def _concluded(study: Study, engine: PoseSelection, filed: PoseSelection) -> RobotAnswer:
+def _concluded(
+    preparation: Preparation, engine: PoseSelection, file_engine: PoseSelection
+) -> RobotAnswer:
     """With the geometry let go."""
     result = stepwise_selection(engine)
-    return answer_of(Seen(study, engine, filed, result, judge(engine, result)), "refitted")
+    return answer_of(
+        RobotSelection(preparation, engine, file_engine, result, judge(engine, result)), "refitted"
+    )
 
 
-def _geometry_is_off(study: Study, filed: PoseSelection, result: SelectionResult) -> bool:
+def _geometry_is_off(
+    preparation: Preparation, file_engine: PoseSelection, result: SelectionResult
+) -> bool:
     """Whether the geometry as a whole would explain more of what is left than chance does."""
-    return _is_real(study, _gain_of_geometry(study, filed, result.final.hypothesis))
+    return _is_real(
+        preparation, _gain_of_geometry(preparation, file_engine, result.final.hypothesis)
+    )
 
 
-def _is_real(study: Study, gain: float) -> bool:
+def _is_real(preparation: Preparation, gain: float) -> bool:
     """F test of the whitened squares that the geometry takes."""
-    count = len(study.prior)
-    dof = study.noise.dof.get("cable_length", 1.0)
+    count = len(preparation.prior)
+    dof = preparation.noise.dof.get("cable_length", 1.0)
     level = float(f_distribution.isf(_GEOMETRY_LEVEL, count, max(dof, 1.0)))
     return gain / count > level
 
 
-def _from(prior: Sequence[Believed], now: Sequence[Believed]) -> tuple[Believed, ...]:
+def _from(
+    prior: Sequence[GeometryPrior], now: Sequence[GeometryPrior]
+) -> tuple[GeometryPrior, ...]:
     """Priors from where the numbers are now."""
     there = {(b.term.effect.id, b.parameter): b.value for b in now}
     out = []
-    for belief in prior:
-        value = there.get((belief.term.effect.id, belief.parameter), 0.0)
-        out.append(replace(belief.moved(value / belief.std), at=value))
+    for item in prior:
+        value = there.get((item.term.effect.id, item.parameter), 0.0)
+        out.append(replace(item.moved(value / item.std), at=value))
     return tuple(out)

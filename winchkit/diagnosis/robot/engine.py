@@ -13,7 +13,7 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.robot.errors import Shown, held_out_rms
+from winchkit.diagnosis.robot.errors import FittedModel, held_out_rms
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
 from winchkit.diagnosis.selection.engine import SelectionEngine
@@ -62,7 +62,7 @@ class PoseSelection(SelectionEngine):
 
     def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
         """Held-out rms error of cable lengths, platform position and tensions, SI."""
-        return held_out_rms(Shown(self.regression, fitted, noise, folds))
+        return held_out_rms(FittedModel(self.regression, fitted, noise, folds))
 
     def _choose_folds(self, fitted: Fit, noise: Noise) -> Folds:
         """Groups of poses: every unknown is common to all of them."""

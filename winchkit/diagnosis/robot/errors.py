@@ -22,7 +22,16 @@ from winchkit.diagnosis.results import OutputFit
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
 
-__all__ = ["UNITS", "Errors", "Shown", "errors_of", "figures", "held_out_rms", "noise_rms", "rms"]
+__all__ = [
+    "UNITS",
+    "Errors",
+    "FittedModel",
+    "errors_of",
+    "figures",
+    "held_out_rms",
+    "noise_rms",
+    "rms",
+]
 
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
@@ -30,7 +39,7 @@ _HELD = 6
 
 
 @dataclass(frozen=True)
-class Shown:
+class FittedModel:
     """A fitted model with all that is needed to judge it."""
 
     regression: PoseRegression
@@ -76,7 +85,9 @@ def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     return out
 
 
-def figures(initial_model: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit]:
+def figures(
+    initial_model: FittedModel, final: FittedModel, noise: PoseNoise
+) -> dict[str, OutputFit]:
     """Every output before and after; a position's rms is of its distance."""
     before, after = (
         errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (initial_model, final)
@@ -131,17 +142,17 @@ def signals(regression: PoseRegression) -> dict[str, float]:
     return out
 
 
-def held_out_rms(shown: Shown) -> dict[str, float]:
+def held_out_rms(model: FittedModel) -> dict[str, float]:
     """Error of every output on poses held out, rms in SI."""
-    return {name: rms(name, error) for name, error in _held_out(shown).items()}
+    return {name: rms(name, error) for name, error in _held_out(model).items()}
 
 
-def _held_out(shown: Shown) -> Errors:
+def _held_out(model: FittedModel) -> Errors:
     """Errors of every pose with the unknowns fitted without its fold, linearised."""
-    regression, found = shown.regression, shown.fit
+    regression, found = model.regression, model.fit
     here = regression.at(found.hypothesis)
-    steps = left_out_steps(regression, found, shown.noise, shown.folds)
-    row, fold = regression.pose_of_row, np.concatenate(shown.folds.of)
+    steps = left_out_steps(regression, found, model.noise, model.folds)
+    row, fold = regression.pose_of_row, np.concatenate(model.folds.of)
     of_pose = np.zeros(len(regression.dataset.measured), dtype=np.intp)
     of_pose[row[row >= 0]] = fold[row >= 0]
     out = {kind: values.copy() for kind, values in here.items()}

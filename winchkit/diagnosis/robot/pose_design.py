@@ -104,7 +104,7 @@ def _placed(
     regression: PoseRegression, robot: Robot, kind: PoseKind, rng: np.random.Generator
 ) -> Pose:
     """Random poses of a kind that the geometry can take."""
-    seen = regression.standing.pose
+    seen = regression.point.pose
     corners = robot.geometry.exit_point
     middle, half = _middle(seen.position)
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
@@ -237,7 +237,7 @@ def pose_offers(
 
     ``needed`` are the whitened squares that answer each question.
     """
-    robot = regression.standing.robot(final.terms)
+    robot = regression.point.robot(final.terms)
     kinds = [kind for kind in KINDS if usable(kind, regression.dataset)]
     tried = [(kind, *imagined(regression, robot, kind)) for kind in kinds]
     tried = [(kind, seen, pose) for kind, seen, pose in tried if len(seen)]
@@ -284,15 +284,15 @@ def _with_all(
     regression: PoseRegression, tried: Sequence[tuple[PoseKind, Measured, Pose]]
 ) -> PoseRegression:
     """The poses so far and all imagined ones as one regression."""
-    standing, dataset = regression.standing, regression.dataset
-    poses = [standing.pose, *(pose for _, _, pose in tried)]
+    point, dataset = regression.point, regression.dataset
+    poses = [point.pose, *(pose for _, _, pose in tried)]
     measured = joined([dataset.measured, *(seen for _, seen, _ in tried)])
     pose = Pose(
         np.concatenate([p.position for p in poses]), np.concatenate([p.rotation for p in poses])
     )
     distinct = np.arange(len(measured), dtype=np.intp)
     wide = replace(dataset, measured=measured, pose=distinct)
-    return PoseRegression(replace(standing, dataset=wide, pose=pose))
+    return PoseRegression(replace(point, dataset=wide, pose=pose))
 
 
 def _information(regression: PoseRegression, final: Hypothesis, question: Question) -> Array:

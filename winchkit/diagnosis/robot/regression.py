@@ -22,7 +22,7 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.robot.candidates import lacking, lacking_parts
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.equations import POSED, Equations
-from winchkit.diagnosis.robot.prior import Believed, believed_profile
+from winchkit.diagnosis.robot.prior import GeometryPrior, profile_with_geometry
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import base_of, line_of_effect
 from winchkit.effects.term import Term, robot_with_terms
@@ -30,7 +30,7 @@ from winchkit.model.robot import Pose, Robot
 from winchkit.model.stages import At, Stage
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["PoseRegression", "Standing"]
+__all__ = ["LinearizationPoint", "PoseRegression"]
 
 _COPIES = 5
 _GROUPS = 5
@@ -41,18 +41,18 @@ _ZERO, _OFFSET = 0.2, 0.05
 
 
 @dataclass(frozen=True)
-class Standing:
+class LinearizationPoint:
     """Where a problem stands: what is taken for granted while effects are fitted."""
 
     dataset: RobotDataset
     pose: Pose
     sigma: Mapping[str, float]
-    believed: tuple[Believed, ...] = ()
+    geometry: tuple[GeometryPrior, ...] = ()
 
     @cached_property
     def profile(self) -> RobotProfile:
         """The profile with the geometry where it is now."""
-        return believed_profile(self.dataset.robot, self.believed)
+        return profile_with_geometry(self.dataset.robot, self.geometry)
 
     def robot(self, terms: Sequence[Term] = ()) -> Robot:
         """With terms beside the geometry."""
@@ -64,16 +64,16 @@ class PoseRegression(Regression):
 
     has_known_loads = False  # Tensions follow from the balance at the pose.
 
-    def __init__(self, standing: Standing) -> None:
-        self.standing = standing
-        self.dataset: RobotDataset = standing.dataset
-        self.robot = standing.robot()
-        self.equations = Equations(standing.dataset, standing.pose, self.robot)
+    def __init__(self, point: LinearizationPoint) -> None:
+        self.point = point
+        self.dataset: RobotDataset = point.dataset
+        self.robot = point.robot()
+        self.equations = Equations(point.dataset, point.pose, self.robot)
         self._start = self.equations.residuals(self.robot)
         self._zeros = _zeros(self._start, self.dataset)
         self._posed = [k for k in POSED if np.isfinite(self._start[k]).any()]
         self._project()
-        prior = [-(b.value - b.at) / b.std for b in standing.believed]
+        prior = [-(b.value - b.at) / b.std for b in point.geometry]
         self._prior = np.tile(np.array(prior) / np.sqrt(_COPIES), _COPIES)
         counts = [int(np.count_nonzero(keep)) for keep in self._keep.values()]
         super().__init__(self._segments(counts), n_runs=1)
@@ -178,7 +178,7 @@ class PoseRegression(Regression):
     def pose_of_row(self) -> NDArray[np.intp]:
         """Row of the run behind each row; −1 − copy for those of the prior, (rows,)."""
         own = [np.nonzero(keep)[0] for keep in self._keep.values()]
-        copies = -1 - np.repeat(np.arange(_COPIES), len(self.standing.believed))
+        copies = -1 - np.repeat(np.arange(_COPIES), len(self.point.geometry))
         return np.concatenate([own[0], copies, *own[1:]])
 
     def n_samples(self, output: str) -> int:
@@ -198,20 +198,20 @@ class PoseRegression(Regression):
 
     def residuals(self, terms: Sequence[Term]) -> dict[str, Array]:
         """Model less measurement by kind, zeros of instruments taken out, SI."""
-        return self.residuals_at(self.standing, terms)
+        return self.residuals_at(self.point, terms)
 
-    def residuals_at(self, standing: Standing, terms: Sequence[Term]) -> dict[str, Array]:
+    def residuals_at(self, point: LinearizationPoint, terms: Sequence[Term]) -> dict[str, Array]:
         """As :meth:`residuals`, with the geometry elsewhere."""
-        found = self.equations.residuals(standing.robot(terms))
+        found = self.equations.residuals(point.robot(terms))
         return {kind: self._zeroed(kind, values) for kind, values in found.items()}
 
     def at(self, hypothesis: Hypothesis) -> dict[str, Array]:
         """Residuals of a hypothesis with the geometry where its nuisances move it."""
-        believed = self.standing.believed
-        first = self.nuisance_columns.shape[1] - len(believed)
-        by = hypothesis.nuisances[first:] or (0.0,) * len(believed)
-        moved = tuple(b.moved(x) for b, x in zip(believed, by, strict=True))
-        return self.residuals_at(replace(self.standing, believed=moved), hypothesis.terms)
+        geometry = self.point.geometry
+        first = self.nuisance_columns.shape[1] - len(geometry)
+        by = hypothesis.nuisances[first:] or (0.0,) * len(geometry)
+        moved = tuple(b.moved(x) for b, x in zip(geometry, by, strict=True))
+        return self.residuals_at(replace(self.point, geometry=moved), hypothesis.terms)
 
     def in_time(self, rows: Array) -> list[Array]:
         """Rows of each segment: there is no time."""
@@ -226,7 +226,7 @@ class PoseRegression(Regression):
 
     def _project(self) -> None:
         """Per pose an orthonormal basis of what no move of it can undo."""
-        sigma, by = self.standing.sigma, self.slope()
+        sigma, by = self.point.sigma, self.slope()
         known = np.concatenate([np.isfinite(self._start[k]) for k in self._posed], axis=1)
         slope = np.concatenate([by[k] / sigma[k] for k in self._posed], axis=1)
         slope = np.where(known[..., None], slope, 0.0)
@@ -250,7 +250,7 @@ class PoseRegression(Regression):
 
     def _rows_of(self, residuals: Mapping[str, Array]) -> Array:
         """Measured less predicted, whitened and freed of the pose: closures, then tensions."""
-        sigma = self.standing.sigma
+        sigma = self.point.sigma
         white = np.concatenate([residuals[k] / sigma[k] for k in self._posed], axis=1)
         white = np.where(np.isfinite(white), white, 0.0)
         free = (np.swapaxes(self._basis, 1, 2) @ white[..., None])[..., 0]
@@ -283,29 +283,29 @@ class PoseRegression(Regression):
                 column = -self._rows_of(moved)
                 if np.any(column):
                     columns.append(self._beside(column, np.zeros_like(self._prior)))
-        for index, moved in enumerate(self.moved_by_belief()):
+        for index, moved in enumerate(self.residuals_by_geometry()):
             column = self._here - self._rows_of(moved)
-            held = np.zeros((_COPIES, len(self.standing.believed)))
+            held = np.zeros((_COPIES, len(self.point.geometry)))
             held[:, index] = 1 / np.sqrt(_COPIES)
             columns.append(self._beside(column, held.ravel()))
         return np.array(columns).reshape(len(columns), self.n_rows).T
 
-    def moved_by_belief(self) -> list[dict[str, Array]]:
+    def residuals_by_geometry(self) -> list[dict[str, Array]]:
         """Residuals with each number of the geometry moved by a standard deviation.
 
         A line's equations hold no other line's numbers: those of one kind are moved together. How
         they turn forces is left out, since it is looked at anew wherever the geometry settles.
         """
-        believed = self.standing.believed
+        geometry = self.point.geometry
         here = self.residuals(())
-        out = [dict(here) for _ in believed]
-        kinds = {(base_of(b.term.effect), b.parameter) for b in believed}
+        out = [dict(here) for _ in geometry]
+        kinds = {(base_of(b.term.effect), b.parameter) for b in geometry}
         for kind in sorted(kinds):
-            own = [(base_of(b.term.effect), b.parameter) == kind for b in believed]
-            moved = [b.moved(1.0) if mine else b for b, mine in zip(believed, own, strict=True)]
-            there = self.residuals_at(replace(self.standing, believed=tuple(moved)), ())
+            own = [(base_of(b.term.effect), b.parameter) == kind for b in geometry]
+            moved = [b.moved(1.0) if mine else b for b, mine in zip(geometry, own, strict=True)]
+            there = self.residuals_at(replace(self.point, geometry=tuple(moved)), ())
             for index in np.flatnonzero(own).tolist():
-                line = line_of_effect(believed[index].term.effect)
+                line = line_of_effect(geometry[index].term.effect)
                 place = [self.dataset.names.index(line)] if line else slice(None)
                 for name in ("rope", "swivel", "gauge"):
                     out[index][name] = here[name].copy()

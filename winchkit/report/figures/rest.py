@@ -27,7 +27,7 @@ def rest_of(answer: Answer, where: Where) -> tuple[Array, Array]:
     """Mean of the variable and of the residual in every bin, (bins,) each, SI."""
     over = Followed(where.output, where.variable, where.share, where.order, line=where.line)
     if isinstance(answer, RobotAnswer):
-        regression, errors = answer.seen.rest
+        regression, errors = answer.selection.rest
         trace = trace_over(regression, over, errors)
         return trace.means(trace.before)
     assert isinstance(answer, WinchAnswer)

@@ -30,7 +30,7 @@ class Waterfall:
 
 def waterfall_of(answer: Answer) -> Waterfall | None:
     """The ladder of a diagnosis; None where it names nothing."""
-    diagnosis, engine, filed = answer.diagnosis, answer.engine, answer.filed
+    diagnosis, engine, file_engine = answer.diagnosis, answer.engine, answer.file_engine
     if not diagnosis.steps:
         return None
     whole = answer.result.final.hypothesis
@@ -42,11 +42,11 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
     rungs: list[tuple[str, Mapping[str, float]]] = [("profile as it is", before)]
     first: dict[str, Mapping[str, float]] = {}
     last: dict[str, Mapping[str, float]] = {}
-    if filed is engine:
+    if file_engine is engine:
         ladder.known[()] = before
         plain = ladder
     else:
-        plain = _Ladder(filed, answer.result, {(): before})
+        plain = _Ladder(file_engine, answer.result, {(): before})
         rungs.append((f"+ {GEOMETRY_NAME}", ladder.error()))
         first[GEOMETRY_NAME], last[GEOMETRY_NAME] = ladder.error(), plain.error(*added)
     rungs += [(f"+ {name}", ladder.error(*added[: n + 1])) for n, name in enumerate(names)]

@@ -178,13 +178,13 @@ def robot_report_html(
     answer: RobotAnswer, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
     """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them."""
-    diagnosis, seen = answer.diagnosis, answer.seen
-    before, after = seen.errors
+    diagnosis, selection = answer.diagnosis, answer.selection
+    before, after = selection.errors
     noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
     moved = moved_outputs(diagnosis.outputs) if diagnosis.steps else []
     grown = after if diagnosis.steps else None
-    figures = pose_figures(seen.final.regression, before, grown, noise, moved)
-    command = Command(seen.study.dataset, profile, options)
+    figures = pose_figures(selection.final.regression, before, grown, noise, moved)
+    command = Command(selection.preparation.dataset, profile, options)
     return page(title, (), sections(answer, figures, (), None, command))
 
 
