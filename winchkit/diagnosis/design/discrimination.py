@@ -15,6 +15,7 @@ from scipy.stats import ncx2
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.design.programmes import KINDS, imagined
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import NextRun
@@ -72,7 +73,7 @@ def power_of(strength: float, needed: float = APART) -> float:
 
 
 def separation(
-    regression: TimeSeriesRegression,
+    regression: Regression,
     first: Term,
     second: Term | None,
     noise: Mapping[str, float],
@@ -98,7 +99,7 @@ def separation(
 
 
 def so_far(
-    regression: TimeSeriesRegression, first: Term, second: Term | None, noise: Mapping[str, float]
+    regression: Regression, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> SoFar | None:
     """What the runs of a problem know of two effects; None where that is no number."""
     rows = _rows(regression, first, second, noise)
@@ -111,7 +112,7 @@ def so_far(
 
 
 def _rows(
-    regression: TimeSeriesRegression, first: Term, second: Term | None, noise: Mapping[str, float]
+    regression: Regression, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> tuple[Array, Array, Array] | None:
     """Columns that are a run's own (states), those that all runs share, and the first effect.
 

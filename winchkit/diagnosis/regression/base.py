@@ -65,6 +65,8 @@ class Regression(ABC):
         Measured minus predicted by the profile without effects.
     nuisance_columns : ndarray of shape (n_rows, n_nuisances)
         Regressor columns of the nuisance parameters, which are linear.
+    fits_offset : bool
+        Whether the first nuisance parameter is the offset of the length instrument.
     fits_discretization : bool
         Whether the last nuisance parameter is a correction of the discretisation error, which
         acts through the effects too.
@@ -80,6 +82,7 @@ class Regression(ABC):
 
     nominal_residual: Array
     nuisance_columns: Array
+    fits_offset: bool = False
     fits_discretization: bool = False
     has_known_loads: bool = True
 

@@ -45,11 +45,6 @@ class TimeSeriesRegression(Regression):
     ----------
     dataset
         Runs of one winch with its profile.
-
-    Attributes
-    ----------
-    fits_offset : bool
-        Whether the offset of the length instrument is a nuisance parameter; it is the first then.
     """
 
     def __init__(self, dataset: Dataset) -> None:
