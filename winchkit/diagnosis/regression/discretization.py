@@ -21,6 +21,7 @@ from winchkit.diagnosis.data.spectrum import to_frequency
 from winchkit.diagnosis.regression.base import Regression, Segment
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
+from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.effects.term import modifiers_of
 from winchkit.model.derivatives import is_calmer
 from winchkit.model.line import Line, Motion
@@ -65,7 +66,7 @@ def without_discretization_error(regression: Regression, fit: Fit, inverse_sigma
 
 def _beside(present: Array, column: Array) -> Array:
     """A column with the present ones projected out; zero where rounding is all that is left."""
-    left = column - present @ np.linalg.lstsq(present, column, rcond=None)[0]
+    left = partialled_out(present, column)
     return np.zeros_like(left) if left @ left <= 1e-12 * float(column @ column) else left
 
 

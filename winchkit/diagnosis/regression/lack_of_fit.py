@@ -16,10 +16,10 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.noise import (
     Noise,
-    orthonormal,
     replicate_contrasts,
     sums_per_band,
 )
+from winchkit.diagnosis.regression.projection import orthonormal
 
 __all__ = ["LackOfFitTest", "lack_of_fit_test"]
 

@@ -17,12 +17,12 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.data.spectrum import smoothed
 from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.projection import orthonormal
 
 __all__ = [
     "Noise",
     "noise_from_repeats",
     "noise_saturated",
-    "orthonormal",
     "replicate_contrasts",
     "replicate_rms",
     "sums_per_band",
@@ -230,23 +230,6 @@ def _fewest_rows(regression: Regression) -> int:
     for segment in regression.segments:
         rows[segment.output] += len(segment.band.frequency)
     return min(rows.values())
-
-
-def orthonormal(columns: Array, most: int | None = None) -> Array:
-    """Orthonormal basis of columns, those that add nothing left out; (rows, rank).
-
-    Of more than ``most`` directions the strongest are kept: as many columns as a short run has
-    rows would leave no noise at all.
-    """
-    size = np.sqrt(np.sum(columns**2, axis=0))
-    scaled = columns[:, size > 0] / size[size > 0]
-    if not scaled.shape[1]:
-        return np.zeros((len(columns), 0))
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    kept = values > 1e-8 * values[-1]
-    if most is not None:
-        kept[: max(0, len(values) - most)] = False
-    return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
 
 
 def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["explained_ss", "explained_ss_of_sets"]
+__all__ = ["explained_ss", "explained_ss_of_sets", "orthonormal", "partialled_out"]
 
 
 def explained_ss(inner: Array, products: Array, least: float) -> float:
@@ -24,3 +24,25 @@ def explained_ss_of_sets(inner: Array, products: Array, least: float) -> Array:
     along = np.einsum("nji,nj->ni", vectors, products)
     kept = values > least
     return np.asarray(np.sum(along**2 / np.where(kept, values, np.inf), axis=-1))
+
+
+def orthonormal(columns: Array, most: int | None = None) -> Array:
+    """Orthonormal basis of columns, those that add nothing left out; (rows, rank).
+
+    Of more than ``most`` directions the strongest are kept: as many columns as a short run has
+    rows would leave no noise at all.
+    """
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    scaled = columns[:, size > 0] / size[size > 0]
+    if not scaled.shape[1]:
+        return np.zeros((len(columns), 0))
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    kept = values > 1e-8 * values[-1]
+    if most is not None:
+        kept[: max(0, len(values) - most)] = False
+    return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
+
+
+def partialled_out(columns: Array, vector: Array) -> Array:
+    """Residual of a vector after its projection on columns, shape (n_rows,)."""
+    return np.asarray(vector - columns @ np.linalg.lstsq(columns, vector)[0])

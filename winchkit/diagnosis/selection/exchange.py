@@ -8,7 +8,8 @@ from itertools import combinations
 import numpy as np
 
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise, orthonormal
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.selection.acceptance import MIN_GAIN
 from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.diagnosis.selection.scores import Score

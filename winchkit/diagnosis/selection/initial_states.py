@@ -14,6 +14,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
@@ -37,13 +38,13 @@ def explained_by_initial_states(
     """
     known, left = base.jacobian * inverse_sigma[:, None], base.residual * inverse_sigma
     gain = base.chi_square - fitted.chi_square
-    column = _beyond(known, _from_rest(regression, fitted.hypothesis) * inverse_sigma)
+    column = partialled_out(known, _from_rest(regression, fitted.hypothesis) * inverse_sigma)
     alone = (column @ left) ** 2 / max(float(column @ column), 1e-300)
     by_itself = bool(alone >= _BY_ITSELF * gain)
     levels = _levels(regression, fitted.hypothesis)
     if levels is None:
         return not by_itself
-    flat = _beyond(np.column_stack([known, levels * inverse_sigma[:, None]]), left)
+    flat = partialled_out(np.column_stack([known, levels * inverse_sigma[:, None]]), left)
     if by_itself and alone >= left @ left - flat @ flat:
         return False
     hypothesis = fitted.hypothesis
@@ -71,8 +72,3 @@ def _levels(regression: Regression, hypothesis: Hypothesis) -> Array | None:
     still = Term(term.effect, {**term.values, **slow})
     frozen = replace(hypothesis, terms=(*hypothesis.terms[:-1], still))
     return regression.jacobian(regression.vector(frozen), frozen)[:, -len(start) :]
-
-
-def _beyond(columns: Array, vector: Array) -> Array:
-    """A vector with what columns explain of it taken out."""
-    return np.asarray(vector - columns @ np.linalg.lstsq(columns, vector)[0])

@@ -11,6 +11,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.selection.scores import Score
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
@@ -112,7 +113,7 @@ def starting_points(
         term = Term(item.candidate.effect, {**values, place.name: at})
         column = regression.change(hypothesis.with_term(term, regression.n_runs)) - here
         column = column * inverse_sigma
-        column = column - jacobian @ np.linalg.lstsq(jacobian, column)[0]
+        column = partialled_out(jacobian, column)
         size = float(column @ column)
         return float((column @ residual) ** 2) / size if size else 0.0
 

@@ -11,7 +11,8 @@ from scipy.stats import chi2
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.cross_validation import held_out
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise, orthonormal
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.exchange import Exchange
 from winchkit.diagnosis.selection.scores import Projected

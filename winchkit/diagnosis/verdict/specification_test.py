@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.noise import orthonormal
-from winchkit.diagnosis.regression.projection import explained_ss
+from winchkit.diagnosis.regression.projection import explained_ss, orthonormal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, with_pair, without_term
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
