@@ -1,7 +1,13 @@
-"""Whether an improvement holds out of sample: block by block, and on whole groups of runs.
+"""Cross-validation: held-out errors of blocks and groups, and a paired rank test of two models.
 
-Everything is linearised at a fit: leaving a part of the data out changes the unknowns by a
-linear solve, so that cross-validation needs no fit of its own.
+Leave-block-out and leave-group-out predictions are linearised at the fit: leaving rows out changes
+the unknowns by one linear solve, so that no model is fitted again.
+
+References
+----------
+Stone, M. (1974). Cross-validatory choice and assessment of statistical predictions. J. R. Stat.
+Soc. B 36, 111-147.
+Wilcoxon, F. (1945). Individual comparisons by ranking methods. Biometrics Bulletin 1, 80-83.
 """
 
 from __future__ import annotations
@@ -31,11 +37,23 @@ _RIDGE = 1e-12
 
 
 def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> float:
-    """Variance of a fold's prediction from the other folds, at most, over the noise's.
+    """Largest variance of a fold's prediction from the other folds, relative to the noise variance.
 
-    Per output and in its unit, as held-out errors are told: noise that is strongest at low
-    frequencies makes a level or a slope, known from the other folds only, far less sure than
-    whitened rows say.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model, at which the prediction is linearised.
+    noise
+        Noise variance.
+    folds
+        Folds to be held out.
+
+    Notes
+    -----
+    Computed per output in its unit: noise that is strongest at low frequencies makes an offset or a
+    drift, which the other folds must determine, less certain than the whitened rows show.
     """
     shared = _shared(fit)
     columns = _in_time(regression, shared * noise.inverse_sigma(regression)[:, None])
@@ -59,9 +77,13 @@ def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) 
 
 
 def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
-    """Whitened squares of every fold, predicted with unknowns fitted without it; (folds,).
+    """Held-out χ² of every fold, its unknowns fitted to the other folds.
 
-    The state in which a run began is its own, whatever is left out.
+    Initial states keep their own run's values, whatever is held out.
+
+    Returns
+    -------
+    ndarray of shape (n_folds,)
     """
     inverse_sigma = noise.inverse_sigma(regression)
     residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
@@ -72,7 +94,12 @@ def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Ar
 
 
 def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
-    """Change of the unknowns when each fold is left out, linearised; (folds, unknowns)."""
+    """Linearised change of the unknowns when each fold is left out.
+
+    Returns
+    -------
+    ndarray of shape (n_folds, n_unknowns)
+    """
     inverse_sigma = noise.inverse_sigma(regression)
     residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
     columns = _in_time(regression, fit.jacobian * inverse_sigma[:, None])
@@ -80,7 +107,7 @@ def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds)
 
 
 def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
-    """Held-out error per output, rms in SI."""
+    """Held-out rms error per output, SI."""
     inverse_sigma = noise.inverse_sigma(regression)
     white = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
     shared = _shared(fit)
@@ -99,27 +126,38 @@ def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -
 
 
 def signed_rank_p_value(before: Array, after: Array) -> float:
-    """Chance (one-sided rank test) that per-fold squares fell from ``before`` to ``after`` by luck.
+    """One-sided p-value of the Wilcoxon signed-rank test that an error decreased.
 
-    Only folds that the change touches at all take part: an effect may live in a few fast ones.
+    Parameters
+    ----------
+    before, after
+        Held-out χ² of every fold with the smaller and the larger model, shape (n_folds,).
+
+    Returns
+    -------
+    float
+        One with fewer than eight folds or no change at all.
+
+    Notes ----- Folds whose change is below 2 % of the largest take no part, unless fewer than eight
+    would remain: an effect may act in a few folds only.
     """
     change = before - after
     size = np.abs(change)
     if size.max() == 0 or len(size) < _AT_LEAST:
         return 1.0
-    # Fewer could not be certain by rank, however much each gains.
+    # With fewer folds the smallest p-value of the rank test would exceed the level.
     touched = change[size >= min(_TOUCHED * size.max(), np.sort(size)[-_AT_LEAST])]
     return float(wilcoxon(touched, alternative="greater").pvalue)
 
 
 def _shared(fit: Fit) -> Array:
-    """Derivatives by the unknowns that all runs share, states left out."""
+    """Derivatives by the unknowns that all runs share, without the initial states."""
     states = sum(len(start) for start in fit.hypothesis.starts)
     return fit.jacobian[:, : fit.jacobian.shape[1] - states]
 
 
 def _in_time(regression: Regression, columns: Array) -> Array:
-    """Columns back in time, (samples, k)."""
+    """Columns transformed to samples, shape (n_samples, k)."""
     samples = sum(s.band.count for s in regression.segments)
     out = np.empty((columns.shape[1], samples)).T
     for index, column in enumerate(columns.T):
@@ -133,7 +171,7 @@ def _left_out(residual: Array, columns: Array, fold: NDArray[np.intp], count: in
 
 
 def _steps(residual: Array, columns: Array, fold: NDArray[np.intp], count: int) -> Array:
-    """Change of the unknowns when a fold is left out, (folds, unknowns)."""
+    """Change of the unknowns when a fold is left out, shape (n_folds, n_unknowns)."""
     k = columns.shape[1]
     normal, gradient = np.zeros((count, k, k)), np.zeros((count, k))
     order = np.argsort(fold, kind="stable")

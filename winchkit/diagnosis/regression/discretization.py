@@ -1,10 +1,9 @@
-"""What the sampling of a run may have rounded: effects on a finer motion, less on the samples.
+"""Discretisation error: change of the effects on a motion interpolated between the samples.
 
-Speeds, accelerations and loops are worked out from samples of the motor angle. Between samples a
-fast move is smoother than its differences say, so that the same effect, computed on the motion
-interpolated between the samples, changes the outputs by a little more or less. How much of that
-is right nobody knows: a real winch moves between samples, a simulation may not. So the whole
-difference is what an effect's values, and what it leaves, may be wrong by.
+Velocities, accelerations and hysteresis branches are computed from samples of the motor angle. On
+a four times finer time grid, interpolated by cubic splines, an effect changes the outputs by a
+slightly different amount. Which of the two is right depends on the motion between the samples, so
+the whole difference is taken as a possible error of fitted values and residuals.
 """
 
 from __future__ import annotations
@@ -36,7 +35,21 @@ _DEGREE = 3
 def discretization_error(
     dataset: Dataset, segments: Sequence[Segment], hypothesis: Hypothesis
 ) -> Array:
-    """What the terms add on a motion of finer steps, less what they add on the samples, rows."""
+    """Change of the effects' outputs on a finer time grid minus that on the samples.
+
+    Parameters
+    ----------
+    dataset
+        Runs of one winch.
+    segments
+        Rows of every output of every run.
+    hypothesis
+        Effects with their values and initial states.
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+    """
     out = np.zeros(segments[-1].rows.stop)
     if not hypothesis.terms:
         return out
@@ -54,7 +67,21 @@ def discretization_error(
 
 
 def without_discretization_error(regression: Regression, fit: Fit, inverse_sigma: Array) -> Array:
-    """A fit's residual without the part, between none and all, that rounding explains, rows."""
+    """Residual minus the share, between zero and one, that the discretisation error explains.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+    """
     column = regression.discretization_error(fit.hypothesis)
     across = _beside(fit.jacobian * inverse_sigma[:, None], column * inverse_sigma)
     size = float(across @ across)
@@ -65,13 +92,13 @@ def without_discretization_error(regression: Regression, fit: Fit, inverse_sigma
 
 
 def _beside(present: Array, column: Array) -> Array:
-    """A column with the present ones projected out; zero where rounding is all that is left."""
+    """Column with the present ones partialled out; zero where only rounding errors remain."""
     left = partialled_out(present, column)
     return np.zeros_like(left) if left @ left <= 1e-12 * float(column @ column) else left
 
 
 def _changes(line: Line, recording: Recording) -> dict[str, Array]:
-    """By how much each output changes with a finer motion, at the samples of one run."""
+    """Change of each output with a finer motion, at the samples of one run."""
     fine = _fine_motion(recording, line)
     if fine is None:
         return {}
@@ -85,10 +112,10 @@ def _changes(line: Line, recording: Recording) -> dict[str, Array]:
 
 
 def _fine_motion(recording: Recording, line: Line) -> Motion | None:
-    """A run's calm motion interpolated between its samples.
+    """Denoised motion of a run, interpolated between its samples.
 
-    None where derivatives are not differences of these samples: they were taken before a long run
-    was thinned out, or the drive's own velocity is calmer than the jitter of its time stamps.
+    None where the derivatives are not differences of these samples: they were taken before a long
+    run was decimated, or the drive's own velocity has less noise than the differences.
     """
     signals, smooth = recording.signals, recording.smooth
     if recording.thinned:
@@ -116,10 +143,10 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
 
 
 def _force_correction(recording: Recording, line: Line) -> Array:
-    """What differences over a span h have rounded off the rope force, (n,).
+    """Force lost by second differences over the span h, shape (n,).
 
-    A second difference of x is its second derivative and h²/12 of the fourth. Only that part of a
-    force counts which follows the rope's acceleration, as a hanging weight does.
+    A second difference of x is x″ + h²/12 · x⁗. Only the part of the force that is proportional to
+    the acceleration of the cable, as of a hanging weight, is corrected.
     """
     signals, tension = recording.signals, recording.smooth.at.tension
     hanging = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))

@@ -1,8 +1,9 @@
-"""Samples that an effect which was found jerks by how much nobody knows.
+"""Exclusion of samples near backlash impacts, which the fitted model does not predict.
 
-Teeth that meet again after a play give the drum its speed at once: how hard that pulls at a hanging
-weight depends on what gives way, and when it was between two samples nobody recorded. Where these
-samples take part, what they leave is taken for ripples and frictions that are not there.
+Where gear teeth meet again after backlash, the drum changes its speed within less than a sampling
+interval. The force then depends on the compliance of the drive train, which is not modelled, and
+on the time between two samples. If these samples are fitted, their residuals are explained by
+spurious ripple and friction.
 """
 
 from __future__ import annotations
@@ -24,8 +25,19 @@ _MOST = 0.25
 
 
 def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
-    """The dataset without force and torque around such samples; None where there are none, or
-    more than a quarter of all.
+    """Data set without force and torque near impacts of the fitted effects.
+
+    Parameters
+    ----------
+    dataset
+        Runs of one winch.
+    found
+        Fitted hypothesis.
+
+    Returns
+    -------
+    Dataset or None
+        None where no sample is affected, or more than a quarter of all are.
     """
     recordings = tuple(
         _without_impacts(recording, started(found, run))
@@ -36,7 +48,7 @@ def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
     names = ", ".join(t.label for t in found.terms if t.effect.shakes is not None)
     share = 1 - _compared(recordings) / max(1, _compared(dataset.recordings))
     if share > _MOST:
-        return None  # No few moments: what is left would tell nothing any more.
+        return None  # The remaining samples would not determine the effects.
     note = (
         f"force and torque are not compared in the moments in which {names} jerks them "
         f"({share:.1%} of the samples): how hard depends on what gives way"
@@ -45,13 +57,13 @@ def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
 
 
 def _compared(recordings: Sequence[Recording]) -> int:
-    """Samples of the torque, or of the force where no torque is measured."""
+    """Number of compared samples of the torque, or of the tension where that is missing."""
     valid = [r.valid.get("motor_torque", r.valid.get("tension")) for r in recordings]
     return sum(int(np.count_nonzero(good)) for good in valid if good is not None)
 
 
 def _without_impacts(recording: Recording, terms: Sequence[Term]) -> Recording:
-    """Without what the terms jerk: the torque, and the tension that a weight makes of it."""
+    """Run without torque near impacts and, under a known weight, without tension."""
     at = recording.raw.at
     shaken = np.zeros(len(at.time), dtype=bool)
     for term in terms:

@@ -1,12 +1,20 @@
-"""How sure fitted values are: profile likelihood, widened by what a likelihood does not know.
+"""95 % intervals of fitted values: profile likelihood, widened for what a likelihood leaves out.
 
-A likelihood believes the model and the noise. So its 95 % interval is widened
+The profile-likelihood interval assumes that model and noise variance are right. It is widened
 
-- to the block jackknife's, where blocks of time vary by more than the noise says;
-- by half of what parts of the data (outputs, groups of runs) contradict each other, where they do;
-- by what the sampling of the runs may have rounded.
+- to the interval of the block jackknife, where blocks of time vary by more than the noise;
+- by half of the contradiction between parts of the data (outputs, groups of runs);
+- by the discretisation error.
 
-Never the covariance of independent residuals: they are correlated.
+The covariance of independent residuals is not used: residuals are correlated. The intervals are not
+conditional on the selection of the model.
+
+References
+----------
+Venzon, D. J., Moolgavkar, S. H. (1988). A method for computing profile-likelihood-based confidence
+intervals. Appl. Stat. 37, 87-94.
+Künsch, H. R. (1989). The jackknife and the bootstrap for general stationary observations. Ann.
+Stat. 17, 1217-1241.
 """
 
 from __future__ import annotations
@@ -42,11 +50,25 @@ _FARTHEST = 4.0
 def profile_ends(
     regression: Regression, fit: Fit, inverse_sigma: Array, covariance: Array, reach: Array
 ) -> tuple[Array, Array]:
-    """Where the whitened squares have risen by ``reach``² with all else refitted; two (unknowns,).
+    """Ends of profile-likelihood intervals of the effects' unknowns.
 
-    ``weight`` is 1/σ per row, ``covariance`` (unknowns, unknowns) that of the linearised fit,
-    ``reach`` (unknowns,) in its standard deviations. Only the coordinates of terms are moved:
-    nuisances are linear, and nobody asks for the state in which a run began.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+    covariance
+        Covariance of the linearised fit, shape (n_unknowns, n_unknowns).
+    reach
+        Square root of the rise of χ² at the ends, shape (n_unknowns,).
+
+    Returns
+    -------
+    low, high : ndarray of shape (n_unknowns,)
+        Nuisance parameters, which are linear, and initial states have symmetric ends.
     """
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     low, high = fit.vector - reach * deviation, fit.vector + reach * deviation
@@ -62,7 +84,7 @@ def profile_ends(
 
 
 class _Walk:
-    """Away from a fit along one unknown, the others following."""
+    """Profile of χ² along one unknown, the others refitted by one linear step."""
 
     def __init__(
         self, regression: Regression, fit: Fit, inverse_sigma: Array, covariance: Array, index: int
@@ -82,21 +104,21 @@ class _Walk:
         self._bounds = regression.bounds(fit.hypothesis)
 
     def length(self, side: float, reach: float) -> float:
-        """How far one may go, in the unknown's coordinate."""
+        """Distance from the fit at which χ² has risen by ``reach``²."""
         usual = reach * self._deviation
         wanted, far = reach**2, usual
         for _ in range(_SEARCHES):
             risen = self._risen(side * far, wanted)
             if abs(risen / wanted - 1) < _LINEAR:
                 break
-            # Squares rise with the square of the way, or nearly so.
+            # χ² rises approximately with the square of the distance.
             far *= float(np.clip(np.sqrt(wanted / max(risen, 1e-9)), 0.3, 2.0))
             if far > _FARTHEST * usual:
                 return _FARTHEST * usual
         return far
 
     def _risen(self, moved: float, wanted: float) -> float:
-        """By how much the whitened squares rise, the others corrected once where it matters."""
+        """Rise of χ², the other unknowns corrected once where it exceeds the target."""
         low, high = self._bounds
         vector = np.clip(self._fit.vector + moved * self._along, low, high)
         residual = self._residual(vector)
@@ -120,22 +142,40 @@ _95 = 1.959964
 _CONTRADICTS = 3.5
 _LEAST_SAY = 1e-3
 _NOTHING = 1e6
-"""Of its usual size: an unknown that may be off by as much is not known at all."""
+"""In units of the usual size: an unknown with a larger standard deviation is undetermined."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """How far every unknown of a fit may be off, in the coordinates of the fit."""
+    """Uncertainty of every unknown of a fit, in the coordinates of the fit.
+
+    Attributes
+    ----------
+    std : ndarray of shape (n_unknowns,)
+        Standard deviation.
+    low, high : ndarray of shape (n_unknowns,)
+        Ends of the 95 % interval.
+    """
 
     std: Array
-    """(unknowns,)."""
     low: Array
-    """Lower ends of 95 % intervals, (unknowns,)."""
     high: Array
 
 
 def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
-    """Standard deviations and 95 % intervals of every unknown."""
+    """Standard deviations and 95 % intervals of every unknown.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    noise
+        Noise variance.
+    blocks
+        Blocks of time for the jackknife.
+    """
     inverse_sigma = noise.inverse_sigma(regression)
     whitened = fit.jacobian * inverse_sigma[:, None]
     normal = whitened.T @ whitened
@@ -165,7 +205,7 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
 
 
 def _jackknife(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Array:
-    """Standard deviation of every unknown from leaving out each block of time."""
+    """Standard deviation of every unknown by the delete-a-block jackknife."""
     steps = left_out_steps(regression, fit, noise, blocks)
     n = blocks.count
     return np.asarray(np.sqrt((n - 1) / n * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
@@ -174,10 +214,11 @@ def _jackknife(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) ->
 def _contradiction(
     regression: Regression, whitened: Array, residual: Array, covariance: Array
 ) -> Array:
-    """Half of the largest difference between what a part and the rest of the data say.
+    """Half of the largest difference between the estimates from a part of the data and the rest.
 
-    Zero where noise alone may have made it. A part's pull on an unknown u = C Jᵀr, of say
-    w = (C N C)/C, is w (1 − w) times the difference of what it and the rest would have found.
+    Zero where the difference is below 3.5 standard deviations. A part with the normal matrix N
+    changes an unknown by u = C Jᵀr, where C is the covariance of the fit; with the weight w = (C N
+    C)/C the estimates of part and rest differ by u/(w(1 − w)).
     """
     out = np.zeros(len(covariance))
     variance = np.maximum(np.diag(covariance), 1e-300)
@@ -213,7 +254,17 @@ def _parts(regression: Regression) -> Iterator[NDArray[np.intp]]:
 def estimates(
     regression: Regression, fit: Fit, spread: Spread
 ) -> list[tuple[Term, dict[str, Estimate]]]:
-    """Every term of a fit with its values, standard deviations, 95 % intervals and units."""
+    """Values of every effect of a fit with standard deviations, 95 % intervals and units.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    spread
+        Uncertainty of its unknowns.
+    """
     at = regression.nuisance_columns.shape[1]
     out = []
     for term in fit.hypothesis.terms:
@@ -239,7 +290,7 @@ def estimates(
 def _ends(
     coordinates: Coordinates, vector: Array, ends: tuple[Array, Array], base: Mapping[str, float]
 ) -> dict[str, tuple[float, float]]:
-    """Intervals of values with a coordinate of their own; an amplitude with a phase has none."""
+    """Intervals of the values with a coordinate of their own; a polar pair has none."""
     out: dict[str, tuple[float, float]] = {}
     for index, name in enumerate(coordinates.names):
         if name in (coordinates.effect.polar or ()):
@@ -259,7 +310,7 @@ def _estimate(
     deviation: Mapping[str, float],
     ends: tuple[float, float] | None,
 ) -> Estimate:
-    """A value; how sure is NaN where the data leave it anywhere within its bounds."""
+    """Estimate of a value; NaN standard deviation where the interval covers its bounds."""
     std = deviation.get(parameter.name, 0.0)
     if std >= parameter.high - parameter.low:
         return Estimate(value, float("nan"), parameter.unit)

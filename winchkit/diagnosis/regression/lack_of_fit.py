@@ -46,7 +46,28 @@ class LackOfFitTest:
 def lack_of_fit_test(
     regression: Regression, residual: Array, jacobian: Array, noise: Noise
 ) -> LackOfFitTest:
-    """F test of the repeats' mean against the noise, band by band."""
+    """F test of the mean of repeats against the pure error, in every band.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    jacobian
+        Derivative of the prediction by the fitted unknowns, shape (n_rows, n_unknowns).
+    noise
+        Noise variance from repeats.
+
+    Returns
+    -------
+    LackOfFitTest
+        With a NaN p-value where the noise is not from repeats.
+
+    Notes ----- In band b the statistic is F = (S_b/ν_b)/σ̂_b², where S_b is the residual sum of
+    squares of the means and ν_b the number of means less the leverage of the fitted unknowns. Its
+    null distribution is F(ν_b, ν̂_b) with the degrees of freedom ν̂_b of the smoothed variance.
+    """
     count = len(regression.bands)
     if not noise.from_repeats:
         nothing = np.zeros(count)
@@ -55,7 +76,7 @@ def lack_of_fit_test(
     total = sums_per_band(split.mean**2, split.mean_band, count)
     dof = sums_per_band(np.ones_like(split.mean), split.mean_band, count)
     basis = orthonormal(jacobian * noise.inverse_sigma(regression)[:, None])
-    # Each fitted unknown takes one degree of freedom from where it has leverage.
+    # Each fitted unknown takes degrees of freedom in proportion to its leverage.
     taken = sums_per_band(np.sum(basis**2, axis=1), regression.band_of_row, count)
     dof = np.maximum(dof - taken, 1.0)
     ratio = total / dof / noise.power

@@ -1,8 +1,15 @@
-"""The noise of the instruments, from repeats; and whether anything else is there.
+"""Noise spectrum: variance of every frequency band, from repeats or from the saturated model.
 
-Differences of two repeats' residuals hold noise only; their mean holds noise and whatever the
-model lacks. Per band of frequency the two powers are compared (F test), after what differs
-between repeats for known reasons, such as the temperature, is taken out.
+With repeats the variance is estimated from pure error: Helmert contrasts of the residuals of
+repeated runs contain noise only. The log power over the bands is then smoothed by a penalised
+Whittle likelihood. Without repeats the variance is that of the residual beside all candidate
+effects at once (saturated model), which counts an effect outside the catalogue as noise.
+
+References
+----------
+Draper, N. R., Smith, H. (1998). Applied Regression Analysis, 3rd ed., ch. 2 (pure error).
+Pawitan, Y., O'Sullivan, F. (1994). Nonparametric spectral density estimation using penalized
+Whittle likelihood. J. Am. Stat. Assoc. 89, 600-610.
 """
 
 from __future__ import annotations
@@ -36,24 +43,33 @@ _ROWS_EACH = 4
 
 @dataclass(frozen=True)
 class Noise:
-    """Power of the noise per band, and how well it is known."""
+    """Variance of the noise per band.
+
+    Attributes
+    ----------
+    power : ndarray of shape (n_bands,)
+        Variance of a spectral coefficient.
+    dof : ndarray of shape (n_bands,)
+        Degrees of freedom of each variance estimate.
+    rms : dict of str to float
+        Rms of the noise per output, in time, SI.
+    from_repeats : bool
+        Whether the variance is pure error; else it is that of the saturated model.
+    """
 
     power: Array
-    """Variance of a coefficient, (bands,)."""
     dof: Array
-    """Degrees of freedom of each estimate, (bands,)."""
     rms: dict[str, float]
-    """Per output, in time, SI."""
     from_repeats: bool
 
     def inverse_sigma(self, regression: Regression) -> Array:
-        """1/σ of every row."""
+        """1/σ of every row, shape (n_rows,)."""
         return np.asarray(1 / np.sqrt(self.power[regression.band_of_row]))
 
     def uncertainty(self, regression: Regression) -> dict[str, float]:
-        """By how much (relative, two deviations) mean squares may exceed the noise's by chance.
+        """Relative uncertainty (two standard deviations) of the mean square per output.
 
-        Coloured noise has few independent values: most of its power is in its lowest bands.
+        Coloured noise has few independent values: most of its power lies in the lowest bands.
         """
         rows = sums_per_band(np.ones(regression.n_rows), regression.band_of_row, len(self.power))
         total, spread = self.power * rows, (self.power * rows) ** 2
@@ -67,7 +83,19 @@ class Noise:
 
 @dataclass(frozen=True)
 class ReplicateContrasts:
-    """One vector over all repeats: differences and means with their bands."""
+    """Differences and means of repeated runs, in frequency.
+
+    Attributes
+    ----------
+    difference : ndarray of shape (n_differences,)
+        Helmert contrasts of the repeats of every group and output.
+    difference_band : ndarray of int, shape (n_differences,)
+        Noise band of every contrast.
+    mean : ndarray of shape (n_means,)
+        Mean of the repeats, scaled to the variance of one run.
+    mean_band : ndarray of int, shape (n_means,)
+        Noise band of every mean.
+    """
 
     difference: Array
     difference_band: NDArray[np.intp]
@@ -78,11 +106,20 @@ class ReplicateContrasts:
 def noise_from_repeats(
     regression: Regression, residual: Array, known: Array, own: Array | None = None
 ) -> Noise:
-    """Noise power from differences of repeats.
+    """Noise variance from the contrasts of repeated runs (pure error).
 
-    ``known`` (rows, k) are signatures that may differ between repeats; their differences are
-    projected out where they are noticeable. ``own`` (rows, m) are derivatives by unknowns that
-    each run has for itself: as much of a difference as they may have taken is no noise's lack.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    known
+        Signatures that may differ between repeats for a measured reason, such as the temperature,
+        shape (n_rows, k). Their contrasts are projected out where they are noticeable.
+    own
+        Derivatives by unknowns that every run has for itself, shape (n_rows, m). Their contrasts
+        are projected out and their degrees of freedom subtracted.
     """
     split = replicate_contrasts(regression, residual)
     count = len(regression.bands)
@@ -91,7 +128,7 @@ def noise_from_repeats(
     whole = dof
     taken = _differences(regression, own)
     for _ in range(_REWEIGHTED if known.size or taken.size else 0):
-        # What differs for a known reason made the first weights: they are drawn anew without it.
+        # The first weights include the known differences: they are computed again without them.
         inverse_sigma = 1 / np.sqrt(_smooth(regression, power, np.maximum(dof, 0.1))[0])
         inverse_sigma = inverse_sigma[split.difference_band]
         basis = _noticeable(regression, known, inverse_sigma)
@@ -106,11 +143,22 @@ def noise_from_repeats(
 
 
 def noise_saturated(regression: Regression, residual: Array, columns: Array) -> Noise:
-    """Noise power as what no effect of the catalogue can explain: without repeats.
+    """Noise variance of the residual beside all candidate effects (saturated model).
 
-    It begins with even weights: weights from the residual itself would trust least the very
-    frequencies in which something is missing. An effect outside the catalogue is taken for noise
-    here, so that it cannot be excluded.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    columns
+        Derivatives by the unknowns and signatures of all candidates, shape (n_rows, p).
+
+    Notes
+    -----
+    The first weights are equal within an output: weights from the residual itself would be smallest
+    at the frequencies at which an effect is missing. Three iterations of reweighting follow. An
+    effect outside the catalogue is counted as noise.
     """
     count = len(regression.bands)
     bands = regression.band_of_row
@@ -129,7 +177,7 @@ def noise_saturated(regression: Regression, residual: Array, columns: Array) -> 
 
 
 def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
-    """Rms of the differences of repeats per output; empty without repeats."""
+    """Rms of the contrasts of repeats per output, SI; empty without repeats."""
     times = {
         (s.run, s.output): time
         for s, time in zip(regression.segments, regression.in_time(residual), strict=True)
@@ -147,7 +195,7 @@ def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
 
 
 def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContrasts:
-    """Differences and means of repeats, transformed anew on their common samples."""
+    """Contrasts and means of repeats, transformed again on their common samples."""
     times = dict(
         zip(((s.run, s.output) for s in regression.segments), regression.in_time(rows), strict=True)
     )
@@ -185,7 +233,7 @@ def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContras
 
 
 def _edges(regression: Regression) -> dict[str, tuple[int, Array]]:
-    """Per output the number of its first band, and its edges from minus to plus infinity."""
+    """Number of the first band of every output, and its edges with infinite ends."""
     out: dict[str, tuple[int, Array]] = {}
     for output in regression.outputs:
         own = [i for i, band in enumerate(regression.bands) if band[0] == output]
@@ -195,14 +243,14 @@ def _edges(regression: Regression) -> dict[str, tuple[int, Array]]:
 
 
 def _differences(regression: Regression, columns: Array | None) -> Array:
-    """What of columns differs between repeats, (differences, m)."""
+    """Contrasts of columns, shape (n_differences, m)."""
     if columns is None or not columns.size:
         return np.zeros((0, 0))
     return np.array([replicate_contrasts(regression, column).difference for column in columns.T]).T
 
 
 def _noticeable(regression: Regression, known: Array, inverse_sigma: Array) -> Array:
-    """Orthonormal directions in which known signatures differ between repeats."""
+    """Orthonormal directions in which known signatures differ noticeably between repeats."""
     different = []
     for column in known.T:
         split = replicate_contrasts(regression, column)
@@ -217,7 +265,7 @@ def _noticeable(regression: Regression, known: Array, inverse_sigma: Array) -> A
 
 
 def _nearest(inverse_sigma: Array, split: ReplicateContrasts) -> Array:
-    """Noise power of the mean's rows, from that of the differences' bands."""
+    """Noise variance of the mean's rows, from the bands of the contrasts."""
     count = int(max(split.mean_band.max(), split.difference_band.max())) + 1
     power = np.ones(count)
     power[split.difference_band] = 1 / inverse_sigma**2
@@ -225,7 +273,7 @@ def _nearest(inverse_sigma: Array, split: ReplicateContrasts) -> Array:
 
 
 def _fewest_rows(regression: Regression) -> int:
-    """Rows of the output that has fewest."""
+    """Number of rows of the output with the fewest."""
     rows = dict.fromkeys(regression.outputs, 0)
     for segment in regression.segments:
         rows[segment.output] += len(segment.band.frequency)
@@ -238,7 +286,7 @@ def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
 
 
 def _smooth(regression: Regression, power: Array, dof: Array) -> tuple[Array, Array]:
-    """Every output's spectrum smoothed over its bands."""
+    """Spectrum of every output smoothed over its bands."""
     power, dof = power.copy(), dof.copy()
     for output in regression.outputs:
         own = np.array([band[0] == output for band in regression.bands])
@@ -247,7 +295,7 @@ def _smooth(regression: Regression, power: Array, dof: Array) -> tuple[Array, Ar
 
 
 def _even(regression: Regression, residual: Array) -> Array:
-    """One power per output, the same in all its bands."""
+    """One variance per output, the same in all its bands."""
     out = np.empty(len(regression.bands))
     for output in regression.outputs:
         rows = np.concatenate([residual[s.rows] for s in regression.segments if s.output == output])
@@ -257,13 +305,13 @@ def _even(regression: Regression, residual: Array) -> Array:
 
 
 def _power(regression: Regression, values: Array, bands: NDArray[np.intp], dof: Array) -> Array:
-    """Mean square per band; noise-free data get a floor far below what instruments resolve."""
+    """Mean square per band, at least the floor far below the resolution of instruments."""
     power = sums_per_band(values**2, bands, len(dof)) / np.maximum(dof, 1.0)
     return np.maximum(power, regression.power_floor)
 
 
 def _rms(regression: Regression, power: Array) -> dict[str, float]:
-    """Root mean square of the noise per output, in time."""
+    """Rms of the noise per output, in time."""
     out = {}
     for output in regression.outputs:
         own = [s for s in regression.segments if s.output == output]

@@ -1,4 +1,4 @@
-"""What columns take of a residual, from their inner products alone."""
+"""Projections: orthonormal bases, partialling out, explained sum of squares."""
 
 from __future__ import annotations
 
@@ -10,16 +10,23 @@ __all__ = ["explained_ss", "explained_ss_of_sets", "orthonormal", "partialled_ou
 
 
 def explained_ss(inner: Array, products: Array, least: float) -> float:
-    """Whitened squares that k columns take side by side.
+    """Sum of squares that a set of columns explains jointly.
 
-    ``inner`` (k, k) and ``products`` with the residual (k,) are of columns scaled to length one
-    before anything was projected out; directions shorter than the root of ``least`` are left out.
+    Parameters
+    ----------
+    inner
+        Inner products of the columns after projection, shape (k, k). The columns had unit length
+        before the projection.
+    products
+        Inner products with the residual, shape (k,).
+    least
+        Eigenvalue of ``inner`` below which a direction is not identifiable and left out.
     """
     return float(explained_ss_of_sets(inner[None], products[None], least)[0])
 
 
 def explained_ss_of_sets(inner: Array, products: Array, least: float) -> Array:
-    """The same for many sets of columns: (n, k, k) and (n, k) → (n,)."""
+    """The same for many sets of columns: (n, k, k) and (n, k) to (n,)."""
     values, vectors = np.linalg.eigh(inner)
     along = np.einsum("nji,nj->ni", vectors, products)
     kept = values > least
@@ -27,10 +34,19 @@ def explained_ss_of_sets(inner: Array, products: Array, least: float) -> Array:
 
 
 def orthonormal(columns: Array, most: int | None = None) -> Array:
-    """Orthonormal basis of columns, those that add nothing left out; (rows, rank).
+    """Orthonormal basis of the space of some columns.
 
-    Of more than ``most`` directions the strongest are kept: as many columns as a short run has
-    rows would leave no noise at all.
+    Parameters
+    ----------
+    columns
+        Shape (n_rows, k); columns of zeros and linearly dependent ones are dropped.
+    most
+        Maximum rank: the directions with the largest eigenvalues are kept, so that a short run
+        keeps degrees of freedom for the noise.
+
+    Returns
+    -------
+    ndarray of shape (n_rows, rank)
     """
     size = np.sqrt(np.sum(columns**2, axis=0))
     scaled = columns[:, size > 0] / size[size > 0]
