@@ -61,7 +61,7 @@ def all_named(case: Case) -> list[Named]:
     """Every method on one case."""
     answer = diagnose([read_run(path) for path in case.runs], read_winch(case.profile))
     sets = {OURS: tuple(step.effects for step in answer.diagnosis.steps)}
-    data = regression_of(answer.inquiry)
+    data = regression_of(answer.engine)
     sets |= {name: tuple((e,) for e in method(data)) for name, method in RIVALS.items()}
     truth = tuple(case.hidden)
     return [Named(case.seed, case.kind, case.snr, truth, m, s) for m, s in sets.items()]

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.spectrum import Band, to_time
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 
 __all__ = ["RIVALS", "Regression", "regression_of"]
 
@@ -45,37 +45,42 @@ class Regression:
     """Block of time of every row."""
 
 
-def regression_of(inquiry: Inquiry) -> Regression:
+def regression_of(engine: TimeSeriesSelection) -> Regression:
     """The regression of an inquiry before anything is added, thinned to what solvers bear."""
-    problem = inquiry.problem
+    regression = engine.regression
     # Each output by its own size: metres and newtons on one scale.
-    known = problem.nuisance_columns
-    left = problem.base - known @ np.linalg.lstsq(known, problem.base, rcond=None)[0]
-    size = np.empty(problem.rows)
-    for output in problem.dataset.outputs:
-        own = [s for s in problem.segments if s.output == output]
+    known = regression.nuisance_columns
+    left = (
+        regression.nominal_residual
+        - known @ np.linalg.lstsq(known, regression.nominal_residual, rcond=None)[0]
+    )
+    size = np.empty(regression.n_rows)
+    for output in regression.dataset.outputs:
+        own = [s for s in regression.segments if s.output == output]
         total = sum(float(np.sum(left[s.rows] ** 2)) for s in own)
         count = sum(s.rows.stop - s.rows.start for s in own)
         for segment in own:
             size[segment.rows] = np.sqrt(total / count) or 1.0
-    rows = np.column_stack([problem.base, problem.nuisance_columns, inquiry.signatures.columns])
+    rows = np.column_stack(
+        [regression.nominal_residual, regression.nuisance_columns, engine.signatures.columns]
+    )
     rows = rows / size[:, None]
-    every = max(1, problem.rows // _MOST_ROWS)
+    every = max(1, regression.n_rows // _MOST_ROWS)
     times, folds = [], []
-    for segment in problem.segments:
+    for segment in regression.segments:
         block = _in_time(rows[segment.rows], segment.band)
         # Means of neighbours, not every n-th: thinning must not throw information away.
         kept = len(block) // every * every
         times.append(block[:kept].reshape(-1, every, block.shape[1]).mean(axis=1))
         folds.append((np.arange(kept // every) * _FOLDS) // max(1, kept // every))
     whole = np.concatenate(times)
-    nuisances = problem.nuisance_columns.shape[1]
+    nuisances = regression.nuisance_columns.shape[1]
     basis = np.linalg.qr(whole[:, 1 : 1 + nuisances])[0]
     whole = whole - basis @ (basis.T @ whole)
     columns = whole[:, 1 + nuisances :]
     length = np.sqrt(np.sum(columns**2, axis=0))
     columns = columns / np.maximum(length, _NOTHING)
-    atoms = inquiry.signatures.atoms
+    atoms = engine.signatures.candidates
     effects = [""] * columns.shape[1]
     for atom in atoms:
         for index in range(atom.columns.start, atom.columns.stop):

@@ -33,13 +33,13 @@ def answer(case: Case) -> Score:
     runs = [read_run(path) for path in case.runs]
     begun = time.perf_counter()
     try:
-        result = diagnose(runs, read_winch(case.profile))
+        answer = diagnose(runs, read_winch(case.profile))
     except WinchkitError as error:
         # A refusal of good files is an answer too, a wrong one.
         return refused(case, str(error), time.perf_counter() - begun)
     seconds = time.perf_counter() - begun
-    p_value = result.found.presence.p_value
-    return score(case, result.diagnosis.to_json(), p_value, seconds)
+    p_value = answer.result.lack_of_fit_test.p_value
+    return score(case, answer.diagnosis.to_json(), p_value, seconds)
 
 
 def _one(job: tuple[int, Plan, str | None]) -> Score | None:

@@ -12,9 +12,9 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.catalog import find
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.diagnose import selection_engine
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.term import Term, modifiers_of
 from winchkit.model.line import Line
@@ -100,16 +100,16 @@ def made(
     return Run(f"run-{seed}", time, channels, known | metadata)
 
 
-def inquiry_into(
+def engine_for(
     hidden: Sequence[Term], ride: Ride, masses: Sequence[float] = (10.0, 25.0)
-) -> Inquiry:
+) -> TimeSeriesSelection:
     """An inquiry into two runs under each load, with terms hidden in them."""
     runs = [
         made(10 * i + k, GROOVED, hidden, load_mass=mass, ride=ride)
         for i, mass in enumerate(masses)
         for k in range(2)
     ]
-    return inquire(prepare(runs, GROOVED), CATALOGUE)
+    return selection_engine(prepare(runs, GROOVED), CATALOGUE)
 
 
 def with_channel(run: Run, name: str, values: Array, unit: str = "N") -> Run:
@@ -122,13 +122,13 @@ def without(run: Run, *names: str) -> Run:
 
 def length_problem(
     residuals: Sequence[Array], ride: Ride, profile: WinchProfile = GROOVED
-) -> Problem:
+) -> TimeSeriesRegression:
     """One output only, the length, whose residual is given; all runs are repeats."""
     runs = []
     for seed, residual in enumerate(residuals):
         run = made(seed, profile, noise={"cable_length": 0.0}, ride=ride, encoder=0.0)
         runs.append(with_channel(run, "cable_length", run["cable_length"] + residual, "m"))
-    return Problem(prepare(runs, profile))
+    return TimeSeriesRegression(prepare(runs, profile))
 
 
 @cache

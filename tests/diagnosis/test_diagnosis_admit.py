@@ -128,8 +128,8 @@ def test_no_run_at_all() -> None:
 
 
 def test_a_constant_load_is_a_weight_and_no_fault() -> None:
-    weighed = with_channel(GOOD, "load", np.full(400, 98.0))
-    assert admit([weighed], GROOVED) == []
+    known_weight = with_channel(GOOD, "load", np.full(400, 98.0))
+    assert admit([known_weight], GROOVED) == []
 
 
 def test_a_small_stroke_is_not_taken_for_another_winch() -> None:

@@ -55,8 +55,8 @@ def test_usual_sizes_are_near_one_and_within_bounds(effect: Effect) -> None:
     coordinates = Coordinates(effect)
     low, high = coordinates.bounds()
     assert np.all(low <= high)
-    for secant in coordinates.secants():
-        x = coordinates.vector({**effect.null, **secant})
+    for usual_step in coordinates.usual_steps():
+        x = coordinates.vector({**effect.null, **usual_step})
         assert np.all((low <= x) & (x <= high))
         assert 0.01 <= np.abs(x[: len(coordinates.amplitudes)]).max() <= 100
 
@@ -114,7 +114,7 @@ def test_a_phase_is_fitted_as_cosine_and_sine() -> None:
     typical = effect.parameter(size).typical
     at = coordinates.vector({size: 2 * typical, phase: np.pi / 6})
     assert at == pytest.approx([2 * np.cos(np.pi / 6), 1.0])
-    assert coordinates.freedom == len(coordinates) == 2
+    assert coordinates.n_parameters == len(coordinates) == 2
 
 
 def test_an_order_is_scanned_and_costs_a_degree_of_freedom() -> None:
@@ -122,5 +122,5 @@ def test_an_order_is_scanned_and_costs_a_degree_of_freedom() -> None:
     coordinates = Coordinates(effect)
     whole = [p for p in effect.parameters if p.whole]
     assert len(whole) == 1
-    assert coordinates.freedom == len(coordinates) + 1
+    assert coordinates.n_parameters == len(coordinates) + 1
     assert [point[whole[0].name] for point in coordinates.grid()] == list(whole[0].grid)

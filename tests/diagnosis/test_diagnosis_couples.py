@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from diagnosis_runs import Ride, inquiry_into, term
+from diagnosis_runs import Ride, engine_for, term
 
 from winchkit.diagnosis.selection.engine import best_of_each
-from winchkit.diagnosis.selection.pairs import couples
-from winchkit.diagnosis.selection.stepwise import _coupled
+from winchkit.diagnosis.selection.pairs import screened_pairs
+from winchkit.diagnosis.selection.stepwise import _best_pair
 from winchkit.effects.term import Term
 
 RIDE = Ride(samples=600, stroke=400.0)
@@ -17,30 +17,34 @@ HIDDEN = (term("cell-gain", gain_error=-0.05), term("cell-offset", offset=0.05 *
 
 
 def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
-    inquiry = inquiry_into(HIDDEN, RIDE, MASSES)
-    present, noise = inquiry.settle(inquiry.begin)
-    scores = inquiry.every_score(present, noise)
-    alone = {s.atom.effect.id: s.gain for s in best_of_each(scores)}
-    projected = inquiry.projected(present, noise)
-    pairs = couples(projected, present.residual, scores, inquiry.price)
-    named = [{item.atom.effect.id for item in pair.scores} for pair in pairs if pair.hidden]
+    engine = engine_for(HIDDEN, RIDE, MASSES)
+    present, noise = engine.fit_with_noise(engine.initial_model)
+    scores = engine.scores_at_all_points(present, noise)
+    alone = {s.candidate.effect.id: s.explained_ss for s in best_of_each(scores)}
+    projected = engine.projected(present, noise)
+    pairs = screened_pairs(projected, present.residual, scores, engine.penalty_per_parameter)
+    named = [
+        {item.candidate.effect.id for item in pair.scores} for pair in pairs if pair.suppressed
+    ]
     assert {"cell-gain", "cell-offset"} in named
-    assert alone["cell-offset"] < 0.5 * present.cost
-    assert [pair.pays for pair in pairs] == sorted((p.pays for p in pairs), reverse=True)
+    assert alone["cell-offset"] < 0.5 * present.chi_square
+    assert [pair.net_gain for pair in pairs] == sorted((p.net_gain for p in pairs), reverse=True)
 
 
 def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() -> None:
-    inquiry = inquiry_into(HIDDEN, RIDE, MASSES)
-    present, noise = inquiry.settle(inquiry.begin)
-    grown = _coupled(inquiry, present, noise)
+    engine = engine_for(HIDDEN, RIDE, MASSES)
+    present, noise = engine.fit_with_noise(engine.initial_model)
+    grown = _best_pair(engine, present, noise)
     assert grown is not None
     assert set(grown.labels) == {"cell-gain", "cell-offset"}
     gain, offset = sorted(grown.hypothesis.terms, key=lambda t: t.label)
     assert abs(gain.values["gain_error"] + 0.05) < 0.005
     assert abs(offset.values["offset"] - 9.8) < 1.0
-    other = present.hypothesis.with_term(term("motor-coulomb", torque=1e-3), inquiry.problem.runs)
-    begun, noise = inquiry.settle(other)
-    exchanged = _coupled(inquiry, begun, noise)
+    other = present.hypothesis.with_term(
+        term("motor-coulomb", torque=1e-3), engine.regression.n_runs
+    )
+    begun, noise = engine.fit_with_noise(other)
+    exchanged = _best_pair(engine, begun, noise)
     assert exchanged is not None
     assert set(exchanged.labels) == {"cell-gain", "cell-offset"}
 
@@ -55,12 +59,12 @@ ONE_WAY = (
 @pytest.mark.parametrize("also", [(), (term("cable-elongation-linear", axial_stiffness=2e5),)])
 def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term, ...]) -> None:
     """Also beside an effect that acts on the length only, where these two do nothing."""
-    inquiry = inquiry_into((*ONE_WAY, *also), RIDE, MASSES)
-    start = inquiry.begin
+    engine = engine_for((*ONE_WAY, *also), RIDE, MASSES)
+    start = engine.initial_model
     for own in also:
-        start = start.with_term(own, inquiry.problem.runs)
-    present, noise = inquiry.settle(start)
-    grown = _coupled(inquiry, present, noise)
+        start = start.with_term(own, engine.regression.n_runs)
+    present, noise = engine.fit_with_noise(start)
+    grown = _best_pair(engine, present, noise)
     assert grown is not None
     assert set(grown.labels) == {t.label for t in (*ONE_WAY, *also)}
     values = {t.label: t.values for t in grown.hypothesis.terms}
@@ -68,15 +72,15 @@ def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term
 
 
 def test_pairs_are_not_pieced_together_upon_what_acts_on_the_same_output() -> None:
-    inquiry = inquiry_into(ONE_WAY, RIDE, MASSES)
-    start = inquiry.begin
+    engine = engine_for(ONE_WAY, RIDE, MASSES)
+    start = engine.initial_model
     for own in (
         term("motor-coulomb", torque=1e-3),
         term("cell-gain", gain_error=1e-4),
         term("drum-radius", radius_error=1e-6),
     ):
-        start = start.with_term(own, inquiry.problem.runs)
-    assert _coupled(inquiry, *inquiry.settle(start)) is None
+        start = start.with_term(own, engine.regression.n_runs)
+    assert _best_pair(engine, *engine.fit_with_noise(start)) is None
 
 
 def test_one_of_two_that_stands_for_a_pair_is_exchanged_for_it() -> None:
@@ -86,10 +90,10 @@ def test_one_of_two_that_stands_for_a_pair_is_exchanged_for_it() -> None:
         term("cell-gain", gain_error=-0.05),
         term("cell-offset", offset=0.05 * 20 * 9.80665),
     )
-    inquiry = inquiry_into(hidden, RIDE, MASSES)
-    start = inquiry.begin
+    engine = engine_for(hidden, RIDE, MASSES)
+    start = engine.initial_model
     for own in (hidden[0], term("motor-coulomb-asymmetry", offset=1e-3)):
-        start = start.with_term(own, inquiry.problem.runs)
-    grown = _coupled(inquiry, *inquiry.settle(start))
+        start = start.with_term(own, engine.regression.n_runs)
+    grown = _best_pair(engine, *engine.fit_with_noise(start))
     assert grown is not None
     assert set(grown.labels) == {t.label for t in hidden}

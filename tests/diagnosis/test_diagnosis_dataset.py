@@ -17,9 +17,9 @@ THIN = replace(SPIRAL, drum=replace(SPIRAL.drum, layer_growth=1e-6))
 RIDE = Ride(samples=800, stroke=800.0, period=8.0)
 
 
-def compared(profile: WinchProfile, output: str, *, weighed: bool = False) -> np.ndarray:
+def compared(profile: WinchProfile, output: str, *, known_weight: bool = False) -> np.ndarray:
     run = made(1, profile, ride=RIDE)
-    if weighed:
+    if known_weight:
         run = with_channel(run, "load", np.full(len(run), 98.0))
     return np.asarray(prepare([run], profile).recordings[0].valid[output])
 
@@ -47,7 +47,7 @@ def test_a_known_weight_is_not_compared_where_a_layer_begins(output: str) -> Non
 def test_a_measured_load_and_a_drum_without_steps_are_compared_there() -> None:
     jumps = layers_begun(THICK)
     inner = jumps[(jumps > 10) & (jumps < RIDE.samples - 10)]
-    assert compared(THICK, "tension", weighed=True)[inner].all()
+    assert compared(THICK, "tension", known_weight=True)[inner].all()
     assert compared(GROOVED, "tension")[inner].all()
     assert compared(THIN, "tension")[inner].all(), "a step lost in the noise"
     assert compared(THICK, "cable_length").all()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_runs import Ride, inquiry_into, term
+from diagnosis_runs import Ride, engine_for, term
 
 from winchkit.diagnosis.verdict.equivalence import confusion_of
 
@@ -21,23 +21,23 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
         term("drum-radius", radius_error=radius_error),
         term("cable-creep", creep_stiffness=7e5, time_constant=20.0),
     )
-    inquiry = inquiry_into(hidden, ONE_WAY)
-    start = inquiry.begin
+    engine = engine_for(hidden, ONE_WAY)
+    start = engine.initial_model
     for own in hidden:
-        start = start.with_term(own, inquiry.problem.runs)
-    final, noise = inquiry.settle(start)
-    alone = inquiry.refit(final.hypothesis.without(0), noise).hypothesis.terms[0]
+        start = start.with_term(own, engine.regression.n_runs)
+    final, noise = engine.fit_with_noise(start)
+    alone = engine.refit(final.hypothesis.without(0), noise).hypothesis.terms[0]
     assert abs(np.log(alone.values["creep_stiffness"] / 7e5)) > 1.0
-    assert set(confusion_of(inquiry, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
+    assert set(confusion_of(engine, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
 
 
 def test_held_as_it_is_a_hypothesis_keeps_its_values() -> None:
     creep = term("cable-creep", creep_stiffness=7e5, time_constant=20.0)
-    inquiry = inquiry_into([creep], ONE_WAY)
-    begin, noise = inquiry.settle(inquiry.begin)
+    engine = engine_for([creep], ONE_WAY)
+    begin, noise = engine.fit_with_noise(engine.initial_model)
     other = begin.hypothesis.with_term(
-        term("cable-creep", creep_stiffness=1e6, time_constant=5.0), inquiry.problem.runs
+        term("cable-creep", creep_stiffness=1e6, time_constant=5.0), engine.regression.n_runs
     )
-    held = inquiry.held(other, noise)
-    assert held.vector == pytest.approx(inquiry.problem.vector(other))
-    assert inquiry.refit(other, noise).cost < held.cost
+    held = engine.fixed(other, noise)
+    assert held.vector == pytest.approx(engine.regression.vector(other))
+    assert engine.refit(other, noise).chi_square < held.chi_square

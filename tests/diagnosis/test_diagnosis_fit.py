@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import GuideSpec
 
@@ -30,17 +30,17 @@ TRUE = {
 }
 
 
-def problem_of(terms: tuple[Term, ...]) -> tuple[Problem, np.ndarray]:
+def problem_of(terms: tuple[Term, ...]) -> tuple[TimeSeriesRegression, np.ndarray]:
     runs = [
         made(2 * mass + seed, GROOVED, terms, load_mass=float(mass), ride=RIDE)
         for mass in (10, 25)
         for seed in range(2)
     ]
-    problem = Problem(prepare(runs, GROOVED))
-    weight = np.empty(problem.rows)
-    for segment in problem.segments:
-        weight[segment.rows] = 1 / NOISE[segment.output]
-    return problem, weight
+    regression = TimeSeriesRegression(prepare(runs, GROOVED))
+    inverse_sigma = np.empty(regression.n_rows)
+    for segment in regression.segments:
+        inverse_sigma[segment.rows] = 1 / NOISE[segment.output]
+    return regression, inverse_sigma
 
 
 def test_a_fit_walks_along_a_bent_valley() -> None:
@@ -48,17 +48,19 @@ def test_a_fit_walks_along_a_bent_valley() -> None:
     profile = replace(GROOVED, guide=GuideSpec(0.005))
     aside = term("guide-offset", offset=-0.09, mismatch=0.005)
     runs = [made(seed, profile, (aside,), ride=Ride(samples=800)) for seed in range(4)]
-    problem = Problem(prepare(runs, profile))
-    weight = np.concatenate(
-        [np.full(s.rows.stop - s.rows.start, 1 / NOISE[s.output]) for s in problem.segments]
+    regression = TimeSeriesRegression(prepare(runs, profile))
+    inverse_sigma = np.concatenate(
+        [np.full(s.rows.stop - s.rows.start, 1 / NOISE[s.output]) for s in regression.segments]
     )
-    best = fit(problem, Hypothesis().with_term(aside, problem.runs), weight)
+    best = fit(regression, Hypothesis().with_term(aside, regression.n_runs), inverse_sigma)
     begun = [Term(aside.effect, aside.effect.null | probe) for probe in aside.effect.probes]
-    found = [fit(problem, Hypothesis().with_term(b, problem.runs), weight) for b in begun]
-    assert min(f.cost for f in found) == pytest.approx(best.cost, abs=1.0)
+    found = [
+        fit(regression, Hypothesis().with_term(b, regression.n_runs), inverse_sigma) for b in begun
+    ]
+    assert min(f.chi_square for f in found) == pytest.approx(best.chi_square, abs=1.0)
 
 
-def from_usual(terms: tuple[Term, ...], problem: Problem) -> Hypothesis:
+def from_usual(terms: tuple[Term, ...], regression: TimeSeriesRegression) -> Hypothesis:
     """The same effects at half their usual size, where a fit may begin."""
     start = Hypothesis()
     for true in terms:
@@ -68,19 +70,19 @@ def from_usual(terms: tuple[Term, ...], problem: Problem) -> Hypothesis:
             for p in effect.parameters
             if p.role != "fixed"
         }
-        start = start.with_term(Term(effect, effect.null | values), problem.runs)
+        start = start.with_term(Term(effect, effect.null | values), regression.n_runs)
     return start
 
 
 @pytest.mark.parametrize("name", TRUE)
 def test_a_fit_is_where_a_general_solver_ends(name: str) -> None:
-    problem, weight = problem_of(TRUE[name])
-    start = from_usual(TRUE[name], problem)
-    ours = fit(problem, start, weight)
-    low, high = problem.bounds(start)
+    regression, inverse_sigma = problem_of(TRUE[name])
+    start = from_usual(TRUE[name], regression)
+    ours = fit(regression, start, inverse_sigma)
+    low, high = regression.bounds(start)
     theirs = least_squares(
-        lambda x: problem.residual(problem.hypothesis(x, start)) * weight,
-        np.clip(problem.vector(start), low, high),
+        lambda x: regression.residual(regression.hypothesis(x, start)) * inverse_sigma,
+        np.clip(regression.vector(start), low, high),
         bounds=(low, high),
         x_scale="jac",
         xtol=1e-12,
@@ -88,18 +90,18 @@ def test_a_fit_is_where_a_general_solver_ends(name: str) -> None:
         gtol=1e-12,
         max_nfev=60,
     )
-    assert ours.freedom == len(theirs.x)
+    assert ours.n_unknowns == len(theirs.x)
     # Within a hundredth of what noise alone moves the sum of squares by.
-    assert ours.cost == pytest.approx(2 * theirs.cost, abs=0.05)
+    assert ours.chi_square == pytest.approx(2 * theirs.cost, abs=0.05)
     curvature = np.sqrt(np.diag(np.linalg.pinv(theirs.jac.T @ theirs.jac)))
     assert np.all(np.abs(ours.vector - theirs.x) < 0.25 * curvature + 1e-9)
-    assert ours.cost == pytest.approx(problem.rows, rel=0.15)
+    assert ours.chi_square == pytest.approx(regression.n_rows, rel=0.15)
 
 
 @pytest.mark.parametrize("name", ["one", "stiffness", "three", "wave"])
 def test_a_fit_finds_the_truth(name: str) -> None:
-    problem, weight = problem_of(TRUE[name])
-    found = fit(problem, from_usual(TRUE[name], problem), weight)
+    regression, inverse_sigma = problem_of(TRUE[name])
+    found = fit(regression, from_usual(TRUE[name], regression), inverse_sigma)
     for true, got in zip(TRUE[name], found.hypothesis.terms, strict=True):
         for parameter in true.effect.parameters:
             if parameter.role == "amplitude":
@@ -109,49 +111,49 @@ def test_a_fit_finds_the_truth(name: str) -> None:
 
 
 def test_a_fit_carries_its_own_residual_and_derivative() -> None:
-    problem, weight = problem_of(TRUE["three"])
-    found = fit(problem, from_usual(TRUE["three"], problem), weight)
-    assert np.allclose(found.residual, problem.residual(found.hypothesis))
-    assert found.cost == pytest.approx(float(np.sum((found.residual * weight) ** 2)))
+    regression, inverse_sigma = problem_of(TRUE["three"])
+    found = fit(regression, from_usual(TRUE["three"], regression), inverse_sigma)
+    assert np.allclose(found.residual, regression.residual(found.hypothesis))
+    assert found.chi_square == pytest.approx(float(np.sum((found.residual * inverse_sigma) ** 2)))
     assert found.labels == ("cable-elongation-linear", "motor-coulomb", "cell-gain")
-    assert np.allclose(problem.vector(found.hypothesis), found.vector, rtol=1e-6)
-    gradient = (found.jacobian * weight[:, None]).T @ (found.residual * weight)
-    size = np.sqrt(np.sum((found.jacobian * weight[:, None]) ** 2, axis=0))
+    assert np.allclose(regression.vector(found.hypothesis), found.vector, rtol=1e-6)
+    gradient = (found.jacobian * inverse_sigma[:, None]).T @ (found.residual * inverse_sigma)
+    size = np.sqrt(np.sum((found.jacobian * inverse_sigma[:, None]) ** 2, axis=0))
     assert np.all(np.abs(gradient / size) < 0.5)
 
 
 def test_bounds_are_kept() -> None:
     """Data that ask for a rope that shortens under load get one that does not stretch."""
     backwards = (term("cable-elongation-linear", axial_stiffness=2e5),)
-    problem, weight = problem_of(())
-    stretch = problem.change(Hypothesis().with_term(backwards[0], problem.runs))
-    problem.base = problem.base - stretch
-    found = fit(problem, Hypothesis().with_term(backwards[0], problem.runs), weight)
+    regression, inverse_sigma = problem_of(())
+    stretch = regression.change(Hypothesis().with_term(backwards[0], regression.n_runs))
+    regression.nominal_residual = regression.nominal_residual - stretch
+    found = fit(regression, Hypothesis().with_term(backwards[0], regression.n_runs), inverse_sigma)
     assert found.hypothesis.terms[0].values["axial_stiffness"] > 1e9
 
 
 def test_unknowns_that_cannot_be_told_apart_stay_small() -> None:
     """A radius and a ratio do the same on a grooved drum: no kilometres are invented."""
     terms = (term("drum-radius", radius_error=3e-4), term("gear-ratio", ratio_error=0.0))
-    problem, weight = problem_of((terms[0],))
+    regression, inverse_sigma = problem_of((terms[0],))
     start = Hypothesis()
     for item in terms:
-        start = start.with_term(Term(item.effect, item.effect.null), problem.runs)
-    found = fit(problem, start, weight)
-    assert found.cost == pytest.approx(problem.rows, rel=0.15)
+        start = start.with_term(Term(item.effect, item.effect.null), regression.n_runs)
+    found = fit(regression, start, inverse_sigma)
+    assert found.chi_square == pytest.approx(regression.n_rows, rel=0.15)
     assert abs(found.hypothesis.terms[0].values["radius_error"]) < 1e-3
 
 
 def test_the_derivative_is_that_of_the_prediction() -> None:
-    problem, _ = problem_of(TRUE["three"])
-    start = from_usual(TRUE["three"], problem)
-    x = problem.vector(start)
-    jacobian = problem.jacobian(x, start)
-    here = problem.residual(start)
+    regression, _ = problem_of(TRUE["three"])
+    start = from_usual(TRUE["three"], regression)
+    x = regression.vector(start)
+    jacobian = regression.jacobian(x, start)
+    here = regression.residual(start)
     for index in range(len(x)):
         moved = x.copy()
         moved[index] += 1e-5
-        column = -(problem.residual(problem.hypothesis(moved, start)) - here) / 1e-5
+        column = -(regression.residual(regression.hypothesis(moved, start)) - here) / 1e-5
         size = np.linalg.norm(column)
         assert size > 0
         assert np.linalg.norm(jacobian[:, index] - column) < 2e-3 * size

@@ -10,7 +10,7 @@ from diagnosis_runs import recorded
 
 from winchkit.catalog import find
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import inquire
+from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.residuals.attribution import follows, ranked
 from winchkit.effects import load_catalogue
 from winchkit.schema.read import read_winch
@@ -27,10 +27,10 @@ class Told:
 def first_followed(*physics: str) -> dict[str, str]:
     """Per output the variable that its error follows most."""
     profile = read_winch(find("profiles", "bench-spiral"))
-    inquiry = inquire(prepare(recorded(*physics), profile), load_catalogue())
-    present, _ = inquiry.settle(inquiry.begin)
+    engine = selection_engine(prepare(recorded(*physics), profile), load_catalogue())
+    present, _ = engine.fit_with_noise(engine.initial_model)
     out: dict[str, str] = {}
-    for found in follows(inquiry.problem, present.residual):
+    for found in follows(engine.regression, present.residual):
         out.setdefault(found.output, found.variable)
     return out
 

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, inquire
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.engine import Inquiry
-from winchkit.diagnosis.selection.stepwise import Found, search
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.specification_test import (
     Beside,
     Doubt,
@@ -52,19 +52,19 @@ def driven(hidden: tuple[Term, ...] = (), drag: float = 0.0) -> list[Run]:
 def test_a_gain_is_what_least_squares_takes(seed: int, free: int, width: int) -> None:
     random = np.random.default_rng(seed)
     jacobian, hats = random.standard_normal((60, free)), random.standard_normal((20, 60))
-    residual, weight = random.standard_normal(60), np.exp(random.standard_normal(60))
+    residual, inverse_sigma = random.standard_normal(60), np.exp(random.standard_normal(60))
     law = random.standard_normal((20, width))
-    beside = Beside(residual, jacobian, weight)
-    whitened = hats * weight
+    beside = Beside(residual, jacobian, inverse_sigma)
+    whitened = hats * inverse_sigma
     left = whitened - (whitened @ beside.explained) @ beside.explained.T
-    gain = _Hats(whitened @ whitened.T, left @ left.T, left @ beside.residual).gain(law)
+    gain = _Hats(whitened @ whitened.T, left @ left.T, left @ beside.residual).explained_ss(law)
 
     def squares(columns: Array) -> float:
-        columns = columns * weight[:, None]
-        found = np.linalg.lstsq(columns, residual * weight, rcond=None)[0]
-        return float(np.sum((residual * weight - columns @ found) ** 2))
+        columns = columns * inverse_sigma[:, None]
+        result = np.linalg.lstsq(columns, residual * inverse_sigma, rcond=None)[0]
+        return float(np.sum((residual * inverse_sigma - columns @ result) ** 2))
 
-    assert beside.cost == pytest.approx(squares(jacobian))
+    assert beside.chi_square == pytest.approx(squares(jacobian))
     together = squares(np.hstack([jacobian, hats.T @ law]))
     assert gain == pytest.approx(squares(jacobian) - together, rel=1e-6, abs=1e-9)
 
@@ -72,12 +72,12 @@ def test_a_gain_is_what_least_squares_takes(seed: int, free: int, width: int) ->
 def test_what_the_model_explains_whole_leaves_curves_nothing() -> None:
     """Rounding of a column that is there already must not be blown up into evidence."""
     random = np.random.default_rng(1)
-    hats, weight = random.standard_normal((20, 80)), np.ones(80)
+    hats, inverse_sigma = random.standard_normal((20, 80)), np.ones(80)
     residual = random.standard_normal(80)
-    beside = Beside(residual, hats[:1].T, weight)
+    beside = Beside(residual, hats[:1].T, inverse_sigma)
     left = hats - (hats @ beside.explained) @ beside.explained.T
     only = np.eye(20)[:, :1]
-    assert _Hats(hats @ hats.T, left @ left.T, left @ beside.residual).gain(only) == 0.0
+    assert _Hats(hats @ hats.T, left @ left.T, left @ beside.residual).explained_ss(only) == 0.0
 
 
 def test_hats_add_up_to_one_and_draw_straight_lines() -> None:
@@ -87,7 +87,7 @@ def test_hats_add_up_to_one_and_draw_straight_lines() -> None:
     assert hats.sum(axis=0) == pytest.approx(np.ones(101))
     assert knots @ hats == pytest.approx(values)
     laws = laws_over(knots, "speed", level=False)
-    assert all(law.shape[0] == 20 and freedom >= 1 for law, freedom in laws)
+    assert all(law.shape[0] == 20 and n_parameters >= 1 for law, n_parameters in laws)
 
 
 def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
@@ -96,34 +96,34 @@ def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
     # Slowly: a curve does not ask how the weight's acceleration changes with it.
     slow = Ride(samples=2000, period=20.0)
     run = made(0, GROOVED, noise=dict.fromkeys(OUTPUTS, 0.0), ride=slow, encoder=0.0)
-    problem = Problem(prepare([run], GROOVED))
+    regression = TimeSeriesRegression(prepare([run], GROOVED))
     radius = term("drum-radius", radius_error=share * 0.06)
-    wrong = problem.change(Hypothesis().with_term(radius, problem.runs))
-    lengths = [r.smooth.at.free_length for r in problem.dataset.recordings]
+    wrong = regression.change(Hypothesis().with_term(radius, regression.n_runs))
+    lengths = [r.smooth.at.free_length for r in regression.dataset.recordings]
     knots = np.linspace(min(map(np.min, lengths)), max(map(np.max, lengths)), 20)
     hats = [hats_over(length, knots) for length in lengths]
-    curve = np.zeros(problem.rows)
-    for own, columns in columns_of(problem, PLACES["winding"], hats, knots):
+    curve = np.zeros(regression.n_rows)
+    for own, columns in columns_of(regression, PLACES["winding"], hats, knots):
         curve[own] = (share * (knots - 4.0)) @ columns
     for output, close in (("cable_length", 0.02), ("motor_torque", 0.02)):
-        rows = np.concatenate([np.r_[s.rows] for s in problem.segments if s.output == output])
+        rows = np.concatenate([np.r_[s.rows] for s in regression.segments if s.output == output])
         across = wrong[rows] - wrong[rows].mean(), curve[rows] - curve[rows].mean()
         assert np.linalg.norm(across[0] - across[1]) < close * np.linalg.norm(across[0]), output
 
 
 def test_a_square_drag_is_not_called_viscous() -> None:
     answer = diagnose(driven(drag=12.0), GROOVED)
-    found = answer.diagnosis
-    assert found.verdict in {"unknown", "partly"}
-    assert not found.steps
-    assert any(place.variable == "speed" for place in found.where)
+    result = answer.diagnosis
+    assert result.verdict in {"unknown", "partly"}
+    assert not result.steps
+    assert any(place.variable == "speed" for place in result.where)
 
 
 def test_a_viscous_drag_keeps_its_name() -> None:
     hidden = (term("pulley-viscous", viscosity=6.0),)
-    found = diagnose(driven(hidden), GROOVED).diagnosis
-    assert found.verdict == "explained"
-    assert [step.effects for step in found.steps] == [("pulley-viscous",)]
+    result = diagnose(driven(hidden), GROOVED).diagnosis
+    assert result.verdict == "explained"
+    assert [step.effects for step in result.steps] == [("pulley-viscous",)]
 
 
 def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name() -> None:
@@ -133,18 +133,29 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
         far = (run["cable_length"] - 4.0) / 0.5
         bent = run["cable_length"] + 1.5e-5 * far**3
         runs.append(with_channel(run, "cable_length", bent, "m"))
-    inquiry = inquire(prepare(runs, GROOVED), CATALOGUE)
-    begin, noise = inquiry.settle(inquiry.begin)
-    hypothesis = begin.hypothesis
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
+    hypothesis = initial_model.hypothesis
     for added in (term("motor-coulomb", torque=0.05), term("gear-ratio", ratio_error=1e-5)):
-        hypothesis = hypothesis.with_term(added, inquiry.problem.runs)
-    final, noise = inquiry.settle(hypothesis, noise)
-    presence = inquiry.presence(final, noise)
-    begun = inquiry.presence(begin, noise)
-    found = Found(
-        begin, noise, begun, True, final.hypothesis, final, noise, presence, False, (), (), 0.0
+        hypothesis = hypothesis.with_term(added, engine.regression.n_runs)
+    final, noise = engine.fit_with_noise(hypothesis, noise)
+    lack_of_fit_test = engine.lack_of_fit_test(final, noise)
+    begun = engine.lack_of_fit_test(initial_model, noise)
+    result = SelectionResult(
+        initial_model,
+        noise,
+        begun,
+        True,
+        final.hypothesis,
+        final,
+        noise,
+        lack_of_fit_test,
+        False,
+        (),
+        (),
+        0.0,
     )
-    judged = judge_and_doubt(inquiry, found)
+    judged = judge_and_doubt(engine, result)
     assert judged.verdict == "explained"
     assert judged.shown.final.labels == ("motor-coulomb",)
     (note,) = judged.notes
@@ -153,27 +164,29 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
 
 
 @cache
-def rubbed() -> tuple[Inquiry, Found]:
+def rubbed() -> tuple[TimeSeriesSelection, SelectionResult]:
     """A search that found dry friction of the motor."""
-    inquiry = inquire(prepare(driven((term("motor-coulomb", torque=0.05),)), GROOVED), CATALOGUE)
-    return inquiry, search(inquiry)
+    engine = selection_engine(
+        prepare(driven((term("motor-coulomb", torque=0.05),)), GROOVED), CATALOGUE
+    )
+    return engine, stepwise_selection(engine)
 
 
 def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
-    inquiry, found = rubbed()
-    doubt = Doubt(inquiry, found)
+    engine, result = rubbed()
+    doubt = Doubt(engine, result)
     whole = doubt.beside(())
-    assert 0.99 * found.final.cost < whole.cost <= found.final.cost * (1 + 1e-9)
+    assert 0.99 * result.final.chi_square < whole.chi_square <= result.final.chi_square * (1 + 1e-9)
     without = doubt.beside([0])
-    refitted = inquiry.refit(found.final.hypothesis.without(0), found.noise)
+    refitted = engine.refit(result.final.hypothesis.without(0), result.noise)
     # What sampling may have rounded is taken out of the one and not of the other.
-    assert 0.95 * refitted.cost < without.cost <= refitted.cost * (1 + 1e-9)
+    assert 0.95 * refitted.chi_square < without.chi_square <= refitted.chi_square * (1 + 1e-9)
 
 
 def test_curves_are_sought_only_where_the_names_act() -> None:
-    inquiry, found = rubbed()
-    beside = Doubt(inquiry, found).beside([0])
-    curve = best_curve(inquiry.problem, beside, ["motor_torque"], inquiry.price)
+    engine, result = rubbed()
+    beside = Doubt(engine, result).beside([0])
+    curve = best_curve(engine.regression, beside, ["motor_torque"], engine.penalty_per_parameter)
     assert curve is not None
     assert curve.place in {"motor_torque", "rope force"}
-    assert best_curve(inquiry.problem, beside, [], inquiry.price) is None
+    assert best_curve(engine.regression, beside, [], engine.penalty_per_parameter) is None

@@ -104,9 +104,9 @@ def test_the_power_is_that_of_all_rows_at_once(flat: tuple[Path, Path]) -> None:
     profile, run = flat
     answer = diagnose_robot([read_run(run)], read_robot(profile))
     (pair,) = pairs_of(answer.sets)
-    problem, final = answer.robot_problem, answer.found.final.hypothesis
-    whole = separation(problem, *pair, dict.fromkeys(problem.dataset.outputs, 1.0))
-    offers = pose_offers(problem, final, [pair], [APART], count=3)
+    regression, final = answer.engine.regression, answer.result.final.hypothesis
+    whole = separation(regression, *pair, dict.fromkeys(regression.dataset.outputs, 1.0))
+    offers = pose_offers(regression, final, [pair], [APART], count=3)
     assert offers[0].so_far[0] == pytest.approx(power_of(whole), abs=0.01)
     assert all(len(offer.pose.position) == 3 for offer in offers)
     (run_offered,) = json.loads(call("diagnose", run, "-p", profile, "--json").stdout)["next_runs"]

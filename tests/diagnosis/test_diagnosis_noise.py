@@ -12,14 +12,9 @@ from scipy.stats import kstest
 
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import (
-    Noise,
-    Presence,
-    noise_from_repeats,
-    noise_saturated,
-    presence,
-)
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 
 RIDE = Ride(samples=300)
 SIZE = 3e-4
@@ -40,46 +35,50 @@ def coloured(random: np.random.Generator, count: int, pole: float = 0.9) -> Arra
     return SIZE * out
 
 
-def fitted(problem: Problem) -> Fit:
-    return fit(problem, Hypothesis(), np.full(problem.rows, 1 / SIZE))
+def fitted(regression: TimeSeriesRegression) -> Fit:
+    return fit(regression, Hypothesis(), np.full(regression.n_rows, 1 / SIZE))
 
 
-def estimated(problem: Problem, known: Array | None = None) -> Noise:
-    none = np.zeros((problem.rows, 0))
-    return noise_from_repeats(problem, fitted(problem).residual, none if known is None else known)
+def estimated(regression: TimeSeriesRegression, known: Array | None = None) -> Noise:
+    none = np.zeros((regression.n_rows, 0))
+    return noise_from_repeats(
+        regression, fitted(regression).residual, none if known is None else known
+    )
 
 
-def judged(problem: Problem) -> tuple[Presence, Noise]:
-    found, noise = fitted(problem), estimated(problem)
-    return presence(problem, found.residual, found.jacobian, noise), noise
+def judged(regression: TimeSeriesRegression) -> tuple[LackOfFitTest, Noise]:
+    found, noise = fitted(regression), estimated(regression)
+    return lack_of_fit_test(regression, found.residual, found.jacobian, noise), noise
 
 
-def power_in_bands(problem: Problem, of_row: Array) -> Array:
+def power_in_bands(regression: TimeSeriesRegression, of_row: Array) -> Array:
     """Mean of a spectrum's rows in every noise band."""
-    rows = problem.band_of_row
+    rows = regression.band_of_row
     return np.asarray(np.bincount(rows, of_row) / np.bincount(rows))
 
 
 def test_white_noise_is_recovered_in_every_band() -> None:
     random, ride = np.random.default_rng(1), Ride(samples=4000)
-    problem = length_problem([white(random, 4000) for _ in range(4)], ride)
-    noise = estimated(problem)
+    regression = length_problem([white(random, 4000) for _ in range(4)], ride)
+    noise = estimated(regression)
     assert noise.from_repeats
-    assert noise.freedom.sum() > 0.9 * 3 * 4000
+    assert noise.dof.sum() > 0.9 * 3 * 4000
     assert noise.rms["cable_length"] == pytest.approx(SIZE, rel=0.03)
-    off = (noise.power / SIZE**2 - 1) / np.sqrt(2 / noise.freedom)
+    off = (noise.power / SIZE**2 - 1) / np.sqrt(2 / noise.dof)
     assert np.all(np.abs(off) < 4.0)
 
 
 def test_coloured_noise_is_recovered_in_every_band() -> None:
     """Against the spectrum of a first-order process, σ²/|1 − a e^{−iω}|²."""
     random, pole, count = np.random.default_rng(2), 0.9, 4000
-    problem = length_problem([coloured(random, count, pole) for _ in range(5)], Ride(samples=count))
-    noise = estimated(problem)
+    regression = length_problem(
+        [coloured(random, count, pole) for _ in range(5)], Ride(samples=count)
+    )
+    noise = estimated(regression)
     omega = np.pi * np.arange(count) / count
     spectrum = SIZE**2 / (1 - 2 * pole * np.cos(omega) + pole**2)
-    expected = power_in_bands(problem, np.tile(spectrum, problem.runs))
-    off = (noise.power / expected - 1) / np.sqrt(2 / noise.freedom)
+    expected = power_in_bands(regression, np.tile(spectrum, regression.n_runs))
+    off = (noise.power / expected - 1) / np.sqrt(2 / noise.dof)
     assert np.all(np.abs(off) < 4.0)
     assert noise.power.max() > 50 * noise.power.min()
     assert noise.rms["cable_length"] == pytest.approx(SIZE / np.sqrt(1 - pole**2), rel=0.1)
@@ -92,8 +91,8 @@ def chances(colour: bool) -> Array:
     for seed in range(CASES):
         random = np.random.default_rng([seed, colour])
         make = coloured if colour else white
-        problem = length_problem([make(random, RIDE.samples) for _ in range(2)], RIDE)
-        out.append(judged(problem)[0].p_value / len(problem.bands))
+        regression = length_problem([make(random, RIDE.samples) for _ in range(2)], RIDE)
+        out.append(judged(regression)[0].p_value / len(regression.bands))
     return np.array(out)
 
 
@@ -123,13 +122,13 @@ def test_a_wave_that_repeats_is_there_and_where_it_is(frequency: float) -> None:
     random = np.random.default_rng(5)
     wave = 0.8 * SIZE * np.sin(2 * np.pi * frequency * RIDE.time)
     runs = [wave + white(random, RIDE.samples) for _ in range(2)]
-    problem = length_problem(runs, RIDE)
-    found, noise = judged(problem)
+    regression = length_problem(runs, RIDE)
+    found, noise = judged(regression)
     assert found.p_value < 1e-3
-    loudest = int(np.argmax(found.excess))
+    loudest = int(np.argmax(found.excess_power))
     assert found.rejected[loudest]
     for band in np.flatnonzero(found.rejected):
-        _, low, high = problem.bands[band]
+        _, low, high = regression.bands[band]
         # What a run of six seconds smears a line over.
         assert low - 0.5 <= frequency <= high + 0.5
     assert noise.rms["cable_length"] == pytest.approx(SIZE, rel=0.15)
@@ -149,9 +148,9 @@ def test_what_differs_for_a_known_reason_is_no_noise() -> None:
     random = np.random.default_rng(7)
     slope = np.linspace(-1, 1, RIDE.samples)
     runs = [white(random, RIDE.samples) + sign * 5 * SIZE * slope for sign in (1, -1)]
-    problem = length_problem(runs, RIDE)
+    regression = length_problem(runs, RIDE)
     known = np.concatenate([dct(sign * slope, type=2, norm="ortho") for sign in (1, -1)])
-    plain, wise = estimated(problem), estimated(problem, known[:, None])
+    plain, wise = estimated(regression), estimated(regression, known[:, None])
     assert plain.rms["cable_length"] > 2 * SIZE
     assert wise.rms["cable_length"] == pytest.approx(SIZE, rel=0.1)
 
@@ -161,17 +160,17 @@ def test_what_each_run_fits_for_itself_takes_no_noise_away() -> None:
     random = np.random.default_rng(5)
     whole, bare, told = [], [], []
     for _ in range(60):
-        problem = length_problem([white(random, RIDE.samples) for _ in range(2)], RIDE)
-        levels = np.zeros((problem.rows, len(problem.segments)))
-        for index, segment in enumerate(problem.segments):
+        regression = length_problem([white(random, RIDE.samples) for _ in range(2)], RIDE)
+        levels = np.zeros((regression.n_rows, len(regression.segments)))
+        for index, segment in enumerate(regression.segments):
             levels[segment.rows.start : segment.rows.start + 3, index] = 1.0
-        residual = fitted(problem).residual
+        residual = fitted(regression).residual
         left = residual - levels @ np.linalg.lstsq(levels, residual)[0]
-        none = np.zeros((problem.rows, 0))
+        none = np.zeros((regression.n_rows, 0))
         first = [
-            noise_from_repeats(problem, residual, none).power[0],
-            noise_from_repeats(problem, left, none).power[0],
-            noise_from_repeats(problem, left, none, levels).power[0],
+            noise_from_repeats(regression, residual, none).power[0],
+            noise_from_repeats(regression, left, none).power[0],
+            noise_from_repeats(regression, left, none, levels).power[0],
         ]
         for out, power in zip((whole, bare, told), first, strict=True):
             out.append(power)
@@ -183,22 +182,22 @@ def test_without_repeats_noise_is_what_no_effect_explains() -> None:
     random = np.random.default_rng(8)
     ride = Ride(samples=2000)
     model = Hypothesis().with_term(term("drum-radius", radius_error=1e-4), 1)
-    problem = length_problem([white(random, 2000)], ride)
-    effect = problem.change(model)
-    columns = np.column_stack([problem.nuisance_columns, effect])
-    residual = problem.residual(Hypothesis()) + 40 * effect
-    assert np.std(problem.in_time(residual)[0]) > 20 * SIZE
-    noise = noise_saturated(problem, residual, columns)
+    regression = length_problem([white(random, 2000)], ride)
+    effect = regression.change(model)
+    columns = np.column_stack([regression.nuisance_columns, effect])
+    residual = regression.residual(Hypothesis()) + 40 * effect
+    assert np.std(regression.in_time(residual)[0]) > 20 * SIZE
+    noise = noise_saturated(regression, residual, columns)
     assert not noise.from_repeats
     assert noise.rms["cable_length"] == pytest.approx(SIZE, rel=0.06)
-    quiet = presence(problem, residual, columns, noise)
+    quiet = lack_of_fit_test(regression, residual, columns, noise)
     assert np.isnan(quiet.p_value)
     assert not quiet.rejected.any()
 
 
 def test_noise_free_runs_get_a_floor_and_no_division_by_zero() -> None:
-    problem = length_problem(NOTHING, RIDE)
-    found, noise = judged(problem)
+    regression = length_problem(NOTHING, RIDE)
+    found, noise = judged(regression)
     assert np.all(noise.power > 0)
     assert found.p_value == 1.0
     assert noise.rms["cable_length"] < 1e-7

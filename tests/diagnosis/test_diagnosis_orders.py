@@ -25,10 +25,10 @@ def test_the_order_and_its_share(order: int) -> None:
     random = np.random.default_rng(order)
     drum = RIDE.angle / GROOVED.gearbox.ratio
     error = 1e-3 * np.sin(order * drum + 0.7) + 5e-4 * random.standard_normal(RIDE.samples)
-    problem = length_problem([error], RIDE)
-    residual = problem.residual(Hypothesis())
-    (shown,) = problem.in_time(residual)
-    found = {f.variable: f for f in harmonics(problem, residual)}
+    regression = length_problem([error], RIDE)
+    residual = regression.residual(Hypothesis())
+    (shown,) = regression.in_time(residual)
+    found = {f.variable: f for f in harmonics(regression, residual)}
     shares = [share(k * drum, shown) for k in range(1, 41)]
     assert found["drum_angle"].order == 1 + int(np.argmax(shares)) == order
     assert found["drum_angle"].share == pytest.approx(max(shares), rel=1e-6)
@@ -39,5 +39,5 @@ def test_the_order_and_its_share(order: int) -> None:
 def test_an_angle_that_hardly_moves_has_no_orders() -> None:
     random = np.random.default_rng(0)
     ride = Ride(samples=3000, rate=100.0, stroke=0.02)
-    problem = length_problem([1e-3 * random.standard_normal(3000)], ride)
-    assert harmonics(problem, problem.residual(Hypothesis())) == []
+    regression = length_problem([1e-3 * random.standard_normal(3000)], ride)
+    assert harmonics(regression, regression.residual(Hypothesis())) == []

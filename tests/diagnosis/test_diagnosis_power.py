@@ -17,15 +17,15 @@ from winchkit.diagnosis.design.discrimination import next_runs, power_of, separa
 from winchkit.diagnosis.design.plan import hopeless
 from winchkit.diagnosis.design.plan import offers as plan_offers
 from winchkit.diagnosis.design.programmes import KINDS, seen
-from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.diagnose import selection_engine
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Detectable, NextRun
-from winchkit.diagnosis.selection.scores import chance_level
+from winchkit.diagnosis.selection.scores import null_maxima
 
 RIDE = Ride(samples=400)
 ROPE = term("cable-elongation-linear", axial_stiffness=3e5)
 FRAME = term("frame-compliance", stiffness=1.2e5)
-BAR = Bar(price=9.0, threshold=3.0)
+BAR = Bar(penalty_per_parameter=9.0, threshold=3.0)
 NAMES = {kind.name for kind in KINDS}
 
 
@@ -46,7 +46,7 @@ def offers(first: str, second: str, noise: float = 1.0, warm: bool = False) -> t
     terms = {"cable-elongation-linear": ROPE, "frame-compliance": FRAME}
     pair = tuple(terms.get(name) or _usual(name) for name in (first, second))
     sizes = {output: noise * size for output, size in NOISE.items()}
-    return next_runs(Problem(dataset(warm=warm)), [(pair[0], pair[1])], sizes)
+    return next_runs(TimeSeriesRegression(dataset(warm=warm)), [(pair[0], pair[1])], sizes)
 
 
 def _usual(effect_id: str) -> object:
@@ -55,7 +55,7 @@ def _usual(effect_id: str) -> object:
 
 
 def test_nothing_to_separate_needs_no_run() -> None:
-    assert next_runs(Problem(dataset()), [], NOISE) == ()
+    assert next_runs(TimeSeriesRegression(dataset()), [], NOISE) == ()
 
 
 def test_rope_and_frame_are_told_apart_by_loads_over_the_stroke() -> None:
@@ -71,12 +71,12 @@ def test_rope_and_frame_are_told_apart_by_loads_over_the_stroke() -> None:
 
 def test_a_plan_offers_what_a_diagnosis_could_not_name_yet() -> None:
     """λ of 16 is no chance, but too little to be named among forty: three loads show more of it."""
-    problem = Problem(dataset())
+    regression = TimeSeriesRegression(dataset())
     frame = [CATALOGUE["frame-compliance"]]
-    strength = separation(problem, _usual("frame-compliance"), None, NOISE)
+    strength = separation(regression, _usual("frame-compliance"), None, NOISE)
     noise = {output: size * np.sqrt(strength / 16) for output, size in NOISE.items()}
     for bar, shown in ((BAR, ("frame-compliance",)), (Bar(0.0, 3.84), ())):
-        shows = {o.kind.name: o.shows for o in plan_offers(problem, [], noise, frame, bar=bar)}
+        shows = {o.kind.name: o.shows for o in plan_offers(regression, [], noise, frame, bar=bar)}
         assert shows["full stroke, three loads"] == shown
     assert BAR.power((np.sqrt(BAR.squares(1)) + norm.ppf(0.9)) ** 2, 1) == pytest.approx(0.9, 0.01)
 
@@ -94,8 +94,8 @@ def test_less_noise_is_more_power() -> None:
 def test_warmth_is_told_apart_by_warming_up_and_by_waiting() -> None:
     sizes = {output: 0.05 * size for output, size in NOISE.items()}
     pair = _usual("cable-thermal"), _usual("cable-creep")
-    problem = Problem(dataset(warm=True))
-    power = {o.kind.name: o.powers[0] for o in plan_offers(problem, [pair], sizes, [], bar=BAR)}
+    regression = TimeSeriesRegression(dataset(warm=True))
+    power = {o.kind.name: o.powers[0] for o in plan_offers(regression, [pair], sizes, [], bar=BAR)}
     assert power["full stroke, warmed up by 15 K"] > 0.9
     assert power["one load at five lengths, with holds"] > 0.9
 
@@ -110,7 +110,9 @@ def test_runs_so_far_and_runs_to_come_say_what_both_say_at_once(first: str, seco
             for e in (first, second)]  # fmt: skip
     sizes = {"cable_length": NOISE["cable_length"]}
     runs = [made(int(m), noise=sizes, load_mass=m, ride=RIDE) for m in (10.0, 20.0, 35.0)]
-    past, coming, both = (Problem(prepare(part, GROOVED)) for part in (runs[:1], runs[1:], runs))
+    past, coming, both = (
+        TimeSeriesRegression(prepare(part, GROOVED)) for part in (runs[:1], runs[1:], runs)
+    )
     known = so_far(past, *pair, sizes)
     assert known is not None
     assert known.left == pytest.approx(separation(past, *pair, sizes))
@@ -135,7 +137,7 @@ def test_a_run_that_shows_nothing_of_a_rival_tells_it_apart_too() -> None:
     creep = term("cable-creep", creep_stiffness=2e5, time_constant=60.0)
     warming = with_channel(made(ride=ride), "temperature", drift, "degC")
     steady = with_channel(made(ride=ride), "temperature", 20.0 + 0 * drift, "degC")
-    past, coming = (Problem(prepare([run], GROOVED)) for run in (warming, steady))
+    past, coming = (TimeSeriesRegression(prepare([run], GROOVED)) for run in (warming, steady))
     alone = power_of(separation(coming, thermal, creep, NOISE))
     known = so_far(past, thermal, creep, NOISE)
     assert alone < 0.1
@@ -152,9 +154,9 @@ def test_what_no_motion_separates_is_left_to_the_card() -> None:
 def test_the_plan_says_what_no_motion_separates() -> None:
     grooved = dataset()
     radius, ratio = _usual("drum-radius"), _usual("gear-ratio")
-    problem = inquire(grooved, CATALOGUE).problem
+    regression = selection_engine(grooved, CATALOGUE).regression
     pairs = [(radius, ratio), (ROPE, FRAME)]
-    found = plan_offers(problem, pairs, NOISE, [], bar=BAR)
+    found = plan_offers(regression, pairs, NOISE, [], bar=BAR)
     assert hopeless(found, pairs) == [(radius, ratio)]
     # The best is the one that separates the other pair.
     assert found[0].powers[1] > 0.9
@@ -172,12 +174,12 @@ def smallest(noise: float, masses: tuple[float, ...] = (10.0,)) -> dict[str, Det
         for mass in masses
         for seed in range(2)
     ]
-    inquiry = inquire(prepare(runs, GROOVED), CATALOGUE)
-    present, known = inquiry.settle(inquiry.begin)
-    scores = tuple(inquiry.scores(present, known))
-    chance = chance_level(inquiry.projected(present, known), inquiry.problem.rows)
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    present, known = engine.fit_with_noise(engine.initial_model)
+    scores = tuple(engine.scores(present, known))
+    chance = null_maxima(engine.projected(present, known), engine.regression.n_rows)
     threshold = float(np.quantile(chance, 0.99))
-    return {d.effect: d for d in detectable(scores, Bar(inquiry.price, threshold))}
+    return {d.effect: d for d in detectable(scores, Bar(engine.penalty_per_parameter, threshold))}
 
 
 def test_half_the_noise_shows_half_the_size() -> None:
@@ -191,20 +193,22 @@ def test_half_the_noise_shows_half_the_size() -> None:
 @pytest.mark.parametrize("effect", ["cell-gain", "motor-coulomb", "drum-radius"])
 def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
     """λ of the smallest size by its own signature in the noise that is there."""
-    inquiry = inquire(dataset(), CATALOGUE)
+    engine = selection_engine(dataset(), CATALOGUE)
     item = smallest(1.0)[effect]
-    problem = inquiry.problem
-    shown = problem.change(
-        inquiry.begin.with_term(term(effect, **{item.parameter: item.smallest}), problem.runs)
+    regression = engine.regression
+    shown = regression.change(
+        engine.initial_model.with_term(
+            term(effect, **{item.parameter: item.smallest}), regression.n_runs
+        )
     )
-    present, known = inquiry.settle(inquiry.begin)
-    weight = known.weight(problem)
-    other = present.jacobian * weight[:, None]
-    left = shown * weight
+    present, known = engine.fit_with_noise(engine.initial_model)
+    inverse_sigma = known.inverse_sigma(regression)
+    other = present.jacobian * inverse_sigma[:, None]
+    left = shown * inverse_sigma
     if other.shape[1]:
         left = left - other @ np.linalg.lstsq(other, left, rcond=None)[0]
-    chance = chance_level(inquiry.projected(present, known), problem.rows)
-    needed = max(0.0, float(np.quantile(chance, 0.99))) + inquiry.price
+    chance = null_maxima(engine.projected(present, known), regression.n_rows)
+    needed = max(0.0, float(np.quantile(chance, 0.99))) + engine.penalty_per_parameter
     assert np.sqrt(left @ left) == pytest.approx(np.sqrt(needed) + norm.ppf(0.9), rel=0.02)
 
 
@@ -219,9 +223,9 @@ def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
 def test_chance_stays_what_chance_can_reach(encoder: float) -> None:
     """Of 40 candidates with one to three unknowns: gains of χ² less their price."""
     runs = [made(seed, ride=RIDE, encoder=encoder) for seed in range(2)]
-    inquiry = inquire(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = inquiry.settle(inquiry.begin)
-    chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    present, noise = engine.fit_with_noise(engine.initial_model)
+    chance = null_maxima(engine.projected(present, noise), engine.regression.n_rows)
     assert np.all(np.diff(chance) >= 0)
     assert np.median(chance) < 10
     assert np.quantile(chance, 0.99) < 100
@@ -236,7 +240,7 @@ def test_a_size_that_is_said_to_show_is_found() -> None:
             made(100 + 2 * case + seed, GROOVED, [term("motor-coulomb", torque=size)], ride=RIDE)
             for seed in range(2)
         ]
-        inquiry = inquire(prepare(runs, GROOVED), [CATALOGUE["motor-coulomb"]])
-        present, noise = inquiry.settle(inquiry.begin)
-        found += inquiry.scores(present, noise)[0].value > 0
+        engine = selection_engine(prepare(runs, GROOVED), [CATALOGUE["motor-coulomb"]])
+        present, noise = engine.fit_with_noise(engine.initial_model)
+        found += engine.scores(present, noise)[0].net_gain > 0
     assert found >= 8

@@ -107,9 +107,9 @@ def test_the_load_comes_from_the_cell_beside_the_weight() -> None:
     plain = signals(EVEN, load=None)
     assert mean_load(plain) is None
     assert mean_load(replace(plain, tension=np.full(400, 90.0))) == pytest.approx(90.0)
-    weighed = replace(plain, tension=np.full(400, 90.0), load_mass=10.0)
-    assert mean_load(weighed) == pytest.approx(98.0665)
-    assert mean_load(replace(weighed, load=np.full(400, 95.0))) == pytest.approx(95.0)
+    known_weight = replace(plain, tension=np.full(400, 90.0), load_mass=10.0)
+    assert mean_load(known_weight) == pytest.approx(98.0665)
+    assert mean_load(replace(known_weight, load=np.full(400, 95.0))) == pytest.approx(95.0)
 
 
 def test_noise_of_the_encoder_breaks_no_repeat() -> None:

@@ -9,13 +9,12 @@ import pytest
 from diagnosis_runs import GROOVED, Array, Ride, made, term
 
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.regression.cross_validation import blocks_of
-from winchkit.diagnosis.regression.discretization import rounded, without_rounding
+from winchkit.diagnosis.regression.discretization import without_discretization_error
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 
@@ -45,22 +44,26 @@ def sampled(seed: int, terms: tuple[Term, ...], every: int = FINER) -> Run:
     return replace(run, time=run.time[::every], channels=thin)
 
 
-def fitted(terms: tuple[Term, ...], every: int = FINER) -> tuple[Problem, Fit, Noise]:
-    problem = Problem(prepare([sampled(s, terms, every) for s in range(4)], GROOVED))
+def fitted(terms: tuple[Term, ...], every: int = FINER) -> tuple[TimeSeriesRegression, Fit, Noise]:
+    regression = TimeSeriesRegression(
+        prepare([sampled(s, terms, every) for s in range(4)], GROOVED)
+    )
     start = Hypothesis()
     for item in terms:
         start = start.with_term(item, 4)
-    first = fit(problem, start, np.ones(problem.rows))
-    noise = noise_from_repeats(problem, first.residual, np.zeros((problem.rows, 0)))
-    return problem, fit(problem, start, noise.weight(problem)), noise
+    first = fit(regression, start, np.ones(regression.n_rows))
+    noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
+    return regression, fit(regression, start, noise.inverse_sigma(regression)), noise
 
 
 def test_an_inertia_that_differences_round_is_held_by_its_interval() -> None:
-    problem, found, noise = fitted((INERTIA,))
-    ((_, values),) = estimates(problem, found, spread_of(problem, found, noise, blocks_of(problem)))
+    regression, found, noise = fitted((INERTIA,))
+    ((_, values),) = estimates(
+        regression, found, spread_of(regression, found, noise, regression.blocks)
+    )
     inertia = values["inertia"]
-    whitened = found.jacobian * noise.weight(problem)[:, None]
-    at = problem.nuisance_columns.shape[1]
+    whitened = found.jacobian * noise.inverse_sigma(regression)[:, None]
+    at = regression.nuisance_columns.shape[1]
     likelihood = float(np.sqrt(np.linalg.inv(whitened.T @ whitened)[at, at])) * 1e-4
     # Differences over samples this coarse round the acceleration: the value is wrong for certain,
     assert abs(inertia.value - 2e-3) > 4 * likelihood
@@ -72,30 +75,35 @@ def test_an_inertia_that_differences_round_is_held_by_its_interval() -> None:
 
 
 def test_what_rounding_leaves_is_taken_out_of_the_residual() -> None:
-    problem, found, noise = fitted((INERTIA,))
-    weight = noise.weight(problem)
-    left = without_rounding(problem, found, weight)
-    before, after = (float(np.sum((r * weight) ** 2)) for r in (found.residual, left))
-    rows = problem.rows
+    regression, found, noise = fitted((INERTIA,))
+    inverse_sigma = noise.inverse_sigma(regression)
+    left = without_discretization_error(regression, found, inverse_sigma)
+    before, after = (float(np.sum((r * inverse_sigma) ** 2)) for r in (found.residual, left))
+    rows = regression.n_rows
     assert before > 1.2 * rows
     assert after < before - 0.5 * (before - rows)
 
 
 def test_what_is_sampled_finely_or_needs_no_derivative_is_not_rounded() -> None:
-    problem, found, _ = fitted((INERTIA,), every=1)
+    regression, found, _ = fitted((INERTIA,), every=1)
     coarse, rough, _ = fitted((INERTIA,))
     fine_share, coarse_share = (
-        np.sqrt(np.mean(rounded(p, f.hypothesis) ** 2) / np.mean(p.change(f.hypothesis) ** 2))
-        for p, f in ((problem, found), (coarse, rough))
+        np.sqrt(
+            np.mean(p.discretization_error(f.hypothesis) ** 2)
+            / np.mean(p.change(f.hypothesis) ** 2)
+        )
+        for p, f in ((regression, found), (coarse, rough))
     )
     assert fine_share < 0.1 * coarse_share
     length, radius, _ = fitted((RADIUS,))
     own = [s for s in length.segments if s.output == "cable_length"]
-    column = rounded(length, radius.hypothesis)
+    column = length.discretization_error(radius.hypothesis)
     assert all(np.allclose(column[s.rows], 0.0, atol=1e-9) for s in own)
 
 
 def test_nothing_is_rounded_without_an_effect() -> None:
-    problem, found, noise = fitted(())
-    assert not rounded(problem, found.hypothesis).any()
-    assert without_rounding(problem, found, noise.weight(problem)) == pytest.approx(found.residual)
+    regression, found, noise = fitted(())
+    assert not regression.discretization_error(found.hypothesis).any()
+    assert without_discretization_error(
+        regression, found, noise.inverse_sigma(regression)
+    ) == pytest.approx(found.residual)

@@ -6,7 +6,7 @@ import numpy as np
 from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
 
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, inquire
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
 
 RIDE = Ride(samples=400)
 
@@ -19,15 +19,15 @@ def test_what_would_help_only_with_the_wrong_sign_gains_nothing() -> None:
         for mass in (10.0, 25.0)
         for seed in range(2)
     ]
-    inquiry = inquire(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = inquiry.settle(inquiry.begin)
-    told = {score.atom.effect.id: score for score in inquiry.scores(present, noise)}
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    present, noise = engine.fit_with_noise(engine.initial_model)
+    told = {score.candidate.effect.id: score for score in engine.scores(present, noise)}
     rotor = told["rotor-inertia"]
-    assert rotor.gain == 0.0
-    assert rotor.value < 0.0
+    assert rotor.explained_ss == 0.0
+    assert rotor.net_gain < 0.0
     assert not rotor.amplitudes.any()
     # It is still listed, and the list is still sorted.
-    values = [score.value for score in inquiry.scores(present, noise)]
+    values = [score.net_gain for score in engine.scores(present, noise)]
     assert values == sorted(values, reverse=True)
     found = diagnose(runs, GROOVED).diagnosis
     assert all("rotor-inertia" not in step.effects for step in found.steps)
@@ -40,8 +40,8 @@ def test_the_right_sign_gains() -> None:
         for mass in (10.0, 25.0)
         for seed in range(2)
     ]
-    inquiry = inquire(prepare(runs, GROOVED), CATALOGUE)
-    present, noise = inquiry.settle(inquiry.begin)
-    best = inquiry.scores(present, noise)[0]
-    assert best.atom.effect.id == "rotor-inertia"
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    present, noise = engine.fit_with_noise(engine.initial_model)
+    best = engine.scores(present, noise)[0]
+    assert best.candidate.effect.id == "rotor-inertia"
     assert np.all(best.amplitudes > 0.0)

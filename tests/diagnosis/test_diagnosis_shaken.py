@@ -8,8 +8,8 @@ from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term, with_channel
 
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.diagnose import diagnose, inquire
-from winchkit.diagnosis.regression.exclusion import calmed
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 
 RIDE = Ride(samples=600, stroke=400.0, period=6.0)
@@ -26,14 +26,14 @@ def dataset_of(load_mass: float | None) -> Dataset:
 
 
 def with_play(dataset: Dataset) -> Hypothesis:
-    inquiry = inquire(dataset, CATALOGUE)
-    return inquiry.begin.with_term(PLAY, inquiry.problem.runs)
+    engine = selection_engine(dataset, CATALOGUE)
+    return engine.initial_model.with_term(PLAY, engine.regression.n_runs)
 
 
 @pytest.mark.parametrize("load_mass", [10.0, None], ids=["weight", "measured"])
 def test_a_weight_is_jerked_and_a_measured_force_is_known(load_mass: float | None) -> None:
     dataset = dataset_of(load_mass)
-    calm = calmed(dataset, with_play(dataset))
+    calm = without_impacts(dataset, with_play(dataset))
     assert calm is not None
     for before, after in zip(dataset.recordings, calm.recordings, strict=True):
         left = {name: before.valid[name] & ~after.valid[name] for name in before.valid}
@@ -51,10 +51,10 @@ def test_a_weight_is_jerked_and_a_measured_force_is_known(load_mass: float | Non
 def test_without_a_play_everything_stays() -> None:
     dataset = dataset_of(10.0)
     rubbing = Hypothesis().with_term(term("pulley-coulomb", friction=0.1), 2)
-    assert calmed(dataset, Hypothesis()) is None
-    assert calmed(dataset, rubbing) is None
+    assert without_impacts(dataset, Hypothesis()) is None
+    assert without_impacts(dataset, rubbing) is None
     none = Hypothesis().with_term(term("gear-backlash", gap=0.0), 2)
-    assert calmed(dataset, none) is None
+    assert without_impacts(dataset, none) is None
 
 
 def test_what_jerks_all_the_time_leaves_too_little_to_do_without() -> None:
@@ -62,7 +62,7 @@ def test_what_jerks_all_the_time_leaves_too_little_to_do_without() -> None:
     standing = Ride(samples=600, stroke=1e-5)
     dataset = prepare([made(seed, load_mass=10.0, ride=standing) for seed in range(2)], GROOVED)
     tiny = Hypothesis().with_term(term("gear-backlash", gap=5e-6), 2)
-    assert calmed(dataset, tiny) is None
+    assert without_impacts(dataset, tiny) is None
 
 
 def test_the_play_is_found_and_fitted_without_these_moments() -> None:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import pytest
 from diagnosis_runs import CATALOGUE, term
 
-from winchkit.diagnosis.selection.starting_values import by_coefficients, elsewhere, in_disguise
+from winchkit.diagnosis.selection.starting_values import (
+    other_grid_point,
+    shape_at_bound,
+    truncated_series,
+)
 from winchkit.effects.reference_motion import standard_motion
 
 
 def test_coefficients_are_taken_from_the_first() -> None:
     fitted = []
-    for law in by_coefficients(CATALOGUE["cable-elongation-quartic"]):
+    for law in truncated_series(CATALOGUE["cable-elongation-quartic"]):
         fitted.append([p.name for p in law.parameters if p.role != "fixed"])
         assert all(name in fitted[-1] for probe in law.probes for name in probe)
     assert fitted == [["k1", "b2"], ["k1", "b2", "b3"], ["k1", "b2", "b3", "b4"]]
@@ -20,7 +24,7 @@ def test_coefficients_are_taken_from_the_first() -> None:
 def test_what_is_no_series_keeps_its_shapes() -> None:
     for effect in CATALOGUE:
         if effect.id != "cable-elongation-quartic":
-            assert by_coefficients(effect) == [effect], effect.id
+            assert truncated_series(effect) == [effect], effect.id
 
 
 @pytest.mark.parametrize(("static", "disguised"), [(0.03, False), (0.01, True)])
@@ -28,14 +32,14 @@ def test_rubbing_less_at_creep_speed_is_no_stribeck_friction(
     static: float, disguised: bool
 ) -> None:
     curve = term("pulley-stribeck", coulomb=0.02, static=static, stribeck_speed=0.03)
-    assert in_disguise(curve) is disguised
+    assert shape_at_bound(curve) is disguised
 
 
 def test_a_shape_at_its_end_is_another_effect() -> None:
     ends = CATALOGUE["motor-stribeck"].parameter("stribeck_speed")
     inside = term("motor-stribeck", torque=0.02, stribeck_speed=ends.typical)
-    assert not in_disguise(inside)
-    assert in_disguise(term("motor-stribeck", torque=0.02, stribeck_speed=ends.high))
+    assert not shape_at_bound(inside)
+    assert shape_at_bound(term("motor-stribeck", torque=0.02, stribeck_speed=ends.high))
 
 
 def test_a_stribeck_speed_is_visible_where_a_run_passes_it() -> None:
@@ -49,8 +53,10 @@ def test_a_stribeck_speed_is_visible_where_a_run_passes_it() -> None:
 
 def test_a_moment_and_an_order_are_sought_elsewhere_too_and_a_time_constant_is_not() -> None:
     slip = term("encoder-slip", step=0.01, time=33.5)
-    assert elsewhere(slip, {"time": 30.0})
-    assert elsewhere(term("motor-cogging", amplitude=0.01, phase=0.0, order=4.0), {"order": 6.0})
-    assert not elsewhere(slip, {"time": 33.5})
+    assert other_grid_point(slip, {"time": 30.0})
+    assert other_grid_point(
+        term("motor-cogging", amplitude=0.01, phase=0.0, order=4.0), {"order": 6.0}
+    )
+    assert not other_grid_point(slip, {"time": 33.5})
     creep = term("cable-creep", creep_stiffness=1e6, time_constant=33.5)
-    assert not elsewhere(creep, {"time_constant": 60.0})
+    assert not other_grid_point(creep, {"time_constant": 60.0})

@@ -13,8 +13,8 @@ from winchkit.diagnosis.data.dataset import Filtering, assemble, prepare
 from winchkit.diagnosis.data.decimation import Thinning, thinning_for
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import spread_of
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.effects.term import Term, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
@@ -124,14 +124,14 @@ def test_thinned_by_twenty_the_same_values_are_found() -> None:
     run = long_run()
     dataset = assemble([run], GROOVED, Filtering(thinning=Thinning(20, 12.5)))
     assert len(dataset.recordings[0].signals.time) == len(run) // 20
-    problem = Problem(dataset)
+    regression = TimeSeriesRegression(dataset)
     candidates = [term.effect for term in true_terms()]
-    inquiry = Inquiry(problem, Hypothesis(), candidates)
+    engine = TimeSeriesSelection(regression, Hypothesis(), candidates)
     begun = Hypothesis()
     for effect in candidates:
-        begun = begun.with_term(Term(effect, effect.null), problem.runs)
-    fitted, noise = inquiry.settle(begun)
-    std = spread_of(problem, fitted, noise, inquiry.blocks).std
+        begun = begun.with_term(Term(effect, effect.null), regression.n_runs)
+    fitted, noise = engine.fit_with_noise(begun)
+    std = spread_of(regression, fitted, noise, engine.regression.blocks).std
     for index, term in enumerate(true_terms(), start=1):
         name, true = next(iter(term.values.items()))
         found = fitted.hypothesis.terms[index - 1].values[name]

@@ -10,11 +10,11 @@ from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_cha
 
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import inquire
+from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.selection.engine import Inquiry
-from winchkit.diagnosis.selection.weighting import weighed
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.runs.run import Run
 
 RIDE = Ride(samples=3000, rate=50.0, period=12.0)
@@ -44,17 +44,19 @@ def rides(added: list[Array], **friction: float) -> list[Run]:
     ]
 
 
-def with_friction(runs: list[Run]) -> tuple[Inquiry, Fit, Noise]:
-    inquiry = inquire(prepare(runs, GROOVED), CATALOGUE)
-    start = inquiry.begin.with_term(term("motor-coulomb", torque=FRICTION), inquiry.problem.runs)
-    return inquiry, *inquiry.settle(start)
+def with_friction(runs: list[Run]) -> tuple[TimeSeriesSelection, Fit, Noise]:
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    start = engine.initial_model.with_term(
+        term("motor-coulomb", torque=FRICTION), engine.regression.n_runs
+    )
+    return engine, *engine.fit_with_noise(start)
 
 
 @pytest.mark.parametrize("size", [0.0, 0.005, 0.02])
 def test_noise_however_slow_is_weighed_as_noise(size: float) -> None:
     runs = rides([size * wander(seed) for seed in (1, 2)], torque=FRICTION)
-    inquiry, present, noise = with_friction(runs)
-    best = weighed(inquiry, present, noise)
+    engine, present, noise = with_friction(runs)
+    best = reweighted(engine, present, noise)
     assert best.fit is present
     assert best.noise is noise
     assert not best.notes
@@ -67,8 +69,8 @@ def warming_up() -> Array:
 
 def test_what_the_model_lacks_is_no_noise_and_values_are_the_mean() -> None:
     """Quick reversals, where the friction's width is told, would have it too small."""
-    inquiry, present, noise = with_friction(rides([warming_up(), warming_up()]))
-    best = weighed(inquiry, present, noise)
+    engine, present, noise = with_friction(rides([warming_up(), warming_up()]))
+    best = reweighted(engine, present, noise)
     sign = np.tanh(RATE / 0.5)
     mean = float(sign @ warming_up() / (sign @ sign))
     by_noise, evenly = (f.hypothesis.terms[0].values["torque"] for f in (present, best.fit))
@@ -93,6 +95,6 @@ def test_measured_noise_is_believed() -> None:
     noisy = [
         with_channel(r, "motor_torque", r["motor_torque"] + 1e-3 * wander(9), "N m") for r in again
     ]
-    inquiry, present, noise = with_friction([*rides(hidden), *noisy])
+    engine, present, noise = with_friction([*rides(hidden), *noisy])
     assert noise.from_repeats
-    assert weighed(inquiry, present, noise).fit is present
+    assert reweighted(engine, present, noise).fit is present

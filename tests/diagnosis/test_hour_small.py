@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from winchkit.diagnosis.data import decimation as thin
-from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.fleet.diagnose import diagnose_each
 from winchkit.effects import load_catalogue
 from winchkit.schema.read import read_winch
@@ -26,7 +26,7 @@ def heard() -> list[tuple[str, float]]:
 
 
 @pytest.fixture(scope="module")
-def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, float]]) -> Answer:
+def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, float]]) -> WinchAnswer:
     runs = hour.recordings(minutes=4, winches=1)
     path = tmp_path_factory.mktemp("hour") / "hour.toml"
     hour.write_profile(hour.WINCH, path)
@@ -38,22 +38,22 @@ def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, floa
             of_winch,
             read_winch(path),
             load_catalogue(),
-            told=lambda what, share: heard.append((what, share)),
+            progress=lambda what, share: heard.append((what, share)),
         )
         ((name, found),) = each
     assert name == "A"
     return found
 
 
-def test_it_is_thinned_and_says_so(answer: Answer) -> None:
+def test_it_is_thinned_and_says_so(answer: WinchAnswer) -> None:
     (note,) = (note for note in answer.diagnosis.notes if "sample of the runs" in note)
     factor = int("".join(filter(str.isdigit, note.split()[1])))
     assert 5 < factor < 50
-    left = [len(r.signals.time) for r in answer.inquiry.problem.dataset.recordings]
+    left = [len(r.signals.time) for r in answer.engine.regression.dataset.recordings]
     assert left == 2 * [-(-120_000 // factor)]
 
 
-def test_what_it_hides_is_named_with_its_size(answer: Answer) -> None:
+def test_what_it_hides_is_named_with_its_size(answer: WinchAnswer) -> None:
     told = hour.told(answer.diagnosis, 0)
     assert told["verdict"] == "explained"
     assert hour.is_right([told])
@@ -62,7 +62,7 @@ def test_what_it_hides_is_named_with_its_size(answer: Answer) -> None:
         assert step.parameters[step.effects[0]][name].value == pytest.approx(true, rel=2e-3)
 
 
-def test_the_bar_moves_on(answer: Answer, heard: list[tuple[str, float]]) -> None:
+def test_the_bar_moves_on(answer: WinchAnswer, heard: list[tuple[str, float]]) -> None:
     assert answer
     shares = [share for _, share in heard]
     assert shares == sorted(shares)

@@ -20,7 +20,7 @@ from scipy.signal import butter, sosfiltfilt
 from winchkit.cli.model.add import write_addition
 from winchkit.diagnosis.add import Addition, add
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import Answer, diagnose, inquire
+from winchkit.diagnosis.diagnose import WinchAnswer, diagnose, selection_engine
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import load_catalogue
@@ -94,12 +94,12 @@ def profile(source: Path) -> WinchProfile:
 
 
 @pytest.fixture(scope="module")
-def found(profile: WinchProfile) -> Answer:
+def found(profile: WinchProfile) -> WinchAnswer:
     return diagnose([run_of("train")], profile)
 
 
 @pytest.fixture(scope="module")
-def answer(found: Answer) -> Diagnosis:
+def answer(found: WinchAnswer) -> Diagnosis:
     return found.diagnosis
 
 
@@ -141,16 +141,16 @@ def test_it_names_friction_what_the_directions_differ_in_and_a_record_of_command
 
 
 def test_what_was_found_leaves_three_hundredths_on_another_file(
-    found: Answer, profile: WinchProfile
+    found: WinchAnswer, profile: WinchProfile
 ) -> None:
     """The files differ by 2.0 % that no function of the motion explains."""
-    terms = found.found.final.hypothesis.terms
+    terms = found.result.final.hypothesis.terms
     assert error_on_test(Line(profile, modifiers_of(terms))) < 0.030
 
 
 def test_without_friction_even_a_refitted_model_misses_a_sixth(profile: WinchProfile) -> None:
-    inquiry = inquire(prepare([run_of("train")], profile), load_catalogue())
-    fitted, _ = inquiry.settle(inquiry.begin)
+    engine = selection_engine(prepare([run_of("train")], profile), load_catalogue())
+    fitted, _ = engine.fit_with_noise(engine.initial_model)
     error = error_on_test(Line(profile, modifiers_of(fitted.hypothesis.terms)))
     assert 0.16 < error < 0.20
 

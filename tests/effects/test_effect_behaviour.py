@@ -117,13 +117,13 @@ def test_its_slope_at_null_agrees_with_its_secant(effect: Effect) -> None:
     if not smooth:
         return
     base = effect.null | {p.name: p.typical for p in effect.parameters if p.role == "shape"}
-    for secant in coordinates.secants():
-        whole = coordinates.vector(base | secant)
+    for usual_step in coordinates.usual_steps():
+        whole = coordinates.vector(base | usual_step)
         null = coordinates.vector(base)
         step = 1e-3
         slightly = coordinates.values(null + step * (whole - null), base)
         near = predict(line.profile, motion, effect, slightly)
-        far = predict(line.profile, motion, effect, base | secant)
+        far = predict(line.profile, motion, effect, base | usual_step)
         for name in effect.outputs:
             slope = (near[name] - bare[name]) / step
             chord = far[name] - bare[name]
@@ -140,7 +140,7 @@ def test_its_slope_at_null_agrees_with_its_secant(effect: Effect) -> None:
 def test_probes_and_secants_change_the_first_output(effect: Effect) -> None:
     motion = standard_motion()
     bare = Line(STANDARD_PROFILE).predict(motion)
-    for probe in Coordinates(effect).secants():
+    for probe in Coordinates(effect).usual_steps():
         predicted = predict(STANDARD_PROFILE, motion, effect, probe)
         assert np.any(predicted[effect.outputs[0]] != bare[effect.outputs[0]]), probe
 

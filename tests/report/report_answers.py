@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 from winchkit.catalog import find
-from winchkit.diagnosis.diagnose import Answer, diagnose
+from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
 from winchkit.diagnosis.results import Diagnosis, Estimate, OutputFit, Step, Where
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_programme, read_simbench, read_winch
@@ -72,11 +72,11 @@ def recorded_both(first: str, second: str) -> tuple[Run, ...]:
     return tuple(record(declared, profiles_of(declared), programme, seed=3, rate=25.0))
 
 
-def answered(runs: Sequence[Run]) -> Answer:
+def answered(runs: Sequence[Run]) -> WinchAnswer:
     return diagnose(runs, read_winch(find("profiles", "bench-spiral")))
 
 
 @cache
-def answer_of(bench: str) -> Answer:
+def answer_of(bench: str) -> WinchAnswer:
     """What the diagnosis says of such a bench."""
     return answered(recorded(bench))

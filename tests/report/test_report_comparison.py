@@ -68,7 +68,7 @@ def test_only_the_present_state_is_drawn() -> None:
 
 def test_the_curves_are_the_residual_of_the_figures() -> None:
     known = held_against("demo-elastic-rope")
-    plots = plots_of(Residuals(known.problem, known.residual, None, {}))
+    plots = plots_of(Residuals(known.regression, known.residual, None, {}))
     for own in plots:
         (line,) = own.over_time.data["series"]
         values = np.array([v for v in line["values"] if v is not None]) * own.scale.worth

@@ -56,9 +56,9 @@ def test_two_variables_take_more_than_either() -> None:
 
 def test_noise_follows_no_pair() -> None:
     known = held("demo-elastic-rope")
-    noise = np.random.default_rng(7).standard_normal(known.problem.rows)
-    assert residual_maps(known.problem, noise) == []
-    assert follows(known.problem, noise) == []
+    noise = np.random.default_rng(7).standard_normal(known.regression.n_rows)
+    assert residual_maps(known.regression, noise) == []
+    assert follows(known.regression, noise) == []
 
 
 def test_the_largest_cell_is_told() -> None:
@@ -74,7 +74,7 @@ def test_the_largest_cell_is_told() -> None:
 def test_another_residual_is_drawn_in_the_same_cells() -> None:
     known = held("demo-elastic-rope")
     drawn = map_over(known, "cable_length", ("cable_length", "load"))
-    again = same_cells(known.problem, 2 * known.residual, drawn)
+    again = same_cells(known.regression, 2 * known.residual, drawn)
     assert again is not None
     np.testing.assert_array_equal(again.edges[0], drawn.edges[0])
     np.testing.assert_allclose(again.mean, 2 * drawn.mean, equal_nan=True)

@@ -12,23 +12,23 @@ import pytest
 from report_answers import FRICTION, answer_of, answered, recorded
 from report_parsed import HOSTILE, Page
 
-from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.report.figures.plots import plots_of
 from winchkit.report.figures.waterfall import waterfall_of
 from winchkit.report.pages.pages import report_html, residuals_of
 from winchkit.report.words.sentence import sentence
 
 
-def renamed(inquiry: Inquiry) -> Inquiry:
+def renamed(engine: TimeSeriesSelection) -> TimeSeriesSelection:
     """The same inquiry into runs with hostile names."""
-    out, problem = copy(inquiry), copy(inquiry.problem)
+    out, regression = copy(engine), copy(engine.regression)
     recordings = [
         replace(r, name=f"{HOSTILE}{n}", path=HOSTILE, programme=HOSTILE)
-        for n, r in enumerate(problem.dataset.recordings)
+        for n, r in enumerate(regression.dataset.recordings)
     ]
-    problem.dataset = replace(problem.dataset, recordings=tuple(recordings))
-    out.problem = problem
+    regression.dataset = replace(regression.dataset, recordings=tuple(recordings))
+    out.regression = regression
     return out
 
 
@@ -83,7 +83,7 @@ def test_every_label_that_is_referred_to_is_there() -> None:
 def test_hostile_names_are_text_and_nothing_else() -> None:
     answer = answer_of("demo-adequate")
     said = replace(answer.diagnosis, notes=(HOSTILE,))
-    hostile = Answer(renamed(answer.inquiry), answer.found, said)
+    hostile = WinchAnswer(renamed(answer.engine), answer.result, said)
     page = Page(report_html(hostile, HOSTILE, [HOSTILE], {HOSTILE: HOSTILE}, HOSTILE))
     clean = page_of("demo-adequate")
     assert page.count("script") == clean.count("script")
@@ -168,7 +168,7 @@ def test_the_ladder_begins_and_ends_at_the_figures() -> None:
 def test_a_confusion_set_is_told_with_angles() -> None:
     answer = answer_of("demo-elastic-rope")
     said = replace(answer.diagnosis, steps=(FRICTION,))
-    page = Page(report_html(Answer(answer.inquiry, answer.found, said), "x"))
+    page = Page(report_html(WinchAnswer(answer.engine, answer.result, said), "x"))
     assert "What these runs cannot tell apart" in page.text
     assert "0.1°" in page.text
 
@@ -184,7 +184,7 @@ def test_without_repeats_the_page_says_what_cannot_be_excluded() -> None:
 def test_partly_without_a_name_shows_what_is_left() -> None:
     real = answer_of("five-cornered-drum")
     said = replace(real.diagnosis, verdict="partly", unexplained_share=0.31)
-    page = Page(report_html(Answer(real.inquiry, real.found, said), "x"))
+    page = Page(report_html(WinchAnswer(real.engine, real.result, said), "x"))
     assert "Partly explained" in page.text
     assert "31 % of what stood above the noise is left" in page.text
 
@@ -208,7 +208,7 @@ def test_story_truth_and_commands_are_told() -> None:
 def test_several_effects_are_added_one_after_another() -> None:
     real = answer_of("demo-elastic-rope")
     said = replace(real.diagnosis, steps=(*real.diagnosis.steps, FRICTION))
-    text = Page(report_html(Answer(real.inquiry, real.found, said), "x", profile="p")).text
+    text = Page(report_html(WinchAnswer(real.engine, real.result, said), "x", profile="p")).text
     assert "winchkit add cable-elongation-linear --profile p --fit" in text
     assert "winchkit add pulley-coulomb --profile better-1.toml --fit" in text
     assert "-o better-2.toml" in text

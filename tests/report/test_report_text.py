@@ -21,7 +21,7 @@ from report_answers import (
 from winchkit.catalog import find
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.compare import compare
-from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.results import Comparison, Diagnosis, NextRun, OutputError
 from winchkit.report.detectability import unseen, visible
 from winchkit.report.text import addition_text, compare_text, report_text
@@ -29,10 +29,10 @@ from winchkit.report.words.sentence import changes_text, sentence
 from winchkit.schema.read import read_winch
 
 
-def saying(diagnosis: Diagnosis) -> Answer:
+def saying(diagnosis: Diagnosis) -> WinchAnswer:
     """A real answer with another diagnosis."""
     real = answer_of("demo-adequate")
-    return Answer(real.inquiry, real.found, diagnosis)
+    return WinchAnswer(real.engine, real.result, diagnosis)
 
 
 @pytest.mark.parametrize("bench", ["demo-elastic-rope", "demo-adequate", "five-cornered-drum"])

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.diagnose import inquire
-from winchkit.diagnosis.regression.exclusion import calmed
+from winchkit.diagnosis.diagnose import selection_engine
+from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.diagnosis.results import Estimate, OutputFit
-from winchkit.diagnosis.selection.candidates import missing_needs
-from winchkit.diagnosis.selection.engine import Inquiry
 from winchkit.diagnosis.selection.scores import Score, score
-from winchkit.diagnosis.selection.weighting import weighed
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.diagnosis.verdict.decision import output_fits
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -88,8 +87,8 @@ def fitted_json(
 class Grown:
     """An addition with everything behind it, for reports."""
 
-    problem: Problem
-    begin: Fit
+    regression: TimeSeriesRegression
+    initial_model: Fit
     """The effects that the profile had, refitted."""
     final: Fit
     """With the new one."""
@@ -125,36 +124,41 @@ def grow(
         raise UsageError(f"profile '{profile.name}' has the effect '{effect_id}' already")
     dataset = prepare(runs, profile, band, thin=True)
     candidates = Catalogue([*catalogue, _placed(effect, dataset)])
-    inquiry = inquire(dataset, candidates)
-    lacking = missing_needs(effect, inquiry.problem)
+    engine = selection_engine(dataset, candidates)
+    lacking = engine.regression.missing_needs(effect)
     if lacking:
         raise UsageError(
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
-    (begin, noise), (final, final_noise) = _fitted(inquiry, effect_id)
-    calm = calmed(dataset, final.hypothesis)
+    (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
+    calm = without_impacts(dataset, final.hypothesis)
     if calm is not None:
-        inquiry = inquire(calm, candidates)
-        (begin, noise), (final, final_noise) = _fitted(inquiry, effect_id)
-    best = weighed(inquiry, final, final_noise)
-    spread = spread_of(inquiry.problem, best.fit, best.noise, inquiry.blocks)
-    outputs = output_fits(inquiry, (begin, noise), (best.fit, best.noise))
-    terms = tuple(estimates(inquiry.problem, best.fit, spread))
-    notes = (*inquiry.problem.dataset.notes, *best.notes)
-    return Grown(inquiry.problem, begin, best.fit, Addition(outputs, terms, notes))
+        engine = selection_engine(calm, candidates)
+        (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
+    best = reweighted(engine, final, final_noise)
+    spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
+    outputs = output_fits(engine, (initial_model, noise), (best.fit, best.noise))
+    terms = tuple(estimates(engine.regression, best.fit, spread))
+    notes = (*engine.regression.dataset.notes, *best.notes)
+    return Grown(engine.regression, initial_model, best.fit, Addition(outputs, terms, notes))
 
 
-def _fitted(inquiry: Inquiry, effect_id: str) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:
+def _fitted(
+    engine: TimeSeriesSelection, effect_id: str
+) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:
     """The profile as it is, and with the effect, each with its noise."""
-    begin, noise = inquiry.settle(inquiry.begin)
-    trials = [inquiry.trial(begin, item, noise) for item in _atoms(inquiry, effect_id, noise)]
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
+    trials = [
+        engine.trial(initial_model, item, noise)
+        for item in _candidates_of(engine, effect_id, noise)
+    ]
     if not trials:
         raise UsageError(
             f"effect '{effect_id}' changes nothing that these runs measured, or gives no number "
             "there"
         )
-    best = min(trials, key=lambda trial: trial.fit.cost)
-    return (begin, noise), inquiry.settle(best.fit.hypothesis, noise)
+    best = min(trials, key=lambda trial: trial.fit.chi_square)
+    return (initial_model, noise), engine.fit_with_noise(best.fit.hypothesis, noise)
 
 
 def _placed(effect: Effect, dataset: Dataset) -> Effect:
@@ -168,12 +172,12 @@ def _placed(effect: Effect, dataset: Dataset) -> Effect:
     return placed(effect, min(float(x.min()) for x in ranges), max(float(x.max()) for x in ranges))
 
 
-def _atoms(inquiry: Inquiry, effect_id: str, noise: Noise) -> list[Score]:
+def _candidates_of(engine: TimeSeriesSelection, effect_id: str, noise: Noise) -> list[Score]:
     """Points of an effect's shape grid that fit best."""
-    begin = inquiry.refit(inquiry.begin, noise)
-    projected = inquiry.projected(begin, noise)
-    ranked = score(projected, begin.residual, inquiry.problem.rows)
-    return [item for item in ranked if item.atom.effect.id == effect_id][:_STARTS]
+    initial_model = engine.refit(engine.initial_model, noise)
+    projected = engine.projected(initial_model, noise)
+    ranked = score(projected, initial_model.residual, engine.regression.n_rows)
+    return [item for item in ranked if item.candidate.effect.id == effect_id][:_STARTS]
 
 
 @dataclass(frozen=True)
@@ -202,17 +206,19 @@ def remove(
     Raises UsageError for an effect that the profile does not have, RunError with every fault of
     every run.
     """
-    inquiry = inquire(prepare(runs, profile, band, thin=True), catalogue or load_catalogue())
-    begin, noise = inquiry.settle(inquiry.begin)
-    terms = begin.hypothesis.terms
+    engine = selection_engine(
+        prepare(runs, profile, band, thin=True), catalogue or load_catalogue()
+    )
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
+    terms = initial_model.hypothesis.terms
     there = [index for index, term in enumerate(terms) if term.effect.id == effect_id]
     if not there:
         has = ", ".join(term.label for term in terms) or "none"
         raise UsageError(f"profile '{profile.name}' has no effect '{effect_id}'; it has {has}")
-    best = weighed(inquiry, *inquiry.settle(begin.hypothesis.without(there[-1])))
+    best = reweighted(engine, *engine.fit_with_noise(initial_model.hypothesis.without(there[-1])))
     # Judged by the noise of the better model: without the effect its trace would pass for noise.
-    outputs = output_fits(inquiry, (begin, noise), (best.fit, noise))
-    spread = spread_of(inquiry.problem, best.fit, best.noise, inquiry.blocks)
-    left = tuple(estimates(inquiry.problem, best.fit, spread))
-    notes = (*inquiry.problem.dataset.notes, *best.notes)
+    outputs = output_fits(engine, (initial_model, noise), (best.fit, noise))
+    spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
+    left = tuple(estimates(engine.regression, best.fit, spread))
+    notes = (*engine.regression.dataset.notes, *best.notes)
     return Removal(effect_id, outputs, left, notes)

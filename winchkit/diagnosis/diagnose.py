@@ -7,29 +7,30 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from winchkit.diagnosis.compare import begin_hypothesis
+from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.design.detectability import Bar, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import what_runs_cannot_show
 from winchkit.diagnosis.regression.cross_validation import held_out
-from winchkit.diagnosis.regression.exclusion import calmed
+from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import follows, harmonics
 from winchkit.diagnosis.results import (
-    Candidate,
+    CandidateScore,
     Diagnosis,
     Estimate,
     Step,
     Where,
 )
-from winchkit.diagnosis.selection.engine import Inquiry
-from winchkit.diagnosis.selection.stepwise import Found, search
-from winchkit.diagnosis.verdict.decision import Judgement, by_best_weights
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.verdict.decision import Judgement, reweighted_judgement
 from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
 from winchkit.diagnosis.verdict.specification_test import judge_and_doubt
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -38,47 +39,86 @@ from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Answer", "Told", "candidates_of", "diagnose", "inquire", "silent", "steps_of"]
+__all__ = [
+    "Answer",
+    "ProgressCallback",
+    "WinchAnswer",
+    "candidates_of",
+    "diagnose",
+    "no_progress",
+    "selection_engine",
+    "steps_of",
+]
 
 _WHERE = 6
 _LOCATED = ("unknown", "partly")
 
 
-Told = Callable[[str, float], None]
+ProgressCallback = Callable[[str, float], None]
 """Hears what is begun, and the share of the work that is done."""
 
 
 class Answer:
-    """A diagnosis with everything behind it, for reports and for adding effects."""
+    """A diagnosis with everything that it was derived from, for reports and plans.
+
+    Parameters
+    ----------
+    engine
+        Engine of the last selection.
+    result
+        Result of the selection, without withheld additions.
+    diagnosis
+        What is printed.
+    sets
+        Equivalence set of every addition.
+    pairs
+        Effects that a next run should distinguish.
+    """
+
+    engine: SelectionEngine
 
     def __init__(
         self,
-        inquiry: Inquiry,
-        found: Found,
+        engine: SelectionEngine,
+        result: SelectionResult,
         diagnosis: Diagnosis,
         sets: Sequence[Confusion] = (),
         pairs: Sequence[tuple[Term, Term]] = (),
     ) -> None:
-        self.inquiry = inquiry
-        self.found = found
-        self.sets = tuple(sets)
-        """What cannot be told apart, a set for each effect that was found."""
-        self.pairs = tuple(pairs)
-        """Effects to be told apart by a next run, of these sets or of what came closest."""
+        self.engine = engine
+        self.result = result
         self.diagnosis = diagnosis
+        self.sets = tuple(sets)
+        self.pairs = tuple(pairs)
 
     @property
     def bar(self) -> Bar:
-        """What an effect had to bring to be named."""
-        return Bar(self.inquiry.price, self.found.threshold)
+        """Reduction of χ² that an effect needs to be named."""
+        return Bar(self.engine.penalty_per_parameter, self.result.threshold)
 
     @property
-    def filed(self) -> Inquiry:
-        """The inquiry into the profile as it was filed; a robot's geometry may have been let go."""
-        return self.inquiry
+    def file_engine(self) -> SelectionEngine:
+        """Engine with the profile at its file values; a robot's geometry may be free later."""
+        return self.engine
 
 
-def silent(what: str, share: float) -> None:
+class WinchAnswer(Answer):
+    """A diagnosis of a winch's runs with everything that it was derived from."""
+
+    engine: TimeSeriesSelection
+
+    def __init__(
+        self,
+        engine: TimeSeriesSelection,
+        result: SelectionResult,
+        diagnosis: Diagnosis,
+        sets: Sequence[Confusion] = (),
+        pairs: Sequence[tuple[Term, Term]] = (),
+    ) -> None:
+        super().__init__(engine, result, diagnosis, sets, pairs)
+
+
+def no_progress(what: str, share: float) -> None:
     """Tells nobody."""
 
 
@@ -89,8 +129,8 @@ def diagnose(
     band: float | None = None,
     *,
     thin: bool = True,
-    told: Told = silent,
-) -> Answer:
+    progress: ProgressCallback = no_progress,
+) -> WinchAnswer:
     """Find which effect of the catalogue the profile lacks on these runs.
 
     ``thin`` lets long runs be thinned out as far as their signals allow; ``told`` hears what is
@@ -98,75 +138,81 @@ def diagnose(
     every run, FileError for effects that do not bind.
     """
     catalogue = catalogue or load_catalogue()
-    told("reading the signals", 0.0)
+    progress("reading the signals", 0.0)
     dataset = prepare(runs, profile, band, thin=thin)
-    told("drawing the candidates", 0.2)
-    inquiry = inquire(dataset, catalogue)
-    told("searching", 0.4)
-    found = search(inquiry)
-    calm = calmed(dataset, found.reached)
+    progress("drawing the candidates", 0.2)
+    engine = selection_engine(dataset, catalogue)
+    progress("searching", 0.4)
+    result = stepwise_selection(engine)
+    calm = without_impacts(dataset, result.last_model)
     if calm is not None:
-        told("searching again without the jerks", 0.6)
-        inquiry = inquire(calm, catalogue)
-        found = search(inquiry)
-    told("naming", 0.8)
-    return _answer(inquiry, found)
+        progress("searching again without the jerks", 0.6)
+        engine = selection_engine(calm, catalogue)
+        result = stepwise_selection(engine)
+    progress("naming", 0.8)
+    return _answer(engine, result)
 
 
-def _answer(inquiry: Inquiry, found: Found) -> Answer:
+def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
     """Everything that is said of what a search found."""
-    judgement = judge_and_doubt(inquiry, found)
+    judgement = judge_and_doubt(engine, result)
     shown = judgement.shown
-    added = range(inquiry.given, len(shown.final.hypothesis.terms))
-    sets = [confusion_of(inquiry, shown.final, shown.noise, index) for index in added]
-    pairs = pairs_of(sets or _closest(inquiry, found, judgement))
+    added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
+    sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
+    pairs = pairs_of(sets or _closest(engine, result, judgement))
     if sets:
-        judgement = by_best_weights(inquiry, judgement)
+        judgement = reweighted_judgement(engine, judgement)
         shown = judgement.shown
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,
-        steps=steps_of(inquiry, shown, sets) if sets else (),
-        candidates=candidates_of(inquiry, found),
-        detectable=detectable(found.scores, Bar(inquiry.price, found.threshold)),
+        steps=steps_of(engine, shown, sets) if sets else (),
+        candidates=candidates_of(engine, result),
+        detectable=detectable(result.scores, Bar(engine.penalty_per_parameter, result.threshold)),
         unexplained_share=judgement.share,
-        where=_where(inquiry.problem, found) if judgement.verdict in _LOCATED else (),
-        next_runs=next_runs(inquiry.problem, pairs, found.noise.rms),
+        where=_where(engine.regression, result) if judgement.verdict in _LOCATED else (),
+        next_runs=next_runs(engine.regression, pairs, result.noise.rms),
         notes=(
-            *inquiry.problem.dataset.notes,
-            *what_runs_cannot_show(inquiry.problem),
+            *engine.regression.dataset.notes,
+            *what_runs_cannot_show(engine.regression),
             *judgement.notes,
         ),
     )
-    return Answer(inquiry, shown, diagnosis, sets, pairs)
+    return WinchAnswer(engine, shown, diagnosis, sets, pairs)
 
 
-def _closest(inquiry: Inquiry, found: Found, judgement: Judgement) -> list[Confusion]:
+def _closest(
+    engine: TimeSeriesSelection, result: SelectionResult, judgement: Judgement
+) -> list[Confusion]:
     """What came closest and may not be named yet, with its rivals: a next run can begin there.
 
     Not for an unknown: what resembles something outside the catalogue leads astray.
     """
     if judgement.verdict != "partly":
         return []
-    added = range(inquiry.given, len(found.final.hypothesis.terms))
-    return [confusion_of(inquiry, found.final, found.noise, index) for index in added]
+    added = range(engine.n_initial_terms, len(result.final.hypothesis.terms))
+    return [confusion_of(engine, result.final, result.noise, index) for index in added]
 
 
-def inquire(dataset: Dataset, catalogue: Catalogue) -> Inquiry:
+def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelection:
     """An inquiry that begins with the effects that the profile already has."""
-    problem = Problem(dataset)
-    begin = begin_hypothesis(dataset.profile, catalogue, problem)
-    return Inquiry(problem, begin, catalogue)
+    regression = TimeSeriesRegression(dataset)
+    initial_model = initial_hypothesis(dataset.profile, catalogue, regression)
+    return TimeSeriesSelection(regression, initial_model, catalogue)
 
 
-def steps_of(inquiry: Inquiry, found: Found, sets: Sequence[Confusion]) -> tuple[Step, ...]:
+def steps_of(
+    engine: SelectionEngine, result: SelectionResult, sets: Sequence[Confusion]
+) -> tuple[Step, ...]:
     """Every addition with its confusion set, values and held-out gain."""
-    final, noise = found.final, found.noise
-    gains = _gains(inquiry, final, noise)
-    spread = spread_of(inquiry.problem, final, noise, inquiry.blocks)
-    own = estimates(inquiry.problem, final, spread)
+    final, noise = result.final, result.noise
+    gains = _gains(engine, final, noise)
+    spread = spread_of(engine.regression, final, noise, engine.regression.blocks)
+    own = estimates(engine.regression, final, spread)
     out = []
-    for confusion, gain, (term, values) in zip(sets, gains, own[inquiry.given :], strict=True):
+    for confusion, gain, (term, values) in zip(
+        sets, gains, own[engine.n_initial_terms :], strict=True
+    ):
         parameters = {term.effect.id: values} | {
             rival.effect.id: _values_only(rival.effect.id, confusion)
             for rival in confusion.terms
@@ -190,46 +236,46 @@ def _values_only(effect_id: str, confusion: Confusion) -> dict[str, Estimate]:
     }
 
 
-def _gains(inquiry: Inquiry, final: Fit, noise: Noise) -> list[float]:
+def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:
     """Held-out gain of each step in the order in which the model grew."""
     hypothesis = final.hypothesis
-    squares, folds = [], inquiry.folds(final, noise)
-    for count in range(inquiry.given, len(hypothesis.terms) + 1):
+    squares, folds = [], engine.folds(final, noise)
+    for count in range(engine.n_initial_terms, len(hypothesis.terms) + 1):
         partial = Hypothesis(
             hypothesis.terms[:count], hypothesis.nuisances, hypothesis.starts[:count]
         )
-        fitted = final if count == len(hypothesis.terms) else inquiry.refit(partial, noise)
-        squares.append(float(np.sum(held_out(inquiry.problem, fitted, noise, folds))))
+        fitted = final if count == len(hypothesis.terms) else engine.refit(partial, noise)
+        squares.append(float(np.sum(held_out(engine.regression, fitted, noise, folds))))
     return [1 - after / before for before, after in pairwise(squares)]
 
 
-def candidates_of(inquiry: Inquiry, found: Found) -> tuple[Candidate, ...]:
+def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[CandidateScore, ...]:
     """Every candidate with its score, the strongest with what it would leave held out."""
     out = []
-    folds = inquiry.folds(found.final, found.noise)
-    for item, fitted in zip_longest(found.scores, found.tried):
+    folds = engine.folds(result.final, result.noise)
+    for item, fitted in zip_longest(result.scores, result.tried):
         rms: dict[str, float] = {}
         if fitted is not None:
-            rms = inquiry.held_out_errors(fitted, found.begin_noise, folds)
-        out.append(Candidate(item.atom.effect.id, item.value, rms))
+            rms = engine.held_out_errors(fitted, result.initial_noise, folds)
+        out.append(CandidateScore(item.candidate.effect.id, item.net_gain, rms))
     return tuple(out)
 
 
-def _where(problem: Problem, found: Found) -> tuple[Where, ...]:
+def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[Where, ...]:
     """Where the rest lives: angles with an order, other variables, and the loudest band.
 
     The rest beside what came closest; where that left nothing, yet may not be named, all of it.
     """
-    fitted, presence = found.final, found.presence
-    if not found.still:
-        fitted, presence = found.begin, found.begin_presence
-    places = [*harmonics(problem, fitted.residual), *follows(problem, fitted.residual)]
+    fitted, lack_of_fit_test = result.final, result.lack_of_fit_test
+    if not result.lack_of_fit:
+        fitted, lack_of_fit_test = result.initial_model, result.initial_lack_of_fit_test
+    places = [*harmonics(regression, fitted.residual), *follows(regression, fitted.residual)]
     out = [Where(f.output, f.variable, f.share, f.order) for f in places]
-    excess = presence.excess
-    if excess.size and excess.max() > 0:
-        loudest = int(np.argmax(excess))
-        output, low, high = problem.bands[loudest]
+    excess_power = lack_of_fit_test.excess_power
+    if excess_power.size and excess_power.max() > 0:
+        loudest = int(np.argmax(excess_power))
+        output, low, high = regression.bands[loudest]
         middle = low if not np.isfinite(high) else (low + high) / 2
-        share = float(excess[loudest] / np.sum(np.maximum(excess, 0)))
+        share = float(excess_power[loudest] / np.sum(np.maximum(excess_power, 0)))
         out.append(Where(output, "time", share, frequency=middle))
     return tuple(sorted(out, key=lambda w: -w.share)[:_WHERE])

@@ -12,7 +12,7 @@ from winchkit.effects.empirical import empirical_id
 from winchkit.effects.placement import HOME
 
 __all__ = [
-    "Candidate",
+    "CandidateScore",
     "Comparison",
     "Detectable",
     "Diagnosis",
@@ -132,7 +132,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateScore:
     """A candidate effect with its score beside the initial model."""
 
     effect: str
@@ -188,7 +188,7 @@ class Diagnosis:
     verdict: Verdict
     outputs: Mapping[str, OutputFit]
     steps: tuple[Step, ...]
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateScore, ...]
     detectable: tuple[Detectable, ...]
     unexplained_share: float
     where: tuple[Where, ...]

@@ -59,7 +59,7 @@ class Coordinates:
         return tuple(p.name for p in self._fitted)
 
     @property
-    def freedom(self) -> int:
+    def n_parameters(self) -> int:
         """Degrees of freedom, a scanned order included."""
         return len(self) + sum(p.whole for p in self.effect.parameters)
 
@@ -129,7 +129,7 @@ class Coordinates:
         combinations = product(*(p.grid for p in shaped))
         return [dict(zip((p.name for p in shaped), point, strict=True)) for point in combinations]
 
-    def secants(self) -> list[dict[str, float]]:
+    def usual_steps(self) -> list[dict[str, float]]:
         """Values of a usual size, one set per column of the effect's signature."""
         if self.effect.probes:
             return [dict(probe) for probe in self.effect.probes]

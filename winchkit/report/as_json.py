@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.diagnose import Answer, WinchAnswer
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.maps import residual_maps
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.report.detectability import unseen
@@ -22,45 +22,51 @@ __all__ = ["report_json"]
 def report_json(answer: Answer) -> dict[str, Any]:
     """As ``winchkit diagnose --json`` prints it; figures in SI."""
     diagnosis, ladder = answer.diagnosis, waterfall_of(answer)
-    drawn = _of_poses(answer) if isinstance(answer, RobotAnswer) else _of_runs(answer)
+    if isinstance(answer, RobotAnswer):
+        drawn = _of_poses(answer)
+    else:
+        assert isinstance(answer, WinchAnswer)
+        drawn = _of_runs(answer)
     return {
         **diagnosis.to_json(),
         "sentence": sentence(diagnosis),
         "would_change": changes_text(diagnosis),
         "not_looked_for": [{"effect": e, "needs": list(needs)} for e, needs in unseen(answer)],
-        "evidence_of_noise": max(answer.found.threshold, 0.0),
+        "evidence_of_noise": max(answer.result.threshold, 0.0),
         "waterfall": None if ladder is None else _waterfall(ladder),
         **drawn,
     }
 
 
-def _of_runs(answer: Answer) -> dict[str, Any]:
+def _of_runs(answer: WinchAnswer) -> dict[str, Any]:
     return {"residuals": _states(answer, _curves), "maps": _states(answer, _maps)}
 
 
 def _of_poses(answer: RobotAnswer) -> dict[str, Any]:
     """Errors over what they followed before, beside those that are left."""
-    seen = answer.seen
-    drawn = traces(seen.final.problem, *seen.errors)
+    selection = answer.selection
+    drawn = traces(selection.final.regression, *selection.errors)
     after = [t.to_json(t.after) for t in drawn if t.after is not None]
     before = [t.to_json(t.before) for t in drawn]
     return {"residuals": {"before": before, "after": after if answer.diagnosis.steps else None}}
 
 
-def _states(answer: Answer, drawn: Callable[[Problem, Array], list[Any]]) -> dict[str, Any]:
+def _states(
+    answer: WinchAnswer, drawn: Callable[[TimeSeriesRegression, Array], list[Any]]
+) -> dict[str, Any]:
     """What is drawn of the residual before, and after where something was named."""
-    found, problem = answer.found, answer.inquiry.problem
-    after = drawn(problem, found.final.residual) if answer.diagnosis.steps else None
-    return {"before": drawn(problem, found.begin.residual), "after": after}
+    found, regression = answer.result, answer.engine.regression
+    after = drawn(regression, found.final.residual) if answer.diagnosis.steps else None
+    return {"before": drawn(regression, found.initial_model.residual), "after": after}
 
 
-def _curves(problem: Problem, residual: Array) -> list[Any]:
-    found = strongest(problem, residual).values()
-    return [curve_of(problem, residual, over).to_json() for over in found]
+def _curves(regression: TimeSeriesRegression, residual: Array) -> list[Any]:
+    found = strongest(regression, residual).values()
+    return [curve_of(regression, residual, over).to_json() for over in found]
 
 
-def _maps(problem: Problem, residual: Array) -> list[Any]:
-    return [drawn.to_json() for drawn in residual_maps(problem, residual)]
+def _maps(regression: TimeSeriesRegression, residual: Array) -> list[Any]:
+    return [drawn.to_json() for drawn in residual_maps(regression, residual)]
 
 
 def _waterfall(ladder: Waterfall) -> dict[str, Any]:

@@ -36,8 +36,8 @@ class Visible:
 
 def effects_of(answer: Answer) -> dict[str, Effect]:
     """Every effect that a diagnosis tried or has, by id."""
-    tried = {score.atom.effect.id: score.atom.effect for score in answer.found.scores}
-    present = {t.effect.id: t.effect for t in answer.found.final.hypothesis.terms}
+    tried = {score.candidate.effect.id: score.candidate.effect for score in answer.result.scores}
+    present = {t.effect.id: t.effect for t in answer.result.final.hypothesis.terms}
     return tried | present
 
 
@@ -81,7 +81,7 @@ def unseen(answer: Answer) -> list[tuple[str, list[str]]]:
     tried = {e.partition("/")[0] for e in effects_of(answer)}
     out = []
     for effect in load_catalogue():
-        lacking = answer.inquiry.lacking(effect) if effect.id not in tried else []
+        lacking = answer.engine.regression.missing_needs(effect) if effect.id not in tried else []
         if lacking:
             out.append((effect.id, list(lacking)))
     return out

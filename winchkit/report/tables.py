@@ -7,7 +7,7 @@ from itertools import chain
 from math import degrees, isfinite
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.results import Candidate, Diagnosis, Estimate, OutputFit
+from winchkit.diagnosis.results import CandidateScore, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect
 from winchkit.report.detectability import unseen, visible
 from winchkit.report.figures.waterfall import Waterfall
@@ -154,7 +154,7 @@ def candidates(answer: Answer) -> Markup:
     rows = [_candidate(candidate, scales) for candidate in ranked]
     caption = (
         "Evidence: whitened squares that an effect saves, less the price of its freedom; noise "
-        f"alone reaches {significant(max(answer.found.threshold, 0.0), 2)} once in a hundred "
+        f"alone reaches {significant(max(answer.result.threshold, 0.0), 2)} once in a hundred "
         "cases. The held-out error is that with this effect alone, where its evidence earned a fit."
     )
     return _shortened(caption, head, rows, "more, with less evidence")
@@ -176,7 +176,7 @@ def _times(share: float) -> str:
     return f"{significant(share, 2)} ×" if isfinite(share) else "–"
 
 
-def _candidate(candidate: Candidate, scales: Mapping[str, Scale]) -> list[str]:
+def _candidate(candidate: CandidateScore, scales: Mapping[str, Scale]) -> list[str]:
     errors = [
         significant(candidate.heldout_rms[name] / scale.worth)
         if name in candidate.heldout_rms

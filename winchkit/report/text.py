@@ -219,7 +219,7 @@ def _candidates(answer: Answer) -> list[str]:
     best = [c for c in diagnosis.candidates if c.score > 0][:_FEW]
     if not best:
         return []
-    chance = significant(max(answer.found.threshold, 0.0), 2)
+    chance = significant(max(answer.result.threshold, 0.0), 2)
     rows = [[c.effect, grouped(c.score), clause(c.effect)] for c in best]
     head = f"strongest evidence, each alone (noise reaches {chance} once in a hundred cases)"
     return [head, *hanging(rows)]

@@ -71,11 +71,11 @@ def _tell_each(
 
     found, errors = {}, {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
-    with progress_bar() as told:
+    with progress_bar() as progress:
         winches = read_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
         for index, (name, own) in enumerate(winches.items()):
-            told(f"winch {name}", index / len(winches))
+            progress(f"winch {name}", index / len(winches))
             answer = compared(own, declared, catalogue, asked.band)
             found[name], errors[name] = answer.comparison, errors_of(answer)
             if html:

@@ -26,7 +26,7 @@ from winchkit.cli.model.options import (
 )
 
 if TYPE_CHECKING:
-    from winchkit.diagnosis.diagnose import Answer
+    from winchkit.diagnosis.diagnose import Answer, WinchAnswer
     from winchkit.diagnosis.results import Diagnosis
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
@@ -73,9 +73,9 @@ def _tell_one(
     """What one winch lacks, on a page besides where that is asked."""
     from winchkit.diagnosis.diagnose import diagnose
 
-    with progress_bar() as told:
+    with progress_bar() as progress:
         own, catalogue = asked.runs(runs), asked.catalogue
-        answer = diagnose(own, declared, catalogue, asked.band, thin=thin, told=told)
+        answer = diagnose(own, declared, catalogue, asked.band, thin=thin, progress=progress)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         write_page(html, _page(answer, page_title(declared.name, runs), asked))
@@ -98,13 +98,13 @@ def _tell_each(
     found: dict[str, Diagnosis] = {}
     present: dict[str, float] = {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
-    with threads_abandoned(), progress_bar() as told:
+    with threads_abandoned(), progress_bar() as progress:
         winches = read_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
-        each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, told=told)
+        each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, progress=progress)
         for name, answer in each:
             found[name], said[name] = answer.diagnosis, _said(answer, as_json)
-            present[name] = answer.found.presence.p_value
+            present[name] = answer.result.lack_of_fit_test.p_value
             if html:
                 own = _page(answer, f"{title}, {name}", replace(asked, winch=name))
                 save_page(str(Path(html).with_name(pages[name])), own)
@@ -127,8 +127,8 @@ def _tell_robot(
     """What a robot's model lacks, from poses."""
     from winchkit.diagnosis.robot.diagnose import diagnose_robot
 
-    with progress_bar() as told:
-        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, told)
+    with progress_bar() as progress:
+        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, progress)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         from winchkit.report.pages.robot import robot_report_html
@@ -137,7 +137,7 @@ def _tell_robot(
         write_page(html, robot_report_html(answer, title, asked.profile, options=asked.options))
 
 
-def _page(answer: Answer, title: str, asked: Asked) -> str:
+def _page(answer: WinchAnswer, title: str, asked: Asked) -> str:
     """An answer as a page, with the commands that repeat it."""
     from winchkit.report.pages.pages import report_html
 

@@ -192,13 +192,13 @@ def _plan_winch(
     limits = None if bench is None else _limits(bench, asked.winch)
     catalogue = asked.catalogue
     answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
-    problem, pairs = answer.inquiry.problem, answer.pairs
-    room = seen(problem.dataset) if limits is None else allowed(problem.dataset, limits)
-    noise = answer.found.noise.rms
-    found = offers(problem, pairs, noise, list(catalogue), bar=answer.bar, room=room)
+    regression, pairs = answer.engine.regression, answer.pairs
+    room = seen(regression.dataset) if limits is None else allowed(regression.dataset, limits)
+    noise = answer.result.noise.rms
+    found = offers(regression, pairs, noise, list(catalogue), bar=answer.bar, room=room)
     if output:
         path = Path(output)
-        write_programme(programme_of(problem.dataset, found[0].kind, path.stem, room), path)
+        write_programme(programme_of(regression.dataset, found[0].kind, path.stem, room), path)
         click.echo(f"written: {output}", err=True)
     if as_json:
         listed = [offer.to_json(pairs) for offer in found]

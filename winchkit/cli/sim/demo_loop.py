@@ -13,7 +13,7 @@ from winchkit.catalog import find
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
     from winchkit.diagnosis.add import Addition
-    from winchkit.diagnosis.diagnose import Answer
+    from winchkit.diagnosis.diagnose import WinchAnswer
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme, Step
     from winchkit.schema.simbench import SimBench
@@ -32,7 +32,7 @@ _APPROACH = 0.5
 class Findings:
     """What the loop found, the truth still unknown to it."""
 
-    answer: Answer
+    answer: WinchAnswer
     addition: Addition | None
     """The effect named first, added to the profile."""
 

@@ -148,7 +148,7 @@ def narrow_edges(frequency: Array) -> Array:
     return np.array([-np.inf, *inner.tolist(), np.inf])
 
 
-def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
+def smoothed(power: Array, dof: Array) -> tuple[Array, Array]:
     """Smooth the logarithm of a spectrum over its bands; with the degrees of freedom of the result.
 
     Parameters
@@ -176,14 +176,14 @@ def smoothed(power: Array, freedom: Array) -> tuple[Array, Array]:
     """
     count = len(power)
     if count < 3:
-        return power, freedom
+        return power, dof
     bend = np.diff(np.eye(count), 2, axis=0)
     stiff = bend.T @ bend / _BEND**2
-    weight = np.diag(np.maximum(freedom, 1e-6) / 2)
+    weight = np.diag(np.maximum(dof, 1e-6) / 2)
     level = np.log(power)
     eta = np.linalg.solve(weight + stiff, weight @ level)
     for _ in range(_ITERATIONS):
-        # Bounded working residual, so that a band far below its neighbours does not diverge.
+        # A band far below its neighbours may pull the logarithm down by one step only.
         working = eta + np.clip(power / np.exp(eta) - 1, -1.0, 3.0)
         eta = np.linalg.solve(weight + stiff, weight @ working)
     covariance = np.linalg.inv(weight + stiff)

@@ -20,18 +20,18 @@ _POWER_QUANTILE = 1.2816
 class Bar:
     """Detection threshold of a candidate effect, in decrease of χ²."""
 
-    price: float
+    penalty_per_parameter: float
     """Penalty per parameter, ln n."""
     threshold: float
     """1 % level of the largest score under noise alone."""
 
-    def squares(self, freedom: int) -> float:
+    def squares(self, n_parameters: int) -> float:
         """Decrease of χ² that an effect of ``freedom`` parameters must reach."""
-        return max(self.threshold, 0.0) + self.price * freedom
+        return max(self.threshold, 0.0) + self.penalty_per_parameter * n_parameters
 
-    def power(self, strength: float, freedom: int) -> float:
+    def power(self, strength: float, n_parameters: int) -> float:
         """Probability that an effect of noncentrality λ reaches it."""
-        return power_of(strength, self.squares(freedom))
+        return power_of(strength, self.squares(n_parameters))
 
 
 def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
@@ -57,20 +57,22 @@ def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
     """
     out = []
     for item in scores:
-        effect = item.atom.effect
-        if item.strength <= 0:
+        effect = item.candidate.effect
+        if item.noncentrality <= 0:
             continue
-        size = (np.sqrt(bar.squares(item.atom.freedom)) + _POWER_QUANTILE) / np.sqrt(item.strength)
-        secant = item.atom.secants[0]
-        name = next(iter(secant))
+        size = (np.sqrt(bar.squares(item.candidate.n_parameters)) + _POWER_QUANTILE) / np.sqrt(
+            item.noncentrality
+        )
+        usual_step = item.candidate.usual_steps[0]
+        name = next(iter(usual_step))
         parameter = effect.parameter(name)
         if effect.polar and name == effect.polar[0]:
-            value = size * secant[name]
+            value = size * usual_step[name]
         else:
             coordinates = Coordinates(effect)
-            base = {**effect.null, **item.atom.shape}
+            base = {**effect.null, **item.candidate.shape}
             null = coordinates.vector(base)
-            moved = null + size * (coordinates.vector({**base, **secant}) - null)
+            moved = null + size * (coordinates.vector({**base, **usual_step}) - null)
             low, high = coordinates.bounds()
             if np.any((moved < low) | (moved > high)):
                 value = float("nan")

@@ -18,8 +18,9 @@ from scipy.stats import ncx2
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.design.programmes import KINDS, imagined
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import NextRun
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
@@ -45,7 +46,7 @@ class SoFar:
 
 
 def next_runs(
-    problem: Problem, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
+    regression: TimeSeriesRegression, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
 ) -> tuple[NextRun, ...]:
     """Programmes that separate each pair best per minute, with their power.
 
@@ -67,20 +68,20 @@ def next_runs(
     if not pairs:
         return ()
     out: list[NextRun] = []
-    tried = [(kind, imagined(problem.dataset, kind)) for kind in KINDS]
+    tried = [(kind, imagined(regression.dataset, kind)) for kind in KINDS]
     for first, second in pairs:
-        offers, known = [], so_far(problem, first, second, noise)
+        offers, known = [], so_far(regression, first, second, noise)
         for kind, programme in tried:
             minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
             strength = separation(programme, first, second, noise, known=known)
             offers.append((strength / minutes, power_of(strength), kind.name))
-        # Among programmes of equal power, the one with most noncentrality per minute.
+        # Any programme sure to separate them will do: of those the quickest per minute.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
         useful = [offer for offer in offers if offer[1] >= _WORTHWHILE][:_OFFERED]
         out += [NextRun(names, name, power) for _, power, name in useful]
         if not useful:
-            # No motion separates them: the card says what does; its power is not known.
+            # No motion separates them: what does is on the card, and its power is not known.
             out.append(NextRun(names, told_apart(first.effect, second.effect), float("nan")))
     return tuple(out)
 
@@ -104,7 +105,7 @@ def power_of(strength: float, needed: float = APART) -> float:
 
 
 def separation(
-    problem: Problem,
+    regression: Regression,
     first: Term,
     second: Term | None,
     noise: Mapping[str, float],
@@ -128,7 +129,7 @@ def separation(
     repeats
         How often the programme is run.
     """
-    rows = _rows(problem, first, second, noise)
+    rows = _rows(regression, first, second, noise)
     if rows is None:
         return 0.0
     own, shared, shown = (np.asarray(np.sqrt(repeats) * part) for part in rows)
@@ -140,10 +141,10 @@ def separation(
 
 
 def so_far(
-    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+    regression: Regression, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> SoFar | None:
     """Information of a problem's runs on two effects; None where a prediction is not finite."""
-    rows = _rows(problem, first, second, noise)
+    rows = _rows(regression, first, second, noise)
     if rows is None:
         return None
     own, shared, shown = rows
@@ -153,28 +154,28 @@ def so_far(
 
 
 def _rows(
-    problem: Problem, first: Term, second: Term | None, noise: Mapping[str, float]
+    regression: Regression, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> tuple[Array, Array, Array] | None:
     """Columns of a run's own states, columns shared by all runs, and the first effect, whitened.
 
     None where a prediction is not finite.
     """
-    weight = np.empty(problem.rows)
-    for segment in problem.segments:
+    weight = np.empty(regression.n_rows)
+    for segment in regression.segments:
         weight[segment.rows] = 1 / max(noise.get(segment.output, np.inf), 1e-300)
-    shown = problem.change(Hypothesis().with_term(first, problem.runs)) * weight
+    shown = regression.change(Hypothesis().with_term(first, regression.n_runs)) * weight
     rival = Hypothesis()
     if second is not None:
-        rival = rival.with_term(second, problem.runs)
-    imitation = problem.jacobian(problem.vector(rival), rival) * weight[:, None]
+        rival = rival.with_term(second, regression.n_runs)
+    imitation = regression.jacobian(regression.vector(rival), rival) * weight[:, None]
     if not (np.isfinite(imitation).all() and np.isfinite(shown).all()):
         return None
     states = sum(len(start) for start in rival.starts)
-    nuisances, offset = problem.nuisance_columns.shape[1], int(problem.fits_offset)
+    nuisances, offset = regression.nuisance_columns.shape[1], int(regression.fits_offset)
     own = [*range(offset, nuisances), *range(imitation.shape[1] - states, imitation.shape[1])]
     numbers = imitation[:, nuisances : imitation.shape[1] - states]
-    level = imitation[:, :1] if offset else np.zeros((problem.rows, 1))
-    shared = np.column_stack([level, numbers, problem.change(rival) * weight])
+    level = imitation[:, :1] if offset else np.zeros((regression.n_rows, 1))
+    shared = np.column_stack([level, numbers, regression.change(rival) * weight])
     return imitation[:, own], shared, shown
 
 

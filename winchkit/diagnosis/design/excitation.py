@@ -8,7 +8,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.repeats import mean_load
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 
 __all__ = ["what_runs_cannot_show"]
 
@@ -20,7 +20,7 @@ _ONE_SPEED = 0.1
 _PLATEAU = 0.75
 
 
-def what_runs_cannot_show(problem: Problem) -> list[str]:
+def what_runs_cannot_show(regression: TimeSeriesRegression) -> list[str]:
     """Notes on missing repeats, loads, directions, reversals, speeds and temperatures.
 
     Parameters
@@ -33,7 +33,7 @@ def what_runs_cannot_show(problem: Problem) -> list[str]:
     list of str
         One sentence each, with what to record.
     """
-    dataset = problem.dataset
+    dataset = regression.dataset
     notes = []
     if not dataset.repeated:
         notes.append(

@@ -17,8 +17,7 @@ from winchkit.diagnosis.design.programmes import (
     seen,
     usual_temperature,
 )
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.candidates import missing_needs
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -74,7 +73,7 @@ class Offer:
 
 
 def offers(
-    problem: Problem,
+    regression: TimeSeriesRegression,
     pairs: Sequence[tuple[Term, Term]],
     noise: Mapping[str, float],
     effects: Sequence[Effect],
@@ -99,11 +98,11 @@ def offers(
     room
         Operating range; None for that of the runs so far.
     """
-    dataset = problem.dataset
+    dataset = regression.dataset
     room = room or seen(dataset)
-    usual = [(term, so_far(problem, term, None, noise)) for term in _usual(effects, problem)]
+    usual = [(term, so_far(regression, term, None, noise)) for term in _usual(effects, regression)]
     hidden = [(t, known) for t, known in usual if known and not _sees(bar, t, known.left)]
-    known_pairs = [(a, b, so_far(problem, a, b, noise)) for a, b in pairs]
+    known_pairs = [(a, b, so_far(regression, a, b, noise)) for a, b in pairs]
     out = []
     for kind in KINDS:
         tried = imagined(dataset, kind, room)
@@ -128,7 +127,7 @@ def offers(
 
 def _sees(bar: Bar, term: Term, strength: float) -> bool:
     """Whether an effect of noncentrality λ is detected with at least 90 % power."""
-    return bar.power(strength, Coordinates(term.effect).freedom) >= _SURE
+    return bar.power(strength, Coordinates(term.effect).n_parameters) >= _SURE
 
 
 def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list[tuple[Term, Term]]:
@@ -206,13 +205,13 @@ def _warm(dataset: Dataset) -> bool:
     return usual_temperature(dataset) is not None
 
 
-def _usual(effects: Sequence[Effect], problem: Problem) -> list[Term]:
+def _usual(effects: Sequence[Effect], regression: TimeSeriesRegression) -> list[Term]:
     """Every effect that these channels can show, at its usual size."""
     out = []
     for effect in effects:
-        if missing_needs(effect, problem):
+        if regression.missing_needs(effect):
             continue
         shape = next(iter(Coordinates(effect).grid()))
-        secant = next(iter(Coordinates(effect).secants()))
-        out.append(Term(effect, {**effect.null, **shape, **secant}))
+        usual_step = next(iter(Coordinates(effect).usual_steps()))
+        out.append(Term(effect, {**effect.null, **shape, **usual_step}))
     return out

@@ -9,7 +9,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset, assemble
 from winchkit.diagnosis.data.repeats import mean_load
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.line import GRAVITY, Line
 from winchkit.model.stages import Signals
 from winchkit.model.trajectory import plan
@@ -119,7 +119,7 @@ def usual_temperature(dataset: Dataset) -> float | None:
     return float(np.mean([np.mean(t) for t in known if t is not None]))
 
 
-def imagined(dataset: Dataset, kind: Kind, room: Room | None = None) -> Problem:
+def imagined(dataset: Dataset, kind: Kind, room: Room | None = None) -> TimeSeriesRegression:
     """Regression problem of simulated runs of a kind of programme, on the nominal model."""
     usual = usual_temperature(dataset)
     room = room or seen(dataset)
@@ -128,7 +128,7 @@ def imagined(dataset: Dataset, kind: Kind, room: Room | None = None) -> Problem:
         for warmed in kind.warmed if usual is not None else (0.0,):
             warm = None if usual is None else usual + warmed
             runs.append(_run(dataset, kind, room, room.load(load), warm))
-    return Problem(assemble(runs, dataset.profile))
+    return TimeSeriesRegression(assemble(runs, dataset.profile))
 
 
 def _run(dataset: Dataset, kind: Kind, room: Room, mass: float | None, warm: float | None) -> Run:

@@ -83,11 +83,13 @@ class SharedError:
 
 def errors_of(compared: Compared) -> dict[str, WinchErrors]:
     """Errors per output of one winch, decimated to at most about 50,000 samples."""
-    problem, out = compared.problem, {}
-    times = problem.in_time(compared.residual)
+    regression, out = compared.regression, {}
+    times = regression.in_time(compared.residual)
     for output, told in compared.comparison.outputs.items():
-        own = [(s, t) for s, t in zip(problem.segments, times, strict=True) if s.output == output]
-        recordings = [problem.dataset.recordings[s.run] for s, _ in own]
+        own = [
+            (s, t) for s, t in zip(regression.segments, times, strict=True) if s.output == output
+        ]
+        recordings = [regression.dataset.recordings[s.run] for s, _ in own]
         valid = [recording.valid[output] for recording in recordings]
         step = max(1, told.samples // _MOST)
         known = [variables_of(recording) for recording in recordings]
@@ -99,7 +101,7 @@ def errors_of(compared: Compared) -> dict[str, WinchErrors]:
             if all(name in run for run in known)
         }
         error = np.concatenate([t[v] for (_, t), v in zip(own, valid, strict=True)])[::step]
-        kept = min(len(error), kept_rows(problem, output))
+        kept = min(len(error), kept_rows(regression, output))
         out[output] = WinchErrors(told.unit, told.rms**2, error, variables, kept)
     return out
 
@@ -134,7 +136,7 @@ def _follows(own: Mapping[str, WinchErrors]) -> tuple[SharedFollowed, ...]:
     errors = np.concatenate([e.error for e in own.values()])
     if len(own) < 2 or not np.any(errors):
         return ()
-    # The winch itself: one bin each, that is, a level of its own.
+    # A winch by itself is one bin over nothing: a level of its own.
     over = {"winch": np.zeros(len(errors), dtype=np.intp)}
     for name in next(iter(own.values())).variables:
         if all(name in e.variables for e in own.values()):

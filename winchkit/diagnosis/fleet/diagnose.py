@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from threading import Thread
 
-from winchkit.diagnosis.diagnose import Answer, Told, diagnose, silent
+from winchkit.diagnosis.diagnose import ProgressCallback, WinchAnswer, diagnose, no_progress
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -24,8 +24,8 @@ def diagnose_each(
     band: float | None = None,
     *,
     thin: bool = True,
-    told: Told = silent,
-) -> Iterator[tuple[str, Answer]]:
+    progress: ProgressCallback = no_progress,
+) -> Iterator[tuple[str, WinchAnswer]]:
     """Name and answer of every winch, in order, all compared with one profile.
 
     Parameters
@@ -51,16 +51,16 @@ def diagnose_each(
     catalogue = catalogue or load_catalogue()
     shares = dict.fromkeys(winches, 0.0)
 
-    def one(name: str) -> Answer:
+    def one(name: str) -> WinchAnswer:
         def heard(what: str, share: float) -> None:
             shares[name] = share
-            told(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
+            progress(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
 
-        answer = diagnose(winches[name], profile, catalogue, band, thin=thin, told=heard)
+        answer = diagnose(winches[name], profile, catalogue, band, thin=thin, progress=heard)
         heard("done", 1.0)
         return answer
 
-    begun: deque[tuple[str, Future[Answer]]] = deque()
+    begun: deque[tuple[str, Future[WinchAnswer]]] = deque()
     for name in winches:
         begun.append((name, _begun(one, name)))
         if len(begun) == _AT_A_TIME:
@@ -69,23 +69,23 @@ def diagnose_each(
         yield _taken(begun)
 
 
-def _taken(begun: deque[tuple[str, Future[Answer]]]) -> tuple[str, Answer]:
+def _taken(begun: deque[tuple[str, Future[WinchAnswer]]]) -> tuple[str, WinchAnswer]:
     """Wait for the oldest answer; no reference to it is kept here."""
     name, future = begun.popleft()
     return name, future.result()
 
 
-def _begun(work: Callable[[str], Answer], name: str) -> Future[Answer]:
+def _begun(work: Callable[[str], WinchAnswer], name: str) -> Future[WinchAnswer]:
     """Start the computation of an answer in a thread.
 
     A thread pool would wait for its threads, for seconds, when the caller is interrupted.
     """
-    future: Future[Answer] = Future()
+    future: Future[WinchAnswer] = Future()
 
     def run() -> None:
         try:
             future.set_result(work(name))
-        except BaseException as error:  # noqa: BLE001 - raised where the answer is awaited
+        except BaseException as error:  # noqa: BLE001 - handed to whoever waits for the answer
             future.set_exception(error)
 
     Thread(target=run, name=f"diagnose {name}").start()

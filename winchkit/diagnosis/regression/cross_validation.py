@@ -1,12 +1,17 @@
-"""Whether an improvement holds out of sample: block by block, and on whole groups of runs.
+"""Cross-validation: held-out errors of blocks and groups, and a paired rank test of two models.
 
-Everything is linearised at a fit: leaving a part of the data out changes the unknowns by a
-linear solve, so that cross-validation needs no fit of its own.
+Leave-block-out and leave-group-out predictions are linearised at the fit: leaving rows out changes
+the unknowns by one linear solve, so that no model is fitted again.
+
+References
+----------
+Stone, M. (1974). Cross-validatory choice and assessment of statistical predictions. J. R. Stat.
+Soc. B 36, 111-147.
+Wilcoxon, F. (1945). Individual comparisons by ranking methods. Biometrics Bulletin 1, 80-83.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -14,78 +19,47 @@ from numpy.typing import NDArray
 from scipy.stats import wilcoxon
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
 
 __all__ = [
-    "Folds",
-    "blocks_of",
-    "confidence",
-    "groups_of",
+    "extrapolation",
     "held_out",
     "held_out_rms",
     "left_out_steps",
+    "signed_rank_p_value",
 ]
 
-_BLOCKS = 48
 _TOUCHED = 0.02
 _AT_LEAST = 8
 _RIDGE = 1e-12
 
 
-@dataclass(frozen=True)
-class Folds:
-    """A partition of every sample in time: per segment a fold number per sample."""
+def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> float:
+    """Largest variance of a fold's prediction from the other folds, relative to the noise variance.
 
-    of: tuple[NDArray[np.intp], ...]
-    count: int
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model, at which the prediction is linearised.
+    noise
+        Noise variance.
+    folds
+        Folds to be held out.
 
-
-def blocks_of(problem: Problem, wanted: int = _BLOCKS) -> Folds:
-    """Contiguous blocks of time, equally long within a run, the same for all its outputs."""
-    total = sum(len(r.signals.time) for r in problem.dataset.recordings)
-    first, starts, counts = 0, [], []
-    for recording in problem.dataset.recordings:
-        share = max(2, round(wanted * len(recording.signals.time) / total))
-        starts.append(first)
-        counts.append(share)
-        first += share
-    of = tuple(
-        starts[s.run] + (np.arange(s.band.count) * counts[s.run]) // s.band.count
-        for s in problem.segments
-    )
-    return Folds(of, first)
-
-
-def five_blocks(problem: Problem) -> Folds:
-    """Five stretches of time, one after another through all runs."""
-    blocks = blocks_of(problem)
-    return Folds(tuple((b * 5) // blocks.count for b in blocks.of), 5)
-
-
-def groups_of(problem: Problem) -> Folds:
-    """Whole groups of programme and load; with one group only, five blocks of time."""
-    groups = problem.dataset.repeats
-    if len(groups) < 2:
-        return five_blocks(problem)
-    of_run = {run: index for index, group in enumerate(groups) for run in group.runs}
-    of = tuple(np.full(s.band.count, of_run[s.run], dtype=np.intp) for s in problem.segments)
-    return Folds(of, len(groups))
-
-
-def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> float:
-    """Variance of a fold's prediction from the other folds, at most, over the noise's.
-
-    Per output and in its unit, as held-out errors are told: noise that is strongest at low
-    frequencies makes a level or a slope, known from the other folds only, far less sure than
-    whitened rows say.
+    Notes
+    -----
+    Computed per output in its unit: noise that is strongest at low frequencies makes an offset or a
+    drift, which the other folds must determine, less certain than the whitened rows show.
     """
     shared = _shared(fit)
-    columns = _in_time(problem, shared * noise.weight(problem)[:, None])
-    plain = _in_time(problem, shared)
+    columns = _in_time(regression, shared * noise.inverse_sigma(regression)[:, None])
+    plain = _in_time(regression, shared)
     fold = np.concatenate(folds.of)
-    output = np.concatenate([np.full(s.band.count, s.output) for s in problem.segments])
+    output = np.concatenate([np.full(s.band.count, s.output) for s in regression.segments])
     size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
     columns, plain = columns / size, plain / size
     whole = columns.T @ columns
@@ -102,72 +76,92 @@ def extrapolation(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> flo
     return worst
 
 
-def held_out(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Array:
-    """Whitened squares of every fold, predicted with unknowns fitted without it; (folds,).
+def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
+    """Held-out χ² of every fold, its unknowns fitted to the other folds.
 
-    The state in which a run began is its own, whatever is left out.
+    Initial states keep their own run's values, whatever is held out.
+
+    Returns
+    -------
+    ndarray of shape (n_folds,)
     """
-    weight = noise.weight(problem)
-    residual = np.concatenate(problem.in_time(fit.residual * weight))
-    columns = _in_time(problem, _shared(fit) * weight[:, None])
+    inverse_sigma = noise.inverse_sigma(regression)
+    residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
+    columns = _in_time(regression, _shared(fit) * inverse_sigma[:, None])
     fold = np.concatenate(folds.of)
     left = _left_out(residual, columns, fold, folds.count)
     return np.asarray(np.bincount(fold, weights=left**2, minlength=folds.count), dtype=float)
 
 
-def left_out_steps(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> Array:
-    """Change of the unknowns when each fold is left out, linearised; (folds, unknowns)."""
-    weight = noise.weight(problem)
-    residual = np.concatenate(problem.in_time(fit.residual * weight))
-    columns = _in_time(problem, fit.jacobian * weight[:, None])
+def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
+    """Linearised change of the unknowns when each fold is left out.
+
+    Returns
+    -------
+    ndarray of shape (n_folds, n_unknowns)
+    """
+    inverse_sigma = noise.inverse_sigma(regression)
+    residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
+    columns = _in_time(regression, fit.jacobian * inverse_sigma[:, None])
     return _steps(residual, columns, np.concatenate(folds.of), folds.count)
 
 
-def held_out_rms(problem: Problem, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
-    """Held-out error per output, rms in SI."""
-    weight = noise.weight(problem)
-    white = np.concatenate(problem.in_time(fit.residual * weight))
+def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+    """Held-out rms error per output, SI."""
+    inverse_sigma = noise.inverse_sigma(regression)
+    white = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
     shared = _shared(fit)
-    columns = _in_time(problem, shared * weight[:, None])
+    columns = _in_time(regression, shared * inverse_sigma[:, None])
     steps = _steps(white, columns, np.concatenate(folds.of), folds.count)
-    plain = np.concatenate(problem.in_time(fit.residual))
-    plain_columns = _in_time(problem, shared)
+    plain = np.concatenate(regression.in_time(fit.residual))
+    plain_columns = _in_time(regression, shared)
     fold = np.concatenate(folds.of)
     left = plain - np.einsum("ij,ij->i", plain_columns, steps[fold])
-    squares, at = dict.fromkeys(problem.dataset.outputs, 0.0), 0
-    for segment in problem.segments:
+    squares, at = dict.fromkeys(regression.outputs, 0.0), 0
+    for segment in regression.segments:
         part = left[at : at + segment.band.count]
         at += segment.band.count
         squares[segment.output] += float(part @ part)
-    return {o: float(np.sqrt(total / problem.samples(o))) for o, total in squares.items()}
+    return {o: float(np.sqrt(total / regression.n_samples(o))) for o, total in squares.items()}
 
 
-def confidence(before: Array, after: Array) -> float:
-    """Chance (one-sided rank test) that per-fold squares fell from ``before`` to ``after`` by luck.
+def signed_rank_p_value(before: Array, after: Array) -> float:
+    """One-sided p-value of the Wilcoxon signed-rank test that an error decreased.
 
-    Only folds that the change touches at all take part: an effect may live in a few fast ones.
+    Parameters
+    ----------
+    before, after
+        Held-out χ² of every fold with the smaller and the larger model, shape (n_folds,).
+
+    Returns
+    -------
+    float
+        One with fewer than eight folds or no change at all.
+
+    Notes ----- Folds whose change is below 2 % of the largest take no part, unless fewer than eight
+    would remain: an effect may act in a few folds only.
     """
     change = before - after
     size = np.abs(change)
     if size.max() == 0 or len(size) < _AT_LEAST:
         return 1.0
-    # Fewer could not be certain by rank, however much each gains.
+    # With fewer folds the smallest p-value of the rank test would exceed the level.
     touched = change[size >= min(_TOUCHED * size.max(), np.sort(size)[-_AT_LEAST])]
     return float(wilcoxon(touched, alternative="greater").pvalue)
 
 
 def _shared(fit: Fit) -> Array:
-    """Derivatives by the unknowns that all runs share, states left out."""
+    """Derivatives by the unknowns that all runs share, without the initial states."""
     states = sum(len(start) for start in fit.hypothesis.starts)
     return fit.jacobian[:, : fit.jacobian.shape[1] - states]
 
 
-def _in_time(problem: Problem, columns: Array) -> Array:
-    """Columns back in time, (samples, k)."""
-    samples = sum(s.band.count for s in problem.segments)
+def _in_time(regression: Regression, columns: Array) -> Array:
+    """Columns transformed to samples, shape (n_samples, k)."""
+    samples = sum(s.band.count for s in regression.segments)
     out = np.empty((columns.shape[1], samples)).T
     for index, column in enumerate(columns.T):
-        out[:, index] = np.concatenate(problem.in_time(column))
+        out[:, index] = np.concatenate(regression.in_time(column))
     return out
 
 
@@ -177,7 +171,7 @@ def _left_out(residual: Array, columns: Array, fold: NDArray[np.intp], count: in
 
 
 def _steps(residual: Array, columns: Array, fold: NDArray[np.intp], count: int) -> Array:
-    """Change of the unknowns when a fold is left out, (folds, unknowns)."""
+    """Change of the unknowns when a fold is left out, shape (n_folds, n_unknowns)."""
     k = columns.shape[1]
     normal, gradient = np.zeros((count, k, k)), np.zeros((count, k))
     order = np.argsort(fold, kind="stable")

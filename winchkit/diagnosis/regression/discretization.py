@@ -1,47 +1,63 @@
-"""What the sampling of a run may have rounded: effects on a finer motion, less on the samples.
+"""Discretisation error: change of the effects on a motion interpolated between the samples.
 
-Speeds, accelerations and loops are worked out from samples of the motor angle. Between samples a
-fast move is smoother than its differences say, so that the same effect, computed on the motion
-interpolated between the samples, changes the outputs by a little more or less. How much of that
-is right nobody knows: a real winch moves between samples, a simulation may not. So the whole
-difference is what an effect's values, and what it leaves, may be wrong by.
+Velocities, accelerations and hysteresis branches are computed from samples of the motor angle. On
+a four times finer time grid, interpolated by cubic splines, an effect changes the outputs by a
+slightly different amount. Which of the two is right depends on the motion between the samples, so
+the whole difference is taken as a possible error of fitted values and residuals.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.data.dataset import Dataset, Recording
 from winchkit.diagnosis.data.spectrum import to_frequency
+from winchkit.diagnosis.regression.base import Regression, Segment
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.effects.term import modifiers_of
 from winchkit.model.derivatives import is_calmer
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 
-__all__ = ["rounded", "without_rounding"]
+__all__ = ["discretization_error", "without_discretization_error"]
 
 _FINER = 4
 _DEGREE = 3
 
 
-def rounded(problem: Problem, hypothesis: Hypothesis) -> Array:
-    """What the terms add on a motion of finer steps, less what they add on the samples, rows."""
-    out = np.zeros(problem.rows)
-    dataset = problem.dataset
-    if not hypothesis.terms or not dataset.recordings:
+def discretization_error(
+    dataset: Dataset, segments: Sequence[Segment], hypothesis: Hypothesis
+) -> Array:
+    """Change of the effects' outputs on a finer time grid minus that on the samples.
+
+    Parameters
+    ----------
+    dataset
+        Runs of one winch.
+    segments
+        Rows of every output of every run.
+    hypothesis
+        Effects with their values and initial states.
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+    """
+    out = np.zeros(segments[-1].rows.stop)
+    if not hypothesis.terms:
         return out
     moved = [
-        _moved(Line(dataset.profile, modifiers_of(started(hypothesis, run))), recording)
+        _changes(Line(dataset.profile, modifiers_of(started(hypothesis, run))), recording)
         for run, recording in enumerate(dataset.recordings)
     ]
-    for segment in problem.segments:
+    for segment in segments:
         recording = dataset.recordings[segment.run]
         valid = recording.valid[segment.output]
         signal = moved[segment.run].get(segment.output)
@@ -50,26 +66,40 @@ def rounded(problem: Problem, hypothesis: Hypothesis) -> Array:
     return out
 
 
-def without_rounding(problem: Problem, fit: Fit, weight: Array) -> Array:
-    """A fit's residual without the part, between none and all, that rounding explains, rows."""
-    column = rounded(problem, fit.hypothesis)
-    across = _beside(fit.jacobian * weight[:, None], column * weight)
+def without_discretization_error(regression: Regression, fit: Fit, inverse_sigma: Array) -> Array:
+    """Residual minus the share, between zero and one, that the discretisation error explains.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+    """
+    column = regression.discretization_error(fit.hypothesis)
+    across = _beside(fit.jacobian * inverse_sigma[:, None], column * inverse_sigma)
     size = float(across @ across)
     if not size:
         return fit.residual
-    share = float(np.clip(across @ (fit.residual * weight) / size, 0.0, 1.0))
-    return fit.residual - share * across / weight
+    share = float(np.clip(across @ (fit.residual * inverse_sigma) / size, 0.0, 1.0))
+    return fit.residual - share * across / inverse_sigma
 
 
 def _beside(present: Array, column: Array) -> Array:
-    """A column with the present ones projected out; zero where rounding is all that is left."""
-    left = column - present @ np.linalg.lstsq(present, column, rcond=None)[0]
+    """Column with the present ones partialled out; zero where only rounding errors remain."""
+    left = partialled_out(present, column)
     return np.zeros_like(left) if left @ left <= 1e-12 * float(column @ column) else left
 
 
-def _moved(line: Line, recording: Recording) -> dict[str, Array]:
-    """By how much each output changes with a finer motion, at the samples of one run."""
-    fine = _finer(recording, line)
+def _changes(line: Line, recording: Recording) -> dict[str, Array]:
+    """Change of each output with a finer motion, at the samples of one run."""
+    fine = _fine_motion(recording, line)
     if fine is None:
         return {}
     nominal = Line(line.profile).predict(fine)
@@ -81,11 +111,11 @@ def _moved(line: Line, recording: Recording) -> dict[str, Array]:
     }
 
 
-def _finer(recording: Recording, line: Line) -> Motion | None:
-    """A run's calm motion interpolated between its samples.
+def _fine_motion(recording: Recording, line: Line) -> Motion | None:
+    """Denoised motion of a run, interpolated between its samples.
 
-    None where derivatives are not differences of these samples: they were taken before a long run
-    was thinned out, or the drive's own velocity is calmer than the jitter of its time stamps.
+    None where the derivatives are not differences of these samples: they were taken before a long
+    run was decimated, or the drive's own velocity has less noise than the differences.
     """
     signals, smooth = recording.signals, recording.smooth
     if recording.thinned:
@@ -104,7 +134,7 @@ def _finer(recording: Recording, line: Line) -> Motion | None:
     finer = line.motion(Signals(time, angle, fastest=signals.fastest))
     at = replace(
         finer.at,
-        tension=between(smooth.at.tension + _sharper(recording, line)),
+        tension=between(smooth.at.tension + _force_correction(recording, line)),
         temperature=np.interp(there, here, smooth.at.temperature),
     )
     load = None if smooth.load is None else at.tension
@@ -112,17 +142,17 @@ def _finer(recording: Recording, line: Line) -> Motion | None:
     return replace(finer, at=at, load=load, drum_tension=drum_side, load_mass=smooth.load_mass)
 
 
-def _sharper(recording: Recording, line: Line) -> Array:
-    """What differences over a span h have rounded off the rope force, (n,).
+def _force_correction(recording: Recording, line: Line) -> Array:
+    """Force lost by second differences over the span h, shape (n,).
 
-    A second difference of x is its second derivative and h²/12 of the fourth. Only that part of a
-    force counts which follows the rope's acceleration, as a hanging weight does.
+    A second difference of x is x″ + h²/12 · x⁗. Only the part of the force that is proportional to
+    the acceleration of the cable, as of a hanging weight, is corrected.
     """
     signals, tension = recording.signals, recording.smooth.at.tension
     hanging = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
     assert hanging.load is not None
     assert hanging.rounding is not None
-    weight = hanging.load - hanging.load.mean()
-    size = float(weight @ weight)
-    mass = float(weight @ tension) / size if size else 0.0
+    inverse_sigma = hanging.load - hanging.load.mean()
+    size = float(inverse_sigma @ inverse_sigma)
+    mass = float(inverse_sigma @ tension) / size if size else 0.0
     return -mass * hanging.rounding / 12

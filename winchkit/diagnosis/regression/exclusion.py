@@ -1,8 +1,9 @@
-"""Samples that an effect which was found jerks by how much nobody knows.
+"""Exclusion of samples near backlash impacts, which the fitted model does not predict.
 
-Teeth that meet again after a play give the drum its speed at once: how hard that pulls at a hanging
-weight depends on what gives way, and when it was between two samples nobody recorded. Where these
-samples take part, what they leave is taken for ripples and frictions that are not there.
+Where gear teeth meet again after backlash, the drum changes its speed within less than a sampling
+interval. The force then depends on the compliance of the drive train, which is not modelled, and
+on the time between two samples. If these samples are fitted, their residuals are explained by
+spurious ripple and friction.
 """
 
 from __future__ import annotations
@@ -17,25 +18,37 @@ from winchkit.diagnosis.data.transients import around
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.effects.term import Term
 
-__all__ = ["calmed"]
+__all__ = ["without_impacts"]
 
 _FORCES = ("tension", "motor_torque")
 _MOST = 0.25
 
 
-def calmed(dataset: Dataset, found: Hypothesis) -> Dataset | None:
-    """The dataset without force and torque around such samples; None where there are none, or
-    more than a quarter of all.
+def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
+    """Data set without force and torque near impacts of the fitted effects.
+
+    Parameters
+    ----------
+    dataset
+        Runs of one winch.
+    found
+        Fitted hypothesis.
+
+    Returns
+    -------
+    Dataset or None
+        None where no sample is affected, or more than a quarter of all are.
     """
     recordings = tuple(
-        _calmed(recording, started(found, run)) for run, recording in enumerate(dataset.recordings)
+        _without_impacts(recording, started(found, run))
+        for run, recording in enumerate(dataset.recordings)
     )
     if all(a is b for a, b in zip(recordings, dataset.recordings, strict=True)):
         return None
     names = ", ".join(t.label for t in found.terms if t.effect.shakes is not None)
     share = 1 - _compared(recordings) / max(1, _compared(dataset.recordings))
     if share > _MOST:
-        return None  # No few moments: what is left would tell nothing any more.
+        return None  # The remaining samples would not determine the effects.
     note = (
         f"force and torque are not compared in the moments in which {names} jerks them "
         f"({share:.1%} of the samples): how hard depends on what gives way"
@@ -44,20 +57,20 @@ def calmed(dataset: Dataset, found: Hypothesis) -> Dataset | None:
 
 
 def _compared(recordings: Sequence[Recording]) -> int:
-    """Samples of the torque, or of the force where no torque is measured."""
+    """Number of compared samples of the torque, or of the tension where that is missing."""
     valid = [r.valid.get("motor_torque", r.valid.get("tension")) for r in recordings]
     return sum(int(np.count_nonzero(good)) for good in valid if good is not None)
 
 
-def _calmed(recording: Recording, terms: Sequence[Term]) -> Recording:
-    """Without what the terms jerk: the torque, and the tension that a weight makes of it."""
+def _without_impacts(recording: Recording, terms: Sequence[Term]) -> Recording:
+    """Run without torque near impacts and, under a known weight, without tension."""
     at = recording.raw.at
     shaken = np.zeros(len(at.time), dtype=bool)
     for term in terms:
         if term.effect.shakes is not None:
             shaken |= term.effect.shakes(at, term.values)
-    weighed = recording.raw.load_mass is not None
-    left = set(_FORCES if weighed else _FORCES[1:]) & recording.valid.keys()
+    known_weight = recording.raw.load_mass is not None
+    left = set(_FORCES if known_weight else _FORCES[1:]) & recording.valid.keys()
     if not shaken.any() or not left:
         return recording
     near = around(shaken, at.time)

@@ -1,7 +1,16 @@
-"""Generalised least squares: a hypothesis fitted to whitened residuals (Levenberg–Marquardt).
+"""Generalised least squares by the Levenberg-Marquardt method with bounds and several starts.
 
-Own code, because a whitened residual of 10⁵ rows has a handful of unknowns: normal equations
-with a tolerance in units of χ² are ten times quicker here than a general solver.
+The fit minimises χ² = Σ (rᵢ/σᵢ)², the sum of squared whitened residuals. The normal equations are
+solved in scaled form, directions that the data do not determine are left out (truncated
+eigenvalues), and the iteration stops where it would reduce χ² by less than 0.02. With 10⁵ rows and
+a handful of unknowns this is about ten times faster than a general solver.
+
+References
+----------
+Marquardt, D. W. (1963). An algorithm for least-squares estimation of nonlinear parameters. J. Soc.
+Ind. Appl. Math. 11, 431-441.
+Aitken, A. C. (1935). On least squares and linear combination of observations. Proc. R. Soc. Edinb.
+55, 42-48.
 """
 
 from __future__ import annotations
@@ -12,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
 
 __all__ = ["Fit", "fit", "fit_from"]
 
@@ -27,86 +36,131 @@ _PROMISING = 2
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted hypothesis with its whitened residual and derivative."""
+    """A fitted hypothesis.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+        Effects, nuisance parameters and initial states at their fitted values.
+    vector : ndarray of shape (n_unknowns,)
+        The same as a vector of unknowns.
+    residual : ndarray of shape (n_rows,)
+        Measured minus predicted, not whitened.
+    jacobian : ndarray of shape (n_rows, n_unknowns)
+        Derivative of the prediction, not whitened.
+    chi_square : float
+        Sum of squared whitened residuals.
+    n_unknowns : int
+        Number of unknowns.
+    """
 
     hypothesis: Hypothesis
     vector: Array
     residual: Array
-    """Unwhitened, rows."""
     jacobian: Array
-    """Of the prediction, unwhitened, (rows, unknowns)."""
-    cost: float
-    """Sum of whitened squares."""
-    freedom: int
+    chi_square: float
+    n_unknowns: int
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of its terms."""
+        """Labels of the effects."""
         return tuple(term.label for term in self.hypothesis.terms)
 
 
-def fit(problem: Problem, start: Hypothesis, weight: Array, most: int | None = None) -> Fit:
-    """Fit all unknowns from ``start``; ``weight`` is 1/σ per row. Bounds are kept.
+def fit(
+    regression: Regression, start: Hypothesis, inverse_sigma: Array, most: int | None = None
+) -> Fit:
+    """Fit all unknowns within their bounds.
 
-    ``most`` is how many steps it may take, by default as many as are worth walking.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    start
+        Hypothesis at the starting values.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+    most
+        Maximum number of iterations; by default 15, or 40 for an effect whose parameters act by
+        their product.
+
+    Returns
+    -------
+    Fit
+        The best point reached; the fit has converged unless the number of iterations was the limit.
     """
-    x = problem.vector(start)
-    low, high = problem.bounds(start)
+    x = regression.vector(start)
+    low, high = regression.bounds(start)
     x = np.clip(x, low, high)
-    residual = problem.residual(problem.hypothesis(x, start))
-    cost = _cost(residual, weight)
+    residual = regression.residual(regression.hypothesis(x, start))
+    chi_square = _chi_square(residual, inverse_sigma)
     damping = 1e-6
-    jacobian = problem.jacobian(x, start)
+    jacobian = regression.jacobian(x, start)
     for _ in range((_iterations(start) if most is None else most) if len(x) else 0):
         step, promised = _step(
-            jacobian * weight[:, None], residual * weight, damping, x, (low, high)
+            jacobian * inverse_sigma[:, None], residual * inverse_sigma, damping, x, (low, high)
         )
         if promised < _ENOUGH:
             break
         trial = np.clip(x + step, low, high)
-        there = problem.residual(problem.hypothesis(trial, start))
-        new = _cost(there, weight)
-        if new < cost:
-            gained = cost - new
-            x, residual, cost, damping = trial, there, new, damping / 10
-            jacobian = problem.jacobian(x, start)
+        there = regression.residual(regression.hypothesis(trial, start))
+        new = _chi_square(there, inverse_sigma)
+        if new < chi_square:
+            gained = chi_square - new
+            x, residual, chi_square, damping = trial, there, new, damping / 10
+            jacobian = regression.jacobian(x, start)
             if gained < _ENOUGH:
                 break
         else:
             damping = max(damping * 100, 1e-4)
             if damping > 1e6:
                 break
-    fitted = problem.hypothesis(x, start)
-    return Fit(fitted, x, residual, jacobian, cost, len(x))
+    fitted = regression.hypothesis(x, start)
+    return Fit(fitted, x, residual, jacobian, chi_square, len(x))
 
 
-def fit_from(problem: Problem, starts: Sequence[Hypothesis], weight: Array) -> Fit:
-    """The best fit from several starts; after a first look only from the most promising ones."""
+def fit_from(regression: Regression, starts: Sequence[Hypothesis], inverse_sigma: Array) -> Fit:
+    """Fit from several starting values and keep the smallest χ².
+
+    Of more than two starts only the two best after eight iterations are fitted to the end.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    starts
+        Hypotheses of the same effects at several starting values.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+    """
     if len(starts) > _PROMISING:
-        looked = [fit(problem, start, weight, _LOOK) for start in starts]
-        looked.sort(key=lambda fitted: fitted.cost)
+        looked = [fit(regression, start, inverse_sigma, _LOOK) for start in starts]
+        looked.sort(key=lambda fitted: fitted.chi_square)
         starts = [fitted.hypothesis for fitted in looked[:_PROMISING]]
-    return min((fit(problem, start, weight) for start in starts), key=lambda fitted: fitted.cost)
+    return min(
+        (fit(regression, start, inverse_sigma) for start in starts),
+        key=lambda fitted: fitted.chi_square,
+    )
 
 
 def _iterations(start: Hypothesis) -> int:
-    """How many steps a fit may take: more where the last term's unknowns act by their product.
+    """Maximum number of iterations: more where the last effect's parameters act by their product.
 
-    Such a term has probes, since none of its unknowns does anything alone, and its squares lie
-    in a bent valley: walked slowly, worth walking when it is the one that is tried.
+    Such an effect has probes, since none of its parameters changes the prediction alone; χ² then
+    has a curved valley along which the iteration is slow.
     """
     return _PATIENT if start.terms and start.terms[-1].effect.probes else _ITERATIONS
 
 
-def _cost(residual: Array, weight: Array) -> float:
-    whitened = residual * weight
+def _chi_square(residual: Array, inverse_sigma: Array) -> float:
+    whitened = residual * inverse_sigma
     return float(whitened @ whitened)
 
 
 def _step(
     whitened: Array, residual: Array, damping: float, x: Array, bounds: tuple[Array, Array]
 ) -> tuple[Array, float]:
-    """Damped Gauss–Newton step among the unknowns that can move, and the χ² it promises."""
+    """Damped Gauss-Newton step of the unknowns away from their bounds, and its expected Δχ²."""
     low, high = bounds
     gradient = whitened.T @ residual
     normal = whitened.T @ whitened
@@ -118,7 +172,7 @@ def _step(
     inner = normal[np.ix_(free, free)]
     scale = np.sqrt(np.diag(inner))
     scaled = inner / np.outer(scale, scale)
-    # Unknowns that the data cannot tell apart are left where they are: a truncated solution.
+    # Linearly dependent unknowns stay where they are: truncated eigenvalues.
     values, vectors = np.linalg.eigh(scaled)
     kept = values > _FORGET * values[-1]
     along = vectors[:, kept].T @ (gradient[free] / scale)

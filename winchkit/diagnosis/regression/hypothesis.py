@@ -1,4 +1,4 @@
-"""What is held against the runs: terms with their values, nuisances, and initial states."""
+"""A model specification: effects with values, nuisance parameters and initial states."""
 
 from __future__ import annotations
 
@@ -11,31 +11,39 @@ from winchkit.effects.term import Term
 __all__ = ["START", "Hypothesis", "started"]
 
 START = "start"
-"""Parameter of an effect with memory that says in which state a run begins."""
+"""Parameter of an effect with memory: its state at the start of a run."""
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Terms with their values, nuisances, and initial states."""
+    """A model specification.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        Effects with their values.
+    nuisances : tuple of float
+        One per nuisance column of the regression; empty means zero.
+    starts : tuple of tuple of float
+        Per effect its initial state in every run; empty for an effect without memory.
+    """
 
     terms: tuple[Term, ...] = ()
     nuisances: tuple[float, ...] = ()
-    """One per column of the problem's ``nuisance_columns``; none is all zero."""
     starts: tuple[tuple[float, ...], ...] = ()
-    """Per term: one initial state per run where it has memory, else nothing."""
 
     def with_term(self, term: Term, runs: int) -> Hypothesis:
-        """With one term more."""
+        """Hypothesis with one effect more, its initial states at zero."""
         remembers = term.effect.memory and START in term.values
         start = (0.0,) * runs if remembers else ()
         return replace(self, terms=(*self.terms, term), starts=(*self.starts, start))
 
     def with_law(self, effect: Effect) -> Hypothesis:
-        """With another effect at the values of the last term."""
+        """Hypothesis with another effect at the values of the last one."""
         return replace(self, terms=(*self.terms[:-1], Term(effect, self.terms[-1].values)))
 
     def without(self, index: int) -> Hypothesis:
-        """With one term less."""
+        """Hypothesis with one effect less."""
         keep = [i for i in range(len(self.terms)) if i != index]
         return replace(
             self,
@@ -45,7 +53,7 @@ class Hypothesis:
 
 
 def started(hypothesis: Hypothesis, run: int) -> Sequence[Term]:
-    """Terms with the initial states of one run."""
+    """Effects with the initial states of one run."""
     out = []
     for term, start in zip(hypothesis.terms, hypothesis.starts, strict=True):
         values: Mapping[str, float] = term.values

@@ -1,12 +1,20 @@
-"""How sure fitted values are: profile likelihood, widened by what a likelihood does not know.
+"""95 % intervals of fitted values: profile likelihood, widened for what a likelihood leaves out.
 
-A likelihood believes the model and the noise. So its 95 % interval is widened
+The profile-likelihood interval assumes that model and noise variance are right. It is widened
 
-- to the block jackknife's, where blocks of time vary by more than the noise says;
-- by half of what parts of the data (outputs, groups of runs) contradict each other, where they do;
-- by what the sampling of the runs may have rounded.
+- to the interval of the block jackknife, where blocks of time vary by more than the noise;
+- by half of the contradiction between parts of the data (outputs, groups of runs);
+- by the discretisation error.
 
-Never the covariance of independent residuals: they are correlated.
+The covariance of independent residuals is not used: residuals are correlated. The intervals are not
+conditional on the selection of the model.
+
+References
+----------
+Venzon, D. J., Moolgavkar, S. H. (1988). A method for computing profile-likelihood-based confidence
+intervals. Appl. Stat. 37, 87-94.
+Künsch, H. R. (1989). The jackknife and the bootstrap for general stationary observations. Ann.
+Stat. 17, 1217-1241.
 """
 
 from __future__ import annotations
@@ -18,11 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.cross_validation import Folds, left_out_steps
-from winchkit.diagnosis.regression.discretization import rounded
+from winchkit.diagnosis.regression.base import Folds, Regression
+from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.results import Estimate
 from winchkit.effects.effect import Parameter
 from winchkit.effects.parametrization import Coordinates
@@ -41,110 +48,152 @@ _FARTHEST = 4.0
 
 
 def profile_ends(
-    problem: Problem, fit: Fit, weight: Array, covariance: Array, reach: Array
+    regression: Regression, fit: Fit, inverse_sigma: Array, covariance: Array, reach: Array
 ) -> tuple[Array, Array]:
-    """Where the whitened squares have risen by ``reach``² with all else refitted; two (unknowns,).
+    """Ends of profile-likelihood intervals of the effects' unknowns.
 
-    ``weight`` is 1/σ per row, ``covariance`` (unknowns, unknowns) that of the linearised fit,
-    ``reach`` (unknowns,) in its standard deviations. Only the coordinates of terms are moved:
-    nuisances are linear, and nobody asks for the state in which a run began.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+    covariance
+        Covariance of the linearised fit, shape (n_unknowns, n_unknowns).
+    reach
+        Square root of the rise of χ² at the ends, shape (n_unknowns,).
+
+    Returns
+    -------
+    low, high : ndarray of shape (n_unknowns,)
+        Nuisance parameters, which are linear, and initial states have symmetric ends.
     """
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     low, high = fit.vector - reach * deviation, fit.vector + reach * deviation
-    bounds = problem.bounds(fit.hypothesis)
-    first = problem.nuisance_columns.shape[1]
+    bounds = regression.bounds(fit.hypothesis)
+    first = regression.nuisance_columns.shape[1]
     states = sum(len(start) for start in fit.hypothesis.starts)
     for index in range(first, len(fit.vector) - states):
         if deviation[index] > 0.0:
-            walk = _Walk(problem, fit, weight, covariance, index)
+            walk = _Walk(regression, fit, inverse_sigma, covariance, index)
             low[index] = fit.vector[index] - walk.length(-1.0, reach[index])
             high[index] = fit.vector[index] + walk.length(1.0, reach[index])
     return np.clip(low, *bounds), np.clip(high, *bounds)
 
 
 class _Walk:
-    """Away from a fit along one unknown, the others following."""
+    """Profile of χ² along one unknown, the others refitted by one linear step."""
 
     def __init__(
-        self, problem: Problem, fit: Fit, weight: Array, covariance: Array, index: int
+        self, regression: Regression, fit: Fit, inverse_sigma: Array, covariance: Array, index: int
     ) -> None:
-        self._problem, self._fit, self._weight, self._index = problem, fit, weight, index
+        self._regression, self._fit, self._inverse_sigma, self._index = (
+            regression,
+            fit,
+            inverse_sigma,
+            index,
+        )
         self._deviation = float(np.sqrt(covariance[index, index]))
         self._along = covariance[:, index] / covariance[index, index]
         others = np.arange(len(covariance)) != index
-        whitened = fit.jacobian[:, others] * weight[:, None]
+        whitened = fit.jacobian[:, others] * inverse_sigma[:, None]
         normal = np.linalg.pinv(whitened.T @ whitened, rcond=1e-12, hermitian=True)
         self._others, self._whitened, self._normal = others, whitened, normal
-        self._bounds = problem.bounds(fit.hypothesis)
+        self._bounds = regression.bounds(fit.hypothesis)
 
     def length(self, side: float, reach: float) -> float:
-        """How far one may go, in the unknown's coordinate."""
+        """Distance from the fit at which χ² has risen by ``reach``²."""
         usual = reach * self._deviation
         wanted, far = reach**2, usual
         for _ in range(_SEARCHES):
             risen = self._risen(side * far, wanted)
             if abs(risen / wanted - 1) < _LINEAR:
                 break
-            # Squares rise with the square of the way, or nearly so.
+            # χ² rises approximately with the square of the distance.
             far *= float(np.clip(np.sqrt(wanted / max(risen, 1e-9)), 0.3, 2.0))
             if far > _FARTHEST * usual:
                 return _FARTHEST * usual
         return far
 
     def _risen(self, moved: float, wanted: float) -> float:
-        """By how much the whitened squares rise, the others corrected once where it matters."""
+        """Rise of χ², the other unknowns corrected once where it exceeds the target."""
         low, high = self._bounds
         vector = np.clip(self._fit.vector + moved * self._along, low, high)
         residual = self._residual(vector)
-        risen = float(residual @ residual) - self._fit.cost
+        risen = float(residual @ residual) - self._fit.chi_square
         if risen < (1 + _LINEAR) * wanted:
             return risen
         step = np.zeros_like(vector)
         step[self._others] = self._normal @ (self._whitened.T @ residual)
         corrected = self._residual(np.clip(vector + step, low, high))
-        return min(risen, float(corrected @ corrected) - self._fit.cost)
+        return min(risen, float(corrected @ corrected) - self._fit.chi_square)
 
     def _residual(self, vector: Array) -> Array:
         like = self._fit.hypothesis
-        return self._problem.residual(self._problem.hypothesis(vector, like)) * self._weight
+        return (
+            self._regression.residual(self._regression.hypothesis(vector, like))
+            * self._inverse_sigma
+        )
 
 
 _95 = 1.959964
 _CONTRADICTS = 3.5
 _LEAST_SAY = 1e-3
 _NOTHING = 1e6
-"""Of its usual size: an unknown that may be off by as much is not known at all."""
+"""In units of the usual size: an unknown with a larger standard deviation is undetermined."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """How far every unknown of a fit may be off, in the coordinates of the fit."""
+    """Uncertainty of every unknown of a fit, in the coordinates of the fit.
+
+    Attributes
+    ----------
+    std : ndarray of shape (n_unknowns,)
+        Standard deviation.
+    low, high : ndarray of shape (n_unknowns,)
+        Ends of the 95 % interval.
+    """
 
     std: Array
-    """(unknowns,)."""
     low: Array
-    """Lower ends of 95 % intervals, (unknowns,)."""
     high: Array
 
 
-def spread_of(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
-    """Standard deviations and 95 % intervals of every unknown."""
-    weight = noise.weight(problem)
-    whitened = fit.jacobian * weight[:, None]
+def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
+    """Standard deviations and 95 % intervals of every unknown.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    noise
+        Noise variance.
+    blocks
+        Blocks of time for the jackknife.
+    """
+    inverse_sigma = noise.inverse_sigma(regression)
+    whitened = fit.jacobian * inverse_sigma[:, None]
     normal = whitened.T @ whitened
     covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    statistical = np.maximum(likelihood, _jackknife(problem, fit, noise, blocks))
+    statistical = np.maximum(likelihood, _jackknife(regression, fit, noise, blocks))
     unknown = (statistical > _NOTHING) | (np.diag(normal) == 0.0)
     covariance[unknown] = covariance[:, unknown] = likelihood[unknown] = 0.0
     statistical[unknown] = _NOTHING
-    shift = covariance @ (whitened.T @ (rounded(problem, fit.hypothesis) * weight))
-    contradiction = _contradiction(problem, whitened, fit.residual * weight, covariance)
+    shift = covariance @ (
+        whitened.T @ (regression.discretization_error(fit.hypothesis) * inverse_sigma)
+    )
+    contradiction = _contradiction(regression, whitened, fit.residual * inverse_sigma, covariance)
     systematic = np.hypot(shift, contradiction)
     wider = np.divide(
         statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
     )
-    low, high = profile_ends(problem, fit, weight, covariance, _95 * wider)
+    low, high = profile_ends(regression, fit, inverse_sigma, covariance, _95 * wider)
     below, above = (
         np.where(unknown, _NOTHING, way) for way in (fit.vector - low, high - fit.vector)
     )
@@ -155,22 +204,25 @@ def spread_of(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Spread
     )
 
 
-def _jackknife(problem: Problem, fit: Fit, noise: Noise, blocks: Folds) -> Array:
-    """Standard deviation of every unknown from leaving out each block of time."""
-    steps = left_out_steps(problem, fit, noise, blocks)
+def _jackknife(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Array:
+    """Standard deviation of every unknown by the delete-a-block jackknife."""
+    steps = left_out_steps(regression, fit, noise, blocks)
     n = blocks.count
     return np.asarray(np.sqrt((n - 1) / n * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
 
 
-def _contradiction(problem: Problem, whitened: Array, residual: Array, covariance: Array) -> Array:
-    """Half of the largest difference between what a part and the rest of the data say.
+def _contradiction(
+    regression: Regression, whitened: Array, residual: Array, covariance: Array
+) -> Array:
+    """Half of the largest difference between the estimates from a part of the data and the rest.
 
-    Zero where noise alone may have made it. A part's pull on an unknown u = C Jᵀr, of say
-    w = (C N C)/C, is w (1 − w) times the difference of what it and the rest would have found.
+    Zero where the difference is below 3.5 standard deviations. A part with the normal matrix N
+    changes an unknown by u = C Jᵀr, where C is the covariance of the fit; with the weight w = (C N
+    C)/C the estimates of part and rest differ by u/(w(1 − w)).
     """
     out = np.zeros(len(covariance))
     variance = np.maximum(np.diag(covariance), 1e-300)
-    for part in _parts(problem):
+    for part in _parts(regression):
         own = whitened[part]
         normal = own.T @ own
         pull = covariance @ (own.T @ residual[part])
@@ -184,21 +236,36 @@ def _contradiction(problem: Problem, whitened: Array, residual: Array, covarianc
     return out
 
 
-def _parts(problem: Problem) -> Iterator[NDArray[np.intp]]:
+def _parts(regression: Regression) -> Iterator[NDArray[np.intp]]:
     """Rows of each output, and of each group of programme and load, where there are several."""
-    groups = {run: i for i, group in enumerate(problem.dataset.repeats) for run in group.runs}
-    for key in (lambda s: s.output, lambda s: groups[s.run]):
-        kinds = dict.fromkeys(key(s) for s in problem.segments)
+    by_output = [s.output for s in regression.segments]
+    by_group = [str(regression.group_of_run[s.run]) for s in regression.segments]
+    for keys in (by_output, by_group):
+        kinds = dict.fromkeys(keys)
         for kind in kinds if len(kinds) > 1 else ():
             rows = [
-                np.arange(s.rows.start, s.rows.stop) for s in problem.segments if key(s) == kind
+                np.arange(s.rows.start, s.rows.stop)
+                for s, key in zip(regression.segments, keys, strict=True)
+                if key == kind
             ]
             yield np.concatenate(rows)
 
 
-def estimates(problem: Problem, fit: Fit, spread: Spread) -> list[tuple[Term, dict[str, Estimate]]]:
-    """Every term of a fit with its values, standard deviations, 95 % intervals and units."""
-    at = problem.nuisance_columns.shape[1]
+def estimates(
+    regression: Regression, fit: Fit, spread: Spread
+) -> list[tuple[Term, dict[str, Estimate]]]:
+    """Values of every effect of a fit with standard deviations, 95 % intervals and units.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    spread
+        Uncertainty of its unknowns.
+    """
+    at = regression.nuisance_columns.shape[1]
     out = []
     for term in fit.hypothesis.terms:
         coordinates = Coordinates(term.effect)
@@ -223,7 +290,7 @@ def estimates(problem: Problem, fit: Fit, spread: Spread) -> list[tuple[Term, di
 def _ends(
     coordinates: Coordinates, vector: Array, ends: tuple[Array, Array], base: Mapping[str, float]
 ) -> dict[str, tuple[float, float]]:
-    """Intervals of values with a coordinate of their own; an amplitude with a phase has none."""
+    """Intervals of the values with a coordinate of their own; a polar pair has none."""
     out: dict[str, tuple[float, float]] = {}
     for index, name in enumerate(coordinates.names):
         if name in (coordinates.effect.polar or ()):
@@ -243,7 +310,7 @@ def _estimate(
     deviation: Mapping[str, float],
     ends: tuple[float, float] | None,
 ) -> Estimate:
-    """A value; how sure is NaN where the data leave it anywhere within its bounds."""
+    """Estimate of a value; NaN standard deviation where the interval covers its bounds."""
     std = deviation.get(parameter.name, 0.0)
     if std >= parameter.high - parameter.low:
         return Estimate(value, float("nan"), parameter.unit)

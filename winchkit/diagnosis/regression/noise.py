@@ -1,8 +1,15 @@
-"""The noise of the instruments, from repeats; and whether anything else is there.
+"""Noise spectrum: variance of every frequency band, from repeats or from the saturated model.
 
-Differences of two repeats' residuals hold noise only; their mean holds noise and whatever the
-model lacks. Per band of frequency the two powers are compared (F test), after what differs
-between repeats for known reasons, such as the temperature, is taken out.
+With repeats the variance is estimated from pure error: Helmert contrasts of the residuals of
+repeated runs contain noise only. The log power over the bands is then smoothed by a penalised
+Whittle likelihood. Without repeats the variance is that of the residual beside all candidate
+effects at once (saturated model), which counts an effect outside the catalogue as noise.
+
+References
+----------
+Draper, N. R., Smith, H. (1998). Applied Regression Analysis, 3rd ed., ch. 2 (pure error).
+Pawitan, Y., O'Sullivan, F. (1994). Nonparametric spectral density estimation using penalized
+Whittle likelihood. J. Am. Stat. Assoc. 89, 600-610.
 """
 
 from __future__ import annotations
@@ -12,14 +19,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
-from scipy.stats import f as f_distribution
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.data.spectrum import smoothed
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.projection import orthonormal
 
-__all__ = ["Noise", "Presence", "noise_from_repeats", "noise_saturated", "orthonormal", "presence"]
+__all__ = [
+    "Noise",
+    "noise_from_repeats",
+    "noise_saturated",
+    "replicate_contrasts",
+    "replicate_rms",
+    "sums_per_band",
+]
 
 _KNOWN_DIFFERENCES = 6
 _NOTICEABLE = 0.02
@@ -29,50 +43,59 @@ _ROWS_EACH = 4
 
 @dataclass(frozen=True)
 class Noise:
-    """Power of the noise per band, and how well it is known."""
+    """Variance of the noise per band.
+
+    Attributes
+    ----------
+    power : ndarray of shape (n_bands,)
+        Variance of a spectral coefficient.
+    dof : ndarray of shape (n_bands,)
+        Degrees of freedom of each variance estimate.
+    rms : dict of str to float
+        Rms of the noise per output, in time, SI.
+    from_repeats : bool
+        Whether the variance is pure error; else it is that of the saturated model.
+    """
 
     power: Array
-    """Variance of a coefficient, (bands,)."""
-    freedom: Array
-    """Degrees of freedom of each estimate, (bands,)."""
+    dof: Array
     rms: dict[str, float]
-    """Per output, in time, SI."""
     from_repeats: bool
 
-    def weight(self, problem: Problem) -> Array:
-        """1/σ of every row."""
-        return np.asarray(1 / np.sqrt(self.power[problem.band_of_row]))
+    def inverse_sigma(self, regression: Regression) -> Array:
+        """1/σ of every row, shape (n_rows,)."""
+        return np.asarray(1 / np.sqrt(self.power[regression.band_of_row]))
 
-    def uncertainty(self, problem: Problem) -> dict[str, float]:
-        """By how much (relative, two deviations) mean squares may exceed the noise's by chance.
+    def uncertainty(self, regression: Regression) -> dict[str, float]:
+        """Relative uncertainty (two standard deviations) of the mean square per output.
 
-        Coloured noise has few independent values: most of its power is in its lowest bands.
+        Coloured noise has few independent values: most of its power lies in the lowest bands.
         """
-        rows = _sums(np.ones(problem.rows), problem.band_of_row, len(self.power))
+        rows = sums_per_band(np.ones(regression.n_rows), regression.band_of_row, len(self.power))
         total, spread = self.power * rows, (self.power * rows) ** 2
         out = {}
         for output in self.rms:
-            own = np.array([band[0] == output for band in problem.bands])
-            variance = 2 * np.sum((spread * (1 / self.freedom + 1 / np.maximum(rows, 1.0)))[own])
+            own = np.array([band[0] == output for band in regression.bands])
+            variance = 2 * np.sum((spread * (1 / self.dof + 1 / np.maximum(rows, 1.0)))[own])
             out[output] = float(2 * np.sqrt(variance) / np.sum(total[own]))
         return out
 
 
 @dataclass(frozen=True)
-class Presence:
-    """Whether the residual holds more than noise, and in which bands."""
+class ReplicateContrasts:
+    """Differences and means of repeated runs, in frequency.
 
-    p_value: float
-    """After Bonferroni over all bands; NaN without repeats."""
-    excess: Array
-    """Power beyond the noise, in units of one coefficient's noise power, (bands,)."""
-    rejected: NDArray[np.bool_]
-    """Bands in which noise alone is refused at 5 % over all."""
-
-
-@dataclass(frozen=True)
-class _Split:
-    """One vector over all repeats: differences and means with their bands."""
+    Attributes
+    ----------
+    difference : ndarray of shape (n_differences,)
+        Helmert contrasts of the repeats of every group and output.
+    difference_band : ndarray of int, shape (n_differences,)
+        Noise band of every contrast.
+    mean : ndarray of shape (n_means,)
+        Mean of the repeats, scaled to the variance of one run.
+    mean_band : ndarray of int, shape (n_means,)
+        Noise band of every mean.
+    """
 
     difference: Array
     difference_band: NDArray[np.intp]
@@ -81,86 +104,107 @@ class _Split:
 
 
 def noise_from_repeats(
-    problem: Problem, residual: Array, known: Array, own: Array | None = None
+    regression: Regression, residual: Array, known: Array, own: Array | None = None
 ) -> Noise:
-    """Noise power from differences of repeats.
+    """Noise variance from the contrasts of repeated runs (pure error).
 
-    ``known`` (rows, k) are signatures that may differ between repeats; their differences are
-    projected out where they are noticeable. ``own`` (rows, m) are derivatives by unknowns that
-    each run has for itself: as much of a difference as they may have taken is no noise's lack.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    known
+        Signatures that may differ between repeats for a measured reason, such as the temperature,
+        shape (n_rows, k). Their contrasts are projected out where they are noticeable.
+    own
+        Derivatives by unknowns that every run has for itself, shape (n_rows, m). Their contrasts
+        are projected out and their degrees of freedom subtracted.
     """
-    split = _split(problem, residual)
-    count = len(problem.bands)
-    freedom = _sums(np.ones_like(split.difference), split.difference_band, count)
-    power = _power(problem, split.difference, split.difference_band, freedom)
-    whole = freedom
-    taken = _differences(problem, own)
+    split = replicate_contrasts(regression, residual)
+    count = len(regression.bands)
+    dof = sums_per_band(np.ones_like(split.difference), split.difference_band, count)
+    power = _power(regression, split.difference, split.difference_band, dof)
+    whole = dof
+    taken = _differences(regression, own)
     for _ in range(_REWEIGHTED if known.size or taken.size else 0):
-        # What differs for a known reason made the first weights: they are drawn anew without it.
-        weight = 1 / np.sqrt(_smooth(problem, power, np.maximum(freedom, 0.1))[0])
-        weight = weight[split.difference_band]
-        basis = _noticeable(problem, known, weight)
+        # The first weights include the known differences: they are computed again without them.
+        inverse_sigma = 1 / np.sqrt(_smooth(regression, power, np.maximum(dof, 0.1))[0])
+        inverse_sigma = inverse_sigma[split.difference_band]
+        basis = _noticeable(regression, known, inverse_sigma)
         if taken.size:
-            basis = orthonormal(np.hstack([basis, taken * weight[:, None]]))
-        whitened = split.difference * weight
-        left = (whitened - basis @ (basis.T @ whitened)) / weight
-        freedom = whole - _sums(np.sum(basis**2, axis=1), split.difference_band, count)
-        power = _power(problem, left, split.difference_band, np.maximum(freedom, 1.0))
-    power, freedom = _smooth(problem, power, np.maximum(freedom, 0.1))
-    return Noise(power, freedom, _rms(problem, power), from_repeats=True)
+            basis = orthonormal(np.hstack([basis, taken * inverse_sigma[:, None]]))
+        whitened = split.difference * inverse_sigma
+        left = (whitened - basis @ (basis.T @ whitened)) / inverse_sigma
+        dof = whole - sums_per_band(np.sum(basis**2, axis=1), split.difference_band, count)
+        power = _power(regression, left, split.difference_band, np.maximum(dof, 1.0))
+    power, dof = _smooth(regression, power, np.maximum(dof, 0.1))
+    return Noise(power, dof, _rms(regression, power), from_repeats=True)
 
 
-def noise_saturated(problem: Problem, residual: Array, columns: Array) -> Noise:
-    """Noise power as what no effect of the catalogue can explain: without repeats.
+def noise_saturated(regression: Regression, residual: Array, columns: Array) -> Noise:
+    """Noise variance of the residual beside all candidate effects (saturated model).
 
-    It begins with even weights: weights from the residual itself would trust least the very
-    frequencies in which something is missing. An effect outside the catalogue is taken for noise
-    here, so that it cannot be excluded.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    columns
+        Derivatives by the unknowns and signatures of all candidates, shape (n_rows, p).
+
+    Notes
+    -----
+    The first weights are equal within an output: weights from the residual itself would be smallest
+    at the frequencies at which an effect is missing. Three iterations of reweighting follow. An
+    effect outside the catalogue is counted as noise.
     """
-    count = len(problem.bands)
-    bands = problem.band_of_row
-    total = _sums(np.ones(problem.rows), bands, count)
-    power = _even(problem, residual)
+    count = len(regression.bands)
+    bands = regression.band_of_row
+    total = sums_per_band(np.ones(regression.n_rows), bands, count)
+    power = _even(regression, residual)
     for _ in range(_REWEIGHTED):
-        weight = 1 / np.sqrt(power[bands])
-        basis = orthonormal(columns * weight[:, None], _fewest_rows(problem) // _ROWS_EACH)
-        whitened = residual * weight
-        left = (whitened - basis @ (basis.T @ whitened)) / weight
-        freedom = np.maximum(total - _sums(np.sum(basis**2, axis=1), bands, count), 1.0)
-        power = _power(problem, left, bands, freedom)
-    return Noise(power, freedom, _rms(problem, power), from_repeats=False)
+        inverse_sigma = 1 / np.sqrt(power[bands])
+        basis = orthonormal(
+            columns * inverse_sigma[:, None], _fewest_rows(regression) // _ROWS_EACH
+        )
+        whitened = residual * inverse_sigma
+        left = (whitened - basis @ (basis.T @ whitened)) / inverse_sigma
+        dof = np.maximum(total - sums_per_band(np.sum(basis**2, axis=1), bands, count), 1.0)
+        power = _power(regression, left, bands, dof)
+    return Noise(power, dof, _rms(regression, power), from_repeats=False)
 
 
-def presence(problem: Problem, residual: Array, jacobian: Array, noise: Noise) -> Presence:
-    """F test of the repeats' mean against the noise, band by band."""
-    count = len(problem.bands)
-    if not noise.from_repeats:
-        nothing = np.zeros(count)
-        return Presence(float("nan"), nothing, nothing.astype(bool))
-    split = _split(problem, residual)
-    total = _sums(split.mean**2, split.mean_band, count)
-    freedom = _sums(np.ones_like(split.mean), split.mean_band, count)
-    basis = orthonormal(jacobian * noise.weight(problem)[:, None])
-    # Each fitted unknown takes one degree of freedom from where it has leverage.
-    taken = _sums(np.sum(basis**2, axis=1), problem.band_of_row, count)
-    freedom = np.maximum(freedom - taken, 1.0)
-    ratio = total / freedom / noise.power
-    p = np.asarray(f_distribution.sf(ratio, freedom, noise.freedom))
-    tested = max(count, 1)
-    worst = float(min(1.0, p.min() * tested)) if count else 1.0
-    return Presence(worst, total / noise.power - freedom, p * tested < 0.05)
+def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
+    """Rms of the contrasts of repeats per output, SI; empty without repeats."""
+    times = {
+        (s.run, s.output): time
+        for s, time in zip(regression.segments, regression.in_time(residual), strict=True)
+    }
+    squares: dict[str, list[Array]] = {}
+    for group in regression.replicates:
+        for output in regression.outputs:
+            if all((run, output) in times for run in group.runs):
+                aligned = [
+                    times[run, output][rows]
+                    for run, rows in zip(group.runs, group.rows, strict=True)
+                ]
+                squares.setdefault(output, []).append(contrasts(np.array(aligned))[1].ravel() ** 2)
+    return {o: float(np.sqrt(np.mean(np.concatenate(parts)))) for o, parts in squares.items()}
 
 
-def _split(problem: Problem, rows: Array) -> _Split:
-    """Differences and means of repeats, transformed anew on their common samples."""
+def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContrasts:
+    """Contrasts and means of repeats, transformed again on their common samples."""
     times = dict(
-        zip(((s.run, s.output) for s in problem.segments), problem.in_time(rows), strict=True)
+        zip(((s.run, s.output) for s in regression.segments), regression.in_time(rows), strict=True)
     )
-    edges = _edges(problem)
+    edges = _edges(regression)
     parts: tuple[list[Array], list[Array]] = ([], [])
     bands: tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]] = ([], [])
-    for group in problem.dataset.repeated:
-        for output in problem.dataset.outputs:
+    bands_of = {(s.run, s.output): s.band for s in regression.segments}
+    for group in regression.replicates:
+        for output in regression.outputs:
             if any((run, output) not in times for run in group.runs):
                 continue
             aligned = np.array(
@@ -170,7 +214,7 @@ def _split(problem: Problem, rows: Array) -> _Split:
                 ]
             )
             mean, differences = contrasts(aligned)
-            band = replace(problem.dataset.recordings[group.runs[0]].bands[output], count=len(mean))
+            band = replace(bands_of[group.runs[0], output], count=len(mean))
             frequency = band.frequency
             kept = slice(len(frequency))
             first, own = edges[output]
@@ -180,7 +224,7 @@ def _split(problem: Problem, rows: Array) -> _Split:
             bands[0].append(np.tile(ids, len(spectra)))
             parts[1].append(np.asarray(dct(mean, type=2, norm="ortho"))[kept])
             bands[1].append(ids)
-    return _Split(
+    return ReplicateContrasts(
         np.concatenate(parts[0]),
         np.concatenate(bands[0]),
         np.concatenate(parts[1]),
@@ -188,105 +232,89 @@ def _split(problem: Problem, rows: Array) -> _Split:
     )
 
 
-def _edges(problem: Problem) -> dict[str, tuple[int, Array]]:
-    """Per output the number of its first band, and its edges from minus to plus infinity."""
+def _edges(regression: Regression) -> dict[str, tuple[int, Array]]:
+    """Number of the first band of every output, and its edges with infinite ends."""
     out: dict[str, tuple[int, Array]] = {}
-    for output in problem.dataset.outputs:
-        own = [i for i, band in enumerate(problem.bands) if band[0] == output]
-        inner = [problem.bands[i][1] for i in own[1:]]
+    for output in regression.outputs:
+        own = [i for i, band in enumerate(regression.bands) if band[0] == output]
+        inner = [regression.bands[i][1] for i in own[1:]]
         out[output] = own[0], np.array([-np.inf, *inner, np.inf])
     return out
 
 
-def _differences(problem: Problem, columns: Array | None) -> Array:
-    """What of columns differs between repeats, (differences, m)."""
+def _differences(regression: Regression, columns: Array | None) -> Array:
+    """Contrasts of columns, shape (n_differences, m)."""
     if columns is None or not columns.size:
         return np.zeros((0, 0))
-    return np.array([_split(problem, column).difference for column in columns.T]).T
+    return np.array([replicate_contrasts(regression, column).difference for column in columns.T]).T
 
 
-def _noticeable(problem: Problem, known: Array, weight: Array) -> Array:
-    """Orthonormal directions in which known signatures differ between repeats."""
+def _noticeable(regression: Regression, known: Array, inverse_sigma: Array) -> Array:
+    """Orthonormal directions in which known signatures differ noticeably between repeats."""
     different = []
     for column in known.T:
-        split = _split(problem, column)
-        whitened = split.difference * weight
-        mean = split.mean / np.sqrt(_nearest(weight, split))
+        split = replicate_contrasts(regression, column)
+        whitened = split.difference * inverse_sigma
+        mean = split.mean / np.sqrt(_nearest(inverse_sigma, split))
         if whitened @ whitened > _NOTICEABLE * float(mean @ mean):
             different.append(whitened / np.sqrt(whitened @ whitened))
     if not different:
-        return np.zeros((len(weight), 0))
+        return np.zeros((len(inverse_sigma), 0))
     left, size, _ = np.linalg.svd(np.array(different).T, full_matrices=False)
     return np.asarray(left[:, :_KNOWN_DIFFERENCES][:, size[:_KNOWN_DIFFERENCES] > 0.1])
 
 
-def _nearest(weight: Array, split: _Split) -> Array:
-    """Noise power of the mean's rows, from that of the differences' bands."""
+def _nearest(inverse_sigma: Array, split: ReplicateContrasts) -> Array:
+    """Noise variance of the mean's rows, from the bands of the contrasts."""
     count = int(max(split.mean_band.max(), split.difference_band.max())) + 1
     power = np.ones(count)
-    power[split.difference_band] = 1 / weight**2
+    power[split.difference_band] = 1 / inverse_sigma**2
     return power[split.mean_band]
 
 
-def _fewest_rows(problem: Problem) -> int:
-    """Rows of the output that has fewest."""
-    rows = dict.fromkeys(problem.dataset.outputs, 0)
-    for segment in problem.segments:
+def _fewest_rows(regression: Regression) -> int:
+    """Number of rows of the output with the fewest."""
+    rows = dict.fromkeys(regression.outputs, 0)
+    for segment in regression.segments:
         rows[segment.output] += len(segment.band.frequency)
     return min(rows.values())
 
 
-def orthonormal(columns: Array, most: int | None = None) -> Array:
-    """Orthonormal basis of columns, those that add nothing left out; (rows, rank).
-
-    Of more than ``most`` directions the strongest are kept: as many columns as a short run has
-    rows would leave no noise at all.
-    """
-    size = np.sqrt(np.sum(columns**2, axis=0))
-    scaled = columns[:, size > 0] / size[size > 0]
-    if not scaled.shape[1]:
-        return np.zeros((len(columns), 0))
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    kept = values > 1e-8 * values[-1]
-    if most is not None:
-        kept[: max(0, len(values) - most)] = False
-    return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
-
-
-def _sums(values: Array, bands: NDArray[np.intp], count: int) -> Array:
+def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
+    """Sums of values per noise band, shape (count,)."""
     return np.asarray(np.bincount(bands, weights=values, minlength=count))
 
 
-def _smooth(problem: Problem, power: Array, freedom: Array) -> tuple[Array, Array]:
-    """Every output's spectrum smoothed over its bands."""
-    power, freedom = power.copy(), freedom.copy()
-    for output in problem.dataset.outputs:
-        own = np.array([band[0] == output for band in problem.bands])
-        power[own], freedom[own] = smoothed(power[own], freedom[own])
-    return power, freedom
+def _smooth(regression: Regression, power: Array, dof: Array) -> tuple[Array, Array]:
+    """Spectrum of every output smoothed over its bands."""
+    power, dof = power.copy(), dof.copy()
+    for output in regression.outputs:
+        own = np.array([band[0] == output for band in regression.bands])
+        power[own], dof[own] = smoothed(power[own], dof[own])
+    return power, dof
 
 
-def _even(problem: Problem, residual: Array) -> Array:
-    """One power per output, the same in all its bands."""
-    out = np.empty(len(problem.bands))
-    for output in problem.dataset.outputs:
-        rows = np.concatenate([residual[s.rows] for s in problem.segments if s.output == output])
-        own = [band[0] == output for band in problem.bands]
+def _even(regression: Regression, residual: Array) -> Array:
+    """One variance per output, the same in all its bands."""
+    out = np.empty(len(regression.bands))
+    for output in regression.outputs:
+        rows = np.concatenate([residual[s.rows] for s in regression.segments if s.output == output])
+        own = [band[0] == output for band in regression.bands]
         out[own] = np.mean(rows**2)
-    return np.maximum(out, problem.floor)
+    return np.maximum(out, regression.power_floor)
 
 
-def _power(problem: Problem, values: Array, bands: NDArray[np.intp], freedom: Array) -> Array:
-    """Mean square per band; noise-free data get a floor far below what instruments resolve."""
-    power = _sums(values**2, bands, len(freedom)) / np.maximum(freedom, 1.0)
-    return np.maximum(power, problem.floor)
+def _power(regression: Regression, values: Array, bands: NDArray[np.intp], dof: Array) -> Array:
+    """Mean square per band, at least the floor far below the resolution of instruments."""
+    power = sums_per_band(values**2, bands, len(dof)) / np.maximum(dof, 1.0)
+    return np.maximum(power, regression.power_floor)
 
 
-def _rms(problem: Problem, power: Array) -> dict[str, float]:
-    """Root mean square of the noise per output, in time."""
+def _rms(regression: Regression, power: Array) -> dict[str, float]:
+    """Rms of the noise per output, in time."""
     out = {}
-    for output in problem.dataset.outputs:
-        own = [s for s in problem.segments if s.output == output]
-        total = sum(float(np.sum(power[problem.band_of_row[s.rows]])) for s in own)
-        out[output] = float(np.sqrt(total / problem.samples(output)))
+    for output in regression.outputs:
+        own = [s for s in regression.segments if s.output == output]
+        total = sum(float(np.sum(power[regression.band_of_row[s.rows]])) for s in own)
+        out[output] = float(np.sqrt(total / regression.n_samples(output)))
     return out

@@ -1,7 +1,7 @@
-"""Predicts one run for many hypotheses: what one shares with the last few is not computed again.
+"""Prediction of one run for many hypotheses, with a cache of the stages that they share.
 
-A candidate on the motor's torque leaves the rope's way as it is, and a derivative by one unknown
-moves one part of the line only. So every part is kept with the terms that it came from.
+An effect on the motor torque leaves the cable's path unchanged, and a derivative by one unknown
+changes one part of the line. Every stage is therefore cached by the effects that act on it.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = ["Predictor", "masked"]
 
 Part = TypeVar("Part")
-Sharper = float | None
-"""The share of its rounding that a known weight's force is given back; None leaves it as it is."""
+Correction = float | None
+"""Discretisation correction of a known weight's force; None for no correction."""
 _KEPT = 3
-"""The hypothesis at hand, the one moved from it, and the one it came from."""
+"""Entries per stage: the present hypothesis, the one of a derivative, and the previous one."""
 _WAY = (Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND)
 _FORCE = (Stage.ROPE_WEIGHT, Stage.PULLEY)
 _SHOWN = {
@@ -38,13 +38,13 @@ _SHOWN = {
 
 
 class Predictor:
-    """What hypotheses change in the outputs of one recording."""
+    """Change of the outputs of one run by the effects of a hypothesis."""
 
     def __init__(self, profile: WinchProfile, recording: Recording) -> None:
         self._profile = profile
         self._recording = recording
         self._kept: dict[str, OrderedDict[Hashable, Any]] = {}
-        # A measured load does not care how the rope is paid out; a known weight does.
+        # A measured load does not depend on the cable's path; a known weight's force does.
         force = _FORCE if recording.smooth.load_mass is None else _WAY + _FORCE
         self._stages: dict[str, tuple[Stage, ...]] = {
             "motion": (),
@@ -57,65 +57,65 @@ class Predictor:
         }
 
     def outputs_of(self, stage: Stage) -> set[str]:
-        """Outputs on whose way a stage lies."""
+        """Outputs that a stage acts on."""
         return {output for output in _SHOWN if stage in self._stages[output]}
 
-    def change(self, output: str, terms: Sequence[Term], sharper: Sharper = None) -> Array:
-        """Coefficients of what the terms change in an output, (kept,); zero where not compared."""
+    def change(self, output: str, terms: Sequence[Term], correction: Correction = None) -> Array:
+        """Coefficients of the change of an output, shape (n_kept,); zero where not compared."""
 
         def compute() -> Array:
-            moved = self._shown(output, terms, sharper) - self._nominal(sharper)[output]
+            moved = self._shown(output, terms, correction) - self._nominal(correction)[output]
             return masked(self._recording, output, moved)
 
-        return self._remembered(output, terms, sharper, compute)
+        return self._cached(output, terms, correction, compute)
 
-    def _motion(self, sharper: Sharper) -> Motion:
+    def _motion(self, correction: Correction) -> Motion:
         smooth = self._recording.smooth
-        if sharper is None:
+        if correction is None:
             return smooth
-        return self._remembered("motion", (), sharper, lambda: _sharpened(smooth, sharper))
+        return self._cached("motion", (), correction, lambda: _corrected(smooth, correction))
 
-    def _nominal(self, sharper: Sharper) -> Mapping[str, Array]:
-        if sharper is None:
+    def _nominal(self, correction: Correction) -> Mapping[str, Array]:
+        if correction is None:
             return self._recording.nominal_smooth
 
         def compute() -> Mapping[str, Array]:
-            return self._line(()).predict(self._motion(sharper))
+            return self._line(()).predict(self._motion(correction))
 
-        return self._remembered("nominal", (), sharper, compute)
+        return self._cached("nominal", (), correction, compute)
 
-    def _shown(self, output: str, terms: Sequence[Term], sharper: Sharper) -> Array:
-        line, at, way = self._line(terms), self._motion(sharper).at, self._way(terms)
+    def _shown(self, output: str, terms: Sequence[Term], correction: Correction) -> Array:
+        line, at, way = self._line(terms), self._motion(correction).at, self._way(terms)
         if output == "cable_length":
             return line.shown_length(at, way)
         if output == "tension":
-            return line.shown_tension(at, self._force(terms, sharper))
-        return line.shown_torque(at, way, self._force(terms, sharper))
+            return line.shown_tension(at, self._force(terms, correction))
+        return line.shown_torque(at, way, self._force(terms, correction))
 
     def _way(self, terms: Sequence[Term]) -> Way:
         def compute() -> Way:
             return self._line(terms).way(self._recording.smooth.at)
 
-        return self._remembered("way", terms, None, compute)
+        return self._cached("way", terms, None, compute)
 
-    def _force(self, terms: Sequence[Term], sharper: Sharper) -> Array:
+    def _force(self, terms: Sequence[Term], correction: Correction) -> Array:
         def compute() -> Array:
-            return self._line(terms).drum_side(self._motion(sharper), self._way(terms))
+            return self._line(terms).drum_side(self._motion(correction), self._way(terms))
 
-        return self._remembered("force", terms, sharper, compute)
+        return self._cached("force", terms, correction, compute)
 
     def _line(self, terms: Sequence[Term]) -> Line:
         return Line(self._profile, modifiers_of(terms))
 
-    def _remembered(
-        self, part: str, terms: Sequence[Term], sharper: Sharper, compute: Callable[[], Part]
+    def _cached(
+        self, part: str, terms: Sequence[Term], correction: Correction, compute: Callable[[], Part]
     ) -> Part:
         """A part of the prediction from the terms that act on it, computed or kept."""
         stages = self._stages[part]
         own = (
             (term.effect.id, *term.values.items()) for term in terms if term.effect.stage in stages
         )
-        key = (sharper, *own)
+        key = (correction, *own)
         kept = self._kept.setdefault(part, OrderedDict())
         if key not in kept:
             kept[key] = compute()
@@ -127,20 +127,20 @@ class Predictor:
 
 
 def masked(recording: Recording, output: str, signal: Array) -> Array:
-    """Coefficients of a signal within its band, zero where the output is not compared, (kept,)."""
+    """Coefficients of a signal within its band, zero where not compared, shape (n_kept,)."""
     return to_frequency(np.where(recording.valid[output], signal, 0.0), recording.bands[output])
 
 
-def _sharpened(motion: Motion, sharper: float) -> Motion:
-    """A motion with a known weight's force given back what differences rounded off.
+def _corrected(motion: Motion, correction: float) -> Motion:
+    """Motion with the discretisation error of a known weight's force corrected.
 
-    Loops depend on it: they turn around where the rope is quickest to speed up.
+    Hysteresis effects depend on it: the branch changes where the tension has its extremum.
     """
     if motion.load is None or motion.rounding is None:
         return motion
-    load = motion.load + sharper * motion.rounding
-    # Over a span the second difference is off by span²/12 of the fourth derivative; that of a
-    # simulation that differentiates twice over steps h by h²/3: as far is what the line adds.
+    load = motion.load + correction * motion.rounding
+    # The error of a second difference over a span is span²/12 of the fourth derivative; that of a
+    # simulation that differentiates twice over steps h is h²/3, the most that the line adds.
     twice = 1 / (3 * motion.clock.reach**2)
-    rounded = float(np.clip((sharper + 1 / 12) / twice, 0.0, 1.0))
+    rounded = float(np.clip((correction + 1 / 12) / twice, 0.0, 1.0))
     return replace(motion, at=replace(motion.at, tension=load), load=load, rounded=rounded)

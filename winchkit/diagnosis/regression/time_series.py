@@ -1,14 +1,14 @@
-"""A dataset as one regression: the residual vector of a hypothesis, in frequency.
+"""Regression problem of a winch's runs: spectral coefficients of every output of every run.
 
-Rows are the kept cosine coefficients of every output of every run. A hypothesis is a tuple of
-terms with nuisances and, for effects with memory, one initial state per run. Nuisances are the
-length instrument's offset and, where a known weight is the load, how its acceleration is rounded.
+Rows are the discrete cosine transform (DCT-II, orthonormal) of measured minus predicted, within
+each output's band. Nuisance parameters are the offset of the length instrument and, where a known
+weight is the load, the correction of its acceleration's discretisation error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container
-from dataclasses import dataclass, replace
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -17,196 +17,179 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.data.spectrum import Band, band_edges, narrow_edges, to_time
-from winchkit.diagnosis.regression.hypothesis import START, Hypothesis, started
+from winchkit.diagnosis.data.repeats import Repeats
+from winchkit.diagnosis.data.requirements import excites, missing_needs
+from winchkit.diagnosis.data.spectrum import (
+    WHOLE_FILTER,
+    band_edges,
+    low_pass,
+    narrow_edges,
+    to_time,
+)
+from winchkit.diagnosis.regression.base import Folds, Regression, Segment
+from winchkit.diagnosis.regression.discretization import discretization_error
+from winchkit.diagnosis.regression.folds import five_blocks, group_folds, time_blocks
+from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.diagnosis.regression.prediction_cache import Predictor, masked
-from winchkit.effects.parametrization import Coordinates
-from winchkit.effects.term import Term
+from winchkit.effects.effect import Effect
 from winchkit.model.line import Line
-from winchkit.model.stages import Stage
+from winchkit.model.stages import At, Stage
 
-__all__ = ["Problem", "Segment"]
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Where one output of one run stands in the rows."""
-
-    run: int
-    output: str
-    rows: slice
-    band: Band
+__all__ = ["TimeSeriesRegression"]
 
 
-class Problem:
-    """Residuals of hypotheses on a dataset, and how hypotheses become vectors to fit."""
+class TimeSeriesRegression(Regression):
+    """Regression of a winch's runs on the effects of a hypothesis.
+
+    Parameters
+    ----------
+    dataset
+        Runs of one winch with its profile.
+    """
 
     def __init__(self, dataset: Dataset) -> None:
+        super().__init__(_segments(dataset), len(dataset.recordings))
         self.dataset = dataset
-        self.runs = len(dataset.recordings)
-        self.segments = _segments(dataset)
-        self.rows = self.segments[-1].rows.stop
         self._predictors = [Predictor(dataset.profile, r) for r in dataset.recordings]
-        self.base = self._base()
-        offset, rounding = self._offset_column(), self._rounding_column()
+        self.nominal_residual = self._nominal_residual()
+        offset, discretization = self._offset_column(), self._discretization_column()
         self.fits_offset = bool(np.any(offset))
-        """Whether the length instrument's offset is an unknown; it is the first one then."""
-        self.rounds = bool(np.any(rounding))
-        """Whether how a known weight's acceleration is rounded is an unknown; the last one then."""
-        present = [column for column in (offset, rounding) if np.any(column)]
-        self.nuisance_columns = np.array(present).reshape(len(present), self.rows).T
-        """By their unknowns, (rows, nuisances)."""
+        self.fits_discretization = bool(np.any(discretization))
+        present = [column for column in (offset, discretization) if np.any(column)]
+        self.nuisance_columns = np.array(present).reshape(len(present), self.n_rows).T
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Measured outputs, in a fixed order."""
+        return self.dataset.outputs
 
     @cached_property
     def band_of_row(self) -> NDArray[np.intp]:
-        """Noise band of every row; bands are numbered through all outputs."""
+        """Noise band of every row, numbered through all outputs, shape (n_rows,)."""
         return self._bands[0]
 
     @cached_property
     def bands(self) -> list[tuple[str, float, float]]:
-        """Output and frequency range of every noise band."""
+        """Output and frequency range in Hz of every noise band."""
         return self._bands[1]
 
     @cached_property
-    def floor(self) -> Array:
-        """Least noise power that is believed per band, a 10⁻⁸ of what the output measures."""
+    def power_floor(self) -> Array:
+        """Lower limit of the noise variance: (10⁻⁸ of the output's standard deviation)²."""
         size = {
             output: max(
                 float(np.std(r.measured[output]))
                 for r in self.dataset.recordings
                 if output in r.measured
             )
-            for output in self.dataset.outputs
+            for output in self.outputs
         }
         return np.array([(1e-8 * size[output]) ** 2 or 1e-300 for output, _, _ in self.bands])
 
-    def samples(self, output: str) -> int:
-        """How many samples of an output are compared; the others are zero in every residual."""
+    @property
+    def n_observations(self) -> int:
+        """Number of rows."""
+        return self.n_rows
+
+    def n_samples(self, output: str) -> int:
+        """Number of compared samples of an output; the others are zero in every residual."""
         there = [r.valid[output] for r in self.dataset.recordings if output in r.valid]
         return max(1, sum(int(np.count_nonzero(valid)) for valid in there))
 
-    def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
-        """What the terms add to the nominal prediction, rows; only those of some outputs count.
+    def in_time(self, rows: Array) -> list[Array]:
+        """Inverse transform of the rows, one array of samples per segment."""
+        return [to_time(rows[s.rows], s.band) for s in self.segments]
 
-        What the others hold then is of no meaning.
-        """
+    def signal_rms(self, output: str) -> float:
+        """Rms of a measured output within the band of the comparison, SI."""
+        squares, count = 0.0, 0
+        for recording in self.dataset.recordings:
+            if output in recording.measured:
+                band = recording.bands[output]
+                signal = recording.measured[output]
+                if band.cut_off is not None:
+                    signal = low_pass(signal, band.rate, band.cut_off)
+                signal = signal[recording.valid[output]]
+                squares += float(signal @ signal)
+                count += len(signal)
+        return float(np.sqrt(squares / count)) if count else float("nan")
+
+    def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
+        """Change of the prediction by the effects; see :meth:`Regression.change`."""
         if not hypothesis.terms:
-            return np.zeros(self.rows)
-        terms = [started(hypothesis, run) for run in range(self.runs)]
-        sharper = hypothesis.nuisances[-1] if self.rounds and hypothesis.nuisances else None
-        out = np.empty(self.rows)
+            return np.zeros(self.n_rows)
+        terms = [started(hypothesis, run) for run in range(self.n_runs)]
+        correction = (
+            hypothesis.nuisances[-1] if self.fits_discretization and hypothesis.nuisances else None
+        )
+        out = np.empty(self.n_rows)
         for segment in self.segments:
             if outputs is None or segment.output in outputs:
                 predictor = self._predictors[segment.run]
-                out[segment.rows] = predictor.change(segment.output, terms[segment.run], sharper)
+                out[segment.rows] = predictor.change(segment.output, terms[segment.run], correction)
         return out
-
-    def rows_of(self, outputs: Container[str]) -> list[slice]:
-        """Where the segments of some outputs stand."""
-        return [s.rows for s in self.segments if s.output in outputs]
 
     def outputs_of(self, stage: Stage) -> set[str]:
-        """Outputs on whose way a stage lies, in some run."""
+        """Outputs that a stage of the model acts on in at least one run."""
         return {output for p in self._predictors for output in p.outputs_of(stage)}
 
-    def residual(self, hypothesis: Hypothesis) -> Array:
-        """Measured minus predicted, rows."""
-        residual = self.base - self.change(hypothesis)
-        if hypothesis.nuisances:
-            residual -= self.nuisance_columns @ np.array(hypothesis.nuisances)
-        return residual
+    def discretization_error(self, hypothesis: Hypothesis) -> Array:
+        """Change of the prediction on a four times finer time grid, shape (n_rows,)."""
+        return discretization_error(self.dataset, self.segments, hypothesis)
 
-    def in_time(self, rows: Array) -> list[Array]:
-        """Rows back in time, one array per segment."""
-        return [to_time(rows[s.rows], s.band) for s in self.segments]
+    def unfiltered(self) -> TimeSeriesRegression:
+        """The same regression with the rows above the low-pass filter's cut-off."""
+        recordings = tuple(
+            replace(r, bands={o: replace(b, skirt=WHOLE_FILTER) for o, b in r.bands.items()})
+            for r in self.dataset.recordings
+        )
+        return TimeSeriesRegression(replace(self.dataset, recordings=recordings))
 
-    def vector(self, hypothesis: Hypothesis) -> Array:
-        """Everything to fit: nuisances, coordinates of the terms, initial states."""
-        count = self.nuisance_columns.shape[1]
-        parts = [np.array(hypothesis.nuisances or (0.0,) * count)]
-        parts += [Coordinates(t.effect).vector(t.values) for t in hypothesis.terms]
-        parts += [np.array(start) for start in hypothesis.starts]
-        return np.concatenate([np.zeros(0), *parts])
+    @property
+    def motions(self) -> tuple[At, ...]:
+        """Motion of every run."""
+        return self.dataset.motions
 
-    def hypothesis(self, vector: Array, like: Hypothesis) -> Hypothesis:
-        """A hypothesis of the same terms at a vector."""
-        at = self.nuisance_columns.shape[1]
-        nuisances = tuple(vector[:at].tolist())
-        terms, starts = [], []
-        for term in like.terms:
-            coordinates = Coordinates(term.effect)
-            part = vector[at : at + len(coordinates)]
-            terms.append(Term(term.effect, coordinates.values(part, term.values)))
-            at += len(coordinates)
-        for start in like.starts:
-            starts.append(tuple(vector[at : at + len(start)].tolist()))
-            at += len(start)
-        return Hypothesis(tuple(terms), nuisances, tuple(starts))
+    def missing_needs(self, effect: Effect) -> list[str]:
+        """Parts and channels that an effect needs and that are absent, in words."""
+        return missing_needs(effect, self.dataset)
 
-    def unknowns_of(self, index: int, like: Hypothesis) -> NDArray[np.bool_]:
-        """Which elements of the vector belong to one term: its coordinates, its states."""
-        owners = [np.full(self.nuisance_columns.shape[1], -1)]
-        owners += [np.full(len(Coordinates(t.effect)), i) for i, t in enumerate(like.terms)]
-        owners += [np.full(len(start), i) for i, start in enumerate(like.starts)]
-        return np.asarray(np.concatenate(owners) == index)
+    def excites(self, shape: Mapping[str, float]) -> bool:
+        """Whether the motor turns through two periods of an effect's order in one run."""
+        return excites(shape, self.dataset)
 
-    def bounds(self, like: Hypothesis) -> tuple[Array, Array]:
-        """Lower and upper ends of the vector."""
-        pairs = [Coordinates(t.effect).bounds() for t in like.terms]
-        count = self.nuisance_columns.shape[1]
-        low = [np.full(count, -np.inf), *(pair[0] for pair in pairs)]
-        high = [np.full(count, np.inf), *(pair[1] for pair in pairs)]
-        for term, start in zip(like.terms, like.starts, strict=True):
-            if start:
-                parameter = term.effect.parameter(START)
-                low.append(np.full(len(start), parameter.low))
-                high.append(np.full(len(start), parameter.high))
-        return np.concatenate(low), np.concatenate(high)
+    @property
+    def replicates(self) -> Sequence[Repeats]:
+        """Sets of at least two runs of one programme and load."""
+        return self.dataset.repeated
 
-    def jacobian(self, vector: Array, like: Hypothesis) -> Array:
-        """Derivative of the prediction by the vector, by differences; (rows, len)."""
-        here = self.change(self.hypothesis(vector, like))
-        _, high = self.bounds(like)
-        out = np.empty((len(vector), self.rows)).T  # Columns are written one by one.
-        states = sum(len(start) for start in like.starts)
-        count = self.nuisance_columns.shape[1]
-        out[:, :count] = self.nuisance_columns
-        # What sharpens a weight's force also acts through the terms.
-        through = [count - 1] if self.rounds and like.terms else []
-        for index in (*through, *range(count, len(vector) - states)):
-            step = 1e-3 * max(1.0, abs(vector[index]))
-            if vector[index] + step > high[index]:
-                step = -step
-            moved = vector.copy()
-            moved[index] += step
-            own = self.nuisance_columns[:, index] if index < count else 0.0
-            out[:, index] = own + (self.change(self.hypothesis(moved, like)) - here) / step
-        self._by_states(out, vector, like, here, len(vector) - states)
-        return out
+    @cached_property
+    def group_of_run(self) -> tuple[int, ...]:
+        """Group of equal programme and load of every run."""
+        groups = enumerate(self.dataset.repeats)
+        group_of_run = {run: index for index, group in groups for run in group.runs}
+        return tuple(group_of_run[run] for run in range(self.n_runs))
 
-    def _by_states(
-        self, out: Array, vector: Array, like: Hypothesis, here: Array, first: int
-    ) -> None:
-        """Columns of initial states: each touches one run only, so one evaluation serves all."""
-        for start in like.starts:
-            if not start:
-                continue
-            steps = np.where(vector[first : first + len(start)] > 0, -1e-3, 1e-3)
-            moved = vector.copy()
-            moved[first : first + len(start)] += steps
-            difference = self.change(self.hypothesis(moved, like)) - here
-            out[:, first : first + len(start)] = 0.0
-            for segment in self.segments:
-                out[segment.rows, first + segment.run] = (
-                    difference[segment.rows] / steps[segment.run]
-                )
-            first += len(start)
+    @cached_property
+    def blocks(self) -> Folds:
+        """48 contiguous blocks of time or, of many runs, at least two per run."""
+        return time_blocks(self.segments, [len(r.signals.time) for r in self.dataset.recordings])
+
+    @cached_property
+    def five_blocks(self) -> Folds:
+        """Five contiguous blocks of time."""
+        return five_blocks(self.blocks)
+
+    @cached_property
+    def groups(self) -> Folds:
+        """Groups of equal programme and load; with one group only, five blocks of time."""
+        return group_folds(self.segments, self.group_of_run) or five_blocks(self.blocks)
 
     def _masked(self, segment: Segment, signal: Array) -> Array:
         return masked(self.dataset.recordings[segment.run], segment.output, signal)
 
-    def _base(self) -> Array:
-        out = np.zeros(self.rows)
+    def _nominal_residual(self) -> Array:
+        out = np.zeros(self.n_rows)
         for segment in self.segments:
             recording = self.dataset.recordings[segment.run]
             error = recording.measured[segment.output] - recording.nominal[segment.output]
@@ -214,39 +197,40 @@ class Problem:
         return out
 
     def _offset_column(self) -> Array:
-        out = np.zeros(self.rows)
+        out = np.zeros(self.n_rows)
         for segment in self.segments:
             recording = self.dataset.recordings[segment.run]
             if segment.output == "cable_length" and not recording.zeroed:
                 out[segment.rows] = self._masked(segment, np.ones(segment.band.count))
         return out
 
-    def _rounding_column(self) -> Array:
-        """What the outputs gain from a known weight's acceleration being a little less rounded.
+    def _discretization_column(self) -> Array:
+        """Change of the outputs per unit discretisation correction of a weight's acceleration.
 
-        Differences of the angle round the acceleration by its own curvature, by how much depends
-        on the sampling: without this unknown it is taken for a lag of the cell.
+        Second differences of the angle underestimate the acceleration in proportion to its second
+        derivative and the squared sampling interval; without this nuisance parameter that error
+        is fitted by a lag of the cell.
         """
-        out = np.zeros(self.rows)
+        out = np.zeros(self.n_rows)
         for run, recording in enumerate(self.dataset.recordings):
-            rounded = recording.raw.rounding
-            if rounded is None or recording.raw.load is None:
+            curvature = recording.raw.rounding
+            if curvature is None or recording.raw.load is None:
                 continue
             line = Line(self.dataset.profile)
-            moved = line.predict(replace(recording.raw, load=recording.raw.load + rounded))
+            moved = line.predict(replace(recording.raw, load=recording.raw.load + curvature))
             for segment in (s for s in self.segments if s.run == run):
-                gained = moved[segment.output] - recording.nominal[segment.output]
-                out[segment.rows] = self._masked(segment, gained)
+                change = moved[segment.output] - recording.nominal[segment.output]
+                out[segment.rows] = self._masked(segment, change)
         return out
 
     @cached_property
     def _bands(self) -> tuple[NDArray[np.intp], list[tuple[str, float, float]]]:
-        ids = np.zeros(self.rows, dtype=np.intp)
+        ids = np.zeros(self.n_rows, dtype=np.intp)
         bands: list[tuple[str, float, float]] = []
-        for output in self.dataset.outputs:
+        for output in self.outputs:
             own = [s for s in self.segments if s.output == output]
             longest = max(own, key=lambda s: s.band.count)
-            # Repeats are smoothed over narrow bands; what a saturated fit leaves is not.
+            # Narrow bands are smoothed later, for the noise of repeats only.
             frequency = longest.band.frequency
             repeated = bool(self.dataset.repeated)
             edges = narrow_edges(frequency) if repeated else band_edges(frequency, 1)

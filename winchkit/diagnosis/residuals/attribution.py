@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLES
 
 __all__ = [
@@ -80,7 +80,7 @@ def variables_of(recording: Recording) -> dict[str, Array]:
     return out
 
 
-def follows(problem: Problem, residual: Array) -> list[Followed]:
+def follows(regression: TimeSeriesRegression, residual: Array) -> list[Followed]:
     """Per output the variables that explain its residual, largest share first.
 
     Parameters
@@ -95,14 +95,16 @@ def follows(problem: Problem, residual: Array) -> list[Followed]:
     list of Followed
         Those whose share exceeds 2 % and three standard deviations of its null distribution.
     """
-    times = problem.in_time(residual)
+    times = regression.in_time(residual)
     out: list[Followed] = []
-    known = [variables_of(recording) for recording in problem.dataset.recordings]
-    for output in problem.dataset.outputs:
-        own = [(s, t) for s, t in zip(problem.segments, times, strict=True) if s.output == output]
-        valid = [problem.dataset.recordings[s.run].valid[output] for s, _ in own]
+    known = [variables_of(recording) for recording in regression.dataset.recordings]
+    for output in regression.dataset.outputs:
+        own = [
+            (s, t) for s, t in zip(regression.segments, times, strict=True) if s.output == output
+        ]
+        valid = [regression.dataset.recordings[s.run].valid[output] for s, _ in own]
         error = np.concatenate([t[v] for (_, t), v in zip(own, valid, strict=True)])
-        found, kept = [], kept_rows(problem, output)
+        found, kept = [], kept_rows(regression, output)
         for name in known[own[0][0].run]:
             if any(name not in known[s.run] for s, _ in own):
                 continue
@@ -125,7 +127,7 @@ def ranked(found: Iterable[_S]) -> list[_S]:
     return sorted((item for item in found if not needless(item)), key=lambda item: -item.share)
 
 
-def harmonics(problem: Problem, residual: Array) -> list[Followed]:
+def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Followed]:
     """Per output and angle the order whose sine explains most of the residual variance.
 
     Parameters
@@ -140,14 +142,16 @@ def harmonics(problem: Problem, residual: Array) -> list[Followed]:
     list of Followed
         Orders 1 to 40 with a share above 2 %, largest share first.
     """
-    times = problem.in_time(residual)
+    times = regression.in_time(residual)
     out = []
-    for output in problem.dataset.outputs:
-        own = [(s, t) for s, t in zip(problem.segments, times, strict=True) if s.output == output]
+    for output in regression.dataset.outputs:
+        own = [
+            (s, t) for s, t in zip(regression.segments, times, strict=True) if s.output == output
+        ]
         error = np.concatenate([t for _, t in own])
         for name in ANGLES:
             angle = np.concatenate(
-                [VARIABLES[name](problem.dataset.recordings[s.run].raw.at) for s, _ in own]
+                [VARIABLES[name](regression.dataset.recordings[s.run].raw.at) for s, _ in own]
             )
             shares = _harmonic_shares(angle, error)
             best = int(np.argmax(shares))
@@ -156,9 +160,9 @@ def harmonics(problem: Problem, residual: Array) -> list[Followed]:
     return sorted(out, key=lambda f: -f.share)
 
 
-def kept_rows(problem: Problem, output: str) -> int:
+def kept_rows(regression: TimeSeriesRegression, output: str) -> int:
     """Number of independent values of an output: coefficients that its low-pass keeps."""
-    return sum(s.rows.stop - s.rows.start for s in problem.segments if s.output == output)
+    return sum(s.rows.stop - s.rows.start for s in regression.segments if s.output == output)
 
 
 def by_chance(bins: int, kept: int) -> float:
@@ -217,7 +221,7 @@ def _harmonic_shares(angle: Array, error: Array) -> Array:
     normal = np.empty((_ORDERS, 2, 2))
     normal[:, 0, 0], normal[:, 1, 1] = (count + twice.real) / 2, (count - twice.real) / 2
     normal[:, 0, 1] = normal[:, 1, 0] = twice.imag / 2
-    # No orders of an angle that hardly changes.
+    # An angle that hardly moves has no orders.
     turned = np.linalg.cond(normal) <= 1e6
     toward = np.stack([gradient.real, gradient.imag], axis=1)[turned]
     out = np.zeros(_ORDERS)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import by_chance, kept_rows, variables_of
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 from winchkit.plain_json import significant
@@ -73,7 +73,7 @@ class ResidualMap:
         }
 
 
-def residual_maps(problem: Problem, residual: Array) -> list[ResidualMap]:
+def residual_maps(regression: TimeSeriesRegression, residual: Array) -> list[ResidualMap]:
     """Maps whose cells explain more of a residual than chance, per output the largest share first.
 
     Parameters
@@ -83,14 +83,14 @@ def residual_maps(problem: Problem, residual: Array) -> list[ResidualMap]:
     residual : (rows,) array
         Measured less predicted.
     """
-    known = [variables_of(recording) for recording in problem.dataset.recordings]
+    known = [variables_of(recording) for recording in regression.dataset.recordings]
     out: list[ResidualMap] = []
-    for output in problem.dataset.outputs:
-        error, kept = _errors(problem, residual, output), kept_rows(problem, output)
+    for output in regression.dataset.outputs:
+        error, kept = _errors(regression, residual, output), kept_rows(regression, output)
         found = [
             drawn
             for pair in PAIRS
-            if (places := _places(problem, known, output, pair)) is not None
+            if (places := _places(regression, known, output, pair)) is not None
             and (drawn := _map_of(output, places, error, kept)) is not None
             and drawn.share > by_chance(int(np.isfinite(drawn.mean).sum()), kept)
         ]
@@ -98,12 +98,14 @@ def residual_maps(problem: Problem, residual: Array) -> list[ResidualMap]:
     return out
 
 
-def same_cells(problem: Problem, residual: Array, like: ResidualMap) -> ResidualMap | None:
+def same_cells(
+    regression: TimeSeriesRegression, residual: Array, like: ResidualMap
+) -> ResidualMap | None:
     """Map of another residual of the same problem over the cells of ``like``."""
-    known = [variables_of(recording) for recording in problem.dataset.recordings]
-    places = _places(problem, known, like.output, like.over)
-    error = _errors(problem, residual, like.output)
-    kept = kept_rows(problem, like.output)
+    known = [variables_of(recording) for recording in regression.dataset.recordings]
+    places = _places(regression, known, like.output, like.over)
+    error = _errors(regression, residual, like.output)
+    kept = kept_rows(regression, like.output)
     return None if places is None else _map_of(like.output, places, error, kept)
 
 
@@ -111,10 +113,13 @@ _Places = tuple[tuple[str, str], tuple[Array, Array]]
 
 
 def _places(
-    problem: Problem, known: list[dict[str, Array]], output: str, pair: tuple[str, str]
+    regression: TimeSeriesRegression,
+    known: list[dict[str, Array]],
+    output: str,
+    pair: tuple[str, str],
 ) -> _Places | None:
     """Names and values of a pair at every compared sample; None where a run lacks one."""
-    own = [s for s in problem.segments if s.output == output]
+    own = [s for s in regression.segments if s.output == output]
     names = [_name(name, known[own[0].run]) for name in pair]
     if any(name not in known[s.run] for s in own for name in names):
         return None
@@ -122,7 +127,7 @@ def _places(
         np.concatenate(
             [
                 _within_turn(name, known[s.run][name])[
-                    problem.dataset.recordings[s.run].valid[output]
+                    regression.dataset.recordings[s.run].valid[output]
                 ]
                 for s in own
             ]
@@ -140,14 +145,14 @@ def _within_turn(name: str, values: Array) -> Array:
     return np.mod(values, 2 * np.pi) if name in ANGLES else values
 
 
-def _errors(problem: Problem, residual: Array, output: str) -> Array:
+def _errors(regression: TimeSeriesRegression, residual: Array, output: str) -> Array:
     """Residual of an output at its compared samples, runs in sequence."""
-    times = problem.in_time(residual)
-    recordings = problem.dataset.recordings
+    times = regression.in_time(residual)
+    recordings = regression.dataset.recordings
     return np.concatenate(
         [
             time[recordings[s.run].valid[output]]
-            for s, time in zip(problem.segments, times, strict=True)
+            for s, time in zip(regression.segments, times, strict=True)
             if s.output == output
         ]
     )

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
-from winchkit.diagnosis.robot.candidates import lacking, needless
-from winchkit.diagnosis.robot.errors import Errors, Shown, errors_of, figures
-from winchkit.diagnosis.robot.preparation import Study, study_of
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.candidates import lacking, with_needs_met
+from winchkit.diagnosis.robot.errors import Errors, FittedModel, errors_of, figures
+from winchkit.diagnosis.robot.preparation import Preparation, prepare_selection
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.effects.bind_robot import declared_terms, robot_terms
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -32,7 +32,7 @@ __all__ = [
 class RobotGrown:
     """An addition with everything behind it, for reports."""
 
-    problem: RobotProblem
+    regression: PoseRegression
     errors: tuple[Errors, Errors]
     """Before and after, at every pose."""
     addition: Addition
@@ -65,12 +65,12 @@ def grow_robot(
     effect = _placed(catalogue[effect_id], profile, line)
     if any(term.effect.id == effect.id for term in robot_terms(profile, catalogue)):
         raise UsageError(f"robot '{profile.name}' has the effect '{effect.id}' already")
-    study = study_of(runs, profile, catalogue)
-    if missing := lacking(effect, study.dataset):
+    preparation = prepare_selection(runs, profile, catalogue)
+    if missing := lacking(effect, preparation.dataset):
         raise UsageError(
             f"effect '{effect_id}' cannot be seen in these poses: without {', '.join(missing)}"
         )
-    return _added(study, needless(effect, study.dataset))
+    return _added(preparation, with_needs_met(effect, preparation.dataset))
 
 
 def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
@@ -91,23 +91,30 @@ def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
     return at_line(effect, line)
 
 
-def _added(study: Study, effect: Effect) -> RobotGrown:
-    inquiry = study.as_filed()
-    begin, noise = inquiry.settle(inquiry.begin)
-    scores = [s for s in inquiry.scores(begin, noise) if s.atom.effect.id == effect.id]
+def _added(preparation: Preparation, effect: Effect) -> RobotGrown:
+    engine = preparation.file_geometry()
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
+    scores = [s for s in engine.scores(initial_model, noise) if s.candidate.effect.id == effect.id]
     if not scores:
         raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
-    final: Fit = inquiry.trial(begin, scores[0], noise).fit
-    problem = inquiry.robot_problem
-    before, after = (Shown(problem, fit, noise, inquiry.groups) for fit in (begin, final))
-    spread = spread_of(problem, final, noise, inquiry.blocks)
-    own = {term.effect.id for term in declared_terms(study.dataset.robot, study.catalogue)}
-    found = estimates(problem, final, spread)
+    final: Fit = engine.trial(initial_model, scores[0], noise).fit
+    regression = engine.regression
+    before, after = (
+        FittedModel(regression, fit, noise, engine.regression.groups)
+        for fit in (initial_model, final)
+    )
+    spread = spread_of(regression, final, noise, engine.regression.blocks)
+    own = {
+        term.effect.id for term in declared_terms(preparation.dataset.robot, preparation.catalogue)
+    }
+    found = estimates(regression, final, spread)
     # What a line's winch brings along is refitted beside it and stays in the winch's own profile.
     terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
-    was, now = (errors_of(problem, problem.at(fit.hypothesis)) for fit in (begin, final))
-    addition = Addition(figures(before, after, study.noise), terms, study.dataset.notes)
-    return RobotGrown(problem, (was, now), addition)
+    was, now = (
+        errors_of(regression, regression.at(fit.hypothesis)) for fit in (initial_model, final)
+    )
+    addition = Addition(figures(before, after, preparation.noise), terms, preparation.dataset.notes)
+    return RobotGrown(regression, (was, now), addition)
 
 
 def remove_from_robot(
@@ -129,18 +136,23 @@ def remove_from_robot(
     if not gone:
         has = ", ".join(own) or "none"
         raise UsageError(f"robot '{profile.name}' has no effect '{effect_id}'; it has {has}")
-    study = study_of(runs, profile, catalogue)
-    inquiry = study.as_filed()
-    begin, noise = inquiry.settle(inquiry.begin)
-    hypothesis = begin.hypothesis
+    preparation = prepare_selection(runs, profile, catalogue)
+    engine = preparation.file_geometry()
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
+    hypothesis = initial_model.hypothesis
     for index in reversed(range(len(hypothesis.terms))):
         if hypothesis.terms[index].effect.id in gone:
             hypothesis = hypothesis.without(index)
-    final, _ = inquiry.settle(hypothesis)
-    problem = inquiry.robot_problem
-    before, after = (Shown(problem, fit, noise, inquiry.groups) for fit in (begin, final))
-    found = estimates(problem, final, spread_of(problem, final, noise, inquiry.blocks))
+    final, _ = engine.fit_with_noise(hypothesis)
+    regression = engine.regression
+    before, after = (
+        FittedModel(regression, fit, noise, engine.regression.groups)
+        for fit in (initial_model, final)
+    )
+    found = estimates(
+        regression, final, spread_of(regression, final, noise, engine.regression.blocks)
+    )
     # What a line's winch brings along is refitted beside them and stays in the winch's own profile.
     left = tuple(item for item in found if item[0].effect.id in own)
-    outputs = figures(before, after, study.noise)
-    return Removal(effect_id, outputs, left, study.dataset.notes)
+    outputs = figures(before, after, preparation.noise)
+    return Removal(effect_id, outputs, left, preparation.dataset.notes)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.residuals.attribution import Followed
 from winchkit.diagnosis.robot.errors import Errors
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.robot import angles_of
 
 __all__ = ["AXES", "ON_PLATFORM", "follows_of", "most_telling", "on_cables", "variables_of_poses"]
@@ -49,12 +49,12 @@ class _Share:
     """Whether that line has more than half of it."""
 
 
-def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
+def follows_of(regression: PoseRegression, errors: Errors) -> list[Followed]:
     """Variables that explain the errors of each output, the largest share first.
 
     Parameters
     ----------
-    problem : RobotProblem
+    regression : PoseRegression
         Of p poses.
     errors : dict
         By output, as :func:`winchkit.diagnosis.robot.errors.errors_of` returns them.
@@ -64,9 +64,9 @@ def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
     list of Followed
         ``winch`` is the share of a constant per line, ``pose`` that of a constant per pose.
     """
-    variables, out = variables_of_poses(problem), []
-    for output, error in on_cables(problem, errors).items():
-        lines = AXES if output == "platform_position" else problem.dataset.names
+    variables, out = variables_of_poses(regression), []
+    for output, error in on_cables(regression, errors).items():
+        lines = AXES if output == "platform_position" else regression.dataset.names
         found = []
         for name, values in variables.items():
             if values.shape[1] not in (1, error.shape[1]):
@@ -76,7 +76,7 @@ def follows_of(problem: RobotProblem, errors: Errors) -> list[Followed]:
                 line = lines[taken.column] if taken.alone else None
                 found.append(Followed(output, name, taken.share, line=line))
         if output != "platform_position":
-            found += _constants(problem, output, error)
+            found += _constants(regression, output, error)
         out += sorted(found, key=lambda f: -f.share)
     return out
 
@@ -86,30 +86,30 @@ def most_telling(values: Array, error: Array) -> int:
     return _taken(np.broadcast_to(values, error.shape), error).column
 
 
-def on_cables(problem: RobotProblem, errors: Errors) -> Errors:
+def on_cables(regression: PoseRegression, errors: Errors) -> Errors:
     """Errors as they are drawn: those of tensions as the least cable forces that balance them."""
     out = dict(errors)
     if "tension" in out:
         known = np.isfinite(out["tension"])
         inside = np.where(known, out["tension"], 0.0)
-        spread = (problem.equations.to_cables @ inside[..., None])[..., 0]
+        spread = (regression.equations.to_cables @ inside[..., None])[..., 0]
         out["tension"] = np.where(known.all(axis=1, keepdims=True), spread, np.nan)
     return out
 
 
-def variables_of_poses(problem: RobotProblem) -> dict[str, Array]:
+def variables_of_poses(regression: PoseRegression) -> dict[str, Array]:
     """Variables by name, (p, 1) of the platform, (p, n) of the lines, SI."""
-    dataset, measured = problem.dataset, problem.dataset.measured
+    dataset, measured = regression.dataset, regression.dataset.measured
     angle = measured.motor_angle
     drum = np.empty_like(angle)
-    for i, winch in enumerate(problem.robot.winches):
+    for i, winch in enumerate(regression.robot.winches):
         turned = angle[:, i] - winch.reference.motor_angle
         drum[:, i] = turned * winch.gearbox.direction / winch.gearbox.ratio
-    pose = problem.equations.pose
+    pose = regression.equations.pose
     place = np.concatenate([pose.position, angles_of(pose.rotation)], axis=1)
     out = {name: place[:, [k]] for k, name in enumerate(ON_PLATFORM)}
     out |= {
-        "cable_length": problem.robot.lengths_at(angle),
+        "cable_length": regression.robot.lengths_at(angle),
         "motor_angle": angle,
         "drum_angle": drum,
     }
@@ -145,16 +145,16 @@ def _taken(values: Array, error: Array) -> _Share:
     return _Share(max(0.0, share), _SURE * float(np.sqrt(2 * bins)) / count, most, alone)
 
 
-def _constants(problem: RobotProblem, output: str, error: Array) -> list[Followed]:
+def _constants(regression: PoseRegression, output: str, error: Array) -> list[Followed]:
     """Shares of a constant per line and of a constant per pose."""
     known, out = np.isfinite(error), []
     winch = np.broadcast_to(np.arange(error.shape[1]), error.shape)
-    pose = np.broadcast_to(problem.dataset.pose[:, None], error.shape)
+    pose = np.broadcast_to(regression.dataset.pose[:, None], error.shape)
     for name, values in (("winch", winch), ("pose", pose)):
         taken = _category_share(values[known], error[known])
         if taken.share > max(_WORTH, taken.by_chance):
             own = name == "winch" and taken.alone
-            line = problem.dataset.names[taken.column] if own else None
+            line = regression.dataset.names[taken.column] if own else None
             out.append(Followed(output, name, taken.share, line=line))
     return out
 

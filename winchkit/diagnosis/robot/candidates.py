@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.diagnosis.robot.dataset import RobotDataset
-from winchkit.diagnosis.robot.prior import Believed
+from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.effects.bind_robot import lines_with_home_length
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
@@ -22,7 +22,14 @@ from winchkit.effects.placement import (
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
-__all__ = ["GEOMETRY", "candidates_at", "geometry_believed", "lacking", "lacking_parts", "needless"]
+__all__ = [
+    "GEOMETRY",
+    "candidates_at",
+    "lacking",
+    "lacking_parts",
+    "priors_of_geometry",
+    "with_needs_met",
+]
 
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius", "drum-radius", "layer-thickness")
 """Effects that are the geometry which a calibration fits."""
@@ -50,7 +57,7 @@ def candidates_at(dataset: RobotDataset, catalogue: Catalogue) -> Iterator[Effec
             continue
         for placed in placements(effect, dataset.names):
             if _has_part(placed, dataset):
-                yield needless(placed, dataset)
+                yield with_needs_met(placed, dataset)
 
 
 def lacking(effect: Effect, dataset: RobotDataset) -> list[str]:
@@ -70,7 +77,7 @@ def lacking_parts(effect: Effect, dataset: RobotDataset) -> list[str]:
     return [] if _has_part(effect, dataset) else [_PARTS[base_of(effect)]]
 
 
-def needless(effect: Effect, dataset: RobotDataset) -> Effect:
+def with_needs_met(effect: Effect, dataset: RobotDataset) -> Effect:
     """An effect as the search takes it: its needs are met; a rope's law brings home lengths."""
     if "rope_force" in effect.needs and effect.outputs == ("cable_length",):
         known = lines_with_home_length(dataset.robot)
@@ -78,7 +85,9 @@ def needless(effect: Effect, dataset: RobotDataset) -> Effect:
     return replace(effect, needs=())
 
 
-def geometry_believed(dataset: RobotDataset, catalogue: Catalogue, fitted: bool) -> list[Believed]:
+def priors_of_geometry(
+    dataset: RobotDataset, catalogue: Catalogue, fitted: bool
+) -> list[GeometryPrior]:
     """The geometry as nuisances: with the priors of a calibration, or with what one left.
 
     ``fitted`` takes the standard deviations that a calibration wrote; without them there is none.
@@ -92,7 +101,7 @@ def geometry_believed(dataset: RobotDataset, catalogue: Catalogue, fitted: bool)
             for parameter in placed.parameters:
                 std = _std(dataset, placed, parameter.name, fitted)
                 if std > 0:
-                    out.append(Believed(Term(placed, placed.null), parameter.name, std))
+                    out.append(GeometryPrior(Term(placed, placed.null), parameter.name, std))
     return out
 
 

@@ -15,7 +15,7 @@ from winchkit.diagnosis.robot.attribution import follows_of
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
 from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
-from winchkit.diagnosis.robot.regression import RobotProblem, Standing
+from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.variance_components import START
 from winchkit.effects.bind_robot import robot_terms, robot_with_effects
 from winchkit.effects.catalogue import Catalogue
@@ -30,7 +30,7 @@ class RobotCompared:
     """Comparison with regression and errors, for reports."""
 
     comparison: Comparison
-    problem: RobotProblem
+    regression: PoseRegression
     errors: Errors
     followed: Mapping[str, Followed]
     """By output the variable with the largest share of its error."""
@@ -73,11 +73,11 @@ def compared_robot(
     robot = robot_with_effects(profile, catalogue)
     equations = Equations(dataset, start_pose(dataset), robot)
     pose = placed_by(equations, robot, START)
-    problem = RobotProblem(Standing(dataset, pose, START))
-    errors = errors_of(problem, problem.residuals(robot_terms(profile, catalogue)))
+    regression = PoseRegression(LinearizationPoint(dataset, pose, START))
+    errors = errors_of(regression, regression.residuals(robot_terms(profile, catalogue)))
     noise = _noise(errors, dataset)
-    follows = follows_of(problem, errors)
-    size = signals(problem)
+    follows = follows_of(regression, errors)
+    size = signals(regression)
     outputs = {
         name: OutputError(
             unit=UNITS[name],
@@ -95,7 +95,7 @@ def compared_robot(
     most: dict[str, Followed] = {}
     for followed in follows:
         most.setdefault(followed.output, followed)
-    return RobotCompared(Comparison(outputs, None, dataset.notes), problem, errors, most)
+    return RobotCompared(Comparison(outputs, None, dataset.notes), regression, errors, most)
 
 
 def _largest(name: str, error: Array) -> float:

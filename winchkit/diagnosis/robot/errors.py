@@ -15,14 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.cross_validation import Folds, left_out_steps
+from winchkit.diagnosis.regression.base import Folds
+from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.results import OutputFit
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
 
-__all__ = ["UNITS", "Errors", "Shown", "errors_of", "figures", "held_out_rms", "noise_rms", "rms"]
+__all__ = [
+    "UNITS",
+    "Errors",
+    "FittedModel",
+    "errors_of",
+    "figures",
+    "held_out_rms",
+    "noise_rms",
+    "rms",
+]
 
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
@@ -30,21 +40,21 @@ _HELD = 6
 
 
 @dataclass(frozen=True)
-class Shown:
+class FittedModel:
     """Fitted model with the noise and the folds by which it is judged."""
 
-    problem: RobotProblem
+    regression: PoseRegression
     fit: Fit
     noise: Noise
     folds: Folds
 
 
-def errors_of(problem: RobotProblem, residuals: Mapping[str, Array]) -> Errors:
+def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Errors:
     """Errors by output.
 
     Parameters
     ----------
-    problem : RobotProblem
+    regression : PoseRegression
         Of p poses.
     residuals : mapping
         Residuals by kind, (p, k), SI.
@@ -54,15 +64,15 @@ def errors_of(problem: RobotProblem, residuals: Mapping[str, Array]) -> Errors:
     dict
         By output (p, n), (p, 3) or (p, k), SI; NaN where something was not measured.
     """
-    at_pose, to_place = _maps(problem)
+    at_pose, to_place = _maps(regression)
     known = _seen(residuals)
     moved = np.where(known, np.concatenate([residuals["position"], residuals["rotation"]], 1), 0.0)
-    by = problem.slope()["rope"]
+    by = regression.slope()["rope"]
     closure = residuals["rope"] - (by @ moved[..., None])[..., 0]
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
     out = {"cable_length": np.where(np.isfinite(closure), -length, np.nan)}
-    if problem.dataset.measured.motor_angle.shape[1] >= _HELD:
+    if regression.dataset.measured.motor_angle.shape[1] >= _HELD:
         whole = np.isfinite(residuals["rope"]).all(axis=1, keepdims=True)
         stray = np.where(whole, np.nan_to_num(residuals["rope"]), np.nan)
         found = residuals["position"] - (to_place @ stray[..., None])[..., 0]
@@ -73,11 +83,11 @@ def errors_of(problem: RobotProblem, residuals: Mapping[str, Array]) -> Errors:
     return out
 
 
-def noise_rms(problem: RobotProblem, noise: PoseNoise) -> dict[str, float]:
+def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     """Rms of the errors by the noise of the instruments alone, by output, SI."""
-    at_pose, to_place = _maps(problem)
-    sigma, by = noise.sigma, problem.slope()["rope"]
-    here = problem.residuals(())
+    at_pose, to_place = _maps(regression)
+    sigma, by = noise.sigma, regression.slope()["rope"]
+    here = regression.residuals(())
     pose = np.repeat([sigma["position"] ** 2, sigma["rotation"] ** 2], 3) * _seen(here)
     spread = by * np.sqrt(pose)[:, None, :]
     whole = spread @ np.swapaxes(spread, 1, 2) + sigma["rope"] ** 2 * np.eye(by.shape[1])
@@ -89,12 +99,14 @@ def noise_rms(problem: RobotProblem, noise: PoseNoise) -> dict[str, float]:
     return out
 
 
-def figures(begin: Shown, final: Shown, noise: PoseNoise) -> dict[str, OutputFit]:
+def figures(begin: FittedModel, final: FittedModel, noise: PoseNoise) -> dict[str, OutputFit]:
     """Error statistics of every output before and after; of positions those of the distance."""
-    before, after = (errors_of(s.problem, s.problem.at(s.fit.hypothesis)) for s in (begin, final))
+    before, after = (
+        errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (begin, final)
+    )
     held_before, held_after = held_out_rms(begin), held_out_rms(final)
-    least = noise_rms(final.problem, noise)
-    signal = signals(final.problem)
+    least = noise_rms(final.regression, noise)
+    signal = signals(final.regression)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         name: OutputFit(
@@ -121,11 +133,13 @@ def rms(name: str, error: Array) -> float:
     return float(np.sqrt(np.mean(squares))) if squares.size else float("nan")
 
 
-def signals(problem: RobotProblem) -> dict[str, float]:
+def signals(regression: PoseRegression) -> dict[str, float]:
     """How much each output varies, rms about its mean, SI."""
-    measured = problem.dataset.measured
-    length = problem.equations.residuals(problem.robot)["rope"] + problem.robot.lengths_at(
-        measured.motor_angle, problem.equations.forces(problem.robot), problem.equations.temperature
+    measured = regression.dataset.measured
+    length = regression.equations.residuals(regression.robot)["rope"] + regression.robot.lengths_at(
+        measured.motor_angle,
+        regression.equations.forces(regression.robot),
+        regression.equations.temperature,
     )
     values = {
         "cable_length": length,
@@ -140,29 +154,29 @@ def signals(problem: RobotProblem) -> dict[str, float]:
     return out
 
 
-def held_out_rms(shown: Shown) -> dict[str, float]:
+def held_out_rms(model: FittedModel) -> dict[str, float]:
     """Held-out error of every output, rms, SI."""
-    return {name: rms(name, error) for name, error in _held_out(shown).items()}
+    return {name: rms(name, error) for name, error in _held_out(model).items()}
 
 
-def _held_out(shown: Shown) -> Errors:
+def _held_out(model: FittedModel) -> Errors:
     """Errors of every pose with the parameters fitted without its fold (linearised), SI."""
-    problem, found = shown.problem, shown.fit
-    here = problem.at(found.hypothesis)
-    steps = left_out_steps(problem, found, shown.noise, shown.folds)
-    row, fold = problem.pose_of_row, np.concatenate(shown.folds.of)
-    of_pose = np.zeros(len(problem.dataset.measured), dtype=np.intp)
+    regression, found = model.regression, model.fit
+    here = regression.at(found.hypothesis)
+    steps = left_out_steps(regression, found, model.noise, model.folds)
+    row, fold = regression.pose_of_row, np.concatenate(model.folds.of)
+    of_pose = np.zeros(len(regression.dataset.measured), dtype=np.intp)
     of_pose[row[row >= 0]] = fold[row >= 0]
     out = {kind: values.copy() for kind, values in here.items()}
     for index in range(len(found.vector)):
         step = 1e-3 * max(1.0, abs(found.vector[index]))
         vector = found.vector.copy()
         vector[index] += step
-        there = problem.at(problem.hypothesis(vector, found.hypothesis))
+        there = regression.at(regression.hypothesis(vector, found.hypothesis))
         by = steps[of_pose, index][:, None] / step
         for kind, values in there.items():
             out[kind] += (values - here[kind]) * by
-    return errors_of(problem, out)
+    return errors_of(regression, out)
 
 
 def _seen(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
@@ -171,12 +185,12 @@ def _seen(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(both))
 
 
-def _maps(problem: RobotProblem) -> tuple[Array, Array]:
+def _maps(regression: PoseRegression) -> tuple[Array, Array]:
     """Per pose the projection of closures beside the unmeasured coordinates (p, n, n), and the map
     from closures to positions (p, 3, n)."""
-    by = problem.slope()["rope"]
+    by = regression.slope()["rope"]
     by = np.where(np.isfinite(by), by, 0.0)
-    free = by * ~_seen(problem.residuals(()))[:, None, :]
+    free = by * ~_seen(regression.residuals(()))[:, None, :]
     undone = free @ np.linalg.pinv(free, rcond=1e-9)
     back = np.asarray(np.linalg.pinv(by, rcond=1e-9), dtype=float)
     return np.eye(by.shape[1]) - undone, back[:, :3]

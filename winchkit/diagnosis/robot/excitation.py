@@ -9,7 +9,7 @@ import numpy as np
 from winchkit.model.robot.rotation import rotation_of, rotation_vector
 
 if TYPE_CHECKING:
-    from winchkit.diagnosis.robot.preparation import Study
+    from winchkit.diagnosis.robot.preparation import Preparation
 
 __all__ = ["what_poses_cannot_show"]
 
@@ -17,11 +17,11 @@ _TURNED = np.radians(1.0)
 _FEW = 40
 
 
-def what_poses_cannot_show(study: Study) -> list[str]:
+def what_poses_cannot_show(preparation: Preparation) -> list[str]:
     """Sentences on missing repeats, tensions, temperatures, rotations, and on few poses."""
-    dataset, measured = study.dataset, study.dataset.measured
+    dataset, measured = preparation.dataset, preparation.dataset.measured
     notes = []
-    if not study.noise.from_repeats:
+    if not preparation.noise.from_repeats:
         notes.append(
             "too few poses repeat another: the noise is what neither geometry nor any known effect "
             "explains, so an effect outside the catalogue cannot be excluded; drive to some ten "

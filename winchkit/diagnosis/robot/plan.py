@@ -118,13 +118,13 @@ def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
         Ranked by the number of pairs separated, then by their powers, then the same for
         detectable effects.
     """
-    problem, final = answer.robot_problem, answer.found.final.hypothesis
+    regression, final = answer.engine.regression, answer.result.final.hypothesis
     pairs = tuple(pairs_of(answer.sets))
     hidden = _hidden(answer)
     questions: list[Question] = [*pairs, *((term, None) for term in hidden)]
     many, bar = len(pairs), answer.bar
-    needed = [APART] * many + [bar.squares(Coordinates(t.effect).freedom) for t in hidden]
-    offers = pose_offers(problem, final, questions, needed, count) if questions else []
+    needed = [APART] * many + [bar.squares(Coordinates(t.effect).n_parameters) for t in hidden]
+    offers = pose_offers(regression, final, questions, needed, count) if questions else []
 
     def worth(offer: PoseOffer) -> tuple[float, ...]:
         sure = sum(power >= _SURE for power in offer.powers[:many])
@@ -133,7 +133,7 @@ def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
         return sure, told, shown, round(sum(offer.powers[many:]), 1)
 
     return PosePlan(
-        pairs, hidden, tuple(sorted(offers, key=worth, reverse=True)), problem.dataset.names
+        pairs, hidden, tuple(sorted(offers, key=worth, reverse=True)), regression.dataset.names
     )
 
 
@@ -143,15 +143,15 @@ def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
     Of effects on one line each, the line with the least power.
     """
     faint: dict[str, tuple[float, Term]] = {}
-    there = {term.effect.id for term in answer.found.final.hypothesis.terms}
-    for score in answer.found.scores:
-        effect = score.atom.effect
-        seen = answer.bar.power(score.strength, score.atom.freedom) >= _SURE
-        if not score.strength > 0 or seen or effect.id in there:
+    there = {term.effect.id for term in answer.result.final.hypothesis.terms}
+    for score in answer.result.scores:
+        effect = score.candidate.effect
+        seen = answer.bar.power(score.noncentrality, score.candidate.n_parameters) >= _SURE
+        if not score.noncentrality > 0 or seen or effect.id in there:
             continue
         known = faint.get(base_of(effect))
-        if known is None or score.strength < known[0]:
-            values = {**usual_values(effect), **score.atom.shape}
-            faint[base_of(effect)] = score.strength, Term(effect, values)
+        if known is None or score.noncentrality < known[0]:
+            values = {**usual_values(effect), **score.candidate.shape}
+            faint[base_of(effect)] = score.noncentrality, Term(effect, values)
     ranked = sorted(faint.values(), key=lambda item: -item[0])[:_MOST]
     return tuple(term for _, term in ranked)

@@ -17,7 +17,7 @@ from winchkit.diagnosis.design.discrimination import APART, power_of
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.results import NextRun
 from winchkit.diagnosis.robot.dataset import RobotDataset
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 from winchkit.model.robot import (
@@ -93,12 +93,12 @@ def usable(kind: PoseKind, dataset: RobotDataset) -> bool:
     return bool(np.isfinite(dataset.measured.temperature).all()) or not kind.warmer
 
 
-def imagined(problem: RobotProblem, robot: Robot, kind: PoseKind) -> tuple[Measured, Pose]:
+def imagined(regression: PoseRegression, robot: Robot, kind: PoseKind) -> tuple[Measured, Pose]:
     """Simulate measurements at random poses of a kind, without noise.
 
     Parameters
     ----------
-    problem : RobotProblem
+    regression : PoseRegression
         With the poses so far.
     robot : Robot
         With the effects of the final model.
@@ -113,18 +113,20 @@ def imagined(problem: RobotProblem, robot: Robot, kind: PoseKind) -> tuple[Measu
         Where pulling cables hold the platform.
     """
     rng = np.random.default_rng(_SEED)
-    pose = _placed(problem, robot, kind, rng)
-    force = _forces(problem, robot, kind, pose, rng)
+    pose = _placed(regression, robot, kind, rng)
+    force = _forces(regression, robot, kind, pose, rng)
     good = is_held(robot.geometry, robot.platform, pose)
-    if problem.dataset.has_tension:
+    if regression.dataset.has_tension:
         good &= np.isfinite(force).all(axis=1) & (force > 0).all(axis=1)
     pose, force = Pose(pose.position[good], pose.rotation[good]), force[good]
-    return _measured(problem.dataset, robot, kind, pose, force), pose
+    return _measured(regression.dataset, robot, kind, pose, force), pose
 
 
-def _placed(problem: RobotProblem, robot: Robot, kind: PoseKind, rng: np.random.Generator) -> Pose:
+def _placed(
+    regression: PoseRegression, robot: Robot, kind: PoseKind, rng: np.random.Generator
+) -> Pose:
     """Random poses of a kind."""
-    seen = problem.standing.pose
+    seen = regression.point.pose
     corners = robot.geometry.exit_point
     middle, half = middle_and_half(seen.position)
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
@@ -139,11 +141,11 @@ def _placed(problem: RobotProblem, robot: Robot, kind: PoseKind, rng: np.random.
 
 
 def _forces(
-    problem: RobotProblem, robot: Robot, kind: PoseKind, pose: Pose, rng: np.random.Generator
+    regression: PoseRegression, robot: Robot, kind: PoseKind, pose: Pose, rng: np.random.Generator
 ) -> Array:
     """Cable forces that balance the weight, spread as those measured so far; zero without cells."""
-    measured, many = problem.dataset.measured.tension, len(pose.position)
-    if not problem.dataset.has_tension:
+    measured, many = regression.dataset.measured.tension, len(pose.position)
+    if not regression.dataset.has_tension:
         return np.zeros((many, measured.shape[1]))
     known = measured[np.isfinite(measured).all(axis=1)]
     start = known[rng.integers(len(known), size=many)]
@@ -209,13 +211,13 @@ class PoseOffer:
 
 
 def next_pose_runs(
-    problem: RobotProblem, final: Hypothesis, pairs: Sequence[tuple[Term, Term]]
+    regression: PoseRegression, final: Hypothesis, pairs: Sequence[tuple[Term, Term]]
 ) -> tuple[NextRun, ...]:
     """Kinds of poses that separate pairs of effects.
 
     Parameters
     ----------
-    problem : RobotProblem
+    regression : PoseRegression
         With the poses so far.
     final : Hypothesis
         The final model of the diagnosis.
@@ -230,7 +232,7 @@ def next_pose_runs(
     """
     out: list[NextRun] = []
     for first, second in pairs:
-        offers = pose_offers(problem, final, [(first, second)], [APART])
+        offers = pose_offers(regression, final, [(first, second)], [APART])
         names = (first.effect.id, second.effect.id)
         sure = [o for o in offers if o.powers[0] >= _SURE][:1]
         fair = sorted(offers, key=lambda o: -o.powers[0])
@@ -243,7 +245,7 @@ def next_pose_runs(
 
 
 def pose_offers(
-    problem: RobotProblem,
+    regression: PoseRegression,
     final: Hypothesis,
     questions: Sequence[Question],
     needed: Sequence[float],
@@ -253,7 +255,7 @@ def pose_offers(
 
     Parameters
     ----------
-    problem : RobotProblem
+    regression : PoseRegression
         With the poses so far.
     final : Hypothesis
         The final model of the diagnosis.
@@ -269,13 +271,13 @@ def pose_offers(
     list of PoseOffer
         In ascending order of effort.
     """
-    robot = problem.standing.robot(final.terms)
-    kinds = [kind for kind in KINDS if usable(kind, problem.dataset)]
-    tried = [(kind, *imagined(problem, robot, kind)) for kind in kinds]
+    robot = regression.point.robot(final.terms)
+    kinds = [kind for kind in KINDS if usable(kind, regression.dataset)]
+    tried = [(kind, *imagined(regression, robot, kind)) for kind in kinds]
     tried = [(kind, seen, pose) for kind, seen, pose in tried if len(seen)]
-    wide = _with_all(problem, tried)
+    wide = _with_all(regression, tried)
     parts = [_information(wide, final, question) for question in questions]
-    begin = len(problem.dataset.measured)
+    begin = len(regression.dataset.measured)
     base = [part[-1] + part[:begin].sum(axis=0) for part in parts]
     so_far = _powers([float(noncentrality(own)) for own in base], needed)
     out = []
@@ -313,21 +315,21 @@ def _words(offer: PoseOffer) -> str:
 
 
 def _with_all(
-    problem: RobotProblem, tried: Sequence[tuple[PoseKind, Measured, Pose]]
-) -> RobotProblem:
+    regression: PoseRegression, tried: Sequence[tuple[PoseKind, Measured, Pose]]
+) -> PoseRegression:
     """Regression of the poses so far and all simulated ones."""
-    standing, dataset = problem.standing, problem.dataset
-    poses = [standing.pose, *(pose for _, _, pose in tried)]
+    point, dataset = regression.point, regression.dataset
+    poses = [point.pose, *(pose for _, _, pose in tried)]
     measured = joined([dataset.measured, *(seen for _, seen, _ in tried)])
     pose = Pose(
         np.concatenate([p.position for p in poses]), np.concatenate([p.rotation for p in poses])
     )
     distinct = np.arange(len(measured), dtype=np.intp)
     wide = replace(dataset, measured=measured, pose=distinct)
-    return RobotProblem(replace(standing, dataset=wide, pose=pose))
+    return PoseRegression(replace(point, dataset=wide, pose=pose))
 
 
-def _information(problem: RobotProblem, final: Hypothesis, question: Question) -> Array:
+def _information(regression: PoseRegression, final: Hypothesis, question: Question) -> Array:
     """Information of an effect's column, its rival's and the nuisances', (poses + 1, k, k).
 
     The effect's column is the first; the last matrix is that of the prior.
@@ -337,18 +339,18 @@ def _information(problem: RobotProblem, final: Hypothesis, question: Question) -
     others = Hypothesis()
     for term in final.terms:
         if term.effect.id not in asked:
-            others = others.with_term(term, problem.runs)
-    here = problem.change(others)
-    shown = problem.change(others.with_term(first, problem.runs)) - here
-    rival = others if second is None else others.with_term(second, problem.runs)
-    imitation = problem.jacobian(problem.vector(rival), rival)
-    columns = np.column_stack([shown, imitation, problem.change(rival) - here])
+            others = others.with_term(term, regression.n_runs)
+    here = regression.change(others)
+    shown = regression.change(others.with_term(first, regression.n_runs)) - here
+    rival = others if second is None else others.with_term(second, regression.n_runs)
+    imitation = regression.jacobian(regression.vector(rival), rival)
+    columns = np.column_stack([shown, imitation, regression.change(rival) - here])
     columns = np.where(np.isfinite(columns), columns, 0.0)
     size = np.sqrt(np.sum(columns[:, 1:] ** 2, axis=0))
     kept = np.concatenate([[True], size > 0])
     columns = columns[:, kept] / np.concatenate([[1.0], size[size > 0]])
-    row = np.maximum(problem.pose_of_row, -1)
-    return pose_information(columns, row, len(problem.dataset.measured) + 1)
+    row = np.maximum(regression.pose_of_row, -1)
+    return pose_information(columns, row, len(regression.dataset.measured) + 1)
 
 
 def _chosen(

@@ -16,12 +16,12 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.robot.candidates import candidates_at, geometry_believed
+from winchkit.diagnosis.robot.candidates import candidates_at, priors_of_geometry
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
-from winchkit.diagnosis.robot.engine import RobotInquiry
+from winchkit.diagnosis.robot.engine import PoseSelection
 from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
-from winchkit.diagnosis.robot.prior import Believed
-from winchkit.diagnosis.robot.regression import RobotProblem, Standing
+from winchkit.diagnosis.robot.prior import GeometryPrior
+from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.variance_components import (
     START,
     PoseNoise,
@@ -39,13 +39,13 @@ from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
 __all__ = [
-    "Study",
+    "Preparation",
     "balanced",
-    "begun",
-    "fitted_to",
-    "judged_noise",
-    "settled",
-    "study_of",
+    "calibrated_on",
+    "estimated_noise",
+    "fitted_point",
+    "own_effects",
+    "prepare_selection",
 ]
 
 _STEPS = 8
@@ -56,56 +56,56 @@ _BALANCING = frozenset({"payload-mass", "payload-centre", "cell-offset", "cell-t
 all and a platform without weight would balance anything."""
 
 
-def begun(terms: Sequence[Term]) -> Hypothesis:
+def own_effects(terms: Sequence[Term]) -> Hypothesis:
     """A hypothesis of a profile's own terms."""
     return Hypothesis(tuple(terms), (), ((),) * len(terms))
 
 
-def settled(
+def fitted_point(
     dataset: RobotDataset,
     terms: Sequence[Term],
     sigma: Mapping[str, float],
-    believed: Sequence[Believed] = (),
-) -> tuple[Standing, tuple[Term, ...]]:
+    geometry: Sequence[GeometryPrior] = (),
+) -> tuple[LinearizationPoint, tuple[Term, ...]]:
     """Geometry, poses and the profile's own effects at the best fit with a given noise."""
-    standing = Standing(dataset, start_pose(dataset), sigma, tuple(believed))
+    point = LinearizationPoint(dataset, start_pose(dataset), sigma, tuple(geometry))
     terms = tuple(terms)
     for _ in range(_STEPS):
-        standing = _placed(standing, terms)
-        problem = RobotProblem(standing)
-        found = fit(problem, begun(terms), np.ones(problem.rows))
+        point = _placed(point, terms)
+        regression = PoseRegression(point)
+        found = fit(regression, own_effects(terms), np.ones(regression.n_rows))
         terms = found.hypothesis.terms
-        steps = found.vector[: problem.nuisance_columns.shape[1]]
-        moves = steps[len(steps) - len(believed) :].tolist()
-        moved = tuple(b.moved(by) for b, by in zip(standing.believed, moves, strict=True))
-        standing = replace(standing, believed=moved)
+        steps = found.vector[: regression.nuisance_columns.shape[1]]
+        moves = steps[len(steps) - len(geometry) :].tolist()
+        moved = tuple(b.moved(by) for b, by in zip(point.geometry, moves, strict=True))
+        point = replace(point, geometry=moved)
         if not moves or max(map(abs, moves)) < _STILL:
             break
-    return _placed(standing, terms), terms
+    return _placed(point, terms), terms
 
 
-def _placed(standing: Standing, terms: Sequence[Term]) -> Standing:
-    robot = standing.robot(terms)
-    equations = Equations(standing.dataset, standing.pose, robot)
-    return replace(standing, pose=placed_by(equations, robot, standing.sigma))
+def _placed(point: LinearizationPoint, terms: Sequence[Term]) -> LinearizationPoint:
+    robot = point.robot(terms)
+    equations = Equations(point.dataset, point.pose, robot)
+    return replace(point, pose=placed_by(equations, robot, point.sigma))
 
 
-def judged_noise(
+def estimated_noise(
     dataset: RobotDataset,
     terms: Sequence[Term],
-    believed: Sequence[Believed],
+    geometry: Sequence[GeometryPrior],
     candidates: Iterable[Effect],
 ) -> PoseNoise:
     """Noise of every kind of measurement, whatever may be missing from the model."""
     candidates = tuple(candidates)
     found = PoseNoise(START, {}, from_repeats=False, unexplained=START)
     for _ in range(2):
-        standing, own = settled(dataset, terms, found.sigma, believed)
-        problem = RobotProblem(standing)
-        here = problem.residuals(own)
-        columns = _columns(problem, own, candidates, here)
+        point, own = fitted_point(dataset, terms, found.sigma, geometry)
+        regression = PoseRegression(point)
+        here = regression.residuals(own)
+        columns = _columns(regression, own, candidates, here)
         kinds = [k for k, values in here.items() if np.isfinite(values).any()]
-        slope = {k: v for k, v in problem.slope().items() if k in kinds}
+        slope = {k: v for k, v in regression.slope().items() if k in kinds}
         kept = {k: here[k] for k in kinds}
         stack = Stack(kept, slope, {k: columns[k] for k in kinds})
         found = noise_of(stack, repeated_differences(Stack(kept, slope, {}), dataset.pose))
@@ -126,32 +126,36 @@ def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
 
 
 def _columns(
-    problem: RobotProblem, own: Sequence[Term], candidates: Sequence[Effect], here: dict[str, Array]
+    regression: PoseRegression,
+    own: Sequence[Term],
+    candidates: Sequence[Effect],
+    here: dict[str, Array],
 ) -> dict[str, Array]:
     """What the residuals gain from the geometry and from every candidate, (p, k, m) by kind."""
     moved: list[dict[str, Array]] = []
     for effect in candidates:
         coordinates = Coordinates(effect)
         shape = coordinates.grid()[0]
-        for secant in coordinates.secants():
-            term = Term(effect, {**effect.null, **shape, **secant})
-            there = problem.residuals((*own, term))
+        for usual_step in coordinates.usual_steps():
+            term = Term(effect, {**effect.null, **shape, **usual_step})
+            there = regression.residuals((*own, term))
             if base_of(effect) not in _BALANCING and "tension" in there:
                 there["tension"] = here["tension"]
             moved.append(there)
-    start = problem.residuals(()) if own else here
+    start = regression.residuals(()) if own else here
     moved += [
-        {k: here[k] + there[k] - start[k] for k in here} for there in problem.moved_by_belief()
+        {k: here[k] + there[k] - start[k] for k in here}
+        for there in regression.residuals_by_geometry()
     ]
     out = {k: [m[k] - values for m in moved] for k, values in here.items()}
     for kind in ("swivel", "gauge"):
-        for i in range(len(problem.dataset.names)):
+        for i in range(len(regression.dataset.names)):
             column = np.zeros_like(here[kind])
             column[:, i] = 1.0
             out[kind].append(column)
         for other in out:
             if other != kind:
-                out[other] += [np.zeros_like(here[other])] * len(problem.dataset.names)
+                out[other] += [np.zeros_like(here[other])] * len(regression.dataset.names)
     return {k: np.nan_to_num(np.stack(v, axis=-1)) for k, v in out.items()}
 
 
@@ -159,14 +163,14 @@ _SHORT_LIST = 3
 
 
 @dataclass(frozen=True)
-class Study:
+class Preparation:
     """What stays the same however the geometry is taken."""
 
     dataset: RobotDataset
     catalogue: Catalogue
     candidates: tuple[Effect, ...]
     noise: PoseNoise
-    prior: tuple[Believed, ...]
+    prior: tuple[GeometryPrior, ...]
     """The geometry with the priors of a calibration."""
     guess: tuple[Term, ...] = ()
     """What is missing most likely: where the geometry is let go, it settles beside it."""
@@ -176,58 +180,62 @@ class Study:
         """The profile's own effects at their file values."""
         return robot_terms(self.dataset.robot, self.catalogue)
 
-    def inquiry(self, believed: Sequence[Believed], beside: tuple[Term, ...] = ()) -> RobotInquiry:
+    def engine(
+        self, geometry: Sequence[GeometryPrior], beside: tuple[Term, ...] = ()
+    ) -> PoseSelection:
         """Beginning with the profile's own effects, the geometry believed as given."""
         terms = (*self.own, *beside)
-        standing, terms = settled(self.dataset, terms, self.noise.sigma, believed)
-        problem = RobotProblem(standing)
-        begin = begun(terms[: len(self.own)])
-        return RobotInquiry(problem, begin, self.candidates, self.noise)
+        point, terms = fitted_point(self.dataset, terms, self.noise.sigma, geometry)
+        regression = PoseRegression(point)
+        initial_model = own_effects(terms[: len(self.own)])
+        return PoseSelection(regression, initial_model, self.candidates, self.noise)
 
-    def as_filed(self, beside: tuple[Term, ...] = ()) -> RobotInquiry:
+    def file_geometry(self, beside: tuple[Term, ...] = ()) -> PoseSelection:
         """With the numbers of the file, as sure as its calibration left them."""
-        believed = geometry_believed(self.dataset, self.catalogue, fitted=True)
-        return self.inquiry(believed, beside)
+        geometry = priors_of_geometry(self.dataset, self.catalogue, fitted=True)
+        return self.engine(geometry, beside)
 
-    def let_go(self) -> RobotInquiry:
+    def free_geometry(self) -> PoseSelection:
         """With the geometry fitted too."""
-        return self.inquiry(self.prior, self.guess)
+        return self.engine(self.prior, self.guess)
 
-    def guessed(self) -> Study:
+    def with_guess(self) -> Preparation:
         """With the effect that explains most beside the geometry, and the noise beside it.
 
         A geometry that was fitted without what is missing lies millimetres off, too far to be
         linear in between.
         """
-        inquiry = self.let_go()
-        present, noise = inquiry.settle(inquiry.begin)
-        listed = [s for s in inquiry.scores(present, noise) if s.value > 0][:_SHORT_LIST]
-        trials = [inquiry.trial(present, item, noise) for item in listed]
+        engine = self.free_geometry()
+        present, noise = engine.fit_with_noise(engine.initial_model)
+        listed = [s for s in engine.scores(present, noise) if s.net_gain > 0][:_SHORT_LIST]
+        trials = [engine.trial(present, item, noise) for item in listed]
         best = min(trials, key=lambda t: t.criterion, default=None)
-        if best is None or best.criterion > inquiry.criterion(present):
+        if best is None or best.criterion > engine.criterion(present):
             return self
         guess = best.fit.hypothesis.terms[-1:]
         absent = tuple(e for e in self.candidates if e.id != guess[0].effect.id)
-        noise_beside = judged_noise(self.dataset, (*self.own, *guess), self.prior, absent)
+        noise_beside = estimated_noise(self.dataset, (*self.own, *guess), self.prior, absent)
         return replace(self, guess=guess, noise=noise_beside)
 
 
-def study_of(runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue) -> Study:
+def prepare_selection(
+    runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue
+) -> Preparation:
     """Read poses and judge their noise. Raises RunError, and FileError for effects."""
     dataset = prepare_poses(runs, profile)
     own = robot_terms(profile, catalogue)
-    prior = tuple(geometry_believed(dataset, catalogue, fitted=False))
+    prior = tuple(priors_of_geometry(dataset, catalogue, fitted=False))
     there = {term.effect.id for term in own}
     candidates = tuple(candidates_at(dataset, catalogue))
     absent = tuple(effect for effect in candidates if effect.id not in there)
-    noise = judged_noise(dataset, own, prior, absent)
+    noise = estimated_noise(dataset, own, prior, absent)
     if not balanced(dataset, noise):
         dataset = replace(dataset, balanced=False)
         candidates = tuple(candidates_at(dataset, catalogue))
-    return Study(dataset, catalogue, candidates, noise, prior).guessed()
+    return Preparation(dataset, catalogue, candidates, noise, prior).with_guess()
 
 
-def fitted_to(profile: RobotProfile, runs: Sequence[Run]) -> bool:
+def calibrated_on(profile: RobotProfile, runs: Sequence[Run]) -> bool:
     """Whether the geometry was calibrated on some of these very runs."""
     known = {Path(name).name for name in profile.fitted.runs} if profile.fitted else set()
     return any(Path(run.path or run.name).name in known for run in runs)

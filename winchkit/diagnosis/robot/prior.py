@@ -10,13 +10,13 @@ from winchkit.effects.term import Term
 from winchkit.schema.profiles.robot import LineSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
-__all__ = ["Believed", "believed_profile"]
+__all__ = ["GeometryPrior", "profile_with_geometry"]
 
 Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Believed:
+class GeometryPrior:
     """A number of the geometry that is a nuisance: one parameter of a term, and its prior."""
 
     term: Term
@@ -32,31 +32,31 @@ class Believed:
         """Where it is now."""
         return self.term.values[self.parameter]
 
-    def moved(self, by: float) -> Believed:
+    def moved(self, by: float) -> GeometryPrior:
         """With another value, ``by`` standard deviations from where it is."""
         values = {**self.term.values, self.parameter: self.value + by * self.std}
         return replace(self, term=Term(self.term.effect, values))
 
 
-def believed_profile(profile: RobotProfile, believed: Iterable[Believed]) -> RobotProfile:
+def profile_with_geometry(profile: RobotProfile, geometry: Iterable[GeometryPrior]) -> RobotProfile:
     """A robot's profile with every number of its geometry where it is now."""
     lines = {line.name: line for line in profile.line}
-    for belief in believed:
-        if not belief.value:
+    for item in geometry:
+        if not item.value:
             continue
-        place = line_of_effect(belief.term.effect)
+        place = line_of_effect(item.term.effect)
         for name in [place] if place else lines:
-            lines[name] = _with(lines[name], base_of(belief.term.effect), belief)
+            lines[name] = _with(lines[name], base_of(item.term.effect), item)
     return replace(profile, line=tuple(lines.values()))
 
 
-def _with(line: LineSpec, effect: str, belief: Believed) -> LineSpec:
+def _with(line: LineSpec, effect: str, item: GeometryPrior) -> LineSpec:
     """A line with one number moved."""
-    by, winch = belief.value, line.winch
+    by, winch = item.value, line.winch
     if effect == "exit-point":
-        return replace(line, exit_point=_shifted(line.exit_point, belief.parameter, by))
+        return replace(line, exit_point=_shifted(line.exit_point, item.parameter, by))
     if effect == "anchor-point":
-        return replace(line, anchor_point=_shifted(line.anchor_point, belief.parameter, by))
+        return replace(line, anchor_point=_shifted(line.anchor_point, item.parameter, by))
     if effect == "swivel-radius":
         return replace(line, swivel_radius=line.swivel_radius + by)
     assert isinstance(winch, WinchProfile)

@@ -15,95 +15,173 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.spectrum import Band
+from winchkit.diagnosis.regression.base import Folds, Regression, Segment
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem, Segment
+from winchkit.diagnosis.robot.candidates import lacking, lacking_parts
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.equations import POSED, Equations
-from winchkit.diagnosis.robot.prior import Believed, believed_profile
+from winchkit.diagnosis.robot.prior import GeometryPrior, profile_with_geometry
+from winchkit.effects.effect import Effect
 from winchkit.effects.placement import base_of, line_of_effect
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot
-from winchkit.model.stages import Stage
+from winchkit.model.stages import At, Stage
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["RobotProblem", "Standing"]
+__all__ = ["LinearizationPoint", "PoseRegression"]
 
 _COPIES = 5
+_GROUPS = 5
+_BLOCKS = 24
+_RUN_LEAST = 10
 _SEEN = 1e-9
 _ZERO, _OFFSET = 0.2, 0.05
 
 
 @dataclass(frozen=True)
-class Standing:
+class LinearizationPoint:
     """Where a problem stands: what is taken for granted while effects are fitted."""
 
     dataset: RobotDataset
     pose: Pose
     sigma: Mapping[str, float]
-    believed: tuple[Believed, ...] = ()
+    geometry: tuple[GeometryPrior, ...] = ()
 
     @cached_property
     def profile(self) -> RobotProfile:
         """The profile with the geometry where it is now."""
-        return believed_profile(self.dataset.robot, self.believed)
+        return profile_with_geometry(self.dataset.robot, self.geometry)
 
     def robot(self, terms: Sequence[Term] = ()) -> Robot:
         """With terms beside the geometry."""
         return robot_with_terms(self.profile, terms)
 
 
-class RobotProblem(Problem):
+class PoseRegression(Regression):
     """Residuals of hypotheses on a robot's poses."""
 
-    def __init__(self, standing: Standing) -> None:
-        self.standing = standing
-        self.dataset: RobotDataset = standing.dataset
-        self.runs = 1
-        self.robot = standing.robot()
-        self.equations = Equations(standing.dataset, standing.pose, self.robot)
+    has_known_loads = False  # Tensions follow from the balance at the pose.
+
+    def __init__(self, point: LinearizationPoint) -> None:
+        self.point = point
+        self.dataset: RobotDataset = point.dataset
+        self.robot = point.robot()
+        self.equations = Equations(point.dataset, point.pose, self.robot)
         self._start = self.equations.residuals(self.robot)
         self._zeros = _zeros(self._start, self.dataset)
         self._posed = [k for k in POSED if np.isfinite(self._start[k]).any()]
         self._project()
-        here = self._rows_of(self._start)
-        prior = [-(b.value - b.at) / b.std for b in standing.believed]
+        prior = [-(b.value - b.at) / b.std for b in point.geometry]
         self._prior = np.tile(np.array(prior) / np.sqrt(_COPIES), _COPIES)
         counts = [int(np.count_nonzero(keep)) for keep in self._keep.values()]
-        self.rows_of_poses = sum(counts)
-        self.segments = self._segments(counts)
-        self.rows = self.segments[-1].rows.stop
-        self.base = self._beside(here, self._prior)
-        self._here = here
-        self.fits_offset = self.rounds = False
+        super().__init__(self._segments(counts), n_runs=1)
+        self._n_observations = sum(counts)
+        self._here = self._rows_of(self._start)
+        self.nominal_residual = self._beside(self._here, self._prior)
         self.nuisance_columns = self._nuisances()
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Kinds of equations: lengths and, where they were measured, tensions."""
+        return self.dataset.outputs
 
     @cached_property
     def band_of_row(self) -> NDArray[np.intp]:
-        """One band per kind of output."""
-        out = np.zeros(self.rows, dtype=np.intp)
+        """One band per output, shape (n_rows,)."""
+        out = np.zeros(self.n_rows, dtype=np.intp)
         for index, segment in enumerate(self.segments):
             out[segment.rows] = index
         return out
 
     @property
     def bands(self) -> list[tuple[str, float, float]]:
-        """One per output: poses have no frequency."""
+        """One band per output, since poses have no frequency."""
         return [(s.output, 0.0, float("inf")) for s in self.segments]
 
     @property
-    def floor(self) -> Array:
-        """Rows are whitened."""
+    def power_floor(self) -> Array:
+        """Lower limit of the variance of whitened rows, shape (n_bands,)."""
         return np.full(len(self.segments), 1e-12)
+
+    @property
+    def n_observations(self) -> int:
+        """Number of rows without those of the prior."""
+        return self._n_observations
+
+    def signal_rms(self, output: str) -> float:
+        """NaN: rows are whitened; SI values are computed in ``robot/errors.py``."""
+        return float("nan")
+
+    def discretization_error(self, hypothesis: Hypothesis) -> Array:
+        """Zero: poses are at rest."""
+        return np.zeros(self.n_rows)
+
+    def unfiltered(self) -> PoseRegression:
+        """The regression itself: poses are not filtered."""
+        return self
+
+    @property
+    def motions(self) -> tuple[At, ...]:
+        """None: poses are at rest."""
+        return ()
+
+    def missing_needs(self, effect: Effect) -> list[str]:
+        """Measurements and parts that an effect needs and that are absent, in words."""
+        if not effect.on_robot:
+            return ["a motion: poses stand still"]
+        missing = lacking(effect, self.dataset) or lacking_parts(effect, self.dataset)
+        if not missing and not set(effect.outputs) & set(self.outputs):
+            missing = ["a measured " + " or ".join(effect.outputs)]
+        return missing
+
+    def excites(self, shape: Mapping[str, float]) -> bool:
+        """True: effects on poses have no orders."""
+        return True
+
+    @property
+    def replicates(self) -> tuple[Repeats, ...]:
+        """None: repeats of poses are used for the variance components."""
+        return ()
+
+    @property
+    def group_of_run(self) -> tuple[int, ...]:
+        """All poses form one group."""
+        return (0,)
+
+    @cached_property
+    def blocks(self) -> Folds:
+        """Up to 24 contiguous blocks of distinct poses."""
+        pose = self.dataset.pose
+        count = min(_BLOCKS, int(pose.max()) + 1)
+        return self._folded((pose * count) // (int(pose.max()) + 1), count)
+
+    @cached_property
+    def groups(self) -> Folds:
+        """Runs, where several have at least ten poses of their own; else every fifth pose."""
+        dataset = self.dataset
+        sizes = np.bincount(dataset.measured.run)
+        together = [set(dataset.pose[dataset.measured.run == n]) for n in range(len(sizes))]
+        apart = sum(map(len, together)) == len(set().union(*together))
+        if len(sizes) > 1 and sizes.min() >= _RUN_LEAST and apart:
+            return self._folded(dataset.measured.run, len(sizes))
+        return self._folded(dataset.pose % _GROUPS, _GROUPS)
+
+    def _folded(self, fold_of_pose: NDArray[np.intp], count: int) -> Folds:
+        """Folds of rows; the copies of the prior are distributed over them."""
+        row = self.pose_of_row
+        fold = np.where(row >= 0, fold_of_pose[np.maximum(row, 0)], (-1 - row) % count)
+        return Folds(tuple(fold[s.rows] for s in self.segments), count)
 
     @cached_property
     def pose_of_row(self) -> NDArray[np.intp]:
         """Row of the run behind each row; −1 − copy for those of the prior, (rows,)."""
         own = [np.nonzero(keep)[0] for keep in self._keep.values()]
-        copies = -1 - np.repeat(np.arange(_COPIES), len(self.standing.believed))
+        copies = -1 - np.repeat(np.arange(_COPIES), len(self.point.geometry))
         return np.concatenate([own[0], copies, *own[1:]])
 
-    def samples(self, output: str) -> int:
+    def n_samples(self, output: str) -> int:
         """Rows of an output, the prior's left out."""
         return max(1, int(np.count_nonzero(self._keep[output])))
 
@@ -114,26 +192,26 @@ class RobotProblem(Problem):
     def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
         """What the terms add to the prediction, rows; one output is not had without the others."""
         if not hypothesis.terms:
-            return np.zeros(self.rows)
+            return np.zeros(self.n_rows)
         moved = self._rows_of(self.residuals(hypothesis.terms))
         return self._beside(self._here - moved, np.zeros_like(self._prior))
 
     def residuals(self, terms: Sequence[Term]) -> dict[str, Array]:
         """Model less measurement by kind, zeros of instruments taken out, SI."""
-        return self.residuals_at(self.standing, terms)
+        return self.residuals_at(self.point, terms)
 
-    def residuals_at(self, standing: Standing, terms: Sequence[Term]) -> dict[str, Array]:
+    def residuals_at(self, point: LinearizationPoint, terms: Sequence[Term]) -> dict[str, Array]:
         """As :meth:`residuals`, with the geometry elsewhere."""
-        found = self.equations.residuals(standing.robot(terms))
+        found = self.equations.residuals(point.robot(terms))
         return {kind: self._zeroed(kind, values) for kind, values in found.items()}
 
     def at(self, hypothesis: Hypothesis) -> dict[str, Array]:
         """Residuals of a hypothesis with the geometry where its nuisances move it."""
-        believed = self.standing.believed
-        first = self.nuisance_columns.shape[1] - len(believed)
-        by = hypothesis.nuisances[first:] or (0.0,) * len(believed)
-        moved = tuple(b.moved(x) for b, x in zip(believed, by, strict=True))
-        return self.residuals_at(replace(self.standing, believed=moved), hypothesis.terms)
+        geometry = self.point.geometry
+        first = self.nuisance_columns.shape[1] - len(geometry)
+        by = hypothesis.nuisances[first:] or (0.0,) * len(geometry)
+        moved = tuple(b.moved(x) for b, x in zip(geometry, by, strict=True))
+        return self.residuals_at(replace(self.point, geometry=moved), hypothesis.terms)
 
     def in_time(self, rows: Array) -> list[Array]:
         """Rows of each segment: there is no time."""
@@ -148,7 +226,7 @@ class RobotProblem(Problem):
 
     def _project(self) -> None:
         """Per pose an orthonormal basis of what no move of it can undo."""
-        sigma, by = self.standing.sigma, self.slope()
+        sigma, by = self.point.sigma, self.slope()
         known = np.concatenate([np.isfinite(self._start[k]) for k in self._posed], axis=1)
         slope = np.concatenate([by[k] / sigma[k] for k in self._posed], axis=1)
         slope = np.where(known[..., None], slope, 0.0)
@@ -172,7 +250,7 @@ class RobotProblem(Problem):
 
     def _rows_of(self, residuals: Mapping[str, Array]) -> Array:
         """Measured less predicted, whitened and freed of the pose: closures, then tensions."""
-        sigma = self.standing.sigma
+        sigma = self.point.sigma
         white = np.concatenate([residuals[k] / sigma[k] for k in self._posed], axis=1)
         white = np.where(np.isfinite(white), white, 0.0)
         free = (np.swapaxes(self._basis, 1, 2) @ white[..., None])[..., 0]
@@ -205,29 +283,29 @@ class RobotProblem(Problem):
                 column = -self._rows_of(moved)
                 if np.any(column):
                     columns.append(self._beside(column, np.zeros_like(self._prior)))
-        for index, moved in enumerate(self.moved_by_belief()):
+        for index, moved in enumerate(self.residuals_by_geometry()):
             column = self._here - self._rows_of(moved)
-            held = np.zeros((_COPIES, len(self.standing.believed)))
+            held = np.zeros((_COPIES, len(self.point.geometry)))
             held[:, index] = 1 / np.sqrt(_COPIES)
             columns.append(self._beside(column, held.ravel()))
-        return np.array(columns).reshape(len(columns), self.rows).T
+        return np.array(columns).reshape(len(columns), self.n_rows).T
 
-    def moved_by_belief(self) -> list[dict[str, Array]]:
+    def residuals_by_geometry(self) -> list[dict[str, Array]]:
         """Residuals with each number of the geometry moved by a standard deviation.
 
         A line's equations hold no other line's numbers: those of one kind are moved together. How
         they turn forces is left out, since it is looked at anew wherever the geometry settles.
         """
-        believed = self.standing.believed
+        geometry = self.point.geometry
         here = self.residuals(())
-        out = [dict(here) for _ in believed]
-        kinds = {(base_of(b.term.effect), b.parameter) for b in believed}
+        out = [dict(here) for _ in geometry]
+        kinds = {(base_of(b.term.effect), b.parameter) for b in geometry}
         for kind in sorted(kinds):
-            own = [(base_of(b.term.effect), b.parameter) == kind for b in believed]
-            moved = [b.moved(1.0) if mine else b for b, mine in zip(believed, own, strict=True)]
-            there = self.residuals_at(replace(self.standing, believed=tuple(moved)), ())
+            own = [(base_of(b.term.effect), b.parameter) == kind for b in geometry]
+            moved = [b.moved(1.0) if mine else b for b, mine in zip(geometry, own, strict=True)]
+            there = self.residuals_at(replace(self.point, geometry=tuple(moved)), ())
             for index in np.flatnonzero(own).tolist():
-                line = line_of_effect(believed[index].term.effect)
+                line = line_of_effect(geometry[index].term.effect)
                 place = [self.dataset.names.index(line)] if line else slice(None)
                 for name in ("rope", "swivel", "gauge"):
                     out[index][name] = here[name].copy()

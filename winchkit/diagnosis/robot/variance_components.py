@@ -46,7 +46,7 @@ class PoseNoise:
     """Standard deviations by kind, SI, and their degrees of freedom."""
 
     sigma: Mapping[str, float]
-    freedom: Mapping[str, float]
+    dof: Mapping[str, float]
     """Degrees of freedom of lengths and of tensions, by output."""
     from_repeats: bool
     unexplained: Mapping[str, float]
@@ -102,25 +102,25 @@ def noise_of(stack: Stack, repeats: Stack | None) -> PoseNoise:
     """
     left, free = _components(stack)
     if repeats is not None:
-        sigma, freedom = _components(repeats)
-        if freedom.get("cable_length", 0.0) >= _REPEATS_LEAST:
-            return PoseNoise(sigma, freedom, from_repeats=True, unexplained=left)
+        sigma, dof = _components(repeats)
+        if dof.get("cable_length", 0.0) >= _REPEATS_LEAST:
+            return PoseNoise(sigma, dof, from_repeats=True, unexplained=left)
     return PoseNoise(left, free, from_repeats=False, unexplained=left)
 
 
 def _components(stack: Stack) -> tuple[dict[str, float], dict[str, float]]:
     sigma = {kind: START[kind] for kind in stack.kind}
-    freedom: dict[str, float] = {}
+    dof: dict[str, float] = {}
     posed = [kind for kind in POSED if kind in stack.kind]
     for _ in range(_ROUNDS):
         before = dict(sigma)
         own = _round(stack, posed, sigma)
-        freedom["cable_length"] = sum(own.values())
+        dof["cable_length"] = sum(own.values())
         if "tension" in stack.kind:
-            freedom["tension"] = sum(_round(stack, ["tension"], sigma).values())
+            dof["tension"] = sum(_round(stack, ["tension"], sigma).values())
         if all(abs(sigma[k] - before[k]) <= _SETTLED * before[k] for k in sigma):
             break
-    return sigma, freedom
+    return sigma, dof
 
 
 def _round(stack: Stack, kinds: Sequence[str], sigma: dict[str, float]) -> dict[str, float]:

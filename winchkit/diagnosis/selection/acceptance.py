@@ -4,53 +4,59 @@ from __future__ import annotations
 
 import numpy as np
 
-from winchkit.diagnosis.regression.cross_validation import confidence, held_out, held_out_rms
+from winchkit.diagnosis.regression.cross_validation import (
+    held_out,
+    held_out_rms,
+    signed_rank_p_value,
+)
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.selection.engine import Inquiry, Trial
+from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["BETTER", "MATTERS", "best_that_holds", "holds"]
+__all__ = ["MIN_GAIN", "RELEVANT_RATIO", "best_accepted", "is_accepted"]
 
-_GATE_LEVEL = 0.02
-BETTER = 2.0
+_LEVEL = 0.02
+MIN_GAIN = 2.0
 """By how much a criterion must fall for a change to be worth it."""
 _NO_WORSE = 1.02
-MATTERS = 0.98
+RELEVANT_RATIO = 0.98
 """Of some held-out error, what may be left for a change to matter to anyone."""
 
 
-def best_that_holds(
-    inquiry: Inquiry, present: Fit, noise: Noise, trials: list[Trial]
+def best_accepted(
+    engine: SelectionEngine, present: Fit, noise: Noise, trials: list[Trial]
 ) -> Fit | None:
     """The best of the short list that passes the gate, all refitted; None where none does."""
-    before = inquiry.criterion(present)
+    before = engine.criterion(present)
     for trial in sorted(trials, key=lambda t: t.criterion):
-        if trial.criterion < before - BETTER and holds(inquiry, present, trial.fit, noise):
+        if trial.criterion < before - MIN_GAIN and is_accepted(engine, present, trial.fit, noise):
             return trial.fit
     return None
 
 
-def holds(
-    inquiry: Inquiry, present: Fit, grown: Fit, noise: Noise, matters: float = MATTERS
+def is_accepted(
+    engine: SelectionEngine, present: Fit, grown: Fit, noise: Noise, matters: float = RELEVANT_RATIO
 ) -> bool:
     """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
 
     An effect that shows in few blocks, such as those of one kind of move, cannot be certain by
     rank; that it pays for itself in every single group, none of which it was fitted on, can.
     """
-    problem = inquiry.problem
-    blocks = inquiry.blocks
-    before = held_out(problem, present, noise, blocks)
-    after = held_out(problem, grown, noise, blocks)
-    groups = inquiry.folds(grown, noise)
-    gain = held_out(problem, present, noise, groups) - held_out(problem, grown, noise, groups)
-    pays = inquiry.grouped(groups) and bool(np.min(gain) > inquiry.price * _added(present, grown))
-    if np.sum(before - after) <= 0 or (confidence(before, after) > _GATE_LEVEL and not pays):
+    regression = engine.regression
+    blocks = regression.blocks
+    before = held_out(regression, present, noise, blocks)
+    after = held_out(regression, grown, noise, blocks)
+    groups = engine.folds(grown, noise)
+    gain = held_out(regression, present, noise, groups) - held_out(regression, grown, noise, groups)
+    pays = engine.grouped(groups) and bool(
+        np.min(gain) > engine.penalty_per_parameter * _added(present, grown)
+    )
+    if np.sum(before - after) <= 0 or (signed_rank_p_value(before, after) > _LEVEL and not pays):
         return False
-    was = held_out_rms(problem, present, noise, groups)
-    now = held_out_rms(problem, grown, noise, groups)
-    ratios = [now[output] / was[output] for output in problem.dataset.outputs]
+    was = held_out_rms(regression, present, noise, groups)
+    now = held_out_rms(regression, grown, noise, groups)
+    ratios = [now[output] / was[output] for output in regression.outputs]
     # What is certain and changes nothing, such as a clock a millisecond off, is not worth a name.
     return bool(np.sum(gain) > 0 and min(ratios) < matters and max(ratios) < _NO_WORSE)
 
@@ -58,7 +64,7 @@ def holds(
 def _added(present: Fit, grown: Fit) -> int:
     """Degrees of freedom that a grown model has more than the present model, one at least."""
     after, before = (
-        sum(Coordinates(term.effect).freedom for term in fitted.hypothesis.terms)
+        sum(Coordinates(term.effect).n_parameters for term in fitted.hypothesis.terms)
         for fitted in (grown, present)
     )
     return max(1, after - before)

@@ -1,76 +1,25 @@
-"""What candidates are scored at: effects that these runs could show, at points of their shapes."""
+"""Candidate set: effects that the data could show, at every point of their shape grid."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-import numpy as np
-
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["Point", "missing_needs", "points"]
-
-_PERIODS = 2
-_NEEDED = {
-    "cable": "a rope in the profile ([cable], [[pulley]] or reference.cable_length)",
-    "layers": "a drum that winds in layers (spiral or archimedean)",
-    "guide": "a [guide] in the profile",
-    "pulley": "a [[pulley]] in the profile",
-    "temperature": "a temperature channel in every run",
-    "load": "a load channel or load_mass",
-    "rope_force": "a load, load_mass or tension",
-    "gearing": "a gearbox",
-    "robot": "a robot's profile",
-}
-
-
-def missing_needs(effect: Effect, problem: Problem) -> list[str]:
-    """Parts and channels that an effect needs and that are not there, in words."""
-    dataset = problem.dataset
-    if not effect.needs:
-        measured = set(effect.outputs) & set(dataset.outputs)
-        return [] if measured else ["a measured " + " or ".join(effect.outputs)]
-    profile, recordings = dataset.profile, dataset.recordings
-    cable = profile.cable
-    roped = cable.diameter or cable.dead_length or profile.pulley
-    have = {
-        "cable": bool(roped) or profile.reference.cable_length is not None,
-        "layers": profile.drum.kind in {"spiral", "archimedean"},
-        "guide": profile.guide is not None,
-        "pulley": bool(profile.pulley),
-        "temperature": all(r.signals.temperature is not None for r in recordings),
-        "load": any(r.raw.load is not None for r in recordings),
-        "rope_force": any(bool(r.raw.at.tension.any()) for r in recordings),
-        "gearing": True,
-        "robot": False,
-    }
-    lacking = [_NEEDED[need] for need in effect.needs if not have[need]]
-    if not set(effect.outputs) & set(dataset.outputs):
-        lacking.append("a measured " + " or ".join(effect.outputs))
-    return lacking
-
+__all__ = ["Point", "points"]
 
 Point = tuple[Effect, dict[str, float], list[dict[str, float]]]
 """An effect, a point of its shape grid, and its values of a usual size there."""
 
 
-def points(problem: Problem, effects: Iterable[Effect]) -> Iterator[Point]:
-    """What candidates are scored at, where these runs could show them at all."""
+def points(regression: Regression, effects: Iterable[Effect]) -> Iterator[Point]:
+    """Effects at the points of their shape grids, as far as the data could show them."""
     for effect in effects:
-        if missing_needs(effect, problem):
+        if regression.missing_needs(effect):
             continue
         coordinates = Coordinates(effect)
         for shape in coordinates.grid():
-            if _turns_enough(problem, shape):
-                yield effect, shape, coordinates.secants()
-
-
-def _turns_enough(problem: Problem, shape: dict[str, float]) -> bool:
-    """Whether the motor turns through two periods of an order in some run."""
-    orders = [shape["order"]] if "order" in shape else []
-    if not orders:
-        return True
-    stroke = max(float(np.ptp(r.signals.motor_angle)) for r in problem.dataset.recordings)
-    return all(order * stroke >= _PERIODS * 2 * np.pi for order in orders)
+            if regression.excites(shape):
+                yield effect, shape, coordinates.usual_steps()

@@ -1,52 +1,43 @@
-"""One inquiry: a problem, its candidates, and the moves of a search among hypotheses."""
+"""Selection engine: a regression, its candidates, and the operations of stepwise selection.
+
+The engine fits, scores and compares hypotheses of any regression. How the noise is estimated,
+how lack of fit is tested and which folds are held out depends on the data: the implementations
+are :class:`~winchkit.diagnosis.selection.time_series.TimeSeriesSelection` for a winch's runs and
+:class:`~winchkit.diagnosis.robot.engine.PoseSelection` for a robot's poses.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.cross_validation import (
-    Folds,
-    blocks_of,
-    extrapolation,
-    five_blocks,
-    groups_of,
-    held_out_rms,
-)
-from winchkit.diagnosis.regression.discretization import without_rounding
+from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.gls import Fit, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import (
-    Noise,
-    Presence,
-    noise_from_repeats,
-    noise_saturated,
-    presence,
-)
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.candidates import missing_needs
-from winchkit.diagnosis.selection.initial_states import rests_on_states
-from winchkit.diagnosis.selection.pairs import Couple, couples
-from winchkit.diagnosis.selection.scores import Projected, Score, score, worthless
-from winchkit.diagnosis.selection.signatures import Signatures, redrawn, signatures
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
+from winchkit.diagnosis.selection.pairs import Pair, screened_pairs
+from winchkit.diagnosis.selection.scores import Projected, Score, score, zero_score
+from winchkit.diagnosis.selection.signatures import Signatures, signatures, updated_signatures
 from winchkit.diagnosis.selection.starting_values import (
-    by_coefficients,
-    in_disguise,
-    placed,
+    shape_at_bound,
+    starting_points,
     starting_values,
+    truncated_series,
 )
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
-    "Inquiry",
-    "Last",
+    "LastValue",
+    "SelectionEngine",
     "Trial",
     "admissible",
     "best_of_each",
@@ -58,20 +49,20 @@ def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[
 
     What would help only with the wrong sign, such as an inertia below zero, gains nothing.
     """
-    signed = [item if _possible(item) else worthless(item, rows) for item in ranked]
-    signed.sort(key=lambda item: -item.value)
-    return [item for item in signed if not _stands_there(item.atom.effect, item, present)]
+    signed = [item if _is_feasible(item) else zero_score(item, rows) for item in ranked]
+    signed.sort(key=lambda item: -item.net_gain)
+    return [item for item in signed if not _is_present(item.candidate.effect, item, present)]
 
 
 def best_of_each(scores: Sequence[Score]) -> list[Score]:
     """The best point of each effect's grid, in the order in which they come."""
     first: dict[str, Score] = {}
     for item in scores:
-        first.setdefault(item.atom.effect.id, item)
+        first.setdefault(item.candidate.effect.id, item)
     return list(first.values())
 
 
-def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
+def _is_present(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
     """Whether the effect, or one that contains it, is in the hypothesis already."""
     for term in hypothesis.terms:
         if effect.id in term.effect.contains:
@@ -79,18 +70,18 @@ def _stands_there(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
         if term.effect.id == effect.id:
             orders = [p.name for p in effect.parameters if p.whole]
             if not effect.repeatable or all(
-                term.values[name] == item.atom.shape.get(name) for name in orders
+                term.values[name] == item.candidate.shape.get(name) for name in orders
             ):
                 return True
     return False
 
 
-def _possible(item: Score) -> bool:
+def _is_feasible(item: Score) -> bool:
     """Whether the amplitudes that fit best are within an effect's bounds at all."""
-    coordinates = Coordinates(item.atom.effect)
-    if item.atom.effect.probes:
+    coordinates = Coordinates(item.candidate.effect)
+    if item.candidate.effect.probes:
         return True
-    base = {**item.atom.effect.null, **item.atom.shape}
+    base = {**item.candidate.effect.null, **item.candidate.shape}
     amplitudes = slice(len(coordinates.amplitudes))
     begun = coordinates.vector(starting_values(item)[0])[amplitudes]
     return bool(np.any(begun != coordinates.vector(base)[amplitudes]))
@@ -99,7 +90,7 @@ def _possible(item: Score) -> bool:
 Answer = TypeVar("Answer")
 
 
-class Last(Generic[Answer]):
+class LastValue(Generic[Answer]):
     """Answers for a fit and a noise; the very same objects get the answer of the last time."""
 
     def __init__(self) -> None:
@@ -112,7 +103,6 @@ class Last(Generic[Answer]):
         return self._kept[2]
 
 
-_UNSURE = 0.2
 _WILD = 1.0
 """Of what the differences round: more of it is not rounding."""
 
@@ -126,209 +116,205 @@ class Trial:
     """Whitened squares and the price of all added degrees of freedom: lower is better."""
 
 
-class Inquiry:
-    """What stays the same through a search: data, candidates, folds, the model it began with."""
+class SelectionEngine(ABC):
+    """Candidates, signatures and comparisons that stay the same through a selection.
 
-    loads_are_chosen = True
-    """Whether a next run may hang another load, which shows how a rope's law bends."""
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    initial_model
+        Initial model: the profile's own effects.
+    candidates
+        Effects that may be added.
+    """
 
-    def __init__(self, problem: Problem, begin: Hypothesis, candidates: Iterable[Effect]) -> None:
-        self.problem = problem
-        self.begin = begin
-        self.given = len(begin.terms)
+    regression: Regression
+
+    def __init__(
+        self, regression: Regression, initial_model: Hypothesis, candidates: Iterable[Effect]
+    ) -> None:
+        self.regression = regression
+        self.initial_model = initial_model
+        self.n_initial_terms = len(initial_model.terms)
         self._candidates = tuple(candidates)
-        self._last_folds: Last[Folds] = Last()
-        self._last_presence: Last[Presence] = Last()
-        self._last_projected: Last[Projected] = Last()
-        self.signatures = self._signatures(begin)
+        self._last_folds: LastValue[Folds] = LastValue()
+        self._last_lack_of_fit_test: LastValue[LackOfFitTest] = LastValue()
+        self._last_projected: LastValue[Projected] = LastValue()
+        self.signatures = self._signatures(initial_model)
+
+    @abstractmethod
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+        """Noise estimate beside a fitted model.
+
+        Parameters
+        ----------
+        residual
+            Measured minus predicted, shape (n_rows,).
+        jacobian
+            Derivative of the prediction by the unknowns, shape (n_rows, n_unknowns).
+        states
+            Number of initial states, which are the last unknowns.
+        """
+
+    @abstractmethod
+    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+        """Held-out rms error of every output that a user reads, SI."""
+
+    @abstractmethod
+    def _choose_folds(self, fitted: Fit, noise: Noise) -> Folds:
+        """Folds for leave-group-out cross-validation of a fit."""
+
+    @abstractmethod
+    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
+        """F test of the residual against the noise, band by band."""
+
+    def folds(self, fitted: Fit, noise: Noise) -> Folds:
+        """Folds for leave-group-out cross-validation of a fit; the last answer is kept."""
+        return self._last_folds.of(fitted, noise, lambda: self._choose_folds(fitted, noise))
+
+    def lack_of_fit_test(self, present: Fit, noise: Noise) -> LackOfFitTest:
+        """Lack-of-fit test of a fit; the last answer is kept."""
+        return self._last_lack_of_fit_test.of(
+            present, noise, lambda: self._test_lack_of_fit(present, noise)
+        )
+
+    @property
+    def penalty_per_parameter(self) -> float:
+        """Reduction of χ² required per parameter: ln n, as in the BIC."""
+        return float(np.log(self.regression.n_observations))
+
+    def grouped(self, folds: Folds) -> bool:
+        """Whether folds are whole groups of programme and load, two at least."""
+        return folds is self.regression.groups and len(set(self.regression.group_of_run)) > 1
 
     def _signatures(self, present: Hypothesis) -> Signatures:
-        there = {t.effect.id for t in self.begin.terms if not t.effect.repeatable}
+        there = {t.effect.id for t in self.initial_model.terms if not t.effect.repeatable}
         absent = (effect for effect in self._candidates if effect.id not in there)
-        return signatures(self.problem, present, absent)
+        return signatures(self.regression, present, absent)
 
-    def look_again(self, present: Hypothesis) -> None:
+    def update_signatures(self, present: Hypothesis) -> None:
         """Draw the signatures anew beside a grown model: a lag acts on what is there."""
-        self._last_projected = Last()
-        grown = redrawn(self.problem, present, self.signatures)
+        self._last_projected = LastValue()
+        grown = updated_signatures(self.regression, present, self.signatures)
         if grown is None:
             del self.signatures  # Both at once would be the most memory of a whole diagnosis.
             grown = self._signatures(present)
         self.signatures = grown
 
-    @property
-    def price(self) -> float:
-        """Whitened squares that one degree of freedom must save."""
-        return float(np.log(self.problem.rows))
-
-    @cached_property
-    def blocks(self) -> Folds:
-        """Blocks of time for gates and comparisons."""
-        return blocks_of(self.problem)
-
-    @cached_property
-    def groups(self) -> Folds:
-        """Whole groups of programme and load, to be held out."""
-        return groups_of(self.problem)
-
-    def folds(self, fitted: Fit, noise: Noise) -> Folds:
-        """What to hold out for a fit: whole groups, or blocks where groups would not tell.
-
-        With few groups, say two loads, one may be what determines an unknown: a prediction that
-        rests on little fails whether or not the effect is there.
-        """
-
-        def compute() -> Folds:
-            unsure = extrapolation(self.problem, fitted, noise, self.groups) > _UNSURE
-            return self._five_blocks if unsure else self.groups
-
-        return self._last_folds.of(fitted, noise, compute)
-
-    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
-        """Held-out error of every output that a user reads, rms in SI."""
-        return held_out_rms(self.problem, fitted, noise, folds)
-
-    def lacking(self, effect: Effect) -> list[str]:
-        """Parts and channels without which these data cannot show an effect, in words."""
-        return missing_needs(effect, self.problem)
-
-    def grouped(self, folds: Folds) -> bool:
-        """Whether folds are whole groups of programme and load, two at least."""
-        return folds is self.groups and len(self.problem.dataset.repeats) > 1
-
-    @cached_property
-    def _five_blocks(self) -> Folds:
-        return five_blocks(self.problem)
-
-    @property
-    def _known(self) -> Array:
-        """Signatures that may differ between repeats for a reason that is measured."""
-        warm = [
-            index
-            for atom in self.signatures.atoms
-            if "temperature" in atom.effect.needs
-            for index in range(atom.columns.start, atom.columns.stop)
-        ]
-        return self.signatures.columns[:, warm]
-
-    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
-        """Noise under a present model, from repeats where there are any.
-
-        The last ``states`` columns of ``jacobian`` are by unknowns that each run has for itself.
-        """
-        if self.problem.dataset.repeated:
-            own = jacobian[:, jacobian.shape[1] - states :]
-            return noise_from_repeats(self.problem, residual, self._known, own)
-        columns = np.hstack([jacobian, self.signatures.columns])
-        return noise_saturated(self.problem, residual, columns)
-
-    def settle(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
+    def fit_with_noise(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
         """Fit, with the noise re-estimated from what the fit leaves."""
         states = sum(len(begun) for begun in start.starts)
         if noise is None:
-            vector = self.problem.vector(start)
-            jacobian = self.problem.jacobian(vector, start)
-            noise = self.noise(self.problem.residual(start), jacobian, states)
-        first = fit(self.problem, start, noise.weight(self.problem))
+            vector = self.regression.vector(start)
+            jacobian = self.regression.jacobian(vector, start)
+            noise = self.noise(self.regression.residual(start), jacobian, states)
+        first = fit(self.regression, start, noise.inverse_sigma(self.regression))
         noise = self.noise(first.residual, first.jacobian, states)
-        return fit(self.problem, first.hypothesis, noise.weight(self.problem)), noise
-
-    def presence(self, present: Fit, noise: Noise) -> Presence:
-        """Whether a fit leaves more than noise, and more than sampling may have rounded."""
-
-        def compute() -> Presence:
-            left = without_rounding(self.problem, present, noise.weight(self.problem))
-            return presence(self.problem, left, present.jacobian, noise)
-
-        return self._last_presence.of(present, noise, compute)
+        return fit(self.regression, first.hypothesis, noise.inverse_sigma(self.regression)), noise
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
         """Signatures with a fit's unknowns projected out."""
 
         def compute() -> Projected:
-            return Projected(self.problem, self.signatures, present.jacobian, noise)
+            return Projected(self.regression, self.signatures, present.jacobian, noise)
 
         return self._last_projected.of(present, noise, compute)
 
     def scores(self, present: Fit, noise: Noise) -> list[Score]:
         """Candidates beside a fit, best first, one point of its grid each; none that is there."""
-        return best_of_each(self.every_score(present, noise))
+        return best_of_each(self.scores_at_all_points(present, noise))
 
-    def every_score(self, present: Fit, noise: Noise) -> list[Score]:
+    def scores_at_all_points(self, present: Fit, noise: Noise) -> list[Score]:
         """The same at every point of their grids."""
-        ranked = score(self.projected(present, noise), present.residual, self.problem.rows)
-        return admissible(ranked, present.hypothesis, self.problem.rows)
+        ranked = score(self.projected(present, noise), present.residual, self.regression.n_rows)
+        return admissible(ranked, present.hypothesis, self.regression.n_rows)
 
-    def couples(self, present: Fit, noise: Noise) -> list[Couple]:
+    def pairs(self, present: Fit, noise: Noise) -> list[Pair]:
         """Pairs of candidates that pay beside a fit, best first."""
-        scores = self.every_score(present, noise)
-        return couples(self.projected(present, noise), present.residual, scores, self.price)
+        scores = self.scores_at_all_points(present, noise)
+        return screened_pairs(
+            self.projected(present, noise), present.residual, scores, self.penalty_per_parameter
+        )
 
     def criterion(self, fitted: Fit) -> float:
         """Whitened squares and the price of everything that was added."""
-        added = fitted.hypothesis.terms[self.given :]
-        freedom = sum(Coordinates(term.effect).freedom for term in added)
-        states = sum(len(start) for start in fitted.hypothesis.starts[self.given :])
-        return fitted.cost + self.price * (freedom + states)
+        added = fitted.hypothesis.terms[self.n_initial_terms :]
+        n_parameters = sum(Coordinates(term.effect).n_parameters for term in added)
+        states = sum(len(start) for start in fitted.hypothesis.starts[self.n_initial_terms :])
+        return fitted.chi_square + self.penalty_per_parameter * (n_parameters + states)
 
     def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
         """Fit a candidate beside the present terms; those that it contains give way to it.
 
         Of a series it takes as many coefficients as pay, each added to what was fitted before.
         """
-        effect, weight = item.atom.effect, noise.weight(self.problem)
+        effect, inverse_sigma = item.candidate.effect, noise.inverse_sigma(self.regression)
         hypothesis = present.hypothesis
-        for index in reversed(range(self.given, len(hypothesis.terms))):
+        for index in reversed(range(self.n_initial_terms, len(hypothesis.terms))):
             if hypothesis.terms[index].effect.id in effect.contains:
                 hypothesis = hypothesis.without(index)
         best: Trial | None = None
-        for law in by_coefficients(effect):
+        for law in truncated_series(effect):
             if best is None:
-                own = replace(item, atom=item.atom.of_law(law))
-                places = placed(self.problem, hypothesis, present, own, weight)
+                own = replace(item, candidate=item.candidate.with_law(law))
+                places = starting_points(self.regression, hypothesis, present, own, inverse_sigma)
                 terms = [Term(law, values) for values in places]
-                starts = [hypothesis.with_term(term, self.problem.runs) for term in terms]
-                starts += [anew for start in starts for anew in self._less_rounded(start)]
+                starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
+                starts += [anew for start in starts for anew in self._without_discretization(start)]
             else:
                 starts = [best.fit.hypothesis.with_law(law)]
-            fitted = fit_from(self.problem, starts, weight)
-            longer = Trial(fitted, self._price_of(fitted, hypothesis, present, noise))
+            fitted = fit_from(self.regression, starts, inverse_sigma)
+            longer = Trial(fitted, self._criterion_of_trial(fitted, hypothesis, present, noise))
             if best is not None and not longer.criterion < best.criterion:
                 break
             best = longer if np.isfinite(longer.criterion) else best
         return best or longer
 
-    def _less_rounded(self, start: Hypothesis) -> list[Hypothesis]:
+    def _without_discretization(self, start: Hypothesis) -> list[Hypothesis]:
         """The same begun as if sampling rounded nothing, where a loop is added to a wild rounding.
 
         Without the loop that was there all the time the rounding stood for a part of it, and a
         loop fitted from there turns around too late for good.
         """
-        wild = self.problem.rounds and bool(start.nuisances) and abs(start.nuisances[-1]) > _WILD
+        wild = (
+            self.regression.fits_discretization
+            and bool(start.nuisances)
+            and abs(start.nuisances[-1]) > _WILD
+        )
         if not wild or not start.terms[-1].effect.memory:
             return []
         return [replace(start, nuisances=(*start.nuisances[:-1], 0.0))]
 
-    def _price_of(self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise) -> float:
+    def _criterion_of_trial(
+        self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise
+    ) -> float:
         """The criterion of a trial; infinite where its last term is not what it is called."""
-        price = self.criterion(fitted)
-        if in_disguise(fitted.hypothesis.terms[-1]) or (
-            price < self.criterion(present) and self._rests_on_states(without, fitted, noise)
+        criterion = self.criterion(fitted)
+        if shape_at_bound(fitted.hypothesis.terms[-1]) or (
+            criterion < self.criterion(present)
+            and self._explained_by_initial_states(without, fitted, noise)
         ):
-            price = np.inf
-        return float(price)
+            criterion = np.inf
+        return float(criterion)
 
-    def _rests_on_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
+    def _explained_by_initial_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
         """Whether the last term explains mainly by the states in which the runs began."""
         if not fitted.hypothesis.starts[-1]:
             return False
-        weight = noise.weight(self.problem)
-        return rests_on_states(self.problem, self.refit(without, noise), fitted, weight, self.price)
+        inverse_sigma = noise.inverse_sigma(self.regression)
+        return explained_by_initial_states(
+            self.regression,
+            self.refit(without, noise),
+            fitted,
+            inverse_sigma,
+            self.penalty_per_parameter,
+        )
 
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """Fit a hypothesis under a given noise."""
-        return fit(self.problem, hypothesis, noise.weight(self.problem))
+        return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression))
 
-    def held(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
+    def fixed(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """A hypothesis as it is, fitted no further."""
-        return fit(self.problem, hypothesis, noise.weight(self.problem), 0)
+        return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression), 0)

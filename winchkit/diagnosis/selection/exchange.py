@@ -8,14 +8,15 @@ from itertools import combinations
 import numpy as np
 
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise, orthonormal
-from winchkit.diagnosis.selection.acceptance import BETTER
-from winchkit.diagnosis.selection.engine import Inquiry, Trial
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import orthonormal
+from winchkit.diagnosis.selection.acceptance import MIN_GAIN
+from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.diagnosis.selection.scores import Score
 
 __all__ = [
     "Exchange",
-    "recoupled",
+    "pair_exchange",
 ]
 
 _NEARLY = 0.1
@@ -30,25 +31,25 @@ class Exchange:
     where the others stood beside the term as well.
     """
 
-    def __init__(self, inquiry: Inquiry, present: Fit, noise: Noise, index: int) -> None:
-        self._inquiry, self._noise = inquiry, noise
+    def __init__(self, engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> None:
+        self._engine, self._noise = engine, noise
         self.own = present.hypothesis.terms[index]
         self._others = present.hypothesis.without(index)
-        self.base = inquiry.refit(self._others, noise)
+        self.base = engine.refit(self._others, noise)
         """Without the term, refitted."""
-        self.scores = inquiry.scores(self.base, noise)
+        self.scores = engine.scores(self.base, noise)
         """Of all candidates beside that."""
 
     @cached_property
     def _held(self) -> tuple[Fit, float, dict[str, Score]]:
         """The others as they stand beside the term; the least squares about there; the scores."""
-        held = self._inquiry.held(self._others, self._noise)
-        weight = self._noise.weight(self._inquiry.problem)
-        whitened, residual = held.jacobian * weight[:, None], held.residual * weight
+        held = self._engine.fixed(self._others, self._noise)
+        inverse_sigma = self._noise.inverse_sigma(self._engine.regression)
+        whitened, residual = held.jacobian * inverse_sigma[:, None], held.residual * inverse_sigma
         basis = orthonormal(whitened)
-        least = held.cost - float(np.sum((basis.T @ residual) ** 2))
-        scores = self._inquiry.scores(held, self._noise)
-        return held, least, {item.atom.effect.id: item for item in scores}
+        least = held.chi_square - float(np.sum((basis.T @ residual) ** 2))
+        scores = self._engine.scores(held, self._noise)
+        return held, least, {item.candidate.effect.id: item for item in scores}
 
     def trial(self, rival: Score, enough: float) -> Trial:
         """A rival in the term's place.
@@ -56,53 +57,53 @@ class Exchange:
         It is begun anew where its squares do not fall to ``enough``, yet nearly would beside the
         others as they stand.
         """
-        found = self._inquiry.trial(self.base, rival, self._noise)
-        if found.fit.cost < enough or not self._others.terms:
+        found = self._engine.trial(self.base, rival, self._noise)
+        if found.fit.chi_square < enough or not self._others.terms:
             return found
         held, least, scores = self._held
-        beside = scores.get(rival.atom.effect.id)
-        nearly = enough + _NEARLY * (self.base.cost - enough)
-        if beside is None or least - beside.gain > nearly:
+        beside = scores.get(rival.candidate.effect.id)
+        nearly = enough + _NEARLY * (self.base.chi_square - enough)
+        if beside is None or least - beside.explained_ss > nearly:
             return found
-        again = self._inquiry.trial(held, beside, self._noise)
-        return min(found, again, key=lambda trial: (trial.criterion, trial.fit.cost))
+        again = self._engine.trial(held, beside, self._noise)
+        return min(found, again, key=lambda trial: (trial.criterion, trial.fit.chi_square))
 
 
 _TRIED = 2
 _MOST = 3
 
 
-def recoupled(inquiry: Inquiry, present: Fit, noise: Noise, exchanged: int) -> Fit:
+def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:
     """The present fit, or the best with a better pair in the place of ``exchanged`` additions."""
-    added = range(inquiry.given, len(present.hypothesis.terms))
+    added = range(engine.n_initial_terms, len(present.hypothesis.terms))
     if not 0 < len(added) <= _MOST:
         return present  # So many stand for something that no pair is.
     # An exchange for more than was there is dear to try: as often, whatever may be exchanged.
     tried = _TRIED if exchanged > 1 else max(1, _TRIED // len(added))
     exchanges = [
-        _better(inquiry, present, noise, own, tried) for own in combinations(added, exchanged)
+        _better(engine, present, noise, own, tried) for own in combinations(added, exchanged)
     ]
     better = [fitted for fitted in exchanges if fitted is not None]
-    return min(better, key=inquiry.criterion, default=present)
+    return min(better, key=engine.criterion, default=present)
 
 
 def _better(
-    inquiry: Inquiry, present: Fit, noise: Noise, indices: tuple[int, ...], tried: int
+    engine: SelectionEngine, present: Fit, noise: Noise, indices: tuple[int, ...], tried: int
 ) -> Fit | None:
     """A fit with a pair that pays more than the terms at ``indices`` do; None where none does."""
     hypothesis = present.hypothesis
     for index in reversed(indices):
         hypothesis = hypothesis.without(index)
-    base = inquiry.refit(hypothesis, noise)
-    pays = inquiry.criterion(base) - inquiry.criterion(present) + BETTER
+    base = engine.refit(hypothesis, noise)
+    pays = engine.criterion(base) - engine.criterion(present) + MIN_GAIN
     leave = {present.hypothesis.terms[index].effect.id for index in indices}
     promising = [
-        pair for pair in inquiry.couples(base, noise) if pair.pays > pays and pair.ids != leave
+        pair for pair in engine.pairs(base, noise) if pair.net_gain > pays and pair.ids != leave
     ]
     for pair in promising[:tried]:
         # Newcomers first: what stood for both alone would keep the values that it had.
-        first, second = sorted(pair.scores, key=lambda item: item.atom.effect.id in leave)
-        trial = inquiry.trial(inquiry.trial(base, first, noise).fit, second, noise)
-        if trial.criterion < inquiry.criterion(present) - BETTER:
+        first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in leave)
+        trial = engine.trial(engine.trial(base, first, noise).fit, second, noise)
+        if trial.criterion < engine.criterion(present) - MIN_GAIN:
             return trial.fit
     return None

@@ -11,47 +11,56 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["rests_on_states"]
+__all__ = ["explained_by_initial_states"]
 
 _BY_ITSELF = 0.5
 
 
-def rests_on_states(problem: Problem, base: Fit, fitted: Fit, weight: Array, price: float) -> bool:
+def explained_by_initial_states(
+    regression: Regression,
+    base: Fit,
+    fitted: Fit,
+    inverse_sigma: Array,
+    penalty_per_parameter: float,
+) -> bool:
     """Whether the last term of a fit, which ``base`` lacks, needs its states too much.
 
     It does not where it explains half of what it does from rest in every run, and no less than a
     level per run would: a ramp from zero is three quarters level. Nor, as on a bench under a load
     that hangs for long, where it pays for all its numbers by more than levels do.
     """
-    known, left = base.jacobian * weight[:, None], base.residual * weight
-    gain = base.cost - fitted.cost
-    column = _beyond(known, _from_rest(problem, fitted.hypothesis) * weight)
+    known, left = base.jacobian * inverse_sigma[:, None], base.residual * inverse_sigma
+    gain = base.chi_square - fitted.chi_square
+    column = partialled_out(known, _from_rest(regression, fitted.hypothesis) * inverse_sigma)
     alone = (column @ left) ** 2 / max(float(column @ column), 1e-300)
     by_itself = bool(alone >= _BY_ITSELF * gain)
-    levels = _levels(problem, fitted.hypothesis)
+    levels = _levels(regression, fitted.hypothesis)
     if levels is None:
         return not by_itself
-    flat = _beyond(np.column_stack([known, levels * weight[:, None]]), left)
+    flat = partialled_out(np.column_stack([known, levels * inverse_sigma[:, None]]), left)
     if by_itself and alone >= left @ left - flat @ flat:
         return False
     hypothesis = fitted.hypothesis
-    owed = Coordinates(hypothesis.terms[-1].effect).freedom + len(hypothesis.starts[-1])
-    return float(flat @ flat) - fitted.cost < price * owed
+    owed = Coordinates(hypothesis.terms[-1].effect).n_parameters + len(hypothesis.starts[-1])
+    return float(flat @ flat) - fitted.chi_square < penalty_per_parameter * owed
 
 
-def _from_rest(problem: Problem, hypothesis: Hypothesis) -> Array:
+def _from_rest(regression: Regression, hypothesis: Hypothesis) -> Array:
     """What the last term adds where every run begins at rest, rows."""
     rested = replace(hypothesis, starts=(*hypothesis.starts[:-1], ()))
-    return problem.change(rested) - problem.change(hypothesis.without(len(hypothesis.terms) - 1))
+    return regression.change(rested) - regression.change(
+        hypothesis.without(len(hypothesis.terms) - 1)
+    )
 
 
-def _levels(problem: Problem, hypothesis: Hypothesis) -> Array | None:
+def _levels(regression: Regression, hypothesis: Hypothesis) -> Array | None:
     """What the last term's states explain if nothing moves within a run, (rows, runs).
 
     None for an effect without a time constant: how far it moved is not a matter of time.
@@ -62,9 +71,4 @@ def _levels(problem: Problem, hypothesis: Hypothesis) -> Array | None:
         return None
     still = Term(term.effect, {**term.values, **slow})
     frozen = replace(hypothesis, terms=(*hypothesis.terms[:-1], still))
-    return problem.jacobian(problem.vector(frozen), frozen)[:, -len(start) :]
-
-
-def _beyond(columns: Array, vector: Array) -> Array:
-    """A vector with what columns explain of it taken out."""
-    return np.asarray(vector - columns @ np.linalg.lstsq(columns, vector)[0])
+    return regression.jacobian(regression.vector(frozen), frozen)[:, -len(start) :]

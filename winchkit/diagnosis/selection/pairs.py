@@ -14,57 +14,65 @@ from itertools import combinations
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.projection import gains
+from winchkit.diagnosis.regression.projection import explained_ss_of_sets
 from winchkit.diagnosis.selection.scores import Projected, Score
 
-__all__ = ["Couple", "couples"]
+__all__ = ["Pair", "screened_pairs"]
 
 _TOGETHER = 1.5
 _UNIDENTIFIABLE = 1e-5
 
 
 @dataclass(frozen=True)
-class Couple:
+class Pair:
     """Two candidates side by side."""
 
     scores: tuple[Score, Score]
-    taken: float
+    explained_ss: float
     """Whitened squares."""
-    pays: float
+    net_gain: float
     """The same less the price of their degrees of freedom."""
-    alone: float
+    single_gain: float
     """Whitened squares that the two take one at a time, each at the best point of its grid."""
 
     @property
     def ids(self) -> set[str]:
         """Names of the two."""
-        return {item.atom.effect.id for item in self.scores}
+        return {item.candidate.effect.id for item in self.scores}
 
     @property
-    def hidden(self) -> bool:
+    def suppressed(self) -> bool:
         """Whether they take far more together than the one and the other."""
-        return self.taken > _TOGETHER * self.alone
+        return self.explained_ss > _TOGETHER * self.single_gain
 
 
-def couples(
-    projected: Projected, residual: Array, scores: Sequence[Score], price: float
-) -> list[Couple]:
+def screened_pairs(
+    projected: Projected, residual: Array, scores: Sequence[Score], penalty_per_parameter: float
+) -> list[Pair]:
     """Pairs of candidates that pay, best first, each at the best points of its two grids.
 
     ``scores`` are of all points; ``price`` is what a degree of freedom must save.
     """
-    alone: dict[str, float] = {}
+    single_gain: dict[str, float] = {}
     for item in scores:
-        alone[item.atom.effect.id] = max(item.gain, alone.get(item.atom.effect.id, 0.0))
-    found: dict[frozenset[str], Couple] = {}
+        single_gain[item.candidate.effect.id] = max(
+            item.explained_ss, single_gain.get(item.candidate.effect.id, 0.0)
+        )
+    found: dict[frozenset[str], Pair] = {}
     pairs = _pairs(scores)
-    for pair, taken in zip(pairs, _together(projected, residual, pairs), strict=True):
-        first, second = (item.atom.effect.id for item in pair)
-        pays = taken - price * sum(item.atom.freedom for item in pair)
+    for pair, explained_ss in zip(
+        pairs, _joint_explained_ss(projected, residual, pairs), strict=True
+    ):
+        first, second = (item.candidate.effect.id for item in pair)
+        net_gain = explained_ss - penalty_per_parameter * sum(
+            item.candidate.n_parameters for item in pair
+        )
         ids = frozenset((first, second))
-        if pays > 0 and (ids not in found or pays > found[ids].pays):
-            found[ids] = Couple(pair, taken, pays, alone[first] + alone[second])
-    return sorted(found.values(), key=lambda couple: -couple.pays)
+        if net_gain > 0 and (ids not in found or net_gain > found[ids].net_gain):
+            found[ids] = Pair(
+                pair, explained_ss, net_gain, single_gain[first] + single_gain[second]
+            )
+    return sorted(found.values(), key=lambda couple: -couple.net_gain)
 
 
 def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:
@@ -72,23 +80,25 @@ def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:
     return [
         (first, second)
         for first, second in combinations(scores, 2)
-        if first.atom.effect.id != second.atom.effect.id
-        and not first.atom.effect.nested_with(second.atom.effect)
+        if first.candidate.effect.id != second.candidate.effect.id
+        and not first.candidate.effect.nested_with(second.candidate.effect)
     ]
 
 
-def _together(
+def _joint_explained_ss(
     projected: Projected, residual: Array, pairs: Sequence[tuple[Score, Score]]
 ) -> list[float]:
     """Whitened squares that each pair takes side by side; pairs of as many columns at once."""
     products = projected.products(residual)
     size = np.sqrt(np.maximum(np.diag(projected.inner), 1e-300))
     inner, products = projected.inner / np.outer(size, size), products / size
-    columns = [np.r_[a.atom.columns, b.atom.columns] for a, b in pairs]
+    columns = [np.r_[a.candidate.columns, b.candidate.columns] for a, b in pairs]
     counts = np.array([len(own) for own in columns], dtype=int)
     out = np.zeros(len(pairs))
     for count in np.unique(counts):
         alike = np.flatnonzero(counts == count)
         own = np.array([columns[index] for index in alike])
-        out[alike] = gains(inner[own[:, :, None], own[:, None, :]], products[own], _UNIDENTIFIABLE)
+        out[alike] = explained_ss_of_sets(
+            inner[own[:, :, None], own[:, None, :]], products[own], _UNIDENTIFIABLE
+        )
     return list(map(float, out))

@@ -8,25 +8,26 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.selection.scores import Score
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
-    "by_coefficients",
-    "elsewhere",
-    "gap",
-    "in_disguise",
-    "placed",
+    "grid_spacing",
+    "other_grid_point",
+    "shape_at_bound",
+    "starting_points",
     "starting_values",
+    "truncated_series",
 ]
 
 
-def in_disguise(term: Term) -> bool:
+def shape_at_bound(term: Term) -> bool:
     """Whether a term has become another effect: a shape at its bound, values that cannot be."""
     effect = term.effect
     if effect.possible is not None and not effect.possible(term.values):
@@ -39,7 +40,7 @@ def in_disguise(term: Term) -> bool:
     return bool(np.any(ends[shapes]))
 
 
-def by_coefficients(effect: Effect) -> list[Effect]:
+def truncated_series(effect: Effect) -> list[Effect]:
     """The effect with one coefficient of its series, with two, …, with all of them.
 
     A few loads show a law's first curvature, not its third: coefficients beyond what the data
@@ -57,13 +58,13 @@ def by_coefficients(effect: Effect) -> list[Effect]:
     return out
 
 
-def gap(grid: tuple[float, ...], at: float) -> float:
+def grid_spacing(grid: tuple[float, ...], at: float) -> float:
     """Distance from a point of a grid to its farther neighbour."""
     index = grid.index(at)
     return max(abs(grid[i] - at) for i in (index - 1, index + 1) if 0 <= i < len(grid))
 
 
-def elsewhere(term: Term, shape: Mapping[str, float]) -> bool:
+def other_grid_point(term: Term, shape: Mapping[str, float]) -> bool:
     """Whether a point of a grid is another place to rest than where a fit has left a term.
 
     An order has as many places as the grid has points; a moment has one in every hold, and the
@@ -75,11 +76,11 @@ def elsewhere(term: Term, shape: Mapping[str, float]) -> bool:
 
 def starting_values(item: Score) -> list[dict[str, float]]:
     """Values at which fits of an atom begin: its linear amplitudes within bounds, or its probes."""
-    atom = item.atom
-    coordinates = Coordinates(atom.effect)
-    base = {**atom.effect.null, **atom.shape}
-    usual = [{**base, **secant} for secant in atom.secants]
-    if atom.effect.probes:
+    candidate = item.candidate
+    coordinates = Coordinates(candidate.effect)
+    base = {**candidate.effect.null, **candidate.shape}
+    usual = [{**base, **usual_step} for usual_step in candidate.usual_steps]
+    if candidate.effect.probes:
         return usual
     null = coordinates.vector(base)
     vector = null + sum(
@@ -93,30 +94,30 @@ def starting_values(item: Score) -> list[dict[str, float]]:
 _HALVINGS = 7
 
 
-def placed(
-    problem: Problem, hypothesis: Hypothesis, present: Fit, item: Score, weight: Array
+def starting_points(
+    regression: Regression, hypothesis: Hypothesis, present: Fit, item: Score, inverse_sigma: Array
 ) -> list[dict[str, float]]:
     """Where fits begin; a moment is first sought between the points of its grid.
 
     A step far from its moment has no gradient towards it, but its gain rises all the way.
     """
     begun = starting_values(item)
-    places = [p for p in Coordinates(item.atom.effect).shapes if p.grid and p.low == 0.0]
+    places = [p for p in Coordinates(item.candidate.effect).shapes if p.grid and p.low == 0.0]
     if not places or len(begun) > 1:
         return begun
     place, values = places[0], begun[0]
-    here = problem.change(hypothesis)
-    residual, jacobian = present.residual * weight, present.jacobian * weight[:, None]
+    here = regression.change(hypothesis)
+    residual, jacobian = present.residual * inverse_sigma, present.jacobian * inverse_sigma[:, None]
 
     def gain(at: float) -> float:
-        term = Term(item.atom.effect, {**values, place.name: at})
-        column = problem.change(hypothesis.with_term(term, problem.runs)) - here
-        column = column * weight
-        column = column - jacobian @ np.linalg.lstsq(jacobian, column)[0]
+        term = Term(item.candidate.effect, {**values, place.name: at})
+        column = regression.change(hypothesis.with_term(term, regression.n_runs)) - here
+        column = column * inverse_sigma
+        column = partialled_out(jacobian, column)
         size = float(column @ column)
         return float((column @ residual) ** 2) / size if size else 0.0
 
-    at, step = values[place.name], gap(place.grid, values[place.name])
+    at, step = values[place.name], grid_spacing(place.grid, values[place.name])
     best = gain(at)
     for _ in range(_HALVINGS):
         step /= 2

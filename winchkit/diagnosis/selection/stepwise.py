@@ -8,15 +8,16 @@ import numpy as np
 
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise, Presence
-from winchkit.diagnosis.selection.acceptance import BETTER, best_that_holds, holds
-from winchkit.diagnosis.selection.engine import Inquiry, Trial
-from winchkit.diagnosis.selection.exchange import recoupled
-from winchkit.diagnosis.selection.scores import Score, chance_level
-from winchkit.diagnosis.selection.starting_values import elsewhere
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.selection.acceptance import MIN_GAIN, best_accepted, is_accepted
+from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
+from winchkit.diagnosis.selection.exchange import pair_exchange
+from winchkit.diagnosis.selection.scores import Score, null_maxima
+from winchkit.diagnosis.selection.starting_values import other_grid_point
 from winchkit.effects.term import Term
 
-__all__ = ["Found", "search", "with_a_pair", "without_term"]
+__all__ = ["SelectionResult", "stepwise_selection", "with_pair", "without_term"]
 
 _MOST_STEPS = 6
 _SHORT_LIST = 5
@@ -24,27 +25,27 @@ _RIVALS = 2
 _RECONSIDERED = 3
 _EXCHANGED = 2
 """Additions of which one may be exchanged for a pair."""
-_COUPLES = 3
-_PRESENCE_LEVEL = 0.02
+_PAIRS = 3
+_LACK_OF_FIT_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
 
 
 @dataclass(frozen=True)
-class Found:
+class SelectionResult:
     """Where a search ended."""
 
-    begin: Fit
+    initial_model: Fit
     """The model it began with, fitted."""
-    begin_noise: Noise
-    begin_presence: Presence
-    alarmed: bool
+    initial_noise: Noise
+    initial_lack_of_fit_test: LackOfFitTest
+    lack_of_fit_at_start: bool
     """Whether anything beyond noise was there at the start."""
-    reached: Hypothesis
+    last_model: Hypothesis
     """The final model with additions that were dropped since they may only imitate something."""
     final: Fit
     noise: Noise
-    presence: Presence
-    still: bool
+    lack_of_fit_test: LackOfFitTest
+    lack_of_fit: bool
     """Whether anything beyond noise is left at the end."""
     scores: tuple[Score, ...]
     """Of all candidates at the start, best first."""
@@ -54,140 +55,164 @@ class Found:
     """Score that noise alone reaches in one case of a hundred."""
 
 
-def search(inquiry: Inquiry) -> Found:
+def stepwise_selection(engine: SelectionEngine) -> SelectionResult:
     """Grow the model while something is missing and an effect holds out of sample."""
-    begin, begin_noise = inquiry.settle(inquiry.begin)
-    begin_presence = inquiry.presence(begin, begin_noise)
-    begin_scores = inquiry.scores(begin, begin_noise)
-    threshold = _threshold(inquiry, begin, begin_noise)
-    reached, noise, tried = _grown(inquiry, begin, begin_noise, begin_scores, threshold)
-    final, noise = _without_the_doubtful(inquiry, reached, noise)
-    presence = inquiry.presence(final, noise)
-    grew = len(final.hypothesis.terms) > inquiry.given
-    alarmed = grew or _missing(begin_presence, begin_scores, threshold)
-    if alarmed and not tried:
-        tried = _fits(_short_list(inquiry, begin, begin_noise, begin_scores))
-    return Found(
-        begin=begin,
-        begin_noise=begin_noise,
-        begin_presence=begin_presence,
-        alarmed=alarmed,
-        reached=reached.hypothesis,
+    initial_model, initial_noise = engine.fit_with_noise(engine.initial_model)
+    initial_lack_of_fit_test = engine.lack_of_fit_test(initial_model, initial_noise)
+    initial_scores = engine.scores(initial_model, initial_noise)
+    threshold = _threshold(engine, initial_model, initial_noise)
+    last_model, noise, tried = _forward_selection(
+        engine, initial_model, initial_noise, initial_scores, threshold
+    )
+    final, noise = _without_doubtful_terms(engine, last_model, noise)
+    lack_of_fit_test = engine.lack_of_fit_test(final, noise)
+    grew = len(final.hypothesis.terms) > engine.n_initial_terms
+    lack_of_fit_at_start = grew or _has_lack_of_fit(
+        initial_lack_of_fit_test, initial_scores, threshold
+    )
+    if lack_of_fit_at_start and not tried:
+        tried = _fits(_short_list(engine, initial_model, initial_noise, initial_scores))
+    return SelectionResult(
+        initial_model=initial_model,
+        initial_noise=initial_noise,
+        initial_lack_of_fit_test=initial_lack_of_fit_test,
+        lack_of_fit_at_start=lack_of_fit_at_start,
+        last_model=last_model.hypothesis,
         final=final,
         noise=noise,
-        presence=presence,
-        still=_missing(presence, inquiry.scores(final, noise), threshold),
-        scores=tuple(begin_scores),
-        tried=tried if alarmed else (),
+        lack_of_fit_test=lack_of_fit_test,
+        lack_of_fit=_has_lack_of_fit(lack_of_fit_test, engine.scores(final, noise), threshold),
+        scores=tuple(initial_scores),
+        tried=tried if lack_of_fit_at_start else (),
         threshold=threshold,
     )
 
 
-def _grown(
-    inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score], threshold: float
+def _forward_selection(
+    engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score], threshold: float
 ) -> tuple[Fit, Noise, tuple[Fit, ...]]:
     """The model with all that holds, its noise, and the candidates that were tried first."""
     tried: tuple[Fit, ...] = ()
     for _ in range(_MOST_STEPS):
         grown = None
-        if scores and scores[0].value > threshold:
-            trials = _short_list(inquiry, present, noise, scores)
+        if scores and scores[0].net_gain > threshold:
+            trials = _short_list(engine, present, noise, scores)
             tried = tried or _fits(trials)
-            grown = best_that_holds(inquiry, present, noise, trials)
-        grown = grown or _coupled(inquiry, present, noise)
+            grown = best_accepted(engine, present, noise, trials)
+        grown = grown or _best_pair(engine, present, noise)
         if grown is None:
             break
-        inquiry.look_again(grown.hypothesis)
-        present, noise = inquiry.settle(grown.hypothesis, noise)
-        present, noise = _reconsider(inquiry, present, noise)
-        scores = inquiry.scores(present, noise)
+        engine.update_signatures(grown.hypothesis)
+        present, noise = engine.fit_with_noise(grown.hypothesis, noise)
+        present, noise = _exchange_and_eliminate(engine, present, noise)
+        scores = engine.scores(present, noise)
     return present, noise, tried
 
 
-def _threshold(inquiry: Inquiry, present: Fit, noise: Noise) -> float:
+def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
     """Score that noise alone reaches in one case of a hundred."""
-    chance = chance_level(inquiry.projected(present, noise), inquiry.problem.rows)
+    chance = null_maxima(engine.projected(present, noise), engine.regression.n_rows)
     return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
 
 
-def without_term(inquiry: Inquiry, found: Found, index: int) -> Found:
+def without_term(engine: SelectionEngine, result: SelectionResult, index: int) -> SelectionResult:
     """The same search as if it had ended without one of its additions."""
-    return _ended(inquiry, found, found.final.hypothesis.without(index))
+    return _ended(engine, result, result.final.hypothesis.without(index))
 
 
-def with_a_pair(inquiry: Inquiry, found: Found) -> Found | None:
+def with_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResult | None:
     """The same search with a pair in the place of its only addition; None where none is better."""
-    if len(found.final.hypothesis.terms) != inquiry.given + 1:
+    if len(result.final.hypothesis.terms) != engine.n_initial_terms + 1:
         return None
-    better = _exchanged(inquiry, found.final, found.noise, found.begin)
-    return None if better is None else _ended(inquiry, found, better.hypothesis)
+    better = _accepted_pair_exchange(engine, result.final, result.noise, result.initial_model)
+    return None if better is None else _ended(engine, result, better.hypothesis)
 
 
-def _ended(inquiry: Inquiry, found: Found, hypothesis: Hypothesis) -> Found:
+def _ended(
+    engine: SelectionEngine, result: SelectionResult, hypothesis: Hypothesis
+) -> SelectionResult:
     """A search as if it had ended with this hypothesis."""
-    present, noise = inquiry.settle(hypothesis, found.noise)
-    presence = inquiry.presence(present, noise)
-    still = _missing(presence, inquiry.scores(present, noise), found.threshold)
-    return replace(found, final=present, noise=noise, presence=presence, still=still)
+    present, noise = engine.fit_with_noise(hypothesis, result.noise)
+    lack_of_fit_test = engine.lack_of_fit_test(present, noise)
+    lack_of_fit = _has_lack_of_fit(
+        lack_of_fit_test, engine.scores(present, noise), result.threshold
+    )
+    return replace(
+        result,
+        final=present,
+        noise=noise,
+        lack_of_fit_test=lack_of_fit_test,
+        lack_of_fit=lack_of_fit,
+    )
 
 
-def _missing(presence: Presence, scores: list[Score], threshold: float) -> bool:
+def _has_lack_of_fit(
+    lack_of_fit_test: LackOfFitTest, scores: list[Score], threshold: float
+) -> bool:
     """Whether the residual holds more than noise.
 
     With repeats that is measured. A high score of an effect that then fails out of sample is no
     evidence beside it; without repeats it is all there is.
     """
-    if np.isfinite(presence.p_value):
-        return presence.p_value < _PRESENCE_LEVEL
-    return bool(scores) and scores[0].value > threshold
+    if np.isfinite(lack_of_fit_test.p_value):
+        return lack_of_fit_test.p_value < _LACK_OF_FIT_LEVEL
+    return bool(scores) and scores[0].net_gain > threshold
 
 
-def _short_list(inquiry: Inquiry, present: Fit, noise: Noise, scores: list[Score]) -> list[Trial]:
+def _short_list(
+    engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score]
+) -> list[Trial]:
     """The candidates that score best, each fitted beside the present terms, in their order."""
-    listed = [item for item in scores if item.value > 0][:_SHORT_LIST]
-    return [inquiry.trial(present, item, noise) for item in listed]
+    listed = [item for item in scores if item.net_gain > 0][:_SHORT_LIST]
+    return [engine.trial(present, item, noise) for item in listed]
 
 
-def _coupled(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit | None:
+def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
     """Where something is missing and no candidate holds alone: the best of pairs that do.
 
     In exchange for one of the first additions, or to begin with in outputs that no addition acts
     on: pairs upon what is there already would piece together what nobody knows.
     """
-    added = len(present.hypothesis.terms) - inquiry.given
-    if not inquiry.presence(present, noise).p_value < _PRESENCE_LEVEL:
+    added = len(present.hypothesis.terms) - engine.n_initial_terms
+    if not engine.lack_of_fit_test(present, noise).p_value < _LACK_OF_FIT_LEVEL:
         return None
-    better = _exchanged(inquiry, present, noise, present) if 0 < added <= _EXCHANGED else None
-    if better is not None or _acts_on_what_lacks(inquiry, present, noise):
+    better = (
+        _accepted_pair_exchange(engine, present, noise, present)
+        if 0 < added <= _EXCHANGED
+        else None
+    )
+    if better is not None or _acts_on_unexplained_output(engine, present, noise):
         return better
-    pairs = inquiry.couples(present, noise)
+    pairs = engine.pairs(present, noise)
     # Two may also fail alone since each is wrong where the other acts: a drag one way only.
-    best = [pair for pair in pairs if pair.hidden][:_COUPLES]
-    best += [pair for pair in pairs[:_COUPLES] if not pair.hidden]
+    best = [pair for pair in pairs if pair.suppressed][:_PAIRS]
+    best += [pair for pair in pairs[:_PAIRS] if not pair.suppressed]
     trials = [
-        inquiry.trial(inquiry.trial(present, a, noise).fit, b, noise)
+        engine.trial(engine.trial(present, a, noise).fit, b, noise)
         for a, b in (pair.scores for pair in best)
     ]
-    return best_that_holds(inquiry, present, noise, trials)
+    return best_accepted(engine, present, noise, trials)
 
 
-def _acts_on_what_lacks(inquiry: Inquiry, present: Fit, noise: Noise) -> bool:
+def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: Noise) -> bool:
     """Whether an addition acts on an output in which something is missing still."""
-    problem = inquiry.problem
-    rejected = np.flatnonzero(inquiry.presence(present, noise).rejected).tolist()
-    lacking = {problem.bands[band][0] for band in rejected}
-    added = present.hypothesis.terms[inquiry.given :]
-    return any(problem.outputs_of(term.effect.stage) & lacking for term in added)
+    regression = engine.regression
+    rejected = np.flatnonzero(engine.lack_of_fit_test(present, noise).rejected).tolist()
+    lacking = {regression.bands[band][0] for band in rejected}
+    added = present.hypothesis.terms[engine.n_initial_terms :]
+    return any(regression.outputs_of(term.effect.stage) & lacking for term in added)
 
 
-def _exchanged(inquiry: Inquiry, present: Fit, noise: Noise, against: Fit) -> Fit | None:
+def _accepted_pair_exchange(
+    engine: SelectionEngine, present: Fit, noise: Noise, against: Fit
+) -> Fit | None:
     """A better pair in the place of one addition, that holds against another fit; or None.
 
     It need not lower an error by much: where something is missing, one effect may nearly do what
     two did, with other values.
     """
-    better = recoupled(inquiry, present, noise, 1)
-    if better is present or not holds(inquiry, against, better, noise, matters=1.0):
+    better = pair_exchange(engine, present, noise, 1)
+    if better is present or not is_accepted(engine, against, better, noise, matters=1.0):
         return None
     return better
 
@@ -196,7 +221,9 @@ def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
     return tuple(trial.fit for trial in trials)
 
 
-def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def _exchange_and_eliminate(
+    engine: SelectionEngine, present: Fit, noise: Noise
+) -> tuple[Fit, Noise]:
     """Drop what is no longer needed, and replace what another effect explains better.
 
     Again while that changes anything: the first of two effects may have stood for both, and what
@@ -204,25 +231,25 @@ def _reconsider(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Nois
     """
     for _ in range(_RECONSIDERED):
         before = present.labels
-        present = _replaced(inquiry, _without_the_needless(inquiry, present, noise), noise)
-        present = recoupled(inquiry, present, noise, 2)
-        present = _without_the_needless(inquiry, present, noise)
-        if present.labels == before or len(present.hypothesis.terms) < inquiry.given + 2:
+        present = _exchanged_terms(engine, _backward_elimination(engine, present, noise), noise)
+        present = pair_exchange(engine, present, noise, 2)
+        present = _backward_elimination(engine, present, noise)
+        if present.labels == before or len(present.hypothesis.terms) < engine.n_initial_terms + 2:
             break
-    return inquiry.settle(present.hypothesis, noise)
+    return engine.fit_with_noise(present.hypothesis, noise)
 
 
-def _replaced(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
+def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
     """With every addition replaced by the best of its rivals that fits better."""
-    for index in range(inquiry.given, len(present.hypothesis.terms)):
+    for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
             break  # A rival stood for two.
         own = present.hypothesis.terms[index]
-        base = inquiry.refit(present.hypothesis.without(index), noise)
-        rivals = _rivals_of(own, inquiry.scores(base, noise))
-        trials = [inquiry.trial(base, item, noise) for item in rivals]
+        base = engine.refit(present.hypothesis.without(index), noise)
+        rivals = _rivals_of(own, engine.scores(base, noise))
+        trials = [engine.trial(base, item, noise) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
-        if best is not None and best.criterion < inquiry.criterion(present) - BETTER:
+        if best is not None and best.criterion < engine.criterion(present) - MIN_GAIN:
             present = best.fit
     return present
 
@@ -232,32 +259,38 @@ def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
 
     Before it is fitted a law with more numbers looks better than the simple one that it contains.
     """
-    others = [item for item in scores if item.value > 0 and _another(item, own)]
+    others = [item for item in scores if item.net_gain > 0 and _another(item, own)]
     best = others[:_RIVALS]
-    simpler = {name for item in best for name in item.atom.effect.contains}
-    return best + [item for item in others[_RIVALS:] if item.atom.effect.id in simpler]
+    simpler = {name for item in best for name in item.candidate.effect.contains}
+    return best + [item for item in others[_RIVALS:] if item.candidate.effect.id in simpler]
 
 
 def _another(item: Score, own: Term) -> bool:
     """Whether a candidate is another effect than a term, or the same from another place."""
-    return item.atom.effect.id != own.effect.id or elsewhere(own, item.atom.shape)
+    return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
 
 
-def _without_the_doubtful(inquiry: Inquiry, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def _without_doubtful_terms(
+    engine: SelectionEngine, present: Fit, noise: Noise
+) -> tuple[Fit, Noise]:
     """Drop additions that explain less than what is still missing: they may only imitate it."""
-    left = inquiry.presence(present, noise)
-    missing = float(np.sum(np.maximum(left.excess, 0.0)[left.rejected]))
+    left = engine.lack_of_fit_test(present, noise)
+    missing = float(np.sum(np.maximum(left.excess_power, 0.0)[left.rejected]))
     doubtful = present
-    for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
-        without = inquiry.refit(present.hypothesis.without(index), noise)
-        if without.cost - present.cost < missing:
-            doubtful = inquiry.refit(doubtful.hypothesis.without(index), noise)
-    return (present, noise) if doubtful is present else inquiry.settle(doubtful.hypothesis, noise)
+    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
+        without = engine.refit(present.hypothesis.without(index), noise)
+        if without.chi_square - present.chi_square < missing:
+            doubtful = engine.refit(doubtful.hypothesis.without(index), noise)
+    return (
+        (present, noise)
+        if doubtful is present
+        else engine.fit_with_noise(doubtful.hypothesis, noise)
+    )
 
 
-def _without_the_needless(inquiry: Inquiry, present: Fit, noise: Noise) -> Fit:
-    for index in reversed(range(inquiry.given, len(present.hypothesis.terms))):
-        without = inquiry.refit(present.hypothesis.without(index), noise)
-        if inquiry.criterion(without) < inquiry.criterion(present):
+def _backward_elimination(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
+    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
+        without = engine.refit(present.hypothesis.without(index), noise)
+        if engine.criterion(without) < engine.criterion(present):
             present = without
     return present

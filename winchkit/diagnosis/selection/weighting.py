@@ -13,20 +13,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.acceptance import MATTERS
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
+from winchkit.diagnosis.selection.engine import SelectionEngine
 
-__all__ = ["Weighed", "weighed"]
+__all__ = ["Reweighted", "reweighted"]
 
 _NO_WORSE = 1.01
 
 
 @dataclass(frozen=True)
-class Weighed:
+class Reweighted:
     """A fit by the weights that predict best, the noise of these weights, and a note if need be."""
 
     fit: Fit
@@ -34,45 +34,45 @@ class Weighed:
     notes: tuple[str, ...] = ()
 
 
-def weighed(inquiry: Inquiry, fitted: Fit, noise: Noise) -> Weighed:
+def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted:
     """The same hypothesis with values from even weights in outputs that these predict better.
 
     Intervals under even weights are the block jackknife's, which needs no noise to be white.
     """
-    own = Weighed(fitted, noise)
+    own = Reweighted(fitted, noise)
     if noise.from_repeats or not fitted.hypothesis.terms:
         return own
-    problem, folds = inquiry.problem, inquiry.folds(fitted, noise)
-    was = held_out_rms(problem, fitted, noise, folds)
+    regression, folds = engine.regression, engine.folds(fitted, noise)
+    was = held_out_rms(regression, fitted, noise, folds)
 
     def evenly(outputs: Collection[str]) -> tuple[Fit, Noise, dict[str, float]]:
-        even = _even(problem, noise, outputs)
-        refitted = fit(problem, fitted.hypothesis, even.weight(problem))
-        now = held_out_rms(problem, refitted, even, folds)
+        even = _even(regression, noise, outputs)
+        refitted = fit(regression, fitted.hypothesis, even.inverse_sigma(regression))
+        now = held_out_rms(regression, refitted, even, folds)
         return refitted, even, {o: now[o] / was[o] for o in was if was[o]}
 
-    refitted, even, ratios = evenly(problem.dataset.outputs)
-    better = [output for output, ratio in ratios.items() if ratio < MATTERS]
+    refitted, even, ratios = evenly(regression.outputs)
+    better = [output for output, ratio in ratios.items() if ratio < RELEVANT_RATIO]
     if not better:
         return own
-    if len(better) < len(problem.dataset.outputs):
+    if len(better) < len(regression.outputs):
         refitted, even, ratios = evenly(better)
     gained = 1 - max(ratios[output] for output in better)
-    if gained < 1 - MATTERS or max(ratios.values()) > _NO_WORSE:
+    if gained < 1 - RELEVANT_RATIO or max(ratios.values()) > _NO_WORSE:
         return own
     told = " and ".join(output.replace("_", " ") for output in better)
     note = (
         f"in the {told} all frequencies are weighed evenly, which predicts what was left out "
         f"{gained:.0%} better than weights by the noise: something is missing there too"
     )
-    return Weighed(refitted, even, (note,))
+    return Reweighted(refitted, even, (note,))
 
 
-def _even(problem: Problem, noise: Noise, outputs: Collection[str]) -> Noise:
+def _even(regression: Regression, noise: Noise, outputs: Collection[str]) -> Noise:
     """The same noise as if it were white in some outputs."""
     power = noise.power.copy()
-    rows = np.bincount(problem.band_of_row, minlength=len(power))
+    rows = np.bincount(regression.band_of_row, minlength=len(power))
     for output in outputs:
-        own = np.array([band[0] == output for band in problem.bands])
+        own = np.array([band[0] == output for band in regression.bands])
         power[own] = np.average(power[own], weights=rows[own])
     return replace(noise, power=power)

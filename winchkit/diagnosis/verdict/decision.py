@@ -7,19 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from winchkit.diagnosis.compare import signal_rms
-from winchkit.diagnosis.regression.cross_validation import Folds, held_out_rms
+from winchkit.diagnosis.regression.base import Folds, Regression
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.time_series import Problem
 from winchkit.diagnosis.residuals.error_statistics import Skirt
 from winchkit.diagnosis.results import OutputFit, Verdict
-from winchkit.diagnosis.selection.engine import Inquiry
-from winchkit.diagnosis.selection.stepwise import Found
-from winchkit.diagnosis.selection.weighting import weighed
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.stepwise import SelectionResult
+from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.model.stages import OUTPUT_UNITS
 
-__all__ = ["Judgement", "by_best_weights", "judge", "output_fits", "withheld"]
+__all__ = ["Judgement", "judge", "output_fits", "reweighted_judgement", "withheld"]
 
 _HALF = 0.5
 _GENERALISES = 0.15
@@ -39,12 +38,12 @@ class Judgement:
     share: float
     """Share of the excess over the noise that the final model leaves unexplained."""
     outputs: Mapping[str, OutputFit]
-    shown: Found
+    shown: SelectionResult
     """Result of the search, without the effects that are not named."""
     notes: tuple[str, ...]
 
 
-def judge(inquiry: Inquiry, found: Found) -> Judgement:
+def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     """Verdict on the result of a search.
 
     Parameters
@@ -67,37 +66,39 @@ def judge(inquiry: Inquiry, found: Found) -> Judgement:
     noise (held out) and, with repeats, of the lack of fit in the rejected bands; the larger of the
     two.
     """
-    share = _unexplained(inquiry, found)
-    folds = _folds(inquiry, found)
+    share = _unexplained(engine, result)
+    folds = _folds(engine, result)
     outputs = output_fits(
-        inquiry, (found.begin, found.begin_noise), (found.final, found.noise), folds
+        engine, (result.initial_model, result.initial_noise), (result.final, result.noise), folds
     )
-    verdict = _verdict(found, outputs, share)
-    added = found.final.labels[inquiry.given :]
-    # Only the true effect explains nearly all of an excess that is far above the noise.
-    nearly = share < _TRACE and found.noise.from_repeats
+    verdict = _verdict(result, outputs, share)
+    added = result.final.labels[engine.n_initial_terms :]
+    # Nothing but the effect itself explains nearly all of what is far above the noise.
+    nearly = share < _TRACE and result.noise.from_repeats
     if verdict == "explained" or nearly or not added:
-        return Judgement(verdict, share, outputs, found, ())
+        return Judgement(verdict, share, outputs, result, ())
     note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
-    return withheld(inquiry, found, share, note)
+    return withheld(engine, result, share, note)
 
 
-def withheld(inquiry: Inquiry, found: Found, share: float, note: str) -> Judgement:
+def withheld(
+    engine: SelectionEngine, result: SelectionResult, share: float, note: str
+) -> Judgement:
     """Verdict that names no effect, with the reason as a note."""
     verdict: Verdict = "unknown" if share > _HALF else "partly"
-    shown = replace(found, final=found.begin, noise=found.begin_noise)
-    before = (found.begin, found.begin_noise)
-    return Judgement(verdict, share, output_fits(inquiry, before, before), shown, (note,))
+    shown = replace(result, final=result.initial_model, noise=result.initial_noise)
+    before = (result.initial_model, result.initial_noise)
+    return Judgement(verdict, share, output_fits(engine, before, before), shown, (note,))
 
 
-def by_best_weights(inquiry: Inquiry, judgement: Judgement) -> Judgement:
+def reweighted_judgement(engine: SelectionEngine, judgement: Judgement) -> Judgement:
     """The same verdict with parameters from the weights of least held-out error."""
     shown = judgement.shown
-    best = weighed(inquiry, shown.final, shown.noise)
+    best = reweighted(engine, shown.final, shown.noise)
     if best.fit is shown.final:
         return judgement
-    before, after = (shown.begin, shown.begin_noise), (best.fit, best.noise)
-    outputs = output_fits(inquiry, before, after, _folds(inquiry, shown))
+    before, after = (shown.initial_model, shown.initial_noise), (best.fit, best.noise)
+    outputs = output_fits(engine, before, after, _folds(engine, shown))
     return replace(
         judgement,
         outputs=outputs,
@@ -106,61 +107,71 @@ def by_best_weights(inquiry: Inquiry, judgement: Judgement) -> Judgement:
     )
 
 
-def _unexplained(inquiry: Inquiry, found: Found) -> float:
+def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     """Share of the excess over the noise that the final model leaves, larger of two estimates."""
-    if not found.alarmed:
+    if not result.lack_of_fit_at_start:
         return 0.0
-    folds = _folds(inquiry, found)
+    folds = _folds(engine, result)
     held = [
-        held_out_rms(inquiry.problem, fitted, found.noise, folds)
-        for fitted in (found.begin, found.final)
+        held_out_rms(engine.regression, fitted, result.noise, folds)
+        for fitted in (result.initial_model, result.final)
     ]
-    # Without lack of fit in any band, the excess of an output may be chance.
-    chance = {} if found.still else found.noise.uncertainty(inquiry.problem)
+    # Where the bands hold nothing more, what an output is over its noise may be chance.
+    chance = {} if result.lack_of_fit else result.noise.uncertainty(engine.regression)
     squares = [
         sum(
             max(0.0, (rms[o] / noise) ** 2 - 1 - chance.get(o, 0.0))
-            for o, noise in found.noise.rms.items()
+            for o, noise in result.noise.rms.items()
         )
         for rms in held
     ]
     left = squares[1] / squares[0] if squares[0] > 0 else 0.0
-    if found.noise.from_repeats:
-        # Both in units of the final noise, so that its re-estimation does not change the share.
-        scale = found.begin_noise.power / found.noise.power
-        before = float(np.sum(np.maximum(found.begin_presence.excess * scale, 0.0)))
-        after = float(np.sum(np.maximum(found.presence.excess, 0.0)[found.presence.rejected]))
+    if result.noise.from_repeats:
+        # Both in units of the final noise, so that a re-estimated noise does not shift the share.
+        scale = result.initial_noise.power / result.noise.power
+        before = float(
+            np.sum(np.maximum(result.initial_lack_of_fit_test.excess_power * scale, 0.0))
+        )
+        after = float(
+            np.sum(
+                np.maximum(result.lack_of_fit_test.excess_power, 0.0)[
+                    result.lack_of_fit_test.rejected
+                ]
+            )
+        )
         left = max(left if left > _GENERALISES else 0.0, after / before if before > 0 else 0.0)
     return min(1.0, left)
 
 
-def _folds(inquiry: Inquiry, found: Found) -> Folds:
+def _folds(engine: SelectionEngine, result: SelectionResult) -> Folds:
     """Groups of runs while lack of fit remains, where imitations fail; else folds of the fit."""
-    return inquiry.groups if found.still else inquiry.folds(found.final, found.noise)
+    return (
+        engine.regression.groups if result.lack_of_fit else engine.folds(result.final, result.noise)
+    )
 
 
-def _verdict(found: Found, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
-    if not found.alarmed:
+def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
+    if not result.lack_of_fit_at_start:
         return "adequate"
-    grown = len(found.final.hypothesis.terms) > len(found.begin.hypothesis.terms)
+    grown = len(result.final.hypothesis.terms) > len(result.initial_model.hypothesis.terms)
     if not grown or share > _HALF:
         return "unknown"
-    if not found.still or not found.noise.from_repeats:
+    if not result.lack_of_fit or not result.noise.from_repeats:
         return "explained" if share < _GENERALISES else "partly"
-    # A remainder below the noise, such as a load that swings on its cable, is accepted.
+    # A trace below the noise, such as a load that bounces on its rope, is told but changes nothing.
     over = max(
         fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
         for fitted in outputs.values()
     )
-    # An imitation of an unknown effect leaves as much: a significant remainder must be small.
-    trace = _DOUBTFUL_TRACE if found.presence.p_value > _DOUBTFUL else _TRACE
+    # What imitates something unknown leaves as much; where the trace is certain it must be small.
+    trace = _DOUBTFUL_TRACE if result.lack_of_fit_test.p_value > _DOUBTFUL else _TRACE
     allowed = trace if over < _AT_NOISE else _NEGLIGIBLE if over < _NEAR_NOISE else 0.0
     return "explained" if share < allowed else "partly"
 
 
 def output_fits(
-    inquiry: Inquiry,
-    begin: tuple[Fit, Noise],
+    engine: SelectionEngine,
+    initial_model: tuple[Fit, Noise],
     final: tuple[Fit, Noise],
     folds: Folds | None = None,
 ) -> dict[str, OutputFit]:
@@ -180,19 +191,19 @@ def output_fits(
     dict
         By output; rms in SI.
     """
-    problem, folds = inquiry.problem, folds or inquiry.folds(*final)
-    before, after = _rms(problem, begin[0]), _rms(problem, final[0])
-    held_before = held_out_rms(problem, *begin, folds)
-    held_after = held_out_rms(problem, *final, folds)
-    noise, skirt = final[1], Skirt(problem.dataset)
-    beyond = skirt.residual(begin[0].hypothesis), skirt.residual(final[0].hypothesis)
+    regression, folds = engine.regression, folds or engine.folds(*final)
+    before, after = _rms(regression, initial_model[0]), _rms(regression, final[0])
+    held_before = held_out_rms(regression, *initial_model, folds)
+    held_after = held_out_rms(regression, *final, folds)
+    noise, skirt = final[1], Skirt(regression)
+    beyond = skirt.residual(initial_model[0].hypothesis), skirt.residual(final[0].hypothesis)
     noise_beyond = skirt.noise(final[0].hypothesis)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         output: OutputFit(
             unit=OUTPUT_UNITS[output],
-            band=next(s.band.cut_off for s in problem.segments if s.output == output),
-            signal_rms=signal_rms(problem.dataset, output),
+            band=next(s.band.cut_off for s in regression.segments if s.output == output),
+            signal_rms=regression.signal_rms(output),
             rms_before=_with(before[output], beyond[0].get(output)),
             rms_after=_with(after[output], beyond[1].get(output)),
             heldout_rms_before=_with(held_before[output], beyond[0].get(output)),
@@ -200,7 +211,7 @@ def output_fits(
             noise_rms=_with(noise.rms[output], noise_beyond.get(output)),
             noise_source=source,
         )
-        for output in problem.dataset.outputs
+        for output in regression.outputs
     }
 
 
@@ -209,10 +220,10 @@ def _with(rms: float, beyond: float | None) -> float:
     return float(np.hypot(rms, np.sqrt(beyond or 0.0)))
 
 
-def _rms(problem: Problem, fitted: Fit) -> dict[str, float]:
+def _rms(regression: Regression, fitted: Fit) -> dict[str, float]:
     out = {}
-    for output in problem.dataset.outputs:
-        own = [s for s in problem.segments if s.output == output]
+    for output in regression.outputs:
+        own = [s for s in regression.segments if s.output == output]
         total = sum(float(np.sum(fitted.residual[s.rows] ** 2)) for s in own)
-        out[output] = float(np.sqrt(total / problem.samples(output)))
+        out[output] = float(np.sqrt(total / regression.n_samples(output)))
     return out

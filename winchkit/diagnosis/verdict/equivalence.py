@@ -23,11 +23,12 @@ from scipy.stats import chi2
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.cross_validation import held_out
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise, orthonormal
-from winchkit.diagnosis.selection.engine import Inquiry
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import orthonormal
+from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.exchange import Exchange
 from winchkit.diagnosis.selection.scores import Projected
-from winchkit.diagnosis.selection.signatures import Atom
+from winchkit.diagnosis.selection.signatures import Candidate
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -45,26 +46,26 @@ _MATTERS = 0.02
 """Rms difference over the effect below which it is negligible."""
 
 
-def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Effect) -> bool:
+def is_unseen(engine: SelectionEngine, final: Fit, noise: Noise, index: int, rival: Effect) -> bool:
     """Whether a richer ``rival`` differs from the term at ``index``, though not detectably.
 
     The rival has its usual shape and the size of the term. It differs by more than 2 % rms, and the
     noncentrality of the difference, fitted unknowns projected out, is below 1.
     """
-    atom = _usual(inquiry, rival)
-    if atom is None:
+    candidate = _usual(engine, rival)
+    if candidate is None:
         return False
-    problem, weight = inquiry.problem, noise.weight(inquiry.problem)
+    regression, inverse_sigma = engine.regression, noise.inverse_sigma(engine.regression)
     hypothesis = final.hypothesis
     without = hypothesis.without(index)
-    here = problem.change(without)
-    own = (problem.change(hypothesis) - here) * weight
-    explained = orthonormal(final.jacobian * weight[:, None])
+    here = regression.change(without)
+    own = (regression.change(hypothesis) - here) * inverse_sigma
+    explained = orthonormal(final.jacobian * inverse_sigma[:, None])
     differs = False
-    for secant in atom.secants:
-        values = {**rival.null, **atom.shape, **secant}
-        column = problem.change(without.with_term(Term(rival, values), problem.runs)) - here
-        column = column * weight
+    for usual_step in candidate.usual_steps:
+        values = {**rival.null, **candidate.shape, **usual_step}
+        column = regression.change(without.with_term(Term(rival, values), regression.n_runs)) - here
+        column = column * inverse_sigma
         size = float(column @ column)
         column = column * (float(column @ own) / size) if size else column
         left = column - explained @ (explained.T @ column)
@@ -75,16 +76,16 @@ def is_unseen(inquiry: Inquiry, final: Fit, noise: Noise, index: int, rival: Eff
     return differs
 
 
-def _usual(inquiry: Inquiry, effect: Effect) -> Atom | None:
+def _usual(engine: SelectionEngine, effect: Effect) -> Candidate | None:
     """Candidate at the grid point nearest to its usual shape."""
-    atoms = [a for a in inquiry.signatures.atoms if a.effect.id == effect.id]
+    candidates = [a for a in engine.signatures.candidates if a.effect.id == effect.id]
     usual = {p.name: p.typical for p in Coordinates(effect).shapes}
 
-    def away(atom: Atom) -> float:
-        places = [(x, usual[name]) for name, x in atom.shape.items() if usual.get(name)]
+    def away(candidate: Candidate) -> float:
+        places = [(x, usual[name]) for name, x in candidate.shape.items() if usual.get(name)]
         return float(sum(abs(np.log(x / typical)) for x, typical in places))
 
-    return min(atoms, key=away, default=None)
+    return min(candidates, key=away, default=None)
 
 
 _RIVALS = 6
@@ -109,7 +110,7 @@ class Confusion:
     """Angle between its signature and each rival's, rad."""
 
 
-def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Confusion:
+def confusion_of(engine: SelectionEngine, final: Fit, noise: Noise, index: int) -> Confusion:
     """Equivalence set of one term of the final model.
 
     Parameters
@@ -131,37 +132,39 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
     Every rival is compared with the named effect at 5 % by itself; there is no correction for the
     number of rivals. A rival must reach half of the named effect's decrease of χ².
     """
-    place = Exchange(inquiry, final, noise, index)
+    place = Exchange(engine, final, noise, index)
     own, base, scores = place.own, place.base, place.scores
-    mine = next((s.gain for s in scores if s.atom.effect.id == own.effect.id), 0.0)
-    freedom = Coordinates(own.effect).freedom
+    mine = next((s.explained_ss for s in scores if s.candidate.effect.id == own.effect.id), 0.0)
+    n_parameters = Coordinates(own.effect).n_parameters
     rivals = [
         s
         for s in scores
-        if s.atom.effect.id != own.effect.id and s.gain > mine - max(_NEAR, 0.1 * mine)
+        if s.candidate.effect.id != own.effect.id and s.explained_ss > mine - max(_NEAR, 0.1 * mine)
     ][:_RIVALS]
-    rivals += [s for s in scores if _drifts_alike(s.atom.effect, own.effect) and s not in rivals]
-    blocks = inquiry.blocks
-    ours = held_out(inquiry.problem, final, noise, blocks)
-    members: list[tuple[int, float, Term]] = [(freedom, final.cost, own)]
+    rivals += [
+        s for s in scores if _drifts_alike(s.candidate.effect, own.effect) and s not in rivals
+    ]
+    blocks = engine.regression.blocks
+    ours = held_out(engine.regression, final, noise, blocks)
+    members: list[tuple[int, float, Term]] = [(n_parameters, final.chi_square, own)]
     for rival in rivals:
-        trial = place.trial(rival, final.cost + _ALIKE)
+        trial = place.trial(rival, final.chi_square + _ALIKE)
         fitted = trial.fit
         if not np.isfinite(trial.criterion):
             continue
-        if base.cost - fitted.cost < _SHARE * (base.cost - final.cost):
+        if base.chi_square - fitted.chi_square < _SHARE * (base.chi_square - final.chi_square):
             continue
         term = fitted.hypothesis.terms[-1]
-        size = Coordinates(term.effect).freedom
-        counted = _richer(inquiry, final, noise, index, fitted)
+        size = Coordinates(term.effect).n_parameters
+        counted = _richer(engine, final, noise, index, fitted)
         if counted is None:
-            theirs = held_out(inquiry.problem, fitted, noise, blocks)
-            alike = fitted.cost < final.cost + _ALIKE
+            theirs = held_out(engine.regression, fitted, noise, blocks)
+            alike = fitted.chi_square < final.chi_square + _ALIKE
             counted = alike or _flip_chance(theirs - ours) > _LEVEL
-        if counted or _stands_for(inquiry, fitted, final, base, index):
-            members.append((size, fitted.cost, term))
+        if counted or _stands_for(engine, fitted, final, base, index):
+            members.append((size, fitted.chi_square, term))
     ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
-    projected = inquiry.projected(base, noise)
+    projected = engine.projected(base, noise)
     angles = {
         term.effect.id: _angle(projected, own.effect.id, term.effect.id)
         for term in ordered
@@ -170,25 +173,27 @@ def confusion_of(inquiry: Inquiry, final: Fit, noise: Noise, index: int) -> Conf
     return Confusion(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
 
 
-def _richer(inquiry: Inquiry, final: Fit, noise: Noise, index: int, fitted: Fit) -> bool | None:
+def _richer(
+    engine: SelectionEngine, final: Fit, noise: Noise, index: int, fitted: Fit
+) -> bool | None:
     """Whether a rival with more parameters joins the set; None where other rules apply.
 
     A rival that is listed as confusable joins where it explains as much: creep beside a drift with
     temperature, a cable guide beside a wrong ratio. Only the penalty separates the two.
     """
     own, rival = final.hypothesis.terms[index].effect, fitted.hypothesis.terms[-1].effect
-    more = Coordinates(rival).freedom - Coordinates(own).freedom
+    more = Coordinates(rival).n_parameters - Coordinates(own).n_parameters
     if more > 0 and _carded(rival, own) and not rival.nested_with(own):
-        return fitted.cost < final.cost + _ALIKE
+        return fitted.chi_square < final.chi_square + _ALIKE
     if more > 0 and not _kindred(rival, own):
-        bent = inquiry.loads_are_chosen and own.id in rival.contains
+        bent = engine.regression.has_known_loads and own.id in rival.contains
         return _leant_to(final, fitted, more) or (
-            bent and is_unseen(inquiry, final, noise, index, rival)
+            bent and is_unseen(engine, final, noise, index, rival)
         )
     return None
 
 
-def _stands_for(inquiry: Inquiry, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:
+def _stands_for(engine: SelectionEngine, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:
     """Whether a simpler law of the family explains the same within the range of these runs.
 
     Within the speeds of a run that never reach the falling part of a Stribeck curve, it is a
@@ -196,11 +201,15 @@ def _stands_for(inquiry: Inquiry, fitted: Fit, final: Fit, base: Fit, index: int
     """
     own, rival = final.hypothesis.terms[index], fitted.hypothesis.terms[-1].effect
     shown = own.effect.visible
-    if shown is None or any(shown(at, own.values) for at in inquiry.problem.dataset.motions):
+    if shown is None or any(shown(at, own.values) for at in engine.regression.motions):
         return False
-    simpler = Coordinates(rival).freedom < Coordinates(own.effect).freedom
+    simpler = Coordinates(rival).n_parameters < Coordinates(own.effect).n_parameters
     related = bool(own.effect.family) and rival.family == own.effect.family
-    return simpler and related and base.cost - fitted.cost > _NEARLY * (base.cost - final.cost)
+    return (
+        simpler
+        and related
+        and base.chi_square - fitted.chi_square > _NEARLY * (base.chi_square - final.chi_square)
+    )
 
 
 def _kindred(rival: Effect, own: Effect) -> bool:
@@ -217,7 +226,7 @@ def _leant_to(simple: Fit, rich: Fit, more: int) -> bool:
     """Likelihood-ratio test significant at 5 %, for a law that BIC does not prefer."""
     states = [sum(len(start) for start in f.hypothesis.starts) for f in (simple, rich)]
     unknowns = max(1, more + states[1] - states[0])
-    return bool(chi2.sf(simple.cost - rich.cost, unknowns) < _LEVEL)
+    return bool(chi2.sf(simple.chi_square - rich.chi_square, unknowns) < _LEVEL)
 
 
 def _drifts_alike(rival: Effect, own: Effect) -> bool:
@@ -247,9 +256,9 @@ def _flip_chance(worse: Array) -> float:
 def _angle(projected: Projected, first: str, second: str) -> float:
     """Smallest angle between the whitened, projected signatures of two effects, rad."""
     best = 0.0
-    atoms = projected.found.atoms
-    for a in (atom for atom in atoms if atom.effect.id == first):
-        for b in (atom for atom in atoms if atom.effect.id == second):
+    candidates = projected.signatures.candidates
+    for a in (candidate for candidate in candidates if candidate.effect.id == first):
+        for b in (candidate for candidate in candidates if candidate.effect.id == second):
             best = max(best, _cosine(projected.inner, a.columns, b.columns))
     return float(np.arccos(min(1.0, best)))
 

@@ -17,7 +17,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
 from winchkit.diagnosis.regression.prediction_cache import masked
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.model.variables import ANGLES, COMPOUND
 
@@ -39,10 +39,10 @@ Columns = Iterable[tuple[slice, Array]]
 
 
 def curves(
-    problem: Problem, outputs: Sequence[str]
+    regression: TimeSeriesRegression, outputs: Sequence[str]
 ) -> Iterator[tuple[str, str, list[Law], Columns]]:
     """Place, variable, curves and basis columns, where ``outputs`` are changed."""
-    recordings = problem.dataset.recordings
+    recordings = regression.dataset.recordings
     known = [
         variables_of(recording) | {"direction": recording.smooth.at.direction}
         for recording in recordings
@@ -58,10 +58,10 @@ def curves(
             hats = [h * k[factor] for h, k in zip(hats, known, strict=True)]
         laws = laws_over(knots, name, level=factor is not None)
         for place, shown in PLACES.items():
-            seen = set(shown) & set(outputs) & set(problem.dataset.outputs)
+            seen = set(shown) & set(outputs) & set(regression.dataset.outputs)
             if seen and (place != "winding" or (name, factor) == ("cable_length", None)):
                 variable = name if factor is None else f"{factor} times {name}"
-                yield place, variable, laws, columns_of(problem, shown, hats, knots)
+                yield place, variable, laws, columns_of(regression, shown, hats, knots)
 
 
 def _products(names: Sequence[str]) -> list[tuple[str, str]]:
@@ -131,12 +131,15 @@ _Shown = Callable[[Recording, Array, Array], Array]
 
 
 def columns_of(
-    problem: Problem, shown: Mapping[str, _Shown], hats: Sequence[Array], knots: Array
+    regression: TimeSeriesRegression,
+    shown: Mapping[str, _Shown],
+    hats: Sequence[Array],
+    knots: Array,
 ) -> Columns:
     """Change of every output of every run by the basis functions."""
-    for segment in problem.segments:
+    for segment in regression.segments:
         if segment.output in shown:
-            recording = problem.dataset.recordings[segment.run]
+            recording = regression.dataset.recordings[segment.run]
             signal = shown[segment.output](recording, hats[segment.run], knots)
             yield segment.rows, masked(recording, segment.output, signal)
 

@@ -65,14 +65,14 @@ def maps_drawn(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, l
     out: dict[str, list[Markup]] = {}
     for output, scale in scales.items():
         found = [
-            m for m in residual_maps(residuals.problem, residuals.before) if m.output == output
+            m for m in residual_maps(residuals.regression, residuals.before) if m.output == output
         ]
         if not found:
             continue
         noise = residuals.noise.get(output) or 0.0
         peak = max(float(np.nanmax(np.abs(found[0].mean))), _ABOVE_NOISE * noise)
         after = residuals.after
-        changed = None if after is None else same_cells(residuals.problem, after, found[0])
+        changed = None if after is None else same_cells(residuals.regression, after, found[0])
         if changed is None:
             out[output] = [_figure("", drawn, peak, scale) for drawn in found[:_MOST]]
         else:

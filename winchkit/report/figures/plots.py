@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Followed, variables_of
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.plain_json import significant
@@ -36,7 +36,7 @@ _TURN = 2 * np.pi
 class Residuals:
     """What to draw: residuals of a problem, (rows,), and the noise beside them."""
 
-    problem: Problem
+    regression: TimeSeriesRegression
     before: Array
     after: Array | None
     """None where the model was not changed."""
@@ -82,18 +82,18 @@ class _Curves:
 
 def plots_of(residuals: Residuals) -> tuple[OutputPlots, ...]:
     """Drawings per output; ``after`` only of outputs that the change of the model changed."""
-    problem = residuals.problem
-    found = strongest(problem, residuals.before)
+    regression = residuals.regression
+    found = strongest(regression, residuals.before)
     out = []
-    for output in problem.dataset.outputs:
+    for output in regression.dataset.outputs:
         curves = _curves(residuals, output)
         followed = found.get(output)
         out.append(
             OutputPlots(
                 output,
                 curves.scale,
-                _over_time(problem, curves),
-                _over_variable(problem, curves, followed) if followed else None,
+                _over_time(regression, curves),
+                _over_variable(regression, curves, followed) if followed else None,
                 followed,
             )
         )
@@ -101,14 +101,14 @@ def plots_of(residuals: Residuals) -> tuple[OutputPlots, ...]:
 
 
 def _curves(residuals: Residuals, output: str) -> _Curves:
-    problem, noise = residuals.problem, residuals.noise.get(output)
-    recordings = problem.dataset.recordings
-    own = [i for i, s in enumerate(problem.segments) if s.output == output]
+    regression, noise = residuals.regression, residuals.noise.get(output)
+    recordings = regression.dataset.recordings
+    own = [i for i, s in enumerate(regression.segments) if s.output == output]
 
     def in_runs(rows: Array) -> tuple[Array, ...]:
-        times = problem.in_time(rows)
+        times = regression.in_time(rows)
         return tuple(
-            np.where(recordings[problem.segments[i].run].valid[output], times[i], np.nan)
+            np.where(recordings[regression.segments[i].run].valid[output], times[i], np.nan)
             for i in own
         )
 
@@ -121,7 +121,7 @@ def _curves(residuals: Residuals, output: str) -> _Curves:
     return _Curves(
         output,
         scale,
-        tuple(problem.segments[i].run for i in own),
+        tuple(regression.segments[i].run for i in own),
         tuple(part / scale.worth for part in before),
         None if after is None else tuple(part / scale.worth for part in after),
         None if noise is None else noise / scale.worth,
@@ -134,20 +134,20 @@ def _rms(parts: Sequence[Array]) -> float:
     return float(np.sqrt(np.nanmean(np.concatenate(parts) ** 2)))
 
 
-def _over_time(problem: Problem, curves: _Curves) -> Plot:
+def _over_time(regression: TimeSeriesRegression, curves: _Curves) -> Plot:
     """All runs one after another, at most ``_POINTS`` samples."""
-    recordings = problem.dataset.recordings
+    recordings = regression.dataset.recordings
     share = max(2, _POINTS // len(curves.runs))
     parts: list[tuple[Array, list[Array]]] = []
-    marks, begin = [], 0.0
+    marks, initial_model = [], 0.0
     for position, run in enumerate(curves.runs):
         time = recordings[run].signals.time - recordings[run].signals.time[0]
-        marks.append({"at": _number(begin), "name": recordings[run].name})
+        marks.append({"at": _number(initial_model), "name": recordings[run].name})
         lines = [curves.before[position]]
         if curves.after is not None:
             lines.append(curves.after[position])
-        parts.append(thin(begin + time, lines, share))
-        begin += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
+        parts.append(thin(initial_model + time, lines, share))
+        initial_model += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
     x = np.concatenate([part[0] for part in parts])
     lines = [np.concatenate([part[1][i] for part in parts]) for i in range(len(parts[0][1]))]
     name = OUTPUT_NAMES.get(curves.output, curves.output)
@@ -168,9 +168,9 @@ def _over_time(problem: Problem, curves: _Curves) -> Plot:
     )
 
 
-def _over_variable(problem: Problem, curves: _Curves, followed: Followed) -> Plot:
+def _over_variable(regression: TimeSeriesRegression, curves: _Curves, followed: Followed) -> Plot:
     """Samples as dots and means over bins as lines."""
-    variable, label, logarithmic = _axis(problem, curves, followed)
+    variable, label, logarithmic = _axis(regression, curves, followed)
     before = np.concatenate(curves.before)
     lines = [before] if curves.after is None else [before, np.concatenate(curves.after)]
     good = np.isfinite(before) & np.isfinite(variable)
@@ -213,9 +213,11 @@ def _spread(values: Array) -> Array:
     return out
 
 
-def _axis(problem: Problem, curves: _Curves, followed: Followed) -> tuple[Array, str, bool]:
+def _axis(
+    regression: TimeSeriesRegression, curves: _Curves, followed: Followed
+) -> tuple[Array, str, bool]:
     """Values of a variable along the runs as people read them, its label, and if it is a power."""
-    recordings = problem.dataset.recordings
+    recordings = regression.dataset.recordings
     values = np.concatenate(
         [variables_of(recordings[run])[followed.variable] for run in curves.runs]
     )

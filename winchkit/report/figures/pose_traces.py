@@ -17,7 +17,7 @@ from winchkit.diagnosis.robot.attribution import (
     variables_of_poses,
 )
 from winchkit.diagnosis.robot.errors import UNITS, Errors
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.variables import VARIABLE_UNITS
 from winchkit.report.figures.reduction import bin_means, filled_edges
 
@@ -73,30 +73,30 @@ def unit_of(variable: str) -> str:
     return VARIABLE_UNITS.get(variable, "1")
 
 
-def traces(problem: RobotProblem, before: Errors, after: Errors | None = None) -> list[Trace]:
+def traces(regression: PoseRegression, before: Errors, after: Errors | None = None) -> list[Trace]:
     """Per output its errors over what they follow most, before anything was added."""
     found: dict[str, Followed] = {}
-    for followed in follows_of(problem, before):
+    for followed in follows_of(regression, before):
         if followed.variable != "pose":
             found.setdefault(followed.output, followed)
     return [
-        trace_over(problem, found.get(name, Followed(name, NUMBER, float("nan"))), before, after)
+        trace_over(regression, found.get(name, Followed(name, NUMBER, float("nan"))), before, after)
         for name in UNITS
         if name in before
     ]
 
 
 def trace_over(
-    problem: RobotProblem, over: Followed, before: Errors, after: Errors | None = None
+    regression: PoseRegression, over: Followed, before: Errors, after: Errors | None = None
 ) -> Trace:
     """Errors of one output over one variable, of the line that shows it most."""
     name = over.output
-    error = on_cables(problem, {name: before[name]})[name]
-    then = None if after is None else on_cables(problem, {name: after[name]})[name]
-    x = np.broadcast_to(_values(problem, over, error), error.shape)
+    error = on_cables(regression, {name: before[name]})[name]
+    then = None if after is None else on_cables(regression, {name: after[name]})[name]
+    x = np.broadcast_to(_values(regression, over, error), error.shape)
     line = None
     if over.variable not in _POOLED:
-        lines = list(AXES if name == "platform_position" else problem.dataset.names)
+        lines = list(AXES if name == "platform_position" else regression.dataset.names)
         column = lines.index(over.line) if over.line else most_telling(x, error)
         line = lines[column]
         x, error = x[:, [column]], error[:, [column]]
@@ -107,12 +107,12 @@ def trace_over(
     return Trace(over, x[known], error[known], None if then is None else then[known], line)
 
 
-def _values(problem: RobotProblem, over: Followed, error: Array) -> Array:
+def _values(regression: PoseRegression, over: Followed, error: Array) -> Array:
     count, lines = error.shape
     if over.variable == "winch":
         return np.arange(1.0, lines + 1)[None, :]
     if over.variable == NUMBER:
         return np.arange(1.0, count + 1)[:, None]
     if over.variable == "pose":
-        return np.asarray(problem.dataset.pose[:, None] + 1.0, dtype=np.float64)
-    return variables_of_poses(problem)[over.variable]
+        return np.asarray(regression.dataset.pose[:, None] + 1.0, dtype=np.float64)
+    return variables_of_poses(regression)[over.variable]

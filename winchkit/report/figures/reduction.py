@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.time_series import Problem
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Followed, follows, harmonics, variables_of
 from winchkit.model.variables import VARIABLE_UNITS
 from winchkit.report.words.sentence import CLEAR_ORDER
@@ -112,10 +112,10 @@ class Curve:
         }
 
 
-def strongest(problem: Problem, residual: Array) -> dict[str, Followed]:
+def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, Followed]:
     """Per output what to draw its residual over: a clear order, else the largest share."""
-    orders = [f for f in harmonics(problem, residual) if f.share > CLEAR_ORDER]
-    trends = [f for f in follows(problem, residual) if f.share > _WORTH_DRAWING]
+    orders = [f for f in harmonics(regression, residual) if f.share > CLEAR_ORDER]
+    trends = [f for f in follows(regression, residual) if f.share > _WORTH_DRAWING]
     out: dict[str, Followed] = {}
     for found in (*sorted(orders, key=lambda f: -f.share), *sorted(trends, key=lambda f: -f.share)):
         known = out.get(found.output)
@@ -124,12 +124,12 @@ def strongest(problem: Problem, residual: Array) -> dict[str, Followed]:
     return out
 
 
-def curve_of(problem: Problem, residual: Array, over: Followed) -> Curve:
+def curve_of(regression: TimeSeriesRegression, residual: Array, over: Followed) -> Curve:
     """The curve of a residual, (rows,), along what it follows."""
     x, error = [], []
-    for segment, time in zip(problem.segments, problem.in_time(residual), strict=True):
+    for segment, time in zip(regression.segments, regression.in_time(residual), strict=True):
         if segment.output == over.output:
-            recording = problem.dataset.recordings[segment.run]
+            recording = regression.dataset.recordings[segment.run]
             good = recording.valid[over.output]
             x.append(variables_of(recording)[over.variable][good])
             error.append(time[good])

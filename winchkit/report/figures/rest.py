@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Followed
 from winchkit.diagnosis.results import Where
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
@@ -27,10 +27,11 @@ def rest_of(answer: Answer, where: Where) -> tuple[Array, Array]:
     """Mean of the variable and of the residual in every bin, (bins,) each, SI."""
     over = Followed(where.output, where.variable, where.share, where.order, line=where.line)
     if isinstance(answer, RobotAnswer):
-        problem, errors = answer.seen.rest
-        trace = trace_over(problem, over, errors)
+        regression, errors = answer.selection.rest
+        trace = trace_over(regression, over, errors)
         return trace.means(trace.before)
-    curve = curve_of(answer.inquiry.problem, answer.found.final.residual, over)
+    assert isinstance(answer, WinchAnswer)
+    curve = curve_of(answer.engine.regression, answer.result.final.residual, over)
     return curve.x, curve.mean
 
 

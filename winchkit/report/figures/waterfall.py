@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.selection.engine import Inquiry
-from winchkit.diagnosis.selection.stepwise import Found
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.stepwise import SelectionResult
 
 __all__ = ["GEOMETRY_NAME", "Waterfall", "waterfall_of"]
 
@@ -30,23 +30,23 @@ class Waterfall:
 
 def waterfall_of(answer: Answer) -> Waterfall | None:
     """The ladder of a diagnosis; None where it names nothing."""
-    diagnosis, inquiry, filed = answer.diagnosis, answer.inquiry, answer.filed
+    diagnosis, engine, file_engine = answer.diagnosis, answer.engine, answer.file_engine
     if not diagnosis.steps:
         return None
-    whole = answer.found.final.hypothesis
-    added = tuple(range(inquiry.given, len(whole.terms)))
+    whole = answer.result.final.hypothesis
+    added = tuple(range(engine.n_initial_terms, len(whole.terms)))
     names = [whole.terms[index].label for index in added]
     before = {o: fit.heldout_rms_before for o, fit in diagnosis.outputs.items()}
     after = {o: fit.heldout_rms_after for o, fit in diagnosis.outputs.items()}
-    ladder = _Ladder(inquiry, answer.found, {added: after})
+    ladder = _Ladder(engine, answer.result, {added: after})
     rungs: list[tuple[str, Mapping[str, float]]] = [("profile as it is", before)]
     first: dict[str, Mapping[str, float]] = {}
     last: dict[str, Mapping[str, float]] = {}
-    if filed is inquiry:
+    if file_engine is engine:
         ladder.known[()] = before
         plain = ladder
     else:
-        plain = _Ladder(filed, answer.found, {(): before})
+        plain = _Ladder(file_engine, answer.result, {(): before})
         rungs.append((f"+ {GEOMETRY_NAME}", ladder.error()))
         first[GEOMETRY_NAME], last[GEOMETRY_NAME] = ladder.error(), plain.error(*added)
     rungs += [(f"+ {name}", ladder.error(*added[: n + 1])) for n, name in enumerate(names)]
@@ -60,18 +60,18 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
 class _Ladder:
     """Held-out errors of one inquiry's model with some of the terms found."""
 
-    inquiry: Inquiry
-    found: Found
+    engine: SelectionEngine
+    result: SelectionResult
     known: dict[tuple[int, ...], Mapping[str, float]]
 
     def error(self, *terms: int) -> Mapping[str, float]:
         """With what the profile has and these additions, refitted."""
         if terms not in self.known:
-            inquiry, noise = self.inquiry, self.found.noise
-            kept = _only(self.found.final.hypothesis, (*range(inquiry.given), *terms))
-            fitted = inquiry.refit(kept, noise)
-            folds = inquiry.folds(self.found.final, noise)
-            self.known[terms] = inquiry.held_out_errors(fitted, noise, folds)
+            engine, noise = self.engine, self.result.noise
+            kept = _only(self.result.final.hypothesis, (*range(engine.n_initial_terms), *terms))
+            fitted = engine.refit(kept, noise)
+            folds = engine.folds(self.result.final, noise)
+            self.known[terms] = engine.held_out_errors(fitted, noise, folds)
         return self.known[terms]
 
 

@@ -157,9 +157,11 @@ def legend(entries: Sequence[tuple[str, str]]) -> Markup:
     return element("ul", *items, class_="legend")
 
 
-def _rule(begin: tuple[float, float], end: tuple[float, float], tick: float, axis: Axis) -> Markup:
+def _rule(
+    initial_model: tuple[float, float], end: tuple[float, float], tick: float, axis: Axis
+) -> Markup:
     zero = not axis.logarithmic and abs(tick) < _HALF * (axis.high - axis.low)
-    ends = {"x1": begin[0], "y1": begin[1], "x2": end[0], "y2": end[1]}
+    ends = {"x1": initial_model[0], "y1": initial_model[1], "x2": end[0], "y2": end[1]}
     return element(
         "line", class_="zero" if zero else "rule", **{name: f"{v:.1f}" for name, v in ends.items()}
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.add import Grown
 from winchkit.diagnosis.compare import Compared
-from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.report.figures.maps import maps_drawn
 from winchkit.report.figures.plots import OutputPlots, Residuals, plots_of
 from winchkit.report.html.markup import Markup
@@ -22,7 +22,7 @@ __all__ = ["addition_html", "comparison_html", "report_html", "residuals_of"]
 
 
 def report_html(
-    answer: Answer,
+    answer: WinchAnswer,
     title: str,
     story: Sequence[str] = (),
     truth: Mapping[str, object] | None = None,
@@ -40,16 +40,16 @@ def report_html(
     plots = plots_of(residuals)
     moved = moved_outputs(diagnosis.outputs) if diagnosis.steps else []
     figures = _figures(residuals, plots, moved)
-    command = Command(residuals.problem.dataset, profile, options)
+    command = Command(residuals.regression.dataset, profile, options)
     return page(title, plots, sections(answer, figures, story, truth, command))
 
 
-def residuals_of(answer: Answer) -> Residuals:
+def residuals_of(answer: WinchAnswer) -> Residuals:
     """What the page of a diagnosis draws; an ``after`` only where something was named."""
-    diagnosis, found = answer.diagnosis, answer.found
+    diagnosis, found = answer.diagnosis, answer.result
     return Residuals(
-        answer.inquiry.problem,
-        found.begin.residual,
+        answer.engine.regression,
+        found.initial_model.residual,
         found.final.residual if diagnosis.steps else None,
         {name: output.noise_rms for name, output in diagnosis.outputs.items()},
     )
@@ -60,10 +60,10 @@ def comparison_html(
 ) -> str:
     """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`."""
     noise = {name: error.noise_rms for name, error in compared.comparison.outputs.items()}
-    residuals = Residuals(compared.problem, compared.residual, None, noise)
+    residuals = Residuals(compared.regression, compared.residual, None, noise)
     plots = plots_of(residuals)
     figures = _figures(residuals, plots)
-    command = Command(compared.problem.dataset, profile, options)
+    command = Command(compared.regression.dataset, profile, options)
     over = {own.output: own.followed for own in plots if own.followed}
     return page(title, plots, comparison_sections(compared.comparison, over, figures, command))
 
@@ -73,10 +73,12 @@ def addition_html(
 ) -> str:
     """The page of an addition; ``better`` is the profile that was written, the rest as above."""
     noise = {name: output.noise_rms for name, output in grown.addition.outputs.items()}
-    residuals = Residuals(grown.problem, grown.begin.residual, grown.final.residual, noise)
+    residuals = Residuals(
+        grown.regression, grown.initial_model.residual, grown.final.residual, noise
+    )
     plots = plots_of(residuals)
     figures = _figures(residuals, plots, moved_outputs(grown.addition.outputs))
-    command = Command(grown.problem.dataset, profile, options)
+    command = Command(grown.regression.dataset, profile, options)
     better = better or "better.toml"
     return page(title, plots, addition_sections(grown.addition, figures, command, better))
 

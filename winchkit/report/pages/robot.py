@@ -14,7 +14,7 @@ from winchkit.diagnosis.robot.attribution import AXES, on_cables
 from winchkit.diagnosis.robot.compare import RobotCompared
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.diagnosis.robot.errors import UNITS, Errors
-from winchkit.diagnosis.robot.regression import RobotProblem
+from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.report.figures.plots import AT_NOISE
 from winchkit.report.figures.pose_traces import NUMBER, Trace, traces
 from winchkit.report.html.chart import Axis, Chart, axis_over, legend, reading
@@ -41,7 +41,7 @@ _CHANGED = 1.02
 
 
 def pose_figures(
-    problem: RobotProblem,
+    regression: PoseRegression,
     before: Errors,
     after: Errors | None,
     noise: Mapping[str, float | None],
@@ -51,19 +51,25 @@ def pose_figures(
 
     ``after`` is None where nothing was changed; outputs in ``first`` come first.
     """
-    drawn = traces(problem, before, after)
+    drawn = traces(regression, before, after)
     drawn.sort(key=lambda t: list(first).index(t.over.output) if t.over.output in first else 99)
-    return [_output(problem, trace, before, after, noise.get(trace.over.output)) for trace in drawn]
+    return [
+        _output(regression, trace, before, after, noise.get(trace.over.output)) for trace in drawn
+    ]
 
 
 def _output(
-    problem: RobotProblem, trace: Trace, before: Errors, after: Errors | None, noise: float | None
+    regression: PoseRegression,
+    trace: Trace,
+    before: Errors,
+    after: Errors | None,
+    noise: float | None,
 ) -> Markup:
     name = trace.over.output
     title = element("h3", capital(OUTPUT_NAMES.get(name, name)))
-    lines = list(AXES) if name == "platform_position" else list(problem.dataset.names)
-    then = None if after is None else on_cables(problem, {name: after[name]})[name]
-    each = _each_line(name, lines, on_cables(problem, {name: before[name]})[name], then)
+    lines = list(AXES) if name == "platform_position" else list(regression.dataset.names)
+    then = None if after is None else on_cables(regression, {name: after[name]})[name]
+    each = _each_line(name, lines, on_cables(regression, {name: before[name]})[name], then)
     pair = element("div", _figure(trace, noise), each, class_="pair maps")
     return element("div", title, pair, class_="output")
 
@@ -172,13 +178,13 @@ def robot_report_html(
     answer: RobotAnswer, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
     """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them."""
-    diagnosis, seen = answer.diagnosis, answer.seen
-    before, after = seen.errors
+    diagnosis, selection = answer.diagnosis, answer.selection
+    before, after = selection.errors
     noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
     moved = moved_outputs(diagnosis.outputs) if diagnosis.steps else []
     grown = after if diagnosis.steps else None
-    figures = pose_figures(seen.final.problem, before, grown, noise, moved)
-    command = Command(seen.study.dataset, profile, options)
+    figures = pose_figures(selection.final.regression, before, grown, noise, moved)
+    command = Command(selection.preparation.dataset, profile, options)
     return page(title, (), sections(answer, figures, (), None, command))
 
 
@@ -186,9 +192,12 @@ def robot_comparison_html(
     compared: RobotCompared, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
     """The page of a robot's comparison."""
-    comparison, command = compared.comparison, Command(compared.problem.dataset, profile, options)
+    comparison, command = (
+        compared.comparison,
+        Command(compared.regression.dataset, profile, options),
+    )
     noise = {name: error.noise_rms for name, error in comparison.outputs.items()}
-    figures = pose_figures(compared.problem, compared.errors, None, noise)
+    figures = pose_figures(compared.regression, compared.errors, None, noise)
     content = comparison_sections(comparison, compared.followed, figures, command)
     return page(title, (), content)
 
@@ -205,7 +214,7 @@ def robot_addition_html(
     outputs = grown.addition.outputs
     noise = {name: output.noise_rms for name, output in outputs.items()}
     before, after = grown.errors
-    figures = pose_figures(grown.problem, before, after, noise, moved_outputs(outputs))
-    command = Command(grown.problem.dataset, profile, options)
+    figures = pose_figures(grown.regression, before, after, noise, moved_outputs(outputs))
+    command = Command(grown.regression.dataset, profile, options)
     content = addition_sections(grown.addition, figures, command, better or "better.toml")
     return page(title, (), content)

@@ -1,0 +1,59 @@
+"""Requirements of effects on the data: parts of the winch, channels, and range of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.effects.effect import Effect
+
+__all__ = ["excites", "missing_needs"]
+
+_PERIODS = 2
+_NEEDED = {
+    "cable": "a rope in the profile ([cable], [[pulley]] or reference.cable_length)",
+    "layers": "a drum that winds in layers (spiral or archimedean)",
+    "guide": "a [guide] in the profile",
+    "pulley": "a [[pulley]] in the profile",
+    "temperature": "a temperature channel in every run",
+    "load": "a load channel or load_mass",
+    "rope_force": "a load, load_mass or tension",
+    "gearing": "a gearbox",
+    "robot": "a robot's profile",
+}
+
+
+def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
+    """Parts and channels that an effect needs and that are absent, in words."""
+    if not effect.needs:
+        measured = set(effect.outputs) & set(dataset.outputs)
+        return [] if measured else ["a measured " + " or ".join(effect.outputs)]
+    profile, recordings = dataset.profile, dataset.recordings
+    cable = profile.cable
+    roped = cable.diameter or cable.dead_length or profile.pulley
+    have = {
+        "cable": bool(roped) or profile.reference.cable_length is not None,
+        "layers": profile.drum.kind in {"spiral", "archimedean"},
+        "guide": profile.guide is not None,
+        "pulley": bool(profile.pulley),
+        "temperature": all(r.signals.temperature is not None for r in recordings),
+        "load": any(r.raw.load is not None for r in recordings),
+        "rope_force": any(bool(r.raw.at.tension.any()) for r in recordings),
+        "gearing": True,
+        "robot": False,
+    }
+    lacking = [_NEEDED[need] for need in effect.needs if not have[need]]
+    if not set(effect.outputs) & set(dataset.outputs):
+        lacking.append("a measured " + " or ".join(effect.outputs))
+    return lacking
+
+
+def excites(shape: Mapping[str, float], dataset: Dataset) -> bool:
+    """Whether the motor turns through two periods of the shape's order in at least one run."""
+    orders = [shape["order"]] if "order" in shape else []
+    if not orders:
+        return True
+    stroke = max(float(np.ptp(r.signals.motor_angle)) for r in dataset.recordings)
+    return all(order * stroke >= _PERIODS * 2 * np.pi for order in orders)

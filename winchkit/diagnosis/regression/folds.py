@@ -1,0 +1,67 @@
+"""Partitions of runs for cross-validation: blocks of time, and groups of programme and load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from winchkit.diagnosis.regression.base import Folds, Segment
+
+__all__ = ["five_blocks", "group_folds", "time_blocks"]
+
+_BLOCKS = 48
+
+
+def time_blocks(
+    segments: Sequence[Segment], samples: Sequence[int], wanted: int = _BLOCKS
+) -> Folds:
+    """Contiguous blocks of time of equal length within a run, the same for all its outputs.
+
+    Parameters
+    ----------
+    segments
+        Rows of every output of every run.
+    samples
+        Number of samples of every run.
+    wanted
+        Number of blocks of all runs together; every run has at least two.
+
+    Returns
+    -------
+    Folds
+        Blocks numbered from the first run's first one.
+    """
+    total = sum(samples)
+    first, starts, counts = 0, [], []
+    for count in samples:
+        share = max(2, round(wanted * count / total))
+        starts.append(first)
+        counts.append(share)
+        first += share
+    of = tuple(
+        starts[s.run] + (np.arange(s.band.count) * counts[s.run]) // s.band.count for s in segments
+    )
+    return Folds(of, first)
+
+
+def five_blocks(blocks: Folds) -> Folds:
+    """Blocks of time merged to five contiguous ones."""
+    return Folds(tuple((b * 5) // blocks.count for b in blocks.of), 5)
+
+
+def group_folds(segments: Sequence[Segment], group_of_run: Sequence[int]) -> Folds | None:
+    """One fold per group of runs; None for a single group.
+
+    Parameters
+    ----------
+    segments
+        Rows of every output of every run.
+    group_of_run
+        Group of every run.
+    """
+    count = len(set(group_of_run))
+    if count < 2:
+        return None
+    of = tuple(np.full(s.band.count, group_of_run[s.run], dtype=np.intp) for s in segments)
+    return Folds(of, count)

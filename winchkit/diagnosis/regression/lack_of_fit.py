@@ -1,0 +1,86 @@
+"""Lack-of-fit test: residual power of the replicate means against the pure-error power, by band.
+
+The F test of Draper & Smith (Applied Regression Analysis, ch. 2) in every noise band, with
+Bonferroni's correction for the number of bands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.noise import (
+    Noise,
+    replicate_contrasts,
+    sums_per_band,
+)
+from winchkit.diagnosis.regression.projection import orthonormal
+
+__all__ = ["LackOfFitTest", "lack_of_fit_test"]
+
+
+@dataclass(frozen=True)
+class LackOfFitTest:
+    """Result of a lack-of-fit test.
+
+    Attributes
+    ----------
+    p_value : float
+        Smallest p-value of a band times the number of bands (Bonferroni); NaN without repeats.
+    excess_power : ndarray of shape (n_bands,)
+        Residual sum of squares beyond its expectation, in units of the noise variance.
+    rejected : ndarray of bool, shape (n_bands,)
+        Bands whose corrected p-value is below 5 %.
+    """
+
+    p_value: float
+    excess_power: Array
+    rejected: NDArray[np.bool_]
+
+
+def lack_of_fit_test(
+    regression: Regression, residual: Array, jacobian: Array, noise: Noise
+) -> LackOfFitTest:
+    """F test of the mean of repeats against the pure error, in every band.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    jacobian
+        Derivative of the prediction by the fitted unknowns, shape (n_rows, n_unknowns).
+    noise
+        Noise variance from repeats.
+
+    Returns
+    -------
+    LackOfFitTest
+        With a NaN p-value where the noise is not from repeats.
+
+    Notes ----- In band b the statistic is F = (S_b/ν_b)/σ̂_b², where S_b is the residual sum of
+    squares of the means and ν_b the number of means less the leverage of the fitted unknowns. Its
+    null distribution is F(ν_b, ν̂_b) with the degrees of freedom ν̂_b of the smoothed variance.
+    """
+    count = len(regression.bands)
+    if not noise.from_repeats:
+        nothing = np.zeros(count)
+        return LackOfFitTest(float("nan"), nothing, nothing.astype(bool))
+    split = replicate_contrasts(regression, residual)
+    total = sums_per_band(split.mean**2, split.mean_band, count)
+    dof = sums_per_band(np.ones_like(split.mean), split.mean_band, count)
+    basis = orthonormal(jacobian * noise.inverse_sigma(regression)[:, None])
+    # Each fitted unknown takes degrees of freedom in proportion to its leverage.
+    taken = sums_per_band(np.sum(basis**2, axis=1), regression.band_of_row, count)
+    dof = np.maximum(dof - taken, 1.0)
+    ratio = total / dof / noise.power
+    p = np.asarray(f_distribution.sf(ratio, dof, noise.dof))
+    tested = max(count, 1)
+    worst = float(min(1.0, p.min() * tested)) if count else 1.0
+    return LackOfFitTest(worst, total / noise.power - dof, p * tested < 0.05)

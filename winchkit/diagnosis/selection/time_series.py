@@ -1,0 +1,87 @@
+"""Selection engine of a winch's runs: noise from repeats, groups of programme and load as folds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Folds
+from winchkit.diagnosis.regression.cross_validation import extrapolation, held_out_rms
+from winchkit.diagnosis.regression.discretization import without_discretization_error
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.effects.effect import Effect
+
+__all__ = ["TimeSeriesSelection"]
+
+_LARGEST_EXTRAPOLATION = 0.2
+
+
+class TimeSeriesSelection(SelectionEngine):
+    """Selection among hypotheses on a winch's runs.
+
+    Parameters
+    ----------
+    regression
+        The runs and the model.
+    initial_model
+        Initial model: the profile's own effects.
+    candidates
+        Effects that may be added.
+    """
+
+    regression: TimeSeriesRegression
+
+    def __init__(
+        self,
+        regression: TimeSeriesRegression,
+        initial_model: Hypothesis,
+        candidates: Iterable[Effect],
+    ) -> None:
+        super().__init__(regression, initial_model, candidates)
+
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+        """Noise from the contrasts of repeats; without repeats from the saturated model."""
+        if self.regression.replicates:
+            own = jacobian[:, jacobian.shape[1] - states :]
+            return noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
+        columns = np.hstack([jacobian, self.signatures.columns])
+        return noise_saturated(self.regression, residual, columns)
+
+    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+        """Held-out rms error of every output, SI."""
+        return held_out_rms(self.regression, fitted, noise, folds)
+
+    def _choose_folds(self, fitted: Fit, noise: Noise) -> Folds:
+        """Groups of programme and load, or five blocks of time where groups would extrapolate.
+
+        With few groups, say two loads, an unknown may be determined by one group only: its
+        held-out prediction then fails whether or not the effect is present.
+        """
+        groups = self.regression.groups
+        largest = extrapolation(self.regression, fitted, noise, groups)
+        return self.regression.five_blocks if largest > _LARGEST_EXTRAPOLATION else groups
+
+    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
+        """F test of the residual without the part that the discretisation error explains."""
+        left = without_discretization_error(
+            self.regression, present, noise.inverse_sigma(self.regression)
+        )
+        return lack_of_fit_test(self.regression, left, present.jacobian, noise)
+
+    @property
+    def _thermal_signatures(self) -> Array:
+        """Signatures that may differ between repeats because the temperature does."""
+        thermal = [
+            index
+            for candidate in self.signatures.candidates
+            if "temperature" in candidate.effect.needs
+            for index in range(candidate.columns.start, candidate.columns.stop)
+        ]
+        return self.signatures.columns[:, thermal]
