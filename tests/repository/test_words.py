@@ -25,7 +25,7 @@ GONE = {
     r"so does": "name the subject and the verb",
     r"equal runs": "repeats",
     r"twice recorded": "repeats",
-    r"hats?": "basis function, linear B-spline",
+    r"hats?(?! matrix)": "basis function, linear B-spline",
     r"carded": "listed as confusable",
     r"kindred": "of the same family",
     r"skirts?": "transition band, stop-band leakage",

@@ -155,7 +155,7 @@ def smoothed(power: Array, dof: Array) -> tuple[Array, Array]:
     ----------
     power : (bands,) array
         Mean square per band.
-    freedom : (bands,) array
+    dof : (bands,) array
         Degrees of freedom of each.
 
     Returns

@@ -52,7 +52,7 @@ def next_runs(
 
     Parameters
     ----------
-    problem
+    regression
         Regression problem of the runs so far.
     pairs
         Effects to be separated, at their fitted values.
@@ -117,7 +117,7 @@ def separation(
 
     Parameters
     ----------
-    problem
+    regression
         Regression problem of the simulated programme.
     first, second
         Effects; without a second one the first beside nuisance parameters alone.

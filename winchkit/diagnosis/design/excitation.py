@@ -25,7 +25,7 @@ def what_runs_cannot_show(regression: TimeSeriesRegression) -> list[str]:
 
     Parameters
     ----------
-    problem
+    regression
         Regression problem of the runs.
 
     Returns

@@ -85,7 +85,7 @@ def offers(
 
     Parameters
     ----------
-    problem
+    regression
         Regression problem of the runs so far.
     pairs
         Effects to be separated.

@@ -40,7 +40,7 @@ def diagnose_each(
         Cut-off of the torque's low-pass, Hz; None for the default.
     thin
         Whether long runs are decimated.
-    told
+    progress
         Progress callback: text and share of the work done.
 
     Notes

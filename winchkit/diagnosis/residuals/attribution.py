@@ -85,7 +85,7 @@ def follows(regression: TimeSeriesRegression, residual: Array) -> list[Followed]
 
     Parameters
     ----------
-    problem
+    regression
         Regression problem.
     residual : (rows,) array
         Measured less predicted.
@@ -132,7 +132,7 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Followe
 
     Parameters
     ----------
-    problem
+    regression
         Regression problem.
     residual : (rows,) array
         Measured less predicted.

@@ -78,7 +78,7 @@ def residual_maps(regression: TimeSeriesRegression, residual: Array) -> list[Res
 
     Parameters
     ----------
-    problem
+    regression
         Regression problem.
     residual : (rows,) array
         Measured less predicted.

@@ -48,9 +48,9 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
 
     Parameters
     ----------
-    inquiry
+    engine
         Data, candidates and folds of the search.
-    found
+    result
         Its result.
 
     Returns
@@ -158,7 +158,7 @@ def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: f
         return "unknown"
     if not result.lack_of_fit or not result.noise.from_repeats:
         return "explained" if share < _GENERALISES else "partly"
-    # A trace below the noise, such as a load that bounces on its rope, is told but changes nothing.
+    # A trace below the noise, e.g. a load that bounces on its cable, is reported and has no effect.
     over = max(
         fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
         for fitted in outputs.values()
@@ -179,9 +179,9 @@ def output_fits(
 
     Parameters
     ----------
-    inquiry
+    engine
         Data, candidates and folds of the search.
-    begin, final
+    initial_model, final
         Fit and noise of the initial and of the final model.
     folds
         Folds of the held-out errors; None for those that suit the final fit.

@@ -115,7 +115,7 @@ def confusion_of(engine: SelectionEngine, final: Fit, noise: Noise, index: int) 
 
     Parameters
     ----------
-    inquiry
+    engine
         Data, candidates and folds of the search.
     final, noise
         Final fit and its noise.

@@ -76,13 +76,13 @@ def best_curve(
 
     Parameters
     ----------
-    problem
+    regression
         Regression problem.
     beside
         Residual to which curves are fitted.
     outputs
         Outputs of which a curve must change one.
-    price
+    penalty_per_parameter
         Penalty per parameter, ln n.
 
     Returns
@@ -226,7 +226,7 @@ class Doubt:
         effects = [hypothesis.terms[index].effect for index in indices]
         beside = self.beside(indices, rounding=rounding)
         explained_ss = beside.chi_square - self.beside((), rounding=rounding).chi_square
-        # The states in which runs begin are no numbers of a law, and cost it nothing here.
+        # Initial states of runs are not parameters of the law; they carry no penalty here.
         net_gain = explained_ss - engine.penalty_per_parameter * sum(
             Coordinates(effect).n_parameters for effect in effects
         )
