@@ -40,7 +40,7 @@ _HELD = 6
 
 @dataclass(frozen=True)
 class FittedModel:
-    """A fitted model with all that is needed to judge it."""
+    """A fitted model with its noise and folds."""
 
     regression: PoseRegression
     fit: Fit
