@@ -25,7 +25,7 @@ def test_what_one_winch_hides_is_named_there_and_alone(tmp_path: Path) -> None:
     assert score.alarms == score.wrong == []
     (shared,) = score.shared
     assert shared["winches"] == score.there
-    assert sorted(shared["without"]) == score.other_grid_point
+    assert sorted(shared["without"]) == score.elsewhere
 
 
 def test_what_all_winches_hide_is_common_and_alike(tmp_path: Path) -> None:

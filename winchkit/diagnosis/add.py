@@ -1,4 +1,4 @@
-"""Adding an effect: fitted on runs, judged on held-out ones, ready to be written to a profile."""
+"""Add an effect to a winch's profile or remove one, refitted and compared by held-out error."""
 
 from __future__ import annotations
 
@@ -42,7 +42,17 @@ _STARTS = 4
 
 @dataclass(frozen=True)
 class Addition:
-    """A profile's effects, the new one last, refitted together, and what that bought."""
+    """A profile's effects refitted with a new one, and the change of the errors.
+
+    Attributes
+    ----------
+    outputs : mapping of str to OutputFit
+        Errors per output before and after.
+    terms : tuple
+        Every effect with its estimates, the new one last.
+    notes : tuple of str
+        Notes on the data and the weights.
+    """
 
     outputs: Mapping[str, OutputFit]
     terms: tuple[tuple[Term, Mapping[str, Estimate]], ...]
@@ -54,7 +64,7 @@ class Addition:
         return self.terms[-1]
 
     def to_json(self) -> dict[str, Any]:
-        """As ``winchkit add --json`` prints it."""
+        """JSON of ``winchkit add --json``."""
         return fitted_json(self.added[0].effect.id, self.outputs, self.terms, self.notes)
 
 
@@ -64,7 +74,7 @@ def fitted_json(
     terms: Sequence[tuple[Term, Mapping[str, Estimate]]],
     notes: Sequence[str],
 ) -> dict[str, Any]:
-    """What one effect more or less did to a profile, as ``add`` and ``remove`` print it."""
+    """JSON of the change by one effect, for ``add`` and ``remove``."""
     kept = (
         "unit",
         "rms_before",
@@ -85,13 +95,23 @@ def fitted_json(
 
 @dataclass(frozen=True)
 class Grown:
-    """An addition with everything behind it, for reports."""
+    """An addition with everything that it was derived from, for reports.
+
+    Attributes
+    ----------
+    regression : TimeSeriesRegression
+        The runs and the model.
+    initial_model : Fit
+        The profile's effects, refitted.
+    final : Fit
+        The same with the new effect.
+    addition : Addition
+        What is printed.
+    """
 
     regression: TimeSeriesRegression
     initial_model: Fit
-    """The effects that the profile had, refitted."""
     final: Fit
-    """With the new one."""
     addition: Addition
 
 
@@ -102,10 +122,27 @@ def add(
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Addition:
-    """Fit an effect beside those that a profile has, all of them refitted.
+    """Fit an effect beside those of a profile, all of them refitted.
 
-    Raises UsageError for an effect that is unknown, there already, or cannot be seen in the runs,
-    RunError with every fault of every run.
+    Parameters
+    ----------
+    effect_id
+        Name of the effect.
+    runs
+        Recorded runs.
+    profile
+        The winch.
+    catalogue
+        Effects; by default all that are installed.
+    band
+        Cut-off frequency of the torque's low-pass filter, Hz.
+
+    Raises
+    ------
+    UsageError
+        For an effect that is unknown, present already, or that the runs cannot show.
+    RunError
+        With every fault of every run.
     """
     return grow(effect_id, runs, profile, catalogue, band).addition
 
@@ -117,7 +154,7 @@ def grow(
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Grown:
-    """As :func:`add`, with the fits that the figures were taken from."""
+    """The same as :func:`add`, with the fits."""
     catalogue = catalogue or load_catalogue()
     effect = catalogue[effect_id]
     if not effect.repeatable and any(table.id == effect_id for table in profile.effect):
@@ -146,7 +183,7 @@ def grow(
 def _fitted(
     engine: TimeSeriesSelection, effect_id: str
 ) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:
-    """The profile as it is, and with the effect, each with its noise."""
+    """The profile's effects and those with the new one, each with its noise."""
     initial_model, noise = engine.fit_with_noise(engine.initial_model)
     trials = [
         engine.trial(initial_model, item, noise)
@@ -162,7 +199,7 @@ def _fitted(
 
 
 def _placed(effect: Effect, dataset: Dataset) -> Effect:
-    """An empirical curve over what its variable covers in the data; any other effect as it is."""
+    """An empirical curve over the range of its variable in the data; any other effect unchanged."""
     if effect.id not in EMPIRICAL:
         return effect
     name = variable_of(effect)
@@ -173,7 +210,7 @@ def _placed(effect: Effect, dataset: Dataset) -> Effect:
 
 
 def _candidates_of(engine: TimeSeriesSelection, effect_id: str, noise: Noise) -> list[Score]:
-    """Points of an effect's shape grid that fit best."""
+    """Grid points of an effect with the largest scores."""
     initial_model = engine.refit(engine.initial_model, noise)
     projected = engine.projected(initial_model, noise)
     ranked = score(projected, initial_model.residual, engine.regression.n_rows)
@@ -182,7 +219,7 @@ def _candidates_of(engine: TimeSeriesSelection, effect_id: str, noise: Noise) ->
 
 @dataclass(frozen=True)
 class Removal:
-    """What is left of a profile's effects, refitted together, and what the loss did."""
+    """A profile's effects refitted without one, and the change of the errors."""
 
     effect: str
     outputs: Mapping[str, OutputFit]
@@ -190,7 +227,7 @@ class Removal:
     notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """As ``winchkit remove --json`` prints it."""
+        """JSON of ``winchkit remove --json``."""
         return fitted_json(self.effect, self.outputs, self.terms, self.notes)
 
 
@@ -201,10 +238,27 @@ def remove(
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Removal:
-    """Refit a profile's effects without the last one of this name.
+    """Refit a profile's effects without the last one of a name.
 
-    Raises UsageError for an effect that the profile does not have, RunError with every fault of
-    every run.
+    Parameters
+    ----------
+    effect_id
+        Name of the effect.
+    runs
+        Recorded runs.
+    profile
+        The winch.
+    catalogue
+        Effects; by default all that are installed.
+    band
+        Cut-off frequency of the torque's low-pass filter, Hz.
+
+    Raises
+    ------
+    UsageError
+        For an effect that the profile does not have.
+    RunError
+        With every fault of every run.
     """
     engine = selection_engine(
         prepare(runs, profile, band, thin=True), catalogue or load_catalogue()
@@ -216,7 +270,7 @@ def remove(
         has = ", ".join(term.label for term in terms) or "none"
         raise UsageError(f"profile '{profile.name}' has no effect '{effect_id}'; it has {has}")
     best = reweighted(engine, *engine.fit_with_noise(initial_model.hypothesis.without(there[-1])))
-    # Judged by the noise of the better model: without the effect its trace would pass for noise.
+    # With the noise of the better model: without the effect, its residual would count as noise.
     outputs = output_fits(engine, (initial_model, noise), (best.fit, noise))
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     left = tuple(estimates(engine.regression, best.fit, spread))

@@ -1,4 +1,4 @@
-"""A profile against measured runs: how far off, and what the error follows."""
+"""Comparison of a profile with runs: errors per output and the variables that explain them."""
 
 from __future__ import annotations
 
@@ -27,11 +27,20 @@ __all__ = ["Compared", "compare", "compared", "initial_hypothesis"]
 
 @dataclass(frozen=True)
 class Compared:
-    """A comparison with everything behind it, for reports."""
+    """A comparison with everything that it was derived from, for reports.
+
+    Attributes
+    ----------
+    regression : TimeSeriesRegression
+        The runs and the model.
+    residual : ndarray of shape (n_rows,)
+        Measured minus predicted.
+    comparison : Comparison
+        What is printed.
+    """
 
     regression: TimeSeriesRegression
     residual: Array
-    """Measured less predicted, (rows,)."""
     comparison: Comparison
 
 
@@ -41,9 +50,23 @@ def compare(
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Comparison:
-    """Compare runs with a profile, its effects at their file values, only the offset fitted.
+    """Compare runs with a profile, its effects at their file values, only the length offset fitted.
 
-    Raises RunError with every fault of every run.
+    Parameters
+    ----------
+    runs
+        Recorded runs.
+    profile
+        The winch.
+    catalogue
+        Effects; by default all that are installed.
+    band
+        Cut-off frequency of the torque's low-pass filter, Hz.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run.
     """
     return compared(runs, profile, catalogue, band).comparison
 
@@ -54,7 +77,7 @@ def compared(
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Compared:
-    """As :func:`compare`, with the residual that the figures were taken from."""
+    """The same as :func:`compare`, with the residual."""
     regression = TimeSeriesRegression(prepare(runs, profile, band, skirt=WHOLE_FILTER))
     start = initial_hypothesis(profile, catalogue, regression)
     residual = regression.residual(start)

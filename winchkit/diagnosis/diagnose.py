@@ -1,4 +1,4 @@
-"""The diagnosis: compare, search, name what can be named, and say what cannot be known."""
+"""Diagnosis of a winch: data, stepwise selection, verdict, and programmes that would tell more."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ _LOCATED = ("unknown", "partly")
 
 
 ProgressCallback = Callable[[str, float], None]
-"""Hears what is begun, and the share of the work that is done."""
+"""Called with the present step and the share of the work done, 0 to 1."""
 
 
 class Answer:
@@ -119,7 +119,7 @@ class WinchAnswer(Answer):
 
 
 def no_progress(what: str, share: float) -> None:
-    """Tells nobody."""
+    """Progress callback that does nothing."""
 
 
 def diagnose(
@@ -131,11 +131,34 @@ def diagnose(
     thin: bool = True,
     progress: ProgressCallback = no_progress,
 ) -> WinchAnswer:
-    """Find which effect of the catalogue the profile lacks on these runs.
+    """Find the effects that a winch's profile lacks on its runs.
 
-    ``thin`` lets long runs be thinned out as far as their signals allow; ``told`` hears what is
-    begun and which share (0 to 1) of the work is about done. Raises RunError with every fault of
-    every run, FileError for effects that do not bind.
+    Parameters
+    ----------
+    runs
+        Recorded runs.
+    profile
+        The winch.
+    catalogue
+        Effects; by default all that are installed.
+    band
+        Cut-off frequency of the torque's low-pass filter, Hz; by default chosen from the sampling.
+    thin
+        Decimate long runs as far as their signals allow.
+    progress
+        Called with the present step and the share of the work done, 0 to 1.
+
+    Returns
+    -------
+    WinchAnswer
+        The diagnosis with everything that it was derived from.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run.
+    FileError
+        For effects that do not bind.
     """
     catalogue = catalogue or load_catalogue()
     progress("reading the signals", 0.0)
@@ -154,7 +177,7 @@ def diagnose(
 
 
 def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
-    """Everything that is said of what a search found."""
+    """Verdict, equivalence sets, intervals and next programmes of a selection."""
     judgement = judge_and_doubt(engine, result)
     shown = judgement.shown
     added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
@@ -184,9 +207,10 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
 def _closest(
     engine: TimeSeriesSelection, result: SelectionResult, judgement: Judgement
 ) -> list[Confusion]:
-    """What came closest and may not be named yet, with its rivals: a next run can begin there.
+    """Equivalence sets of additions that are not named, where a part of the residual is explained.
 
-    Not for an unknown: what resembles something outside the catalogue leads astray.
+    None for an unknown effect: additions that imitate an effect outside the catalogue would lead to
+    a wrong programme.
     """
     if judgement.verdict != "partly":
         return []
@@ -195,7 +219,7 @@ def _closest(
 
 
 def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelection:
-    """An inquiry that begins with the effects that the profile already has."""
+    """Selection engine whose initial model is the profile's own effects."""
     regression = TimeSeriesRegression(dataset)
     initial_model = initial_hypothesis(dataset.profile, catalogue, regression)
     return TimeSeriesSelection(regression, initial_model, catalogue)
@@ -204,7 +228,17 @@ def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelect
 def steps_of(
     engine: SelectionEngine, result: SelectionResult, sets: Sequence[Confusion]
 ) -> tuple[Step, ...]:
-    """Every addition with its confusion set, values and held-out gain."""
+    """Every addition with its equivalence set, values and held-out gain.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    result
+        Result of the selection.
+    sets
+        Equivalence set of every addition.
+    """
     final, noise = result.final, result.noise
     gains = _gains(engine, final, noise)
     spread = spread_of(engine.regression, final, noise, engine.regression.blocks)
@@ -224,7 +258,7 @@ def steps_of(
 
 
 def _values_only(effect_id: str, confusion: Confusion) -> dict[str, Estimate]:
-    """Values of a rival; how sure they are is not worked out for it."""
+    """Values of a rival, without intervals."""
     term = next(t for t in confusion.terms if t.effect.id == effect_id)
     names = {
         p.name for p in (*Coordinates(term.effect).amplitudes, *Coordinates(term.effect).shapes)
@@ -237,7 +271,7 @@ def _values_only(effect_id: str, confusion: Confusion) -> dict[str, Estimate]:
 
 
 def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:
-    """Held-out gain of each step in the order in which the model grew."""
+    """Relative decrease of the held-out χ² by each addition, in the order of selection."""
     hypothesis = final.hypothesis
     squares, folds = [], engine.folds(final, noise)
     for count in range(engine.n_initial_terms, len(hypothesis.terms) + 1):
@@ -250,7 +284,7 @@ def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:
 
 
 def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[CandidateScore, ...]:
-    """Every candidate with its score, the strongest with what it would leave held out."""
+    """Every candidate with its score, the first ones with their held-out errors."""
     out = []
     folds = engine.folds(result.final, result.noise)
     for item, fitted in zip_longest(result.scores, result.tried):
@@ -262,9 +296,10 @@ def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[Can
 
 
 def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[Where, ...]:
-    """Where the rest lives: angles with an order, other variables, and the loudest band.
+    """Variables, orders and the frequency band with the largest shares of the residual.
 
-    The rest beside what came closest; where that left nothing, yet may not be named, all of it.
+    Of the residual of the final model, or of the initial one where the final one has no lack of
+    fit.
     """
     fitted, lack_of_fit_test = result.final, result.lack_of_fit_test
     if not result.lack_of_fit:

@@ -138,8 +138,10 @@ def signed_rank_p_value(before: Array, after: Array) -> float:
     float
         One with fewer than eight folds or no change at all.
 
-    Notes ----- Folds whose change is below 2 % of the largest take no part, unless fewer than eight
-    would remain: an effect may act in a few folds only.
+    Notes
+    -----
+    Folds whose change is below 2 % of the largest take no part, unless fewer than eight would
+    remain: an effect may act in a few folds only.
     """
     change = before - after
     size = np.abs(change)

@@ -64,9 +64,11 @@ def lack_of_fit_test(
     LackOfFitTest
         With a NaN p-value where the noise is not from repeats.
 
-    Notes ----- In band b the statistic is F = (S_b/ν_b)/σ̂_b², where S_b is the residual sum of
-    squares of the means and ν_b the number of means less the leverage of the fitted unknowns. Its
-    null distribution is F(ν_b, ν̂_b) with the degrees of freedom ν̂_b of the smoothed variance.
+    Notes
+    -----
+    In band b the statistic is F = (S_b/ν_b)/σ̂_b², where S_b is the residual sum of squares of the
+    means and ν_b the number of means less the leverage of the fitted unknowns. Its null
+    distribution is F(ν_b, ν̂_b) with the degrees of freedom ν̂_b of the smoothed variance.
     """
     count = len(regression.bands)
     if not noise.from_repeats:

@@ -1,4 +1,4 @@
-"""Adding an effect to a robot: fitted on its poses, judged on those held out."""
+"""Add an effect to a robot's profile or remove one, refitted and compared by held-out error."""
 
 from __future__ import annotations
 
@@ -30,11 +30,20 @@ __all__ = [
 
 @dataclass(frozen=True)
 class RobotGrown:
-    """An addition with everything behind it, for reports."""
+    """An addition with everything that it was derived from, for reports.
+
+    Attributes
+    ----------
+    regression : PoseRegression
+        The poses and the model.
+    errors : tuple of two dict
+        Errors before and after, at every pose, SI.
+    addition : Addition
+        What is printed.
+    """
 
     regression: PoseRegression
     errors: tuple[Errors, Errors]
-    """Before and after, at every pose."""
     addition: Addition
 
 
@@ -45,10 +54,28 @@ def add_to_robot(
     line: str | None = None,
     catalogue: Catalogue | None = None,
 ) -> Addition:
-    """Fit an effect at its place beside those that a robot has, its geometry as it is.
+    """Fit an effect at its place beside the profile's own, with the geometry of the file.
 
-    Raises UsageError for an effect that is unknown, there already, at no such place, or that the
-    poses cannot show; RunError with every fault of every run.
+    Parameters
+    ----------
+    effect_id
+        Name of the effect.
+    runs
+        Poses.
+    profile
+        The robot.
+    line
+        Line on which the effect acts; None for an effect on the whole robot.
+    catalogue
+        Effects; by default all that are installed.
+
+    Raises
+    ------
+    UsageError
+        For an effect that is unknown, present already, at no such place, or that the poses cannot
+        show.
+    RunError
+        With every fault of every run.
     """
     return grow_robot(effect_id, runs, profile, line, catalogue).addition
 
@@ -60,7 +87,7 @@ def grow_robot(
     line: str | None = None,
     catalogue: Catalogue | None = None,
 ) -> RobotGrown:
-    """As :func:`add_to_robot`, with the errors that the figures were taken from."""
+    """The same as :func:`add_to_robot`, with the errors at every pose."""
     catalogue = catalogue or load_catalogue()
     effect = _placed(catalogue[effect_id], profile, line)
     if any(term.effect.id == effect.id for term in robot_terms(profile, catalogue)):
@@ -108,7 +135,7 @@ def _added(preparation: Preparation, effect: Effect) -> RobotGrown:
         term.effect.id for term in declared_terms(preparation.dataset.robot, preparation.catalogue)
     }
     found = estimates(regression, final, spread)
-    # What a line's winch brings along is refitted beside it and stays in the winch's own profile.
+    # Effects of a line's winch are refitted too and stay in the winch's own profile.
     terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
     was, now = (
         errors_of(regression, regression.at(fit.hypothesis)) for fit in (initial_model, final)
@@ -123,10 +150,16 @@ def remove_from_robot(
     profile: RobotProfile,
     catalogue: Catalogue | None = None,
 ) -> Removal:
-    """Refit a robot's effects on poses without one of them, ``EFFECT`` or ``EFFECT/LINE``.
+    """Refit the profile's effects without one of them, ``EFFECT`` or ``EFFECT/LINE``.
 
-    ``home-length`` alone takes out those of all lines. Raises UsageError for an effect that the
-    profile itself does not have, RunError with every fault of every run.
+    ``home-length`` alone removes those of all lines.
+
+    Raises
+    ------
+    UsageError
+        For an effect that the profile itself does not have.
+    RunError
+        With every fault of every run.
     """
     catalogue = catalogue or load_catalogue()
     own = [term.effect.id for term in declared_terms(profile, catalogue)]
@@ -152,7 +185,7 @@ def remove_from_robot(
     found = estimates(
         regression, final, spread_of(regression, final, noise, engine.regression.blocks)
     )
-    # What a line's winch brings along is refitted beside them and stays in the winch's own profile.
+    # Effects of a line's winch are refitted too and stay in the winch's own profile.
     left = tuple(item for item in found if item[0].effect.id in own)
     outputs = figures(before, after, preparation.noise)
     return Removal(effect_id, outputs, left, preparation.dataset.notes)

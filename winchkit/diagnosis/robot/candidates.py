@@ -1,4 +1,4 @@
-"""Which effects a robot's poses could show, each at each of its places."""
+"""Candidate set of a robot: effects at their places that the poses could show."""
 
 from __future__ import annotations
 
@@ -40,8 +40,10 @@ _PRIORS = {
     "drum-radius": ("winding_radius", 0.5e-3),
     "layer-thickness": ("layer_growth", 0.04e-3),
 }
-"""Their names in ``[prior]`` with the standard deviation where a file has none, m: CABTIVE paper,
-Table 4, its bounds read as two standard deviations."""
+"""Keys in ``[prior]`` and standard deviations without an entry, m.
+
+CABTIVE paper, Table 4: half the width of its bounds is two standard deviations.
+"""
 _PARTS = {
     "swivel-radius": "a line with a swivel_radius",
     "layer-thickness": "a drum that winds in layers",
@@ -51,7 +53,7 @@ _OUTSIDE_LINES = {"tension": "LINE.tension [N] of the load cells", "temperature"
 
 
 def candidates_at(dataset: RobotDataset, catalogue: Catalogue) -> Iterator[Effect]:
-    """Effects at their places, as far as the poses could show them at all."""
+    """Effects at each of their places, as far as the poses could show them."""
     for effect in catalogue:
         if not effect.on_robot or lacking(effect, dataset):
             continue
@@ -61,7 +63,7 @@ def candidates_at(dataset: RobotDataset, catalogue: Catalogue) -> Iterator[Effec
 
 
 def lacking(effect: Effect, dataset: RobotDataset) -> list[str]:
-    """Channels that an effect needs on a robot and that are not there, in words."""
+    """Channels that an effect needs on a robot and that are absent, in words."""
     out = []
     if "rope_force" in effect.needs and not dataset.has_tension:
         out.append(_OUTSIDE_LINES["tension"])
@@ -73,12 +75,12 @@ def lacking(effect: Effect, dataset: RobotDataset) -> list[str]:
 
 
 def lacking_parts(effect: Effect, dataset: RobotDataset) -> list[str]:
-    """Parts that no line has and that an effect is about, in words."""
+    """Parts that an effect needs and that no line has, in words."""
     return [] if _has_part(effect, dataset) else [_PARTS[base_of(effect)]]
 
 
 def with_needs_met(effect: Effect, dataset: RobotDataset) -> Effect:
-    """An effect as the search takes it: its needs are met; a rope's law brings home lengths."""
+    """The effect without needs; a cable law includes the home lengths of lines without one."""
     if "rope_force" in effect.needs and effect.outputs == ("cable_length",):
         known = lines_with_home_length(dataset.robot)
         effect = with_home_lengths(effect, [n for n in dataset.names if n not in known])
@@ -88,9 +90,17 @@ def with_needs_met(effect: Effect, dataset: RobotDataset) -> Effect:
 def priors_of_geometry(
     dataset: RobotDataset, catalogue: Catalogue, fitted: bool
 ) -> list[GeometryPrior]:
-    """The geometry as nuisances: with the priors of a calibration, or with what one left.
+    """Geometry as nuisance parameters.
 
-    ``fitted`` takes the standard deviations that a calibration wrote; without them there is none.
+    Parameters
+    ----------
+    dataset
+        Poses of one robot.
+    catalogue
+        Effects.
+    fitted
+        Use the standard deviations that a calibration wrote into the profile, without which there
+        are no nuisance parameters; else the priors of a calibration.
     """
     out = []
     for name in GEOMETRY:
@@ -110,7 +120,7 @@ def _each(effect: Effect, dataset: RobotDataset) -> Iterable[Effect]:
 
 
 def _std(dataset: RobotDataset, effect: Effect, parameter: str, fitted: bool) -> float:
-    """Of one number of the geometry, m."""
+    """Standard deviation of one number of the geometry, m."""
     key, default = _PRIORS[base_of(effect)]
     profile = dataset.robot
     if not fitted:
@@ -126,7 +136,7 @@ def _std(dataset: RobotDataset, effect: Effect, parameter: str, fitted: bool) ->
 
 
 def _has_part(effect: Effect, dataset: RobotDataset) -> bool:
-    """Whether a line, or any where the effect acts on all, has the part that it is about."""
+    """Whether a line, or any line for an effect on all, has the part that an effect is about."""
     place = line_of_effect(effect)
     lines = [line for line in dataset.robot.line if not place or line.name == place]
     winches = [line.winch for line in lines if isinstance(line.winch, WinchProfile)]

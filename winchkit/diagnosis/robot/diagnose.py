@@ -1,9 +1,9 @@
-"""The diagnosis of a robot: first with the numbers of its file, then with its geometry let go.
+"""Diagnosis of a robot: first with the geometry of its file, then with the geometry free.
 
-The geometry that was fitted to these very runs is fitted again beside whatever is sought, as are
-the values of all effects that a profile has. A geometry that was not is taken as it stands, within
-the uncertainty of its calibration; only where no few effects explain the runs with it is all of it
-let go, and then it is the first thing that the model lacks.
+A geometry that was calibrated on these runs is fitted again beside every candidate, as are the
+profile's own effects. Any other geometry is taken from the file within the uncertainty of its
+calibration; only where no few effects explain the runs is it fitted as a whole, and it is then the
+first missing part of the model.
 """
 
 from __future__ import annotations
@@ -52,12 +52,22 @@ __all__ = [
 
 _WHERE = 6
 _FAR_OFF, _NO_WORSE = 0.7, 1.1
-"""A geometry that was let go is worth a look where some error falls below this share of what it
-was, and none rises above that one."""
+"""Residuals beside a free geometry are shown where some error falls below the first ratio and none
+rises above the second one."""
 
 
 class RobotAnswer(Answer):
-    """A diagnosis of poses with everything behind it."""
+    """A diagnosis of a robot's poses with everything that it was derived from.
+
+    Parameters
+    ----------
+    selection
+        Selection and judgement.
+    sets
+        Equivalence set of every addition.
+    diagnosis
+        What is printed.
+    """
 
     engine: PoseSelection
 
@@ -75,23 +85,36 @@ class RobotAnswer(Answer):
 
 @dataclass(frozen=True)
 class RobotSelection:
-    """Where a search in poses began and ended."""
+    """A selection on poses and its judgement.
+
+    Attributes
+    ----------
+    preparation : Preparation
+        Data, candidates and noise.
+    engine : PoseSelection
+        Engine of the selection.
+    file_engine : PoseSelection
+        Engine with the geometry of the file; the same object where the geometry was not free.
+    result : SelectionResult
+        Result of the selection.
+    judgement : Judgement
+        Verdict and named effects.
+    """
 
     preparation: Preparation
     engine: PoseSelection
     file_engine: PoseSelection
-    """Takes the geometry as the profile has it; the same where that was not let go."""
     result: SelectionResult
     judgement: Judgement
 
     @property
     def geometry_is_free(self) -> bool:
-        """Whether the geometry as filed had to be let go."""
+        """Whether the geometry was fitted instead of taken from the file."""
         return self.engine is not self.file_engine
 
     @cached_property
     def initial_model(self) -> FittedModel:
-        """The profile's own effects fitted, the geometry as filed."""
+        """The profile's own effects fitted, with the geometry of the file."""
         first, noise = self.file_engine.fit_with_noise(self.file_engine.initial_model)
         return FittedModel(
             self.file_engine.regression, first, noise, self.file_engine.regression.groups
@@ -99,13 +122,13 @@ class RobotSelection:
 
     @cached_property
     def final(self) -> FittedModel:
-        """With all that was named."""
+        """The model with all named effects."""
         shown, engine = self.judgement.shown, self.engine
         return FittedModel(engine.regression, shown.final, shown.noise, engine.regression.groups)
 
     @cached_property
     def errors(self) -> tuple[Errors, Errors]:
-        """Of both, at every pose."""
+        """Errors of both models at every pose, SI."""
         initial_model, final = (
             errors_of(s.regression, s.regression.at(s.fit.hypothesis))
             for s in (self.initial_model, self.final)
@@ -114,9 +137,10 @@ class RobotSelection:
 
     @property
     def rest(self) -> tuple[PoseRegression, Errors]:
-        """Where to look for what is left: beside the geometry as filed, unless that is far off.
+        """Model and errors in which to look for a pattern of the unexplained residual.
 
-        A geometry that was let go for nothing has moved to imitate what is missing.
+        With the geometry of the file, unless that is far off: a free geometry that explains little
+        has been fitted to the missing effect.
         """
         before, after = self.errors
         falls = [rms(name, after[name]) / rms(name, before[name]) for name in after]
@@ -126,7 +150,15 @@ class RobotSelection:
 
 
 def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
-    """What was found, in words, figures and places; ``geometry`` is how that was taken."""
+    """Diagnosis of a selection.
+
+    Parameters
+    ----------
+    selection
+        Selection and judgement.
+    geometry
+        How the geometry was taken: ``file`` or ``refitted``.
+    """
     engine, judgement, preparation = selection.engine, selection.judgement, selection.preparation
     shown, verdict = judgement.shown, judgement.verdict
     added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
@@ -154,14 +186,14 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
 
 
 def _places(selection: RobotSelection) -> tuple[Where, ...]:
-    """Where the rest lives, the largest share first."""
+    """Variables that explain the unexplained residual, the largest share first."""
     result = follows_of(*selection.rest)
     places = [Where(f.output, f.variable, f.share, line=f.line) for f in result]
     return tuple(sorted(places, key=lambda w: -w.share)[:_WHERE])
 
 
 def _geometry_step(engine: PoseSelection, shown: SelectionResult, output: OutputFit) -> Step:
-    """All of the geometry, as one addition that no few numbers can replace."""
+    """The whole geometry as one addition."""
     regression = engine.regression
     geometry = regression.point.geometry
     std = spread_of(regression, shown.final, shown.noise, engine.regression.blocks).std
@@ -189,10 +221,25 @@ def diagnose_robot(
     catalogue: Catalogue | None = None,
     progress: ProgressCallback = no_progress,
 ) -> RobotAnswer:
-    """Find which effect of the catalogue a robot's model lacks on these poses.
+    """Find the effects that a robot's model lacks on its poses.
 
-    ``told`` hears what is begun and which share (0 to 1) of the work is about done. Raises RunError
-    with every fault of every run, FileError for effects that do not bind.
+    Parameters
+    ----------
+    runs
+        Poses.
+    profile
+        The robot.
+    catalogue
+        Effects; by default all that are installed.
+    progress
+        Called with the present step and the share of the work done, 0 to 1.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run.
+    FileError
+        For effects that do not bind.
     """
     progress("judging the noise", 0.0)
     preparation = prepare_selection(runs, profile, catalogue or load_catalogue())
@@ -205,7 +252,7 @@ def diagnose_robot(
         return _concluded(preparation, preparation.free_geometry(), file_engine)
     result = stepwise_selection(file_engine)
     if added := result.final.hypothesis.terms[file_engine.n_initial_terms :]:
-        # Poses placed by ropes that contradict each other turn, and tensions there look unbalanced.
+        # Poses estimated from inconsistent cable lengths are tilted, which unbalances tensions.
         file_engine = preparation.file_geometry(added[:1])
         result = stepwise_selection(file_engine)
     judgement = judge(file_engine, result)
@@ -219,7 +266,7 @@ def diagnose_robot(
 
 
 def _beyond_few(preparation: Preparation, file_engine: PoseSelection) -> bool:
-    """Whether the whole geometry explains far more than any single effect does."""
+    """Whether the whole geometry explains far more χ² than any single effect."""
     gain = _gain_of_geometry(preparation, file_engine, file_engine.initial_model)
     if not _is_real(preparation, gain):
         return False
@@ -231,7 +278,7 @@ def _beyond_few(preparation: Preparation, file_engine: PoseSelection) -> bool:
 def _gain_of_geometry(
     preparation: Preparation, file_engine: PoseSelection, model: Hypothesis
 ) -> float:
-    """Whitened squares that the geometry takes, beyond what its uncertainty allows it."""
+    """Decrease of χ² by a free geometry, beyond its calibration's uncertainty."""
     point = file_engine.regression.point
     wide = PoseRegression(replace(point, geometry=_from(preparation.prior, point.geometry)))
     hypothesis = replace(model, nuisances=())
@@ -243,7 +290,7 @@ def _gain_of_geometry(
 def _concluded(
     preparation: Preparation, engine: PoseSelection, file_engine: PoseSelection
 ) -> RobotAnswer:
-    """With the geometry let go."""
+    """Answer with the geometry free."""
     result = stepwise_selection(engine)
     return answer_of(
         RobotSelection(preparation, engine, file_engine, result, judge(engine, result)), "refitted"
@@ -253,14 +300,18 @@ def _concluded(
 def _geometry_is_off(
     preparation: Preparation, file_engine: PoseSelection, result: SelectionResult
 ) -> bool:
-    """Whether the geometry as a whole would explain more of what is left than chance does."""
+    """Whether the whole geometry explains a significant part of the remaining residual."""
     return _is_real(
         preparation, _gain_of_geometry(preparation, file_engine, result.final.hypothesis)
     )
 
 
 def _is_real(preparation: Preparation, gain: float) -> bool:
-    """F test of the whitened squares that the geometry takes."""
+    """F test of the decrease of χ² by the geometry.
+
+    F = (Δχ²/k)/1 with k numbers of the geometry and the degrees of freedom of the noise; level 0.1
+    %.
+    """
     count = len(preparation.prior)
     dof = preparation.noise.dof.get("cable_length", 1.0)
     level = float(f_distribution.isf(_GEOMETRY_LEVEL, count, max(dof, 1.0)))
@@ -270,7 +321,7 @@ def _is_real(preparation: Preparation, gain: float) -> bool:
 def _from(
     prior: Sequence[GeometryPrior], now: Sequence[GeometryPrior]
 ) -> tuple[GeometryPrior, ...]:
-    """Priors from where the numbers are now."""
+    """Priors with their mean at the present values."""
     there = {(b.term.effect.id, b.parameter): b.value for b in now}
     out = []
     for item in prior:

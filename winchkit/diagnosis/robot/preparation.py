@@ -1,7 +1,7 @@
-"""Where a robot's model stands before anything is sought: geometry, poses and noise settled.
+"""Linearisation point of a robot's identification: geometry, poses and noise before the selection.
 
-Geometry and poses are fitted by Gauss and Newton's method, so that what is linearised afterwards
-lies at the best fit of the model that there is.
+Geometry and poses are fitted jointly by the Gauss-Newton method, so that the model is linearised at
+its best fit. The noise is estimated by variance components.
 """
 
 from __future__ import annotations
@@ -52,12 +52,14 @@ _STEPS = 8
 _STILL = 0.02
 _UNBALANCED = 0.2
 _BALANCING = frozenset({"payload-mass", "payload-centre", "cell-offset", "cell-thermal"})
-"""What may explain an imbalance of tensions while their noise is sought. Not gains: no tension at
-all and a platform without weight would balance anything."""
+"""Effects that may explain an imbalance of tensions while its noise is estimated.
+
+Gains are excluded: zero tension and a platform without weight would balance any data.
+"""
 
 
 def own_effects(terms: Sequence[Term]) -> Hypothesis:
-    """A hypothesis of a profile's own terms."""
+    """Hypothesis of a profile's own effects."""
     return Hypothesis(tuple(terms), (), ((),) * len(terms))
 
 
@@ -67,7 +69,24 @@ def fitted_point(
     sigma: Mapping[str, float],
     geometry: Sequence[GeometryPrior] = (),
 ) -> tuple[LinearizationPoint, tuple[Term, ...]]:
-    """Geometry, poses and the profile's own effects at the best fit with a given noise."""
+    """Geometry, poses and the profile's own effects at their best fit under a given noise.
+
+    Parameters
+    ----------
+    dataset
+        Poses of one robot.
+    terms
+        The profile's own effects.
+    sigma
+        Standard deviation per type of measurement, SI.
+    geometry
+        Numbers of the geometry that are nuisance parameters.
+
+    Returns
+    -------
+    point, terms
+        The linearisation point and the fitted effects.
+    """
     point = LinearizationPoint(dataset, start_pose(dataset), sigma, tuple(geometry))
     terms = tuple(terms)
     for _ in range(_STEPS):
@@ -96,7 +115,19 @@ def estimated_noise(
     geometry: Sequence[GeometryPrior],
     candidates: Iterable[Effect],
 ) -> PoseNoise:
-    """Noise of every kind of measurement, whatever may be missing from the model."""
+    """Variance components of the measurements beside all candidate effects.
+
+    Parameters
+    ----------
+    dataset
+        Poses of one robot.
+    terms
+        The profile's own effects.
+    geometry
+        Numbers of the geometry that are nuisance parameters.
+    candidates
+        Effects that may be missing; the noise is estimated beside all of them.
+    """
     candidates = tuple(candidates)
     found = PoseNoise(START, {}, from_repeats=False, unexplained=START)
     for _ in range(2):
@@ -114,10 +145,10 @@ def estimated_noise(
 
 
 def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
-    """Whether what tensions leave unbalanced is small beside how much they vary.
+    """Whether the imbalance of the tensions is below 20 % of their standard deviation.
 
-    Else something pulls at the platform that no profile has, or the cells are no cells of these
-    ropes: the balance is then left out, and said to be.
+    Else an unmodelled force acts on the platform, or the load cells do not measure these cables:
+    the balance is then left out, with a note.
     """
     if not dataset.has_tension:
         return True
@@ -131,7 +162,7 @@ def _columns(
     candidates: Sequence[Effect],
     here: dict[str, Array],
 ) -> dict[str, Array]:
-    """What the residuals gain from the geometry and from every candidate, (p, k, m) by kind."""
+    """Changes of the residuals by the geometry and every candidate, (p, k, m) by type."""
     moved: list[dict[str, Array]] = []
     for effect in candidates:
         coordinates = Coordinates(effect)
@@ -164,16 +195,30 @@ _SHORT_LIST = 3
 
 @dataclass(frozen=True)
 class Preparation:
-    """What stays the same however the geometry is taken."""
+    """Data, candidates and noise of a robot's identification, for any treatment of its geometry.
+
+    Attributes
+    ----------
+    dataset : RobotDataset
+        Poses of one robot.
+    catalogue : Catalogue
+        Effects.
+    candidates : tuple of Effect
+        Effects at their places that the poses could show.
+    noise : PoseNoise
+        Variance components.
+    prior : tuple of GeometryPrior
+        The geometry with the priors of a calibration.
+    guess : tuple of Term
+        The effect that explains most, beside which a free geometry is fitted.
+    """
 
     dataset: RobotDataset
     catalogue: Catalogue
     candidates: tuple[Effect, ...]
     noise: PoseNoise
     prior: tuple[GeometryPrior, ...]
-    """The geometry with the priors of a calibration."""
     guess: tuple[Term, ...] = ()
-    """What is missing most likely: where the geometry is let go, it settles beside it."""
 
     @cached_property
     def own(self) -> tuple[Term, ...]:
@@ -183,7 +228,7 @@ class Preparation:
     def engine(
         self, geometry: Sequence[GeometryPrior], beside: tuple[Term, ...] = ()
     ) -> PoseSelection:
-        """Beginning with the profile's own effects, the geometry believed as given."""
+        """Selection engine with the given geometry as nuisance parameters."""
         terms = (*self.own, *beside)
         point, terms = fitted_point(self.dataset, terms, self.noise.sigma, geometry)
         regression = PoseRegression(point)
@@ -191,19 +236,19 @@ class Preparation:
         return PoseSelection(regression, initial_model, self.candidates, self.noise)
 
     def file_geometry(self, beside: tuple[Term, ...] = ()) -> PoseSelection:
-        """With the numbers of the file, as sure as its calibration left them."""
+        """Selection engine with the geometry of the file and its calibration's uncertainty."""
         geometry = priors_of_geometry(self.dataset, self.catalogue, fitted=True)
         return self.engine(geometry, beside)
 
     def free_geometry(self) -> PoseSelection:
-        """With the geometry fitted too."""
+        """Selection engine with the geometry free, under the priors of a calibration."""
         return self.engine(self.prior, self.guess)
 
     def with_guess(self) -> Preparation:
-        """With the effect that explains most beside the geometry, and the noise beside it.
+        """The same with the effect that explains most beside a free geometry, and its noise.
 
-        A geometry that was fitted without what is missing lies millimetres off, too far to be
-        linear in between.
+        A geometry fitted without the missing effect may be millimetres off, too far for a linear
+        model.
         """
         engine = self.free_geometry()
         present, noise = engine.fit_with_noise(engine.initial_model)
@@ -221,7 +266,15 @@ class Preparation:
 def prepare_selection(
     runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue
 ) -> Preparation:
-    """Read poses and judge their noise. Raises RunError, and FileError for effects."""
+    """Read poses, estimate their noise and collect the candidates.
+
+    Raises
+    ------
+    RunError
+        With every fault of every run.
+    FileError
+        For effects that do not bind.
+    """
     dataset = prepare_poses(runs, profile)
     own = robot_terms(profile, catalogue)
     prior = tuple(priors_of_geometry(dataset, catalogue, fitted=False))
@@ -236,6 +289,6 @@ def prepare_selection(
 
 
 def calibrated_on(profile: RobotProfile, runs: Sequence[Run]) -> bool:
-    """Whether the geometry was calibrated on some of these very runs."""
+    """Whether the geometry was calibrated on some of these runs."""
     known = {Path(name).name for name in profile.fitted.runs} if profile.fitted else set()
     return any(Path(run.path or run.name).name in known for run in runs)

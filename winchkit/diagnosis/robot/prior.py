@@ -1,4 +1,4 @@
-"""Numbers of a robot's geometry that are believed only so well, and the profile that has them."""
+"""Geometry of a robot as nuisance parameters with a Gaussian prior."""
 
 from __future__ import annotations
 
@@ -17,29 +17,38 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class GeometryPrior:
-    """A number of the geometry that is a nuisance: one parameter of a term, and its prior."""
+    """One number of the geometry as a nuisance parameter.
+
+    Attributes
+    ----------
+    term : Term
+        Geometry effect with its present values.
+    parameter : str
+        Name of the parameter.
+    std : float
+        Standard deviation of the prior, SI.
+    at : float
+        Mean of the prior, SI.
+    """
 
     term: Term
-    """Its values are where the fit has them now."""
     parameter: str
     std: float
-    """Of the prior, SI."""
     at: float = 0.0
-    """Where the prior has it."""
 
     @property
     def value(self) -> float:
-        """Where it is now."""
+        """Present value, SI."""
         return self.term.values[self.parameter]
 
     def moved(self, by: float) -> GeometryPrior:
-        """With another value, ``by`` standard deviations from where it is."""
+        """The same number, moved by a multiple of its standard deviation."""
         values = {**self.term.values, self.parameter: self.value + by * self.std}
         return replace(self, term=Term(self.term.effect, values))
 
 
 def profile_with_geometry(profile: RobotProfile, geometry: Iterable[GeometryPrior]) -> RobotProfile:
-    """A robot's profile with every number of its geometry where it is now."""
+    """Robot profile with every number of the geometry at its present value."""
     lines = {line.name: line for line in profile.line}
     for item in geometry:
         if not item.value:
@@ -51,7 +60,7 @@ def profile_with_geometry(profile: RobotProfile, geometry: Iterable[GeometryPrio
 
 
 def _with(line: LineSpec, effect: str, item: GeometryPrior) -> LineSpec:
-    """A line with one number moved."""
+    """Line with one number of its geometry moved."""
     by, winch = item.value, line.winch
     if effect == "exit-point":
         return replace(line, exit_point=_shifted(line.exit_point, item.parameter, by))

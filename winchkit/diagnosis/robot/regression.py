@@ -1,8 +1,9 @@
-"""A robot's poses as one regression: equations that no pose can undo, each with unit noise.
+"""Regression problem of a robot's poses, the pose projected out.
 
-The equations of a pose are whitened, and what its six freedoms can take up is projected out: the
-pose itself is never known exactly. Numbers that are believed only so well (a calibrated geometry)
-are nuisances with a prior: rows that hold them where they were, spread over the folds.
+The closure equations of every pose are whitened with the variance components, and projected on the
+complement of the derivatives by the six coordinates of the pose, which is not known exactly (a
+nuisance parameter per pose). Numbers of the geometry are nuisance parameters with a Gaussian prior:
+the prior adds rows, five copies of each that are distributed over the folds.
 """
 
 from __future__ import annotations
@@ -42,7 +43,19 @@ _ZERO, _OFFSET = 0.2, 0.05
 
 @dataclass(frozen=True)
 class LinearizationPoint:
-    """Where a problem stands: what is taken for granted while effects are fitted."""
+    """Values at which a pose regression is linearised.
+
+    Attributes
+    ----------
+    dataset : RobotDataset
+        Poses of one robot.
+    pose : Pose
+        Estimated pose of the platform in every row.
+    sigma : mapping of str to float
+        Standard deviation per type of measurement, SI.
+    geometry : tuple of GeometryPrior
+        Numbers of the geometry that are nuisance parameters.
+    """
 
     dataset: RobotDataset
     pose: Pose
@@ -51,16 +64,22 @@ class LinearizationPoint:
 
     @cached_property
     def profile(self) -> RobotProfile:
-        """The profile with the geometry where it is now."""
+        """Robot profile with the geometry at its present values."""
         return profile_with_geometry(self.dataset.robot, self.geometry)
 
     def robot(self, terms: Sequence[Term] = ()) -> Robot:
-        """With terms beside the geometry."""
+        """Robot model with effects, at the present geometry."""
         return robot_with_terms(self.profile, terms)
 
 
 class PoseRegression(Regression):
-    """Residuals of hypotheses on a robot's poses."""
+    """Regression of a robot's poses on the effects of a hypothesis.
+
+    Parameters
+    ----------
+    point
+        Poses, variance components and geometry.
+    """
 
     has_known_loads = False  # Tensions follow from the balance at the pose.
 
@@ -176,37 +195,37 @@ class PoseRegression(Regression):
 
     @cached_property
     def pose_of_row(self) -> NDArray[np.intp]:
-        """Row of the run behind each row; −1 − copy for those of the prior, (rows,)."""
+        """Row of the data set behind each row; −1 − copy for those of the prior, (n_rows,)."""
         own = [np.nonzero(keep)[0] for keep in self._keep.values()]
         copies = -1 - np.repeat(np.arange(_COPIES), len(self.point.geometry))
         return np.concatenate([own[0], copies, *own[1:]])
 
     def n_samples(self, output: str) -> int:
-        """Rows of an output, the prior's left out."""
+        """Number of rows of an output without those of the prior, at least one."""
         return max(1, int(np.count_nonzero(self._keep[output])))
 
     def outputs_of(self, stage: Stage) -> set[str]:
-        """All: a rope that is longer moves the platform, and with it every force."""
+        """All outputs: a longer cable moves the platform and with it every force."""
         return set(self.dataset.outputs)
 
     def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
-        """What the terms add to the prediction, rows; one output is not had without the others."""
+        """Change of the prediction by the effects, shape (n_rows,); always of all outputs."""
         if not hypothesis.terms:
             return np.zeros(self.n_rows)
         moved = self._rows_of(self.residuals(hypothesis.terms))
         return self._beside(self._here - moved, np.zeros_like(self._prior))
 
     def residuals(self, terms: Sequence[Term]) -> dict[str, Array]:
-        """Model less measurement by kind, zeros of instruments taken out, SI."""
+        """Model minus measurement by type of equation, zero offsets removed, SI."""
         return self.residuals_at(self.point, terms)
 
     def residuals_at(self, point: LinearizationPoint, terms: Sequence[Term]) -> dict[str, Array]:
-        """As :meth:`residuals`, with the geometry elsewhere."""
+        """The same at another linearisation point."""
         found = self.equations.residuals(point.robot(terms))
         return {kind: self._zeroed(kind, values) for kind, values in found.items()}
 
     def at(self, hypothesis: Hypothesis) -> dict[str, Array]:
-        """Residuals of a hypothesis with the geometry where its nuisances move it."""
+        """Residuals of a hypothesis with the geometry moved by its nuisance parameters, SI."""
         geometry = self.point.geometry
         first = self.nuisance_columns.shape[1] - len(geometry)
         by = hypothesis.nuisances[first:] or (0.0,) * len(geometry)
@@ -214,7 +233,7 @@ class PoseRegression(Regression):
         return self.residuals_at(replace(self.point, geometry=moved), hypothesis.terms)
 
     def in_time(self, rows: Array) -> list[Array]:
-        """Rows of each segment: there is no time."""
+        """Rows of each segment: poses have no time."""
         return [rows[s.rows] for s in self.segments]
 
     def slope(self) -> dict[str, Array]:
@@ -225,12 +244,12 @@ class PoseRegression(Regression):
         return values + self._zeros[kind] if kind in self._zeros else values
 
     def _project(self) -> None:
-        """Per pose an orthonormal basis of what no move of it can undo."""
+        """Orthonormal basis of the complement of the pose's derivatives, per pose."""
         sigma, by = self.point.sigma, self.slope()
         known = np.concatenate([np.isfinite(self._start[k]) for k in self._posed], axis=1)
         slope = np.concatenate([by[k] / sigma[k] for k in self._posed], axis=1)
         slope = np.where(known[..., None], slope, 0.0)
-        # What is unknown gets a direction of its own, which is then left out.
+        # Unmeasured coordinates get directions of their own, which are left out.
         left, size, _ = np.linalg.svd(slope, full_matrices=True)
         rank = np.sum(size > _SEEN * np.maximum(size[:, :1], 1e-300), axis=1)
         index = np.arange(slope.shape[1])
@@ -249,7 +268,7 @@ class PoseRegression(Regression):
             self._keep["tension"] = np.isfinite(self._start["tension"])
 
     def _rows_of(self, residuals: Mapping[str, Array]) -> Array:
-        """Measured less predicted, whitened and freed of the pose: closures, then tensions."""
+        """Measured minus predicted, whitened and projected: closures, then tensions."""
         sigma = self.point.sigma
         white = np.concatenate([residuals[k] / sigma[k] for k in self._posed], axis=1)
         white = np.where(np.isfinite(white), white, 0.0)
@@ -272,7 +291,10 @@ class PoseRegression(Regression):
         ]
 
     def _nuisances(self) -> Array:
-        """Zeros of instruments, then what is believed, in standard deviations; (rows, count)."""
+        """Columns of the instruments' zero offsets, then of the geometry.
+
+        The unit of a geometry column is one standard deviation of its prior.
+        """
         columns = []
         for kind, std in (("swivel", _ZERO), ("gauge", _OFFSET)):
             if kind not in self._zeros or (kind == "gauge" and self.dataset.measured.length_zeroed):
@@ -291,10 +313,11 @@ class PoseRegression(Regression):
         return np.array(columns).reshape(len(columns), self.n_rows).T
 
     def residuals_by_geometry(self) -> list[dict[str, Array]]:
-        """Residuals with each number of the geometry moved by a standard deviation.
+        """Residuals with each number of the geometry moved by one standard deviation of its prior.
 
-        A line's equations hold no other line's numbers: those of one kind are moved together. How
-        they turn forces is left out, since it is looked at anew wherever the geometry settles.
+        The equations of a line contain no number of another line, so that numbers of one type are
+        moved together. Their influence on the forces is neglected: it is updated with the
+        linearisation point.
         """
         geometry = self.point.geometry
         here = self.residuals(())
@@ -314,7 +337,7 @@ class PoseRegression(Regression):
 
 
 def _zeros(start: Mapping[str, Array], dataset: RobotDataset) -> dict[str, Array]:
-    """First guess of the zeros of swivel angles and length instruments, per line."""
+    """First estimate of the zero offsets of swivel angles and length instruments, per line."""
     out: dict[str, Array] = {}
     for kind in ("swivel", "gauge"):
         known = np.isfinite(start[kind])

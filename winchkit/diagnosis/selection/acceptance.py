@@ -1,4 +1,9 @@
-"""Whether a grown model holds where it was not fitted: the gate of the search."""
+"""Acceptance of an addition by cross-validation.
+
+An addition is accepted where its held-out χ² decreases block by block (Wilcoxon signed-rank test)
+or in every group of programme and load by more than the penalty, and where it decreases some
+held-out error by at least 2 %.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +23,16 @@ __all__ = ["MIN_GAIN", "RELEVANT_RATIO", "best_accepted", "is_accepted"]
 
 _LEVEL = 0.02
 MIN_GAIN = 2.0
-"""By how much a criterion must fall for a change to be worth it."""
+"""Minimum decrease of the criterion for a change of the model."""
 _NO_WORSE = 1.02
 RELEVANT_RATIO = 0.98
-"""Of some held-out error, what may be left for a change to matter to anyone."""
+"""Ratio of held-out errors after and before, below which an addition is relevant."""
 
 
 def best_accepted(
     engine: SelectionEngine, present: Fit, noise: Noise, trials: list[Trial]
 ) -> Fit | None:
-    """The best of the short list that passes the gate, all refitted; None where none does."""
+    """Fit of the best trial that is accepted; None where none is."""
     before = engine.criterion(present)
     for trial in sorted(trials, key=lambda t: t.criterion):
         if trial.criterion < before - MIN_GAIN and is_accepted(engine, present, trial.fit, noise):
@@ -38,10 +43,25 @@ def best_accepted(
 def is_accepted(
     engine: SelectionEngine, present: Fit, grown: Fit, noise: Noise, matters: float = RELEVANT_RATIO
 ) -> bool:
-    """Whether the gain holds on blocks left out, by rank, and on groups left out, in sum.
+    """Whether a larger model predicts held-out data better.
 
-    An effect that shows in few blocks, such as those of one kind of move, cannot be certain by
-    rank; that it pays for itself in every single group, none of which it was fitted on, can.
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    present, grown
+        Fits of the smaller and the larger model.
+    noise
+        Noise variance.
+    matters
+        Largest ratio of held-out errors, after to before, of at least one output.
+
+    Notes
+    -----
+    The signed-rank test needs many blocks that the effect acts on. An effect that acts in a few,
+    such as those of one type of motion, is accepted where every single held-out group gains more
+    than ln n per parameter. The level of the test is 2 %, without correction for the number of
+    candidates.
     """
     regression = engine.regression
     blocks = regression.blocks
@@ -57,12 +77,12 @@ def is_accepted(
     was = held_out_rms(regression, present, noise, groups)
     now = held_out_rms(regression, grown, noise, groups)
     ratios = [now[output] / was[output] for output in regression.outputs]
-    # What is certain and changes nothing, such as a clock a millisecond off, is not worth a name.
+    # A significant but irrelevant effect, such as a clock offset of 1 ms, is not added.
     return bool(np.sum(gain) > 0 and min(ratios) < matters and max(ratios) < _NO_WORSE)
 
 
 def _added(present: Fit, grown: Fit) -> int:
-    """Degrees of freedom that a grown model has more than the present model, one at least."""
+    """Number of parameters that the larger model has more, at least one."""
     after, before = (
         sum(Coordinates(term.effect).n_parameters for term in fitted.hypothesis.terms)
         for fitted in (grown, present)

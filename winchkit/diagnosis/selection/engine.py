@@ -45,9 +45,10 @@ __all__ = [
 
 
 def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[Score]:
-    """Candidates that are not there yet, best first.
+    """Scores of the candidates that the model does not contain yet, best first.
 
-    What would help only with the wrong sign, such as an inertia below zero, gains nothing.
+    A candidate whose best amplitudes are all outside their bounds, such as a negative inertia, gets
+    the score zero.
     """
     signed = [item if _is_feasible(item) else zero_score(item, rows) for item in ranked]
     signed.sort(key=lambda item: -item.net_gain)
@@ -55,7 +56,7 @@ def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[
 
 
 def best_of_each(scores: Sequence[Score]) -> list[Score]:
-    """The best point of each effect's grid, in the order in which they come."""
+    """Best point of each effect's shape grid, in the order of the scores."""
     first: dict[str, Score] = {}
     for item in scores:
         first.setdefault(item.candidate.effect.id, item)
@@ -63,7 +64,7 @@ def best_of_each(scores: Sequence[Score]) -> list[Score]:
 
 
 def _is_present(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
-    """Whether the effect, or one that contains it, is in the hypothesis already."""
+    """Whether the hypothesis contains the effect or one that contains it."""
     for term in hypothesis.terms:
         if effect.id in term.effect.contains:
             return True
@@ -77,7 +78,7 @@ def _is_present(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
 
 
 def _is_feasible(item: Score) -> bool:
-    """Whether the amplitudes that fit best are within an effect's bounds at all."""
+    """Whether the best amplitudes of an effect are within its bounds, at least in part."""
     coordinates = Coordinates(item.candidate.effect)
     if item.candidate.effect.probes:
         return True
@@ -91,29 +92,36 @@ Answer = TypeVar("Answer")
 
 
 class LastValue(Generic[Answer]):
-    """Answers for a fit and a noise; the very same objects get the answer of the last time."""
+    """Value computed for a fit and a noise, kept until another fit or noise is given."""
 
     def __init__(self) -> None:
         self._kept: tuple[Fit, Noise, Answer] | None = None
 
     def of(self, fit: Fit, noise: Noise, compute: Callable[[], Answer]) -> Answer:
-        """The answer, computed where another fit or noise was asked about last."""
+        """The kept value, or a new one where the fit or the noise is another object."""
         if self._kept is None or self._kept[0] is not fit or self._kept[1] is not noise:
             self._kept = fit, noise, compute()
         return self._kept[2]
 
 
 _WILD = 1.0
-"""Of what the differences round: more of it is not rounding."""
+"""In units of the theoretical correction: a larger one is not a discretisation error."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A candidate fitted beside the present terms, all refitted, and its criterion."""
+    """A candidate fitted beside the present effects.
+
+    Attributes
+    ----------
+    fit : Fit
+        All effects refitted.
+    criterion : float
+        χ² + (number of added parameters) · ln n; the lower the better.
+    """
 
     fit: Fit
     criterion: float
-    """Whitened squares and the price of all added degrees of freedom: lower is better."""
 
 
 class SelectionEngine(ABC):
@@ -185,7 +193,7 @@ class SelectionEngine(ABC):
         return float(np.log(self.regression.n_observations))
 
     def grouped(self, folds: Folds) -> bool:
-        """Whether folds are whole groups of programme and load, two at least."""
+        """Whether folds are the groups of programme and load, of which there are two at least."""
         return folds is self.regression.groups and len(set(self.regression.group_of_run)) > 1
 
     def _signatures(self, present: Hypothesis) -> Signatures:
@@ -194,16 +202,33 @@ class SelectionEngine(ABC):
         return signatures(self.regression, present, absent)
 
     def update_signatures(self, present: Hypothesis) -> None:
-        """Draw the signatures anew beside a grown model: a lag acts on what is there."""
+        """Compute the signatures beside another model.
+
+        A signature depends on the effects in the model where they act one after another, as a lag
+        does.
+        """
         self._last_projected = LastValue()
         grown = updated_signatures(self.regression, present, self.signatures)
         if grown is None:
-            del self.signatures  # Both at once would be the most memory of a whole diagnosis.
+            del self.signatures  # Both together would double the peak memory.
             grown = self._signatures(present)
         self.signatures = grown
 
     def fit_with_noise(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
-        """Fit, with the noise re-estimated from what the fit leaves."""
+        """Fit a hypothesis and estimate the noise from its residual.
+
+        Parameters
+        ----------
+        start
+            Hypothesis at its starting values.
+        noise
+            First noise estimate; by default that of the residual at the starting values.
+
+        Returns
+        -------
+        fit, noise
+            The fit under the second noise estimate, and that estimate.
+        """
         states = sum(len(begun) for begun in start.starts)
         if noise is None:
             vector = self.regression.vector(start)
@@ -214,7 +239,7 @@ class SelectionEngine(ABC):
         return fit(self.regression, first.hypothesis, noise.inverse_sigma(self.regression)), noise
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
-        """Signatures with a fit's unknowns projected out."""
+        """Signatures with the unknowns of a fit partialled out; the last answer is kept."""
 
         def compute() -> Projected:
             return Projected(self.regression, self.signatures, present.jacobian, noise)
@@ -222,32 +247,51 @@ class SelectionEngine(ABC):
         return self._last_projected.of(present, noise, compute)
 
     def scores(self, present: Fit, noise: Noise) -> list[Score]:
-        """Candidates beside a fit, best first, one point of its grid each; none that is there."""
+        """Scores of all candidates that the model lacks, one per effect, best first."""
         return best_of_each(self.scores_at_all_points(present, noise))
 
     def scores_at_all_points(self, present: Fit, noise: Noise) -> list[Score]:
-        """The same at every point of their grids."""
+        """Scores of all candidates at every point of their shape grids, best first."""
         ranked = score(self.projected(present, noise), present.residual, self.regression.n_rows)
         return admissible(ranked, present.hypothesis, self.regression.n_rows)
 
     def pairs(self, present: Fit, noise: Noise) -> list[Pair]:
-        """Pairs of candidates that pay beside a fit, best first."""
+        """Pairs of candidates with a positive net gain, best first."""
         scores = self.scores_at_all_points(present, noise)
         return screened_pairs(
             self.projected(present, noise), present.residual, scores, self.penalty_per_parameter
         )
 
     def criterion(self, fitted: Fit) -> float:
-        """Whitened squares and the price of everything that was added."""
+        """Bayesian information criterion of a fit, up to a constant.
+
+        Returns
+        -------
+        float
+            χ² + k ln n, where k counts the parameters and initial states of the added effects.
+
+        References
+        ----------
+        Schwarz, G. (1978). Estimating the dimension of a model. Ann. Stat. 6, 461-464.
+        """
         added = fitted.hypothesis.terms[self.n_initial_terms :]
         n_parameters = sum(Coordinates(term.effect).n_parameters for term in added)
         states = sum(len(start) for start in fitted.hypothesis.starts[self.n_initial_terms :])
         return fitted.chi_square + self.penalty_per_parameter * (n_parameters + states)
 
     def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
-        """Fit a candidate beside the present terms; those that it contains give way to it.
+        """Fit a candidate beside the present effects, without those that it contains.
 
-        Of a series it takes as many coefficients as pay, each added to what was fitted before.
+        Of a series law one coefficient after another is added as long as the criterion decreases.
+
+        Parameters
+        ----------
+        present
+            Fit of the present model.
+        item
+            Score of the candidate, with its starting amplitudes.
+        noise
+            Noise variance.
         """
         effect, inverse_sigma = item.candidate.effect, noise.inverse_sigma(self.regression)
         hypothesis = present.hypothesis
@@ -272,10 +316,10 @@ class SelectionEngine(ABC):
         return best or longer
 
     def _without_discretization(self, start: Hypothesis) -> list[Hypothesis]:
-        """The same begun as if sampling rounded nothing, where a loop is added to a wild rounding.
+        """The same start with a zero discretisation correction, where hysteresis is added.
 
-        Without the loop that was there all the time the rounding stood for a part of it, and a
-        loop fitted from there turns around too late for good.
+        Before the hysteresis was in the model, a large correction explained a part of it; a fit
+        started there ends in a local minimum with its reversals too late.
         """
         wild = (
             self.regression.fits_discretization
@@ -289,7 +333,7 @@ class SelectionEngine(ABC):
     def _criterion_of_trial(
         self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise
     ) -> float:
-        """The criterion of a trial; infinite where its last term is not what it is called."""
+        """Criterion of a trial; infinite where its last effect has degenerated to another."""
         criterion = self.criterion(fitted)
         if shape_at_bound(fitted.hypothesis.terms[-1]) or (
             criterion < self.criterion(present)
@@ -299,7 +343,7 @@ class SelectionEngine(ABC):
         return float(criterion)
 
     def _explained_by_initial_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
-        """Whether the last term explains mainly by the states in which the runs began."""
+        """Whether the last effect explains mainly by its initial states."""
         if not fitted.hypothesis.starts[-1]:
             return False
         inverse_sigma = noise.inverse_sigma(self.regression)
@@ -316,5 +360,5 @@ class SelectionEngine(ABC):
         return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression))
 
     def fixed(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
-        """A hypothesis as it is, fitted no further."""
+        """A hypothesis at its values, with residual and Jacobian but without iteration."""
         return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression), 0)

@@ -1,4 +1,4 @@
-"""One term of a fit given up for a rival, all refitted."""
+"""Exchange step: one or two effects of a model replaced by rivals, everything refitted."""
 
 from __future__ import annotations
 
@@ -20,15 +20,37 @@ __all__ = [
 ]
 
 _NEARLY = 0.1
-"""Of what the term explains, as far as straight lines foretell."""
+"""Share of the term's explained χ² by which the linear prediction may miss the target."""
 
 
 class Exchange:
-    """The place of one term, beside all others of a fit.
+    """A place in the model that rivals of one effect may take.
 
-    Without it the others settle elsewhere to make up for it: a creep becomes slow and soft in
-    place of a wrong ratio. A rival begun from there may never come back, so it is begun from
-    where the others stood beside the term as well.
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    present
+        Fit of the present model.
+    noise
+        Noise variance.
+    index
+        Index of the effect.
+
+    Attributes
+    ----------
+    own : Term
+        The effect at its fitted values.
+    base : Fit
+        The model without it, refitted.
+    scores : list of Score
+        Scores of all candidates beside ``base``.
+
+    Notes
+    -----
+    Without the effect the others are refitted to values that compensate for it, for instance a
+    creep with a shorter time constant in place of a wrong ratio. A rival fitted from there may end
+    in a local minimum, so that it is also started from the others' values in the present model.
     """
 
     def __init__(self, engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> None:
@@ -36,13 +58,11 @@ class Exchange:
         self.own = present.hypothesis.terms[index]
         self._others = present.hypothesis.without(index)
         self.base = engine.refit(self._others, noise)
-        """Without the term, refitted."""
         self.scores = engine.scores(self.base, noise)
-        """Of all candidates beside that."""
 
     @cached_property
     def _held(self) -> tuple[Fit, float, dict[str, Score]]:
-        """The others as they stand beside the term; the least squares about there; the scores."""
+        """The others at their present values, the least χ² near there, and the scores."""
         held = self._engine.fixed(self._others, self._noise)
         inverse_sigma = self._noise.inverse_sigma(self._engine.regression)
         whitened, residual = held.jacobian * inverse_sigma[:, None], held.residual * inverse_sigma
@@ -52,10 +72,10 @@ class Exchange:
         return held, least, {item.candidate.effect.id: item for item in scores}
 
     def trial(self, rival: Score, enough: float) -> Trial:
-        """A rival in the term's place.
+        """Fit a rival in the effect's place.
 
-        It is begun anew where its squares do not fall to ``enough``, yet nearly would beside the
-        others as they stand.
+        It is fitted again from the others' present values where its χ² is above ``enough`` and
+        would nearly reach that value by linear prediction.
         """
         found = self._engine.trial(self.base, rival, self._noise)
         if found.fit.chi_square < enough or not self._others.terms:
@@ -74,11 +94,23 @@ _MOST = 3
 
 
 def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:
-    """The present fit, or the best with a better pair in the place of ``exchanged`` additions."""
+    """The present fit, or the best in which a pair replaces ``exchanged`` of its additions.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    present
+        Fit of the present model.
+    noise
+        Noise variance.
+    exchanged
+        Number of additions to be replaced, one or two.
+    """
     added = range(engine.n_initial_terms, len(present.hypothesis.terms))
     if not 0 < len(added) <= _MOST:
-        return present  # So many stand for something that no pair is.
-    # An exchange for more than was there is dear to try: as often, whatever may be exchanged.
+        return present  # More than three additions are not replaced by a pair.
+    # The number of trials is limited, since every one refits the whole model.
     tried = _TRIED if exchanged > 1 else max(1, _TRIED // len(added))
     exchanges = [
         _better(engine, present, noise, own, tried) for own in combinations(added, exchanged)
@@ -90,7 +122,7 @@ def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged
 def _better(
     engine: SelectionEngine, present: Fit, noise: Noise, indices: tuple[int, ...], tried: int
 ) -> Fit | None:
-    """A fit with a pair that pays more than the terms at ``indices`` do; None where none does."""
+    """Fit with a pair in place of the terms at ``indices``; None without a lower criterion."""
     hypothesis = present.hypothesis
     for index in reversed(indices):
         hypothesis = hypothesis.without(index)
@@ -101,7 +133,7 @@ def _better(
         pair for pair in engine.pairs(base, noise) if pair.net_gain > pays and pair.ids != leave
     ]
     for pair in promising[:tried]:
-        # Newcomers first: what stood for both alone would keep the values that it had.
+        # New effects first: one that explained both would keep its old values.
         first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in leave)
         trial = engine.trial(engine.trial(base, first, noise).fit, second, noise)
         if trial.criterion < engine.criterion(present) - MIN_GAIN:

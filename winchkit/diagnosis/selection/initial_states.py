@@ -1,7 +1,7 @@
-"""Whether an effect with a memory explains by how it goes on, or only by how the runs began.
+"""Initial-condition check: whether an effect with memory explains only by its initial states.
 
-A free state per run is a free level per load: creep far slower than the runs would explain
-whatever depends on the load. What remembers must show by how it changes.
+A free initial state per run is confounded with an offset per run: a creep with a time constant much
+longer than the run fits any dependence on the load.
 """
 
 from __future__ import annotations
@@ -30,11 +30,26 @@ def explained_by_initial_states(
     inverse_sigma: Array,
     penalty_per_parameter: float,
 ) -> bool:
-    """Whether the last term of a fit, which ``base`` lacks, needs its states too much.
+    """Whether the last effect of a fit explains mainly by its initial states.
 
-    It does not where it explains half of what it does from rest in every run, and no less than a
-    level per run would: a ramp from zero is three quarters level. Nor, as on a bench under a load
-    that hangs for long, where it pays for all its numbers by more than levels do.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    base
+        Fit without the effect.
+    fitted
+        Fit with it.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+    penalty_per_parameter
+        ln n.
+
+    Notes
+    -----
+    False where the effect explains, starting from rest in every run, at least half of its χ² and at
+    least as much as one offset per run; also where its χ² beyond offsets per run exceeds the
+    penalty of all its parameters and states, as under a load that is constant for long.
     """
     known, left = base.jacobian * inverse_sigma[:, None], base.residual * inverse_sigma
     gain = base.chi_square - fitted.chi_square
@@ -53,7 +68,7 @@ def explained_by_initial_states(
 
 
 def _from_rest(regression: Regression, hypothesis: Hypothesis) -> Array:
-    """What the last term adds where every run begins at rest, rows."""
+    """Change of the prediction by the last effect with zero initial states, shape (n_rows,)."""
     rested = replace(hypothesis, starts=(*hypothesis.starts[:-1], ()))
     return regression.change(rested) - regression.change(
         hypothesis.without(len(hypothesis.terms) - 1)
@@ -61,9 +76,9 @@ def _from_rest(regression: Regression, hypothesis: Hypothesis) -> Array:
 
 
 def _levels(regression: Regression, hypothesis: Hypothesis) -> Array | None:
-    """What the last term's states explain if nothing moves within a run, (rows, runs).
+    """Derivatives by the initial states at the largest time constant, shape (n_rows, n_runs).
 
-    None for an effect without a time constant: how far it moved is not a matter of time.
+    None for an effect without a time constant.
     """
     term, start = hypothesis.terms[-1], hypothesis.starts[-1]
     slow = {p.name: p.high for p in term.effect.parameters if p.role == "shape" and p.unit == "s"}

@@ -1,8 +1,8 @@
-"""Two effects that hide each other: neither helps alone, both together explain.
+"""Joint screening of pairs of candidates, for effects that mask each other (suppression).
 
-A wrong ratio and a rope wound under tension, say, change the length alike and may all but cancel:
-taken one at a time neither would ever be added. Nor need the shapes that help most alone be those
-that help together, so that every point of their grids is tried.
+A wrong ratio and a cable wound under tension, for example, change the length in opposite ways and
+nearly cancel: neither is selected alone. All points of both shape grids are tried, since the best
+shapes of a pair need not be the best ones alone.
 """
 
 from __future__ import annotations
@@ -25,33 +25,51 @@ _UNIDENTIFIABLE = 1e-5
 
 @dataclass(frozen=True)
 class Pair:
-    """Two candidates side by side."""
+    """Two candidates fitted jointly.
+
+    Attributes
+    ----------
+    scores : tuple of two Score
+        Their scores one at a time.
+    explained_ss : float
+        Δχ² of both together.
+    net_gain : float
+        Explained sum of squares minus the penalty of their parameters.
+    single_gain : float
+        Sum of the explained sums of squares one at a time, each at its best grid point.
+    """
 
     scores: tuple[Score, Score]
     explained_ss: float
-    """Whitened squares."""
     net_gain: float
-    """The same less the price of their degrees of freedom."""
     single_gain: float
-    """Whitened squares that the two take one at a time, each at the best point of its grid."""
 
     @property
     def ids(self) -> set[str]:
-        """Names of the two."""
+        """Names of the two effects."""
         return {item.candidate.effect.id for item in self.scores}
 
     @property
     def suppressed(self) -> bool:
-        """Whether they take far more together than the one and the other."""
+        """Whether they explain jointly far more than one at a time."""
         return self.explained_ss > _TOGETHER * self.single_gain
 
 
 def screened_pairs(
     projected: Projected, residual: Array, scores: Sequence[Score], penalty_per_parameter: float
 ) -> list[Pair]:
-    """Pairs of candidates that pay, best first, each at the best points of its two grids.
+    """Pairs of candidates with a positive net gain, best first, each at its best grid points.
 
-    ``scores`` are of all points; ``price`` is what a degree of freedom must save.
+    Parameters
+    ----------
+    projected
+        Signatures with the unknowns partialled out.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    scores
+        Scores of all candidates at all grid points.
+    penalty_per_parameter
+        ln n.
     """
     single_gain: dict[str, float] = {}
     for item in scores:
@@ -76,7 +94,7 @@ def screened_pairs(
 
 
 def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:
-    """Any two of different effects, neither of which is a case of the other."""
+    """All pairs of different effects of which neither contains the other."""
     return [
         (first, second)
         for first, second in combinations(scores, 2)
@@ -88,7 +106,7 @@ def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:
 def _joint_explained_ss(
     projected: Projected, residual: Array, pairs: Sequence[tuple[Score, Score]]
 ) -> list[float]:
-    """Whitened squares that each pair takes side by side; pairs of as many columns at once."""
+    """Explained sum of squares of every pair, pairs of equal size at once."""
     products = projected.products(residual)
     size = np.sqrt(np.maximum(np.diag(projected.inner), 1e-300))
     inner, products = projected.inner / np.outer(size, size), products / size

@@ -1,7 +1,14 @@
-"""How well the residual fits every candidate's signature, and how well noise alone would.
+"""Scores of candidates: explained sum of squares with BIC penalty, and its null distribution.
 
-Only inner products are needed, so that scoring again with another noise, or simulating what noise
-alone would score, costs next to nothing.
+A candidate's score is the χ² that its signature would explain beside the present model, linearised,
+minus ln n per parameter. The null distribution of the largest score of all candidates is simulated
+with the estimated noise variance, whose own uncertainty is drawn from a scaled inverse χ²
+distribution. Only inner products are needed.
+
+References
+----------
+Schwarz, G. (1978). Estimating the dimension of a model. Ann. Stat. 6, 461-464.
+Westfall, P. H., Young, S. S. (1993). Resampling-Based Multiple Testing (maximum statistic). Wiley.
 """
 
 from __future__ import annotations
@@ -25,20 +32,48 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Score:
-    """How much of the residual's whitened squares an atom would take, and its chance level."""
+    """Score of one candidate.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        The effect at a point of its shape grid.
+    explained_ss : float
+        Decrease of χ², linearised.
+    net_gain : float
+        Explained sum of squares minus ln n per parameter.
+    amplitudes : ndarray of shape (n_columns,)
+        Best amplitudes, in usual-size steps.
+    noncentrality : float
+        λ of one usual size: squared length of its whitened, projected signature.
+    """
 
     candidate: Candidate
     explained_ss: float
     net_gain: float
-    """Gain less the price of its degrees of freedom."""
     amplitudes: Array
-    """In units of the secants."""
     noncentrality: float
-    """λ for one usual size: noncentrality of its whitened, projected signature."""
 
 
 class Projected:
-    """Signatures with the present model's unknowns projected out, under one noise."""
+    """Signatures with the unknowns of the present model partialled out, under one noise variance.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    signatures
+        Signatures of all candidates.
+    jacobian
+        Derivative by the fitted unknowns, shape (n_rows, n_unknowns).
+    noise
+        Noise variance.
+
+    Attributes
+    ----------
+    inner : ndarray of shape (p, p)
+        Inner products of the whitened, projected columns.
+    """
 
     def __init__(
         self, regression: Regression, signatures: Signatures, jacobian: Array, noise: Noise
@@ -60,13 +95,13 @@ class Projected:
         self._roots = [self._root(candidate, plain) for candidate in signatures.candidates]
 
     def products(self, residual: Array) -> Array:
-        """Inner products of the whitened residual with the projected columns, (p,)."""
+        """Inner products of the whitened residual with the projected columns, shape (p,)."""
         weighted = residual * self._inverse_variance
         own = self.signatures.columns.T @ weighted
         return np.asarray(own + self._through.T @ (self._jacobian.T @ weighted))
 
     def explained_ss(self, products: Array) -> Array:
-        """Whitened squares that each atom takes; products (p,) or (p, samples)."""
+        """Explained sum of squares of each candidate; products (p,) or (p, n_samples)."""
         return np.array(
             [
                 np.sum((root.T @ products[candidate.columns]) ** 2, axis=0)
@@ -75,18 +110,18 @@ class Projected:
         )
 
     def amplitudes(self, index: int, products: Array) -> Array:
-        """Amplitudes of one atom in units of its secants."""
+        """Best amplitudes of one candidate, in usual-size steps."""
         root = self._roots[index]
         candidate = self.signatures.candidates[index]
         return np.asarray(root @ (root.T @ products[candidate.columns]))
 
     def noncentrality(self, index: int) -> float:
-        """λ for one usual size of an atom; zero where it cannot be identified."""
+        """λ of one usual size of a candidate; zero where it is not identifiable."""
         first = self.signatures.candidates[index].columns.start
         return float(self.inner[first, first]) if self._roots[index].shape[1] else 0.0
 
     def simulated(self, samples: int = _SIMULATIONS) -> Array:
-        """Products that noise alone would give, its power known only so well; (p, samples)."""
+        """Products that noise alone gives, its variance drawn too; shape (p, n_samples)."""
         random = np.random.default_rng(0)
         out = np.zeros((len(self.inner), samples))
         bands = zip(
@@ -94,19 +129,19 @@ class Projected:
         )
         for share, gram, cross, normal, n_parameters in bands:
             part = share * _projected(gram, cross, normal, self._through)
-            # No Cholesky factor: what the present model explains whole is left with rounding only.
+            # No Cholesky factor: columns that the model explains are zero up to rounding.
             values, vectors = np.linalg.eigh(part)
             factor = np.sqrt(n_parameters / random.chisquare(n_parameters, samples))
             noise = random.standard_normal((len(part), samples)) * factor
-            # The symmetric root: the same draws whichever way rounding turns the vectors.
+            # Symmetric root: the draws do not depend on the signs of the eigenvectors.
             out += (vectors * np.sqrt(np.maximum(values, 0.0))) @ (vectors.T @ noise)
         return out
 
     def _root(self, candidate: Candidate, plain: Array) -> Array:
-        """R with R Rᵀ the inverse of an atom's inner products, where they can be identified."""
+        """R with R Rᵀ the inverse of a candidate's inner products, as far as identifiable."""
         inner = self.inner[candidate.columns, candidate.columns]
         if np.max(plain[candidate.columns]) < _ROUNDING:
-            # What a usual size moves by less than rounding would let chance reach any level.
+            # A signature below rounding errors would give scores of any size.
             return np.zeros((len(inner), 0))
         size = np.sqrt(np.maximum(plain[candidate.columns], _NOTHING))
         values, vectors = np.linalg.eigh(inner / np.outer(size, size))
@@ -115,13 +150,13 @@ class Projected:
 
 
 def _projected(gram: Array, cross: Array, normal: Array, through: Array) -> Array:
-    """Inner products of columns from which unknowns were taken out by ``through``, (p, p)."""
+    """Inner products of columns after partialling out by ``through``, shape (p, p)."""
     mixed = cross.T @ through
     return np.asarray(gram + mixed + mixed.T + through.T @ normal @ through)
 
 
 def _cross(regression: Regression, jacobian: Array, columns: Array) -> tuple[Array, Array]:
-    """Per band: inner products of unknowns with columns, and among unknowns."""
+    """Inner products of unknowns with columns and among unknowns, per band."""
     count, q = len(regression.bands), jacobian.shape[1]
     cross, normal = np.zeros((count, q, columns.shape[1])), np.zeros((count, q, q))
     for band, rows in pieces(regression):
@@ -131,7 +166,17 @@ def _cross(regression: Regression, jacobian: Array, columns: Array) -> tuple[Arr
 
 
 def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
-    """Scores of all atoms, best first: gain less (degrees of freedom) · ln(rows)."""
+    """Scores of all candidates, best first.
+
+    Parameters
+    ----------
+    projected
+        Signatures with the unknowns partialled out.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    rows
+        Sample size n of the BIC penalty.
+    """
     products = projected.products(residual)
     out = []
     for index, explained_ss in enumerate(projected.explained_ss(products).tolist()):
@@ -151,7 +196,7 @@ def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
 
 
 def zero_score(item: Score, rows: int) -> Score:
-    """The score of an atom that takes nothing of the residual."""
+    """Score of a candidate that explains nothing."""
     net_gain = -item.candidate.n_parameters * float(np.log(rows))
     return replace(
         item, explained_ss=0.0, net_gain=net_gain, amplitudes=np.zeros_like(item.amplitudes)
@@ -159,7 +204,12 @@ def zero_score(item: Score, rows: int) -> Score:
 
 
 def null_maxima(projected: Projected, rows: int) -> Array:
-    """Largest score over all atoms that noise alone gives, simulated, sorted; (samples,)."""
+    """Simulated null distribution of the largest score of all candidates, sorted.
+
+    Returns
+    -------
+    ndarray of shape (400,)
+    """
     candidates = projected.signatures.candidates
     if not candidates:
         return np.zeros(1)

@@ -1,8 +1,8 @@
-"""What every candidate effect would look like in the data.
+"""Signatures: regressor columns of every candidate beside the present model.
 
-A signature is a set of columns: what the prediction gains from a usual size of the effect, by
-secants and not by tangents, since a radius jumps at layers and some effects have no gradient at
-their null. Their inner products are kept per noise band, for whichever noise they are scored by.
+A column is the change of the prediction by one usual-size step of the effect (a finite difference
+instead of a derivative, since a layer change makes the radius jump and some effects have no
+gradient at zero). Inner products are kept per noise band, to be combined under any noise variance.
 """
 
 from __future__ import annotations
@@ -26,7 +26,19 @@ __all__ = ["Candidate", "Signatures", "pieces", "signatures", "updated_signature
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect at one point of its shape grid: its columns, and where a fit would start."""
+    """An effect at one point of its shape grid.
+
+    Attributes
+    ----------
+    effect : Effect
+        The effect.
+    shape : dict of str to float
+        Its shape parameters.
+    columns : slice
+        Its columns among the signatures.
+    usual_steps : tuple of dict
+        Values of one usual-size step per column.
+    """
 
     effect: Effect
     shape: dict[str, float]
@@ -35,11 +47,11 @@ class Candidate:
 
     @property
     def n_parameters(self) -> int:
-        """Degrees of freedom that choosing it costs."""
+        """Number of fitted parameters, counting a scanned order as one."""
         return Coordinates(self.effect).n_parameters
 
     def with_law(self, law: Effect) -> Candidate:
-        """The same of a law with fewer coefficients, begun where these alone say so."""
+        """The same candidate with a shorter series, its columns limited accordingly."""
         fixed = {p.name for p in law.parameters if p.role == "fixed"}
         usual_steps = tuple(
             usual_step for usual_step in self.usual_steps if not fixed & usual_step.keys()
@@ -49,21 +61,31 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Signatures:
-    """Columns of all candidates, and their inner products per noise band."""
+    """Columns of all candidates beside one model.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        Effects at their grid points.
+    columns : ndarray of shape (n_rows, p)
+        Change of the prediction by one usual-size step each.
+    gram : ndarray of shape (n_bands, p, p)
+        Inner products per noise band.
+    model : Hypothesis
+        Model beside which the columns were computed.
+    without_signature : tuple
+        Effects with values that change nothing beside that model.
+    """
 
     candidates: tuple[Candidate, ...]
     columns: Array
-    """(rows, p)."""
     gram: Array
-    """(bands, p, p)."""
     model: Hypothesis
-    """The present model that they were drawn beside."""
     without_signature: tuple[tuple[Effect, dict[str, float]], ...] = ()
-    """Effects with values at which they changed nothing there, and so have no column."""
 
 
 class _Canvas:
-    """Some outputs beside a present model, into whose rows columns are drawn."""
+    """Writes the columns of effects beside one model, for some outputs."""
 
     def __init__(
         self, regression: Regression, present: Hypothesis, outputs: Collection[str]
@@ -73,10 +95,7 @@ class _Canvas:
         self._here = regression.change(present, outputs)
 
     def draw(self, column: Array, term: Term, outputs: Collection[str]) -> bool:
-        """Write what some of the outputs gain from a term, rows; tells whether they do.
-
-        What has no finite size is nothing.
-        """
+        """Write the change by a term into a column; False where it is zero or not finite."""
         if not outputs:
             return False
         there = self._regression.change(
@@ -94,13 +113,23 @@ class _Canvas:
 def signatures(
     regression: Regression, present: Hypothesis, effects: Iterable[Effect]
 ) -> Signatures:
-    """Columns and inner products of every candidate among ``effects`` beside a present model."""
+    """Signatures of candidate effects beside a model.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    present
+        Model beside which the effects are added.
+    effects
+        Candidates.
+    """
     outputs = regression.outputs
     canvas = _Canvas(regression, present, outputs)
     tried = list(points(regression, effects))
     candidates: list[Candidate] = []
     without_signature: list[tuple[Effect, dict[str, float]]] = []
-    # One column after another in memory: thousands of rows each, written and read whole.
+    # Columns are contiguous in memory, since each is written and read as a whole.
     columns, count = (
         np.empty((sum(len(usual_steps) for *_, usual_steps in tried), regression.n_rows)),
         0,
@@ -125,10 +154,10 @@ def signatures(
 def updated_signatures(
     regression: Regression, present: Hypothesis, found: Signatures
 ) -> Signatures | None:
-    """The same signatures beside a grown model, in the same memory; ``found`` is used up.
+    """Signatures beside another model, computed in the memory of ``found``.
 
-    Drawn anew is only what lies on the way to an output which changed terms touch: a lag acts on
-    what is there. None where an effect that had no column has one now.
+    Only outputs that changed effects act on are computed again. None where an effect that had no
+    column has one now.
     """
     changed = [t for t in present.terms if t not in found.model.terms]
     changed += [t for t in found.model.terms if t not in present.terms]
@@ -152,7 +181,7 @@ def updated_signatures(
 def _multiply(
     gram: Array, regression: Regression, columns: Array, outputs: Collection[str]
 ) -> None:
-    """Inner products per noise band of some outputs, into (bands, p, p)."""
+    """Inner products per noise band of some outputs, written into (n_bands, p, p)."""
     for band, (output, _, _) in enumerate(regression.bands):
         if output in outputs:
             gram[band] = 0.0
@@ -162,7 +191,7 @@ def _multiply(
 
 
 def pieces(regression: Regression) -> Iterator[tuple[int, slice]]:
-    """Runs of rows that lie in one noise band, with its number."""
+    """Contiguous rows of one noise band, with its number."""
     for segment in regression.segments:
         ids = regression.band_of_row[segment.rows]
         edges = np.flatnonzero(np.diff(ids, prepend=-1, append=-1))

@@ -1,4 +1,4 @@
-"""Where fits of a candidate begin, and what becomes of shapes that a fit drives to their ends."""
+"""Starting values of a candidate's fit, and the check of shapes that end at a bound."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 
 
 def shape_at_bound(term: Term) -> bool:
-    """Whether a term has become another effect: a shape at its bound, values that cannot be."""
+    """Whether a shape parameter is at its bound or the values are physically impossible."""
     effect = term.effect
     if effect.possible is not None and not effect.possible(term.values):
         return True
@@ -41,11 +41,10 @@ def shape_at_bound(term: Term) -> bool:
 
 
 def truncated_series(effect: Effect) -> list[Effect]:
-    """The effect with one coefficient of its series, with two, …, with all of them.
+    """The effect with the first coefficient of its series, with the first two, and so on.
 
-    A few loads show a law's first curvature, not its third: coefficients beyond what the data
-    can show run to their bounds, and the law without them is still that law. What has no series
-    is itself alone.
+    A few loads determine the first coefficient of a law, not the third: undetermined coefficients
+    would run to their bounds. An effect without a series is returned alone.
     """
     series = [p for p in effect.parameters if p.role == "shape" and p.low < p.null == 0.0 < p.high]
     out = [effect]
@@ -59,23 +58,23 @@ def truncated_series(effect: Effect) -> list[Effect]:
 
 
 def grid_spacing(grid: tuple[float, ...], at: float) -> float:
-    """Distance from a point of a grid to its farther neighbour."""
+    """Distance of a grid point from its farther neighbour."""
     index = grid.index(at)
     return max(abs(grid[i] - at) for i in (index - 1, index + 1) if 0 <= i < len(grid))
 
 
 def other_grid_point(term: Term, shape: Mapping[str, float]) -> bool:
-    """Whether a point of a grid is another place to rest than where a fit has left a term.
+    """Whether a grid point is another local minimum than the values to which a term was fitted.
 
-    An order has as many places as the grid has points; a moment has one in every hold, and the
-    best of them may be another once more is explained.
+    An order has one at every grid point; the time of an event has one in every hold, and the best
+    of them may change with the other effects.
     """
     grids = [p for p in term.effect.parameters if p.name in shape and p.grid]
     return any(shape[p.name] != term.values[p.name] for p in grids if p.whole or p.low == 0.0)
 
 
 def starting_values(item: Score) -> list[dict[str, float]]:
-    """Values at which fits of an atom begin: its linear amplitudes within bounds, or its probes."""
+    """Starting values of a candidate: best linear amplitudes within bounds, or its probes."""
     candidate = item.candidate
     coordinates = Coordinates(candidate.effect)
     base = {**candidate.effect.null, **candidate.shape}
@@ -97,9 +96,23 @@ _HALVINGS = 7
 def starting_points(
     regression: Regression, hypothesis: Hypothesis, present: Fit, item: Score, inverse_sigma: Array
 ) -> list[dict[str, float]]:
-    """Where fits begin; a moment is first sought between the points of its grid.
+    """Starting values of a candidate, the time of an event found by a line search.
 
-    A step far from its moment has no gradient towards it, but its gain rises all the way.
+    A step far from the true time has no gradient towards it, but its explained sum of squares rises
+    monotonically.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    hypothesis
+        Model without the candidate.
+    present
+        Fit of that model.
+    item
+        Score of the candidate.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
     """
     begun = starting_values(item)
     places = [p for p in Coordinates(item.candidate.effect).shapes if p.grid and p.low == 0.0]

@@ -1,4 +1,15 @@
-"""The search: one effect at a time, everything refitted, gated out of sample, then reconsidered."""
+"""Stepwise selection of effects: forward selection, exchange and backward elimination.
+
+Each step takes the candidate with the best criterion among the five with the largest scores, if
+it is accepted by cross-validation; the larger model is refitted, effects are exchanged for better
+rivals and dropped where the criterion decreases without them.
+
+References
+----------
+Efroymson, M. A. (1960). Multiple regression analysis. In: Mathematical Methods for Digital
+Computers. Wiley.
+Miller, A. (2002). Subset Selection in Regression, 2nd ed. Chapman & Hall.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +35,7 @@ _SHORT_LIST = 5
 _RIVALS = 2
 _RECONSIDERED = 3
 _EXCHANGED = 2
-"""Additions of which one may be exchanged for a pair."""
+"""Largest number of additions of which one may be exchanged for a pair."""
 _PAIRS = 3
 _LACK_OF_FIT_LEVEL = 0.02
 _SCORE_LEVEL = 0.99
@@ -32,31 +43,52 @@ _SCORE_LEVEL = 0.99
 
 @dataclass(frozen=True)
 class SelectionResult:
-    """Where a search ended."""
+    """Result of a stepwise selection.
+
+    Attributes
+    ----------
+    initial_model : Fit
+        The profile's own effects, fitted.
+    initial_noise : Noise
+        Noise variance beside the initial model.
+    initial_lack_of_fit_test : LackOfFitTest
+        Lack-of-fit test of the initial model.
+    lack_of_fit_at_start : bool
+        Whether the initial model has a lack of fit.
+    last_model : Hypothesis
+        Final model with additions that were dropped because they explain less than the lack of fit.
+    final : Fit
+        The final model.
+    noise : Noise
+        Noise variance beside the final model.
+    lack_of_fit_test : LackOfFitTest
+        Lack-of-fit test of the final model.
+    lack_of_fit : bool
+        Whether the final model has a lack of fit.
+    scores : tuple of Score
+        All candidates beside the initial model, best first.
+    tried : tuple of Fit
+        The first of them fitted beside the initial model; empty without a lack of fit.
+    threshold : float
+        Score that noise alone exceeds in 1 % of cases.
+    """
 
     initial_model: Fit
-    """The model it began with, fitted."""
     initial_noise: Noise
     initial_lack_of_fit_test: LackOfFitTest
     lack_of_fit_at_start: bool
-    """Whether anything beyond noise was there at the start."""
     last_model: Hypothesis
-    """The final model with additions that were dropped since they may only imitate something."""
     final: Fit
     noise: Noise
     lack_of_fit_test: LackOfFitTest
     lack_of_fit: bool
-    """Whether anything beyond noise is left at the end."""
     scores: tuple[Score, ...]
-    """Of all candidates at the start, best first."""
     tried: tuple[Fit, ...]
-    """The first of them as fitted beside the model it began with; none without an alarm."""
     threshold: float
-    """Score that noise alone reaches in one case of a hundred."""
 
 
 def stepwise_selection(engine: SelectionEngine) -> SelectionResult:
-    """Grow the model while something is missing and an effect holds out of sample."""
+    """Select effects for a model as long as it has a lack of fit and candidates are accepted."""
     initial_model, initial_noise = engine.fit_with_noise(engine.initial_model)
     initial_lack_of_fit_test = engine.lack_of_fit_test(initial_model, initial_noise)
     initial_scores = engine.scores(initial_model, initial_noise)
@@ -91,7 +123,7 @@ def stepwise_selection(engine: SelectionEngine) -> SelectionResult:
 def _forward_selection(
     engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score], threshold: float
 ) -> tuple[Fit, Noise, tuple[Fit, ...]]:
-    """The model with all that holds, its noise, and the candidates that were tried first."""
+    """Model with all accepted effects, its noise, and the fits of the first candidates."""
     tried: tuple[Fit, ...] = ()
     for _ in range(_MOST_STEPS):
         grown = None
@@ -110,18 +142,18 @@ def _forward_selection(
 
 
 def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
-    """Score that noise alone reaches in one case of a hundred."""
+    """Largest score that noise alone exceeds in 1 % of cases."""
     chance = null_maxima(engine.projected(present, noise), engine.regression.n_rows)
     return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
 
 
 def without_term(engine: SelectionEngine, result: SelectionResult, index: int) -> SelectionResult:
-    """The same search as if it had ended without one of its additions."""
+    """Result as if the selection had ended without one of its additions."""
     return _ended(engine, result, result.final.hypothesis.without(index))
 
 
 def with_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResult | None:
-    """The same search with a pair in the place of its only addition; None where none is better."""
+    """Result with a pair in place of the only addition; None where none is better."""
     if len(result.final.hypothesis.terms) != engine.n_initial_terms + 1:
         return None
     better = _accepted_pair_exchange(engine, result.final, result.noise, result.initial_model)
@@ -131,7 +163,7 @@ def with_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResu
 def _ended(
     engine: SelectionEngine, result: SelectionResult, hypothesis: Hypothesis
 ) -> SelectionResult:
-    """A search as if it had ended with this hypothesis."""
+    """Result as if the selection had ended with this hypothesis."""
     present, noise = engine.fit_with_noise(hypothesis, result.noise)
     lack_of_fit_test = engine.lack_of_fit_test(present, noise)
     lack_of_fit = _has_lack_of_fit(
@@ -149,10 +181,9 @@ def _ended(
 def _has_lack_of_fit(
     lack_of_fit_test: LackOfFitTest, scores: list[Score], threshold: float
 ) -> bool:
-    """Whether the residual holds more than noise.
+    """Whether the residual contains more than noise.
 
-    With repeats that is measured. A high score of an effect that then fails out of sample is no
-    evidence beside it; without repeats it is all there is.
+    With repeats by the lack-of-fit test alone; without repeats by the largest score.
     """
     if np.isfinite(lack_of_fit_test.p_value):
         return lack_of_fit_test.p_value < _LACK_OF_FIT_LEVEL
@@ -162,16 +193,16 @@ def _has_lack_of_fit(
 def _short_list(
     engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score]
 ) -> list[Trial]:
-    """The candidates that score best, each fitted beside the present terms, in their order."""
+    """Trials of the five candidates with the largest scores, in their order."""
     listed = [item for item in scores if item.net_gain > 0][:_SHORT_LIST]
     return [engine.trial(present, item, noise) for item in listed]
 
 
 def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
-    """Where something is missing and no candidate holds alone: the best of pairs that do.
+    """Best accepted pair where the model has a lack of fit and no single candidate is accepted.
 
-    In exchange for one of the first additions, or to begin with in outputs that no addition acts
-    on: pairs upon what is there already would piece together what nobody knows.
+    A pair replaces one of the first additions, or is added in outputs on which no addition acts:
+    pairs beside additions there would be combined to fit an unknown effect.
     """
     added = len(present.hypothesis.terms) - engine.n_initial_terms
     if not engine.lack_of_fit_test(present, noise).p_value < _LACK_OF_FIT_LEVEL:
@@ -184,7 +215,7 @@ def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | Non
     if better is not None or _acts_on_unexplained_output(engine, present, noise):
         return better
     pairs = engine.pairs(present, noise)
-    # Two may also fail alone since each is wrong where the other acts: a drag one way only.
+    # Either may also fail alone because it is wrong where the other acts (one-way friction).
     best = [pair for pair in pairs if pair.suppressed][:_PAIRS]
     best += [pair for pair in pairs[:_PAIRS] if not pair.suppressed]
     trials = [
@@ -195,7 +226,7 @@ def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | Non
 
 
 def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: Noise) -> bool:
-    """Whether an addition acts on an output in which something is missing still."""
+    """Whether an addition acts on an output that has a lack of fit."""
     regression = engine.regression
     rejected = np.flatnonzero(engine.lack_of_fit_test(present, noise).rejected).tolist()
     lacking = {regression.bands[band][0] for band in rejected}
@@ -206,10 +237,10 @@ def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: No
 def _accepted_pair_exchange(
     engine: SelectionEngine, present: Fit, noise: Noise, against: Fit
 ) -> Fit | None:
-    """A better pair in the place of one addition, that holds against another fit; or None.
+    """A pair in place of one addition that is accepted against another fit; else None.
 
-    It need not lower an error by much: where something is missing, one effect may nearly do what
-    two did, with other values.
+    No minimum decrease of an error is required: with a lack of fit one effect may nearly replace
+    two.
     """
     better = pair_exchange(engine, present, noise, 1)
     if better is present or not is_accepted(engine, against, better, noise, matters=1.0):
@@ -224,10 +255,10 @@ def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
 def _exchange_and_eliminate(
     engine: SelectionEngine, present: Fit, noise: Noise
 ) -> tuple[Fit, Noise]:
-    """Drop what is no longer needed, and replace what another effect explains better.
+    """Exchange and eliminate effects until the model does not change.
 
-    Again while that changes anything: the first of two effects may have stood for both, and what
-    it is best replaced by shows only beside the second.
+    The first of two effects may have explained both; its best rival is found only beside the
+    second.
     """
     for _ in range(_RECONSIDERED):
         before = present.labels
@@ -240,10 +271,10 @@ def _exchange_and_eliminate(
 
 
 def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
-    """With every addition replaced by the best of its rivals that fits better."""
+    """Model with every addition exchanged for its best rival, where that fits better."""
     for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
-            break  # A rival stood for two.
+            break  # A rival replaced two effects.
         own = present.hypothesis.terms[index]
         base = engine.refit(present.hypothesis.without(index), noise)
         rivals = _rivals_of(own, engine.scores(base, noise))
@@ -255,9 +286,10 @@ def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit
 
 
 def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
-    """The best candidates for a term's place, and the simpler laws that they contain.
+    """The two best candidates for a term's place, and the simpler laws that they contain.
 
-    Before it is fitted a law with more numbers looks better than the simple one that it contains.
+    Before the fit a law with more parameters has a larger score than a simpler one that it
+    contains.
     """
     others = [item for item in scores if item.net_gain > 0 and _another(item, own)]
     best = others[:_RIVALS]
@@ -266,14 +298,14 @@ def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
 
 
 def _another(item: Score, own: Term) -> bool:
-    """Whether a candidate is another effect than a term, or the same from another place."""
+    """Whether a candidate is another effect than a term, or the same at another minimum."""
     return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
 
 
 def _without_doubtful_terms(
     engine: SelectionEngine, present: Fit, noise: Noise
 ) -> tuple[Fit, Noise]:
-    """Drop additions that explain less than what is still missing: they may only imitate it."""
+    """Model without additions that explain less than the lack of fit."""
     left = engine.lack_of_fit_test(present, noise)
     missing = float(np.sum(np.maximum(left.excess_power, 0.0)[left.rejected]))
     doubtful = present
@@ -289,6 +321,7 @@ def _without_doubtful_terms(
 
 
 def _backward_elimination(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
+    """Model without the additions whose removal decreases the criterion."""
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = engine.refit(present.hypothesis.without(index), noise)
         if engine.criterion(without) < engine.criterion(present):

@@ -1,9 +1,14 @@
-"""How far each frequency is believed when values are told of runs that nobody repeated.
+"""Choice of weights for runs without repeats: inverse noise variance, or equal.
 
-Without repeats the noise is what no effect explains. Where that is noise, weights of 1/σ are the
-best (Aitken 1935): no others predict what was left out better, but by a trifle of chance. Where
-even weights do, what is loud at some frequencies is no noise but what the model lacks there; by
-1/σ the values would suit the quiet frequencies, where they hardly matter.
+Without repeats the noise variance is that of the residual beside all candidates. Where that is
+noise, weights of 1/σ² are the best (Aitken 1935). Where equal weights predict held-out data better,
+the residual contains a missing effect at the frequencies with a large variance, and 1/σ² would fit
+the values to frequencies at which the error is small anyway.
+
+References
+----------
+Aitken, A. C. (1935). On least squares and linear combination of observations. Proc. R. Soc. Edinb.
+55, 42-48.
 """
 
 from __future__ import annotations
@@ -27,7 +32,7 @@ _NO_WORSE = 1.01
 
 @dataclass(frozen=True)
 class Reweighted:
-    """A fit by the weights that predict best, the noise of these weights, and a note if need be."""
+    """A fit with the better weights, their noise, and a note where they are equal."""
 
     fit: Fit
     noise: Noise
@@ -35,9 +40,20 @@ class Reweighted:
 
 
 def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted:
-    """The same hypothesis with values from even weights in outputs that these predict better.
+    """The same hypothesis refitted with equal weights in outputs that these predict better.
 
-    Intervals under even weights are the block jackknife's, which needs no noise to be white.
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    fitted
+        Fit under 1/σ weights.
+    noise
+        Noise variance.
+
+    Notes
+    -----
+    Intervals under equal weights come from the block jackknife, which does not assume white noise.
     """
     own = Reweighted(fitted, noise)
     if noise.from_repeats or not fitted.hypothesis.terms:
@@ -69,7 +85,7 @@ def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted
 
 
 def _even(regression: Regression, noise: Noise, outputs: Collection[str]) -> Noise:
-    """The same noise as if it were white in some outputs."""
+    """Noise with one variance per output for some outputs."""
     power = noise.power.copy()
     rows = np.bincount(regression.band_of_row, minlength=len(power))
     for output in outputs:
