@@ -183,6 +183,40 @@ def test_jog_moves_and_says_where_it_is(served: Path) -> None:
     assert_stands_still(served)
 
 
+@pytest.mark.parametrize(
+    "order",
+    [
+        ("move", "--pay-out", "0.9 m", "--speed", "0.03 m/s"),
+        ("jog", "--pay-out", "900mm", "--speed", "0.03 m/s"),
+    ],
+    ids=lambda order: order[0],
+)
+def test_a_suspended_command_moves_nothing(served: Path, order: tuple[str, ...]) -> None:
+    """SIGSTOP of the client, and not of the process that owns the bench."""
+    with start(*order, "-b", str(served)) as client:
+        try:
+            until_moving(served)
+            client.send_signal(signal.SIGSTOP)
+            stopped = time.monotonic()
+            until(lambda: state(served)[1] != "operation enabled", "it moves on", within=10)
+            # The dead-man, the ramp and a busy computer; before, it moved on for 30 s.
+            assert time.monotonic() - stopped < 3.0
+            assert_stands_still(served)
+            shown = winchkit("monitor", "-b", str(served), "--json", "--for", "0.3s")
+            (warning,) = json.loads(shown.stdout.splitlines()[-1])["warnings"]
+            assert f"{order[0]} (process {client.pid}, user " in warning
+            assert "gave no sign of life for 0.5 s" in warning
+            client.send_signal(signal.SIGCONT)
+            code, errors = ended(client)
+            assert code == 5, errors
+            assert "the dead-man" in errors
+        finally:
+            if client.poll() is None:
+                client.kill()
+                client.communicate()
+    assert winchkit("reset", "-b", str(served)).returncode == 0
+
+
 def test_others_attach_and_one_stops_it_by_name(served: Path, tmp_path: Path) -> None:
     log = tmp_path / "beside.csv"
     with jogging(served) as jog:

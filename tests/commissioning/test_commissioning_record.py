@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import re
 from pathlib import Path
 
 import pytest
 from slave_bench import write_bench
 
+from winchkit.bench.commissioning.dialogue import AnswerFile
 from winchkit.bench.commissioning.record import (
     Confirmation,
     DriveRecord,
@@ -160,3 +162,14 @@ def test_only_buses_without_real_drives_need_no_record(
 ) -> None:
     bus = BusSpec("can", interface=interface, channel=channel)
     assert is_simulated(dataclasses.replace(spec, bus={"can": bus})) is simulated
+
+
+def test_a_fifo_is_refused_as_record_and_as_answers(spec: BenchSpec) -> None:
+    """Reading one would wait for ever."""
+    record = Path(spec.record_file)
+    record.unlink()
+    os.mkfifo(record)
+    (item,) = stale_items(spec)
+    assert "it is a FIFO, not a regular file" in item
+    with pytest.raises(FileError, match="it is a FIFO, not a regular file"):
+        AnswerFile(record, lambda _text: None)

@@ -94,8 +94,21 @@ def test_a_length_that_is_not_known_is_told_and_no_move_goes_by_it(tmp_path: Pat
         assert any("length is not known" in str(item) for item in bench.snapshot.warnings)
         if bench.snapshot.tripped:
             bench.reset()
-        with pytest.raises(NotPermitted, match="home it"):
+        begun = slave.motor.angle
+        with pytest.raises(NotPermitted, match="home first") as refused:
+            winch.move_to(1.0)
+        assert refused.value.exit_code == 5
+        with pytest.raises(NotPermitted, match="home first"):
             winch.move_by(pay_out=0.01)
+        with pytest.raises(NotPermitted, match="home first"):
+            winch.jog(wind_in=0.05, duration=0.2)
+        rig.wait(0.3)
+        assert slave.motor.angle == begun
+        winch.home(at=3.9)
+        assert winch.snapshot.turns_known
+        assert winch.cable_length == pytest.approx(3.9, abs=2e-3)
+        winch.jog(wind_in=0.05, duration=0.2)
+        winch.move_to(3.88)
 
 
 @pytest.mark.parametrize("noise", [(0, 1, 0, -1), (1, -1), (1, 1, 0)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
@@ -12,11 +12,12 @@ from typing import Self
 from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.commissioning.validity import require_commissioned, trust_record
 from winchkit.bench.common_move import begin_together, wait_together
+from winchkit.bench.control.dead_man import LIFE_SIGN
 from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import Callback, ControlLoop
 from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
 from winchkit.bench.control.release import NotReleased, ReleaseGuard
-from winchkit.bench.control.snapshot import BenchSnapshot, Direction
+from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Trip
 from winchkit.bench.hardware import Wired, wire
 from winchkit.bench.lifecycle import (
     await_cycles,
@@ -30,6 +31,7 @@ from winchkit.bench.recording.provenance import origin
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.bench.remote.commander import Client, Commanders, NotCommander, client_name
 from winchkit.bench.remote.handover import own
+from winchkit.bench.remote.life_sign import LifeSigns
 from winchkit.bench.remote.server import StationServer
 from winchkit.bench.winch import Winch
 from winchkit.drivers.can.bus.health import BusHealth
@@ -105,6 +107,7 @@ class Bench:
             self.cells = self._cell_desk()
             """Its instruments by name, for commands and whoever looks at them one by one."""
             self.loop.on_jog = self._jog_from_callback
+            self.loop.callbacks.append(LifeSigns(self._going_on, self._end_silent))
             self.realtime: RealTime = acquire(realtime, self._urgent_threads())
             """What the control loop was granted of real-time settings, and what was refused."""
             stack.callback(self.realtime.close)
@@ -172,15 +175,15 @@ class Bench:
         """Ramp this winch to rest, and with it all others unless ``stop_together`` is false."""
         self._run_down(self.winch if self.spec.stop_together else (name,), wait=wait)
 
-    def stop_commanded(self, names: Collection[str]) -> None:
-        """Ramp these winches to rest for the client that commands them; returns at rest.
+    def stop_commanded(self, names: Collection[str], *, wait: bool = True) -> None:
+        """Ramp these winches to rest for the client that commands them.
 
         The others stop with them unless ``stop_together`` is false, or another client commands
         them.
         """
         held = self.commanders.holder
         others = [name for name in self.winch if held(name) is None or name in names]
-        self._run_down(others if self.spec.stop_together else names, wait=True)
+        self._run_down(others if self.spec.stop_together else names, wait=wait)
 
     def stop_now(self, *, wait: bool = True) -> None:
         """Quick-stop every winch. A jog that is held must be released before the next one."""
@@ -375,6 +378,19 @@ class Bench:
         except MotionError:
             if not self.snapshot.tripped:
                 raise
+
+    def _going_on(self) -> Iterator[tuple[str, Client]]:
+        """Winches whose motion goes on by itself, with the client that commands each."""
+        for name, winch in self.winch.items():
+            client = self.commanders.holder(name)
+            if client is not None and winch.goes_on:
+                yield name, client
+
+    def _end_silent(self, client: Client, names: Collection[str], reason: str) -> None:
+        """Ramp the winches of a client that has fallen silent, and tell everybody why."""
+        self.stopped_by = f"the dead-man ({client.name} was silent for {LIFE_SIGN:g} s)"
+        self.stop_commanded(names, wait=False)
+        self.loop.warn(Trip("client", ", ".join(names), reason, Direction.NONE))
 
     def _stop_feeding(self, recorder: Recorder) -> None:
         if recorder in self._recorders:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 from winchkit.bench.control.cable import RopeMap
 from winchkit.bench.control.motion import Target
 from winchkit.bench.control.snapshot import Direction
+from winchkit.bench.lifecycle import await_cycles
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.modes import Homing
 from winchkit.drivers.can.cia402.profile_parameters import HERE, HomingSpec, check_homing
@@ -29,6 +30,8 @@ _SETTLE = 0.06
 """For which bits of an earlier homing may still stand, s."""
 _JUMP = 1.0
 """A change of the motor angle in one cycle that is no motion but a new zero, rad."""
+_SHOWN = 3
+"""Cycles until a change of mode is seen in feedback and judged."""
 _SAME = 2e-3
 """Of rope, within which a length counts as defined, m."""
 
@@ -110,6 +113,8 @@ def homing(bench: Bench, winch: Winch, asked: HomingRequest) -> Generator[None]:
         if axis.mode != axis.servo.motion_mode:
             bench.wait_at_rest((winch.name,))
             axis.switch_mode(axis.servo.motion_mode)
+            # Until its PDOs show the mode again, any motion is refused.
+            await_cycles(bench.loop, bench.clock, _SHOWN)
 
 
 def _check(winch: Winch, asked: HomingRequest) -> None:

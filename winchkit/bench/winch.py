@@ -84,6 +84,11 @@ class Winch:
         return not self._controller.done
 
     @property
+    def goes_on(self) -> bool:
+        """Whether a motion is under way that does not end by itself without a new command."""
+        return self.moving and self._jog is None
+
+    @property
     def commanded_here(self) -> bool:
         """Whether the client for whom this thread acts commands it."""
         commanders = self._bench.commanders
@@ -214,11 +219,7 @@ class Winch:
         hold: bool = False,
     ) -> Move:
         """The move that ``move_to`` would make; nothing begins. Raises as that does."""
-        if not self.snapshot.turns_known:
-            raise NotPermitted(
-                f"winch {self.name}: its cable length is not known, the drive's position counter "
-                "(6064h) may have wrapped while it was not heard; home it: `winchkit home`"
-            )
+        self._require_length()
         rope = self._parts.rope
         move = Move(
             rope,
@@ -293,8 +294,19 @@ class Winch:
                 f"winch {self.name} is {self._controller.phase.value}; stop it first"
             )
 
+    def _require_length(self) -> None:
+        """Raise NotPermitted where the cable length is not known: no limit of it can be kept."""
+        if not self.snapshot.turns_known:
+            raise NotPermitted(
+                f"winch {self.name}: its cable length is not known, the drive's position counter "
+                "(6064h) may have wrapped while it was not heard; home first: `winchkit home "
+                f"{self.name} --here LENGTH` moves nothing"
+            )
+
     def _refresh(self, winding_speed: float, hold: float, *, held: bool) -> None:
         self._bench.permit(self.name, direction_of(winding_speed), held=held)
+        if winding_speed:
+            self._require_length()
         expires = self._bench.clock.now() + hold
         with self._bench.commanders.claimed(self.name):
             jog = self._jog

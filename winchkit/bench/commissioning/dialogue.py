@@ -9,6 +9,7 @@ from typing import Protocol
 
 from winchkit.bench.commissioning.record import hash_of
 from winchkit.errors import Fault, FileError, NotPermitted, UsageError
+from winchkit.regular_file import read_text
 
 __all__ = ["AnswerFile", "Dialogue", "TypedAnswers", "agreed", "confirm"]
 
@@ -59,7 +60,7 @@ class AnswerFile:
         self.source = f"{found.path} sha256 {found.sha256}"
         self._path = str(path)
         try:
-            self._tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            self._tree = tomllib.loads(read_text(path))
         except (OSError, ValueError) as error:
             raise FileError(Fault(f"cannot be read as TOML: {error}", str(path))) from error
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.errors import FileError, NotPermitted
+from winchkit.regular_file import read_text, regular
 
 __all__ = [
     "Confirmation",
@@ -113,7 +114,8 @@ class Record:
 def hash_of(path: str | Path) -> FileHash:
     """SHA-256 of a file, named without its folder; raises FileError."""
     try:
-        digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        with open(path, "rb", opener=regular) as file:
+            digest = hashlib.sha256(file.read()).hexdigest()
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}") from error
     return FileHash(Path(path).name, digest)
@@ -137,7 +139,7 @@ def write_record(record: Record, path: str | Path) -> None:
 def read_record(path: str | Path) -> Record | None:
     """The record; None where there is none. Raises FileError for one that cannot be used."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_text(path)
     except FileNotFoundError:
         return None
     except (OSError, UnicodeDecodeError) as error:

@@ -289,6 +289,8 @@ class Controller:
             self._enter(Phase.RESETTING, now)
         elif ordered is Phase.RUN_DOWN and self.phase in (Phase.ENABLING, Phase.MOVING):
             self._begin_run_down(now)
+        elif ordered is Phase.RUN_DOWN and self.phase is Phase.DISABLED:
+            self.done = wanted is None
         if wanted is not None and self._take(wanted, now):
             with self._lock:
                 if self._wanted is wanted:

@@ -1,10 +1,13 @@
-"""Times for which a jog lasts without a new command."""
+"""Times for which a motion lasts without a sign of life of whoever commands it."""
 
 from __future__ import annotations
 
-__all__ = ["DEAD_MAN", "FIRST_PRESS"]
+__all__ = ["DEAD_MAN", "FIRST_PRESS", "LIFE_SIGN"]
 
 DEAD_MAN = 0.2
 """A jog ends this long after its last refresh, s."""
 FIRST_PRESS = 0.7
 """Hold of the first press of a key, whose repeat starts late, s."""
+LIFE_SIGN = 0.5
+"""A move, step or homing of another process ends this long after that process's last request, s:
+ten requests of a command, which sends one each 0.05 s."""

@@ -49,7 +49,11 @@ def attach(
 
 
 class RemoteStation:
-    """Calls the owner for everything; its errors are raised here. A context manager."""
+    """Calls the owner for everything; its errors are raised here. A context manager.
+
+    Each call is a sign of life. A move, step or homing that was ordered here ends by a ramp where
+    none is made for :data:`~winchkit.bench.control.dead_man.LIFE_SIGN` (0.5 s): poll ``moving``.
+    """
 
     def __init__(
         self,

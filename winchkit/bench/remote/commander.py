@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Protocol
 
 from winchkit.bench.control.dead_man import FIRST_PRESS
+from winchkit.bench.remote.life_sign import LifeSign
 from winchkit.drivers.clock import Clock
 from winchkit.errors import MotionError, NotPermitted
 
@@ -46,6 +47,13 @@ class Client:
     name: str
     observer: bool = False
     """Whether it only looks on, as ``monitor`` and ``log`` do."""
+    life: LifeSign | None = None
+    """Of a client in another process; None in the process that owns the bench."""
+
+    def heard(self) -> None:
+        """It has sent a request, or given an order."""
+        if self.life is not None:
+            self.life.heard()
 
 
 def client_name(what: str | None = None) -> str:
@@ -169,6 +177,7 @@ class Commanders:
             raise MotionError(f"winch {winch} was taken over by {by}; the motion before it ended")
 
     def _give(self, winch: str, client: Client) -> None:
+        client.heard()
         self._holders[winch] = client
         self._taken.pop((client, winch), None)
         self._winches[winch].commander = client.name

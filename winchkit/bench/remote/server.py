@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from winchkit.bench.ownership import digest_of, listen
 from winchkit.bench.remote.commander import Client
+from winchkit.bench.remote.life_sign import LifeSign
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import ConnectionLost, FileError, NotPermitted, UsageError, WinchkitError
 
@@ -103,7 +104,8 @@ class StationServer:
                 client, _ = self._socket.accept()
             except OSError:
                 return
-            seat = _Seat(client, LocalStation(self._bench, Client("a client without a name")))
+            nameless = Client("a client without a name", life=LifeSign())
+            seat = _Seat(client, LocalStation(self._bench, nameless))
             self._seats.add(seat)
             threading.Thread(target=self._serve, args=(seat,), name="station", daemon=True).start()
 
@@ -127,6 +129,7 @@ class StationServer:
     def _answer(self, seat: _Seat, line: bytes) -> tuple[dict[str, Any], bool]:
         """Do what a request names, and whether it was the last one."""
         left = False
+        seat.station.client.heard()
         try:
             request = json.loads(line)
             operation, arguments = request["op"], request.get("args", [])
@@ -152,7 +155,7 @@ class StationServer:
         with self._lock:
             if self.handed_to:
                 raise ConnectionLost(f"the bench is being handed over to {self.handed_to}")
-            seat.station.client = Client(str(name), observer=bool(observer))
+            seat.station.client = Client(str(name), observer=bool(observer), life=LifeSign())
         return {
             "owner": self._bench.commanders.owner.name,
             "lends": self.may_hand_over,
