@@ -186,8 +186,8 @@ def test_jog_moves_and_says_where_it_is(served: Path) -> None:
 @pytest.mark.parametrize(
     "order",
     [
-        ("move", "--pay-out", "0.9 m", "--speed", "0.03 m/s"),
-        ("jog", "--pay-out", "900mm", "--speed", "0.03 m/s"),
+        ("move", "--wind-in", "0.9 m", "--speed", "0.03 m/s"),
+        ("jog", "--wind-in", "900mm", "--speed", "0.03 m/s"),
     ],
     ids=lambda order: order[0],
 )
