@@ -37,7 +37,7 @@ class Record:
     onsets: list[tuple[Planned, float]] = field(default_factory=list)
     """Faults that came to be, and when, s."""
     unheard: list[Planned] = field(default_factory=list)
-    """Frames of strangers that the drive did not hear: nothing happened to it."""
+    """Frames of strangers that the drive did not hear; the host hears them and stops it."""
     frames: list[tuple[tuple[Planned, float], Strange]] = field(default_factory=list)
     """The stranger's frame of a fault that is one."""
     mended: float = 0.0
@@ -132,7 +132,6 @@ def _play(world: World, record: Record) -> None:
     world.sample()
     for onset, frame in record.frames:
         if frame.heard is False:
-            record.onsets.remove(onset)
             record.unheard.append(onset[0])
     record.moved_again = any(
         abs(sample.velocity) > 0.5

@@ -74,18 +74,18 @@ def test_a_winch_that_goes_on_is_found() -> None:
 
 
 @pytest.mark.parametrize("independent", [True, False])
-def test_a_frame_that_no_drive_hears_is_no_fault(independent: bool) -> None:
-    """A drive that is off the bus for 20 ms (case 172/138) stays operational, and may go on."""
+def test_a_frame_that_no_drive_hears_is_heard_by_the_host(independent: bool) -> None:
+    """A drive that is off the bus for 20 ms (case 172/138) stays operational; the host stops it."""
     kind = "stranger: NMT pre-operational"
     silence = Planned("drive silent", "A", 0.600, 0.02)
     for after, unheard in ((0.005, True), (0.05, False)):
         stranger = Planned(kind, "A", silence.at + after, None)
         record = play(case(kind, faults=(silence, stranger), independent=independent))
         assert (record.unheard == [stranger]) == unheard
-        assert bool(record.trips) != unheard, record.trips
+        assert record.trips
         assert judge(record).good, judge(record)
         ends = [s.follows for s in record.truth["A"] if s.time < record.mended][-1]
-        assert ends == unheard, "the truth: only what was heard stops the drive"
+        assert not ends, "the truth: it is stopped, by itself or by the host"
 
 
 def test_a_case_is_the_same_whenever_it_is_played() -> None:
