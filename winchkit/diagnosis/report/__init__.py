@@ -1,1 +1,0 @@
-"""A diagnosis as a page, as text for a terminal, and in one sentence."""
