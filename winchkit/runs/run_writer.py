@@ -61,6 +61,11 @@ class RunWriter(ABC):
         return self._stream.fileno()
 
     @property
+    def is_open(self) -> bool:
+        """Whether rows can still be added."""
+        return not self._stream.closed
+
+    @property
     def size(self) -> int:
         """Bytes handed over so far."""
         return self._stream.tell()

@@ -47,9 +47,13 @@ class RowLog(LogWriter):
         self.rows += len(rows)
 
     def close(self, end: Mapping[str, str]) -> None:
-        """Write the rows that waited for a source, and finish the file."""
+        """Write the rows that waited for a source, and finish the file.
+
+        Where the next part could not be begun there is no open file, and nothing is written.
+        """
         try:
-            self._append(self._aligner.rows(self._newest, ends=True))
+            if self._writer.is_open:
+                self._append(self._aligner.rows(self._newest, ends=True))
         finally:
             super().close(end)
 
