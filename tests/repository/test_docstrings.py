@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -44,3 +45,38 @@ def test_parameters_of_a_docstring_are_found() -> None:
     text = head + "\n\nReturns\n-------\nx"
     assert described(text) == ["a", "b", "c"]
     assert described("One.") == []
+
+
+_REFERENCE = re.compile(r":(?:class|func|mod|meth|attr|data):`~?(winchkit\.[^`]+)`")
+
+
+def resolves(name: str) -> bool:
+    """Whether a dotted name is a module, or a name in one."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        try:
+            found: object = importlib.import_module(".".join(parts[:count]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[count:]:
+            if part in getattr(found, "__annotations__", {}):
+                return True
+            if not hasattr(found, part):
+                return False
+            found = getattr(found, part)
+        return True
+    return False
+
+
+def test_references_of_docstrings_exist() -> None:
+    texts = {path: path.read_text(encoding="utf-8") for path in (ROOT / "winchkit").rglob("*.py")}
+    named = {(path, name) for path, text in texts.items() for name in _REFERENCE.findall(text)}
+    assert named
+    missing = [f"{path.relative_to(ROOT)}: {name}" for path, name in named if not resolves(name)]
+    assert not missing
+
+
+def test_a_reference_that_leads_nowhere_is_recognised() -> None:
+    assert resolves("winchkit.drivers.can.cia402.axis.Cia402Axis")
+    assert not resolves("winchkit.drivers.can.cia402.axis.Axis")
+    assert not resolves("winchkit.nowhere")

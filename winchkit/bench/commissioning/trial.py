@@ -25,7 +25,7 @@ from winchkit.drivers.can.cia402.state_machine import (
     Wish,
     state_of,
 )
-from winchkit.drivers.can.host_loss.mechanism import Silence
+from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
 from winchkit.drivers.can.host_loss.proof import bring_back
 from winchkit.drivers.clock import Clock
 from winchkit.errors import ConnectionLost, MotionError, NoReply, NotPermitted
@@ -104,9 +104,7 @@ class Trials:
                 self._require_room(name, axis, speed)
             self._run(axis, speed, _MOVE_TIME if speed else _SETTLE_TIME, name)
             start, angle = self._clock.now(), _angle(axis)
-            nothing = axis.host.mechanism.silence is Silence.NOTHING
-            limit = axis.host.mechanism.limit
-            patience = _HARDWARE_PATIENCE if nothing else limit + _PATIENCE
+            limit, patience = axis.host.mechanism.limit, _patience(axis.host.mechanism)
             # Where any frame is a life sign the drive is not asked before its time is over.
             blind = limit + _PATIENCE / 2 if axis.host.mechanism.silence is Silence.ALL else 0.0
             state, after = self._left(axis, start, blind, patience)
@@ -211,10 +209,8 @@ class Trials:
         limits = self.spec.winch[name].limits
         if limits.length is None:
             return
-        mechanism = axis.host.mechanism
-        nothing = mechanism.silence is Silence.NOTHING
-        reaction = _HARDWARE_PATIENCE if nothing else mechanism.limit + _PATIENCE
-        way = speed * (_MOVE_TIME + reaction) + speed**2 / (2 * limits.acceleration)
+        moving = _MOVE_TIME + _patience(axis.host.mechanism)
+        way = speed * moving + speed**2 / (2 * limits.acceleration)
         rope: RopeMap = self._wired.loop.winches[name].rope
         length, low = rope.cable_length(self._hold), limits.length[0]
         if not length - way >= low:
@@ -277,6 +273,12 @@ class Trials:
         counts = axis.objects.read(0x6064) - round(feedback.angle / unit)
         now = feedback.angle + ((counts + _HALF) % (2 * _HALF) - _HALF) * unit
         return rope.cable_length(now) - rope.cable_length(angle)
+
+
+def _patience(mechanism: Mechanism) -> float:
+    """How long a trial waits for a drive to stop once the host is silent, s."""
+    nothing = mechanism.silence is Silence.NOTHING
+    return _HARDWARE_PATIENCE if nothing else mechanism.limit + _PATIENCE
 
 
 def _has_left(state: State) -> bool:

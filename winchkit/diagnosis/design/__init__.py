@@ -1,4 +1,4 @@
 """Design of the next experiment: discrimination of rival effects and detectable sizes.
 
-:func:`~winchkit.diagnosis.design.plan.plan` ranks motion programmes by their power per minute.
+:func:`~winchkit.diagnosis.design.plan.offers` ranks motion programmes by their power per minute.
 """

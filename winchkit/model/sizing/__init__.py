@@ -1,4 +1,4 @@
 """Sizing of a winch: the design equations of the winding-device paper (Eq. 10 to 18).
 
-:func:`~winchkit.model.sizing.sizing.size` evaluates every requirement with its value and limit.
+:func:`~winchkit.model.sizing.sizing.sized` evaluates every requirement with its value and limit.
 """

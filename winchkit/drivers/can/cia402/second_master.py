@@ -34,7 +34,8 @@ class SecondMaster:
     """What somebody else commanded one drive to do, on the bus of a bench.
 
     It listens from the beginning on, before anything is sent to the drive from here, so that no
-    frame of this bench comes back without having been noted (:mod:`.own_frames`).
+    frame of this bench comes back without having been noted
+    (:mod:`~winchkit.drivers.can.bus.own_frames`).
     """
 
     def __init__(self, bus: CanBus, node: int, rpdos: Iterable[int]) -> None:
