@@ -17,8 +17,8 @@ from typing import cast
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.time_series import Problem
 
 __all__ = ["LINEAR", "NONLINEAR", "Curve", "Dataset", "digits", "regression_of", "start_of"]
 
@@ -78,9 +78,9 @@ class Curve:
         return np.array(columns).T
 
 
-def regression_of(data: Dataset) -> Problem:
+def regression_of(data: Dataset) -> Regression:
     """The data set as a regression problem."""
-    return cast(Problem, Curve(data))
+    return cast(Regression, Curve(data))
 
 
 def start_of(vector: tuple[float, ...]) -> Hypothesis:

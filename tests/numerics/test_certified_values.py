@@ -99,4 +99,4 @@ def test_residuals_of_unit_variance_are_fitted_to_the_tolerance_of_chi_square(na
     data = NONLINEAR[name]
     found = fitted(data, data.starts[1], scale=1.0, steps=None)
     free = len(data.y) - len(data.certified)
-    assert found.cost == pytest.approx(free, abs=0.02)
+    assert found.chi_square == pytest.approx(free, abs=0.02)

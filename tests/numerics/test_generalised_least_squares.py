@@ -8,8 +8,7 @@ from strd import Dataset, regression_of, start_of
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.gls import fit
-from winchkit.diagnosis.regression.noise import orthonormal
-from winchkit.diagnosis.regression.projection import gain, gains
+from winchkit.diagnosis.regression.projection import explained_ss, explained_ss_of_sets, orthonormal
 
 ROWS, UNKNOWNS = 400, 5
 
@@ -38,7 +37,7 @@ def test_a_linear_fit_is_the_closed_form(seed: int) -> None:
     found = fit(regression_of(data), start_of((0.0,) * UNKNOWNS), 1e6 * weight, 50)
     np.testing.assert_allclose(found.vector, closed_form(columns, values, weight), rtol=1e-9)
     left = (values - columns @ found.vector) * 1e6 * weight
-    assert found.cost == pytest.approx(float(left @ left), rel=1e-12)
+    assert found.chi_square == pytest.approx(float(left @ left), rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -49,7 +48,7 @@ def test_a_linear_fit_of_unit_variance_is_within_the_tolerance_of_the_closed_for
     data = Dataset("drawn", columns, values, lambda x, b: x @ b, (0.0,) * UNKNOWNS, 1.0)
     found = fit(regression_of(data), start_of((0.0,) * UNKNOWNS), weight)
     best = values - columns @ closed_form(columns, values, weight)
-    assert 0 <= found.cost - float(np.sum((best * weight) ** 2)) < 0.02
+    assert 0 <= found.chi_square - float(np.sum((best * weight) ** 2)) < 0.02
 
 
 def test_a_bound_is_kept_and_the_other_unknowns_are_the_best_beside_it() -> None:
@@ -85,5 +84,7 @@ def test_explained_squares_are_those_of_a_regression() -> None:
     left = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
     explained = float(values @ values - left @ left)
     inner, products = scaled.T @ scaled, scaled.T @ values
-    assert gain(inner, products, 1e-7) == pytest.approx(explained, rel=1e-9)
-    np.testing.assert_allclose(gains(inner[None], products[None], 1e-7), [explained], rtol=1e-9)
+    assert explained_ss(inner, products, 1e-7) == pytest.approx(explained, rel=1e-9)
+    np.testing.assert_allclose(
+        explained_ss_of_sets(inner[None], products[None], 1e-7), [explained], rtol=1e-9
+    )

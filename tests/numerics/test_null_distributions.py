@@ -20,12 +20,13 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.design.discrimination import APART, power_of
 from winchkit.diagnosis.fleet.meta_analysis import pooled
-from winchkit.diagnosis.regression.cross_validation import confidence
+from winchkit.diagnosis.regression.cross_validation import signed_rank_p_value
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, presence
-from winchkit.diagnosis.regression.projection import gain
-from winchkit.diagnosis.regression.time_series import Problem
-from winchkit.diagnosis.selection.scores import Projected, chance_level, score
+from winchkit.diagnosis.regression.lack_of_fit import lack_of_fit_test
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
+from winchkit.diagnosis.regression.projection import explained_ss
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.selection.scores import Projected, null_maxima, score
 from winchkit.diagnosis.selection.signatures import signatures
 from winchkit.diagnosis.verdict.equivalence import _flip_chance
 from winchkit.effects import load_catalogue
@@ -51,7 +52,7 @@ def no_more_than(count: int, cases: int, level: float) -> bool:
 
 
 @pytest.fixture(scope="module")
-def problem() -> Problem:
+def regression() -> TimeSeriesRegression:
     """Lengths of three repeats of one motion, white noise in every kept coefficient."""
     time = np.arange(SAMPLES) / 50.0
     angle = 100.0 * (1 - np.cos(2 * pi * time / time[-1]))
@@ -61,46 +62,48 @@ def problem() -> Problem:
         length = 4.0 - 0.003 * angle + 1e-4 * random.standard_normal(SAMPLES)
         channels = {"motor_angle": Channel(angle, "rad"), "cable_length": Channel(length, "m")}
         runs.append(Run(f"run-{index}", time, channels, {"load_mass": "10 kg"}))
-    return Problem(prepare(runs, PROFILE))
+    return TimeSeriesRegression(prepare(runs, PROFILE))
 
 
-def residuals(problem: Problem, cases: int, seed: int) -> Iterator[Array]:
+def residuals(regression: TimeSeriesRegression, cases: int, seed: int) -> Iterator[Array]:
     random = np.random.default_rng(seed)
     for _ in range(cases):
-        yield random.standard_normal(problem.rows)
+        yield random.standard_normal(regression.n_rows)
 
 
-def known_noise(problem: Problem, freedom: float) -> Noise:
-    count = len(problem.bands)
-    outputs = dict.fromkeys(problem.dataset.outputs, 1.0)
-    return Noise(np.ones(count), np.full(count, freedom), outputs, from_repeats=True)
+def known_noise(regression: TimeSeriesRegression, dof: float) -> Noise:
+    count = len(regression.bands)
+    outputs = dict.fromkeys(regression.outputs, 1.0)
+    return Noise(np.ones(count), np.full(count, dof), outputs, from_repeats=True)
 
 
 class TestLackOfFit:
     def test_the_p_value_is_that_of_an_f_test_of_the_mean_of_repeats(
-        self, problem: Problem
+        self, regression: TimeSeriesRegression
     ) -> None:
-        noise, jacobian = known_noise(problem, 30.0), problem.nuisance_columns
-        for residual in residuals(problem, 5, 2):
-            times = np.array(problem.in_time(residual))
+        noise, jacobian = known_noise(regression, 30.0), regression.nuisance_columns
+        for residual in residuals(regression, 5, 2):
+            times = np.array(regression.in_time(residual))
             mean = np.asarray(dct(times.sum(axis=0) / np.sqrt(REPEATS), type=2, norm="ortho"))
-            band: NDArray[np.intp] = problem.band_of_row[problem.segments[0].rows]
-            count = len(problem.bands)
+            band: NDArray[np.intp] = regression.band_of_row[regression.segments[0].rows]
+            count = len(regression.bands)
             squares = np.bincount(band, mean**2, count)
             leverage = np.linalg.qr(jacobian)[0] ** 2
-            taken = np.bincount(problem.band_of_row, leverage.sum(axis=1), count)
-            freedom = np.maximum(np.bincount(band, minlength=count) - taken, 1.0)
-            p = stats.f.sf(squares / freedom, freedom, 30.0)
-            found = presence(problem, residual, jacobian, noise)
+            taken = np.bincount(regression.band_of_row, leverage.sum(axis=1), count)
+            dof = np.maximum(np.bincount(band, minlength=count) - taken, 1.0)
+            p = stats.f.sf(squares / dof, dof, 30.0)
+            found = lack_of_fit_test(regression, residual, jacobian, noise)
             assert found.p_value == pytest.approx(min(1.0, count * p.min()), rel=1e-9)
             np.testing.assert_array_equal(found.rejected, count * p < 0.05)
 
-    def test_noise_alone_is_rejected_no_more_often_than_the_level(self, problem: Problem) -> None:
-        cases, none = 500, np.zeros((problem.rows, 0))
+    def test_noise_alone_is_rejected_no_more_often_than_the_level(
+        self, regression: TimeSeriesRegression
+    ) -> None:
+        cases, none = 500, np.zeros((regression.n_rows, 0))
         p_values = []
-        for residual in residuals(problem, cases, 3):
-            noise = noise_from_repeats(problem, residual, none)
-            p_values.append(presence(problem, residual, none, noise).p_value)
+        for residual in residuals(regression, cases, 3):
+            noise = noise_from_repeats(regression, residual, none)
+            p_values.append(lack_of_fit_test(regression, residual, none, noise).p_value)
         for level in (0.02, 0.05, 0.2):
             assert no_more_than(int(np.count_nonzero(np.array(p_values) < level)), cases, level)
 
@@ -115,7 +118,7 @@ class TestSignedRanks:
             sums = [ranks[np.array(signs)].sum() for signs in product([True, False], repeat=10)]
             exact = float(np.mean(np.array(sums) >= reached))
             before = np.full(10, 100.0)
-            assert confidence(before, before - change) == pytest.approx(exact, rel=1e-9)
+            assert signed_rank_p_value(before, before - change) == pytest.approx(exact, rel=1e-9)
 
     def test_it_is_scipys_test_of_the_blocks_that_change(self) -> None:
         random = np.random.default_rng(5)
@@ -124,13 +127,13 @@ class TestSignedRanks:
         wanted = stats.wilcoxon(change[:20], alternative="greater").pvalue
         size = np.abs(change[:20])
         assert size.min() > 0.02 * size.max()
-        assert confidence(before, before - change) == pytest.approx(wanted, rel=1e-6)
+        assert signed_rank_p_value(before, before - change) == pytest.approx(wanted, rel=1e-6)
 
     def test_changes_about_zero_are_accepted_as_often_as_the_level(self) -> None:
         random, cases = np.random.default_rng(6), 1500
         before, p_values = np.full(48, 1000.0), []
         for _ in range(cases):
-            p_values.append(confidence(before, before - random.standard_t(3, 48)))
+            p_values.append(signed_rank_p_value(before, before - random.standard_t(3, 48)))
         for level in (0.02, 0.1, 0.5):
             assert within(int(np.count_nonzero(np.array(p_values) <= level)), cases, level)
 
@@ -158,7 +161,7 @@ class TestChiSquare:
         columns /= np.linalg.norm(columns, axis=0)
         inner = columns.T @ columns
         explained = [
-            gain(inner, columns.T @ random.standard_normal(200), 1e-7) for _ in range(1000)
+            explained_ss(inner, columns.T @ random.standard_normal(200), 1e-7) for _ in range(1000)
         ]
         assert stats.kstest(explained, stats.chi2(unknowns).cdf).pvalue > 0.001
 
@@ -179,16 +182,20 @@ class TestChiSquare:
 
 
 class TestLargestScore:
-    def test_simulated_scores_are_those_of_noise(self, problem: Problem) -> None:
+    def test_simulated_scores_are_those_of_noise(self, regression: TimeSeriesRegression) -> None:
         """The largest of all candidates, beside the nuisance parameters, of known noise."""
         effects = [effect for effect in load_catalogue() if not effect.memory]
-        found = signatures(problem, Hypothesis(), effects)
-        assert len(found.atoms) > 5
-        projected = Projected(problem, found, problem.nuisance_columns, known_noise(problem, 1e9))
-        simulated = chance_level(projected, problem.rows)
+        found = signatures(regression, Hypothesis(), effects)
+        assert len(found.candidates) > 5
+        projected = Projected(
+            regression, found, regression.nuisance_columns, known_noise(regression, 1e9)
+        )
+        simulated = null_maxima(projected, regression.n_rows)
         drawn = []
-        for residual in residuals(problem, len(simulated), 11):
-            drawn.append(max(item.value for item in score(projected, residual, problem.rows)))
+        for residual in residuals(regression, len(simulated), 11):
+            drawn.append(
+                max(item.net_gain for item in score(projected, residual, regression.n_rows))
+            )
         assert stats.ks_2samp(simulated, drawn).pvalue > 0.001
 
 
