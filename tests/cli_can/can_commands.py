@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -13,6 +16,7 @@ from click.testing import CliRunner, Result
 from winchkit import catalog
 from winchkit.cli import main
 from winchkit.schema.read import read_simbench
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.paced_clock import PacedClock
 
@@ -43,9 +47,23 @@ class Served:
         return self.live.winches["A"].drive.objects.number(index, sub)
 
 
+def of_commands(simulated: Callable[..., Any], real: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of ``time``, simulated for the thread in which the commands run."""
+
+    def call(*arguments: float) -> Any:
+        here = threading.current_thread() is threading.main_thread()
+        return (simulated if here else real)(*arguments)
+
+    return call
+
+
 @contextmanager
-def served(folder: Path, winches: str = "A") -> Iterator[Served]:
-    """The shipped spiral bench without its instruments, with as many winches as asked for."""
+def served(folder: Path, winches: str = "A", *, paced: bool = False) -> Iterator[Served]:
+    """The shipped spiral bench without its instruments, with as many winches as asked for.
+
+    In simulated time, or ``paced``: for what waits outside the simulated clock, on a socket or for
+    the reply to an SDO request.
+    """
     declared = read_simbench(catalog.find("sim", "spiral-bench"))
     one = declared.bench.winch["A"]
     bare = {
@@ -61,10 +79,32 @@ def served(folder: Path, winches: str = "A") -> Iterator[Served]:
     bus = {"can": declared.bench.bus["can"]}
     bench = replace(declared.bench, winch=bare, bus=bus, cycle=0.004 if len(bare) < 3 else 0.02)
     truth = dict.fromkeys(bare, declared.truth["A"])
-    clock = PacedClock()
-    with pytest.MonkeyPatch.context() as patch:
+    simulated = replace(declared, bench=bench, truth=truth)
+    clock: PacedClock | SimulatedClock
+    if paced:
+        clock = PacedClock()
+        opened = LiveBench(simulated, seed=1, clock=clock.simulation)
+    else:
+        clock = SimulatedClock()
+        opened = LiveBench(simulated, seed=1, simulated_time=clock)
+    with pytest.MonkeyPatch.context() as patch, opened as live:
         for module in CLOCKS:
             patch.setattr(f"{module}.MonotonicClock", lambda: clock)
-        simulated = replace(declared, bench=bench, truth=truth)
-        with LiveBench(simulated, seed=1, clock=clock.simulation) as live:
-            yield Served(live, live.write_bench_file(folder / "bench.toml"))
+        if not paced:
+            patch.setattr("time.sleep", of_commands(clock.sleep, time.sleep))
+            patch.setattr("time.monotonic", of_commands(clock.now, time.monotonic))
+        yield Served(live, live.write_bench_file(folder / "bench.toml"))
+
+
+def without_trip(bench: Served) -> Served:
+    """The same bench, reset where a trip is latched."""
+    if bench.file.with_suffix(".trip.json").exists():
+        cleared = invoke("reset", "-b", bench.file)
+        assert cleared.exit_code == 0, cleared.output
+    return bench
+
+
+def length(bench: Served, winch: str = "A") -> float:
+    """True cable length, m."""
+    with bench.live.up_to_date():
+        return bench.live.winches[winch].plant.cable_length

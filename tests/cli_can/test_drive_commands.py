@@ -15,7 +15,7 @@ from winchkit.sim.drive.nmt import NmtState
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with served(tmp_path_factory.mktemp("drive"), "AB") as running:
+    with served(tmp_path_factory.mktemp("drive"), "AB", paced=True) as running:
         yield running
 
 

@@ -1,25 +1,16 @@
-"""``move``, ``home``, ``reset``, ``stop`` and dry runs against simulated drives in real time."""
+"""``move``, ``home``, ``reset``, ``stop`` and dry runs on simulated drives in simulated time."""
 
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from can_commands import Served, invoke, served
+from can_commands import Served, invoke, length, served, without_trip
 
-from winchkit import open_bench
-from winchkit.bench.bench import Bench
-from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.programme import earlier_runs
-from winchkit.bench.remote.client import RemoteStation, attach
-from winchkit.errors import UsageError
 from winchkit.schema.programme import Programme
-
-pytestmark = pytest.mark.realtime
 
 
 @pytest.fixture(scope="module")
@@ -31,16 +22,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 @pytest.fixture
 def bench(running: Served) -> Served:
     """The served bench, without a trip that another test has left latched."""
-    if running.file.with_suffix(".trip.json").exists():
-        cleared = invoke("reset", "-b", running.file)
-        assert cleared.exit_code == 0, cleared.output
-    return running
-
-
-def length(bench: Served, winch: str = "A") -> float:
-    """True cable length, m."""
-    with bench.live.up_to_date():
-        return bench.live.winches[winch].plant.cable_length
+    return without_trip(running)
 
 
 def test_move_to_and_by(bench: Served) -> None:
@@ -246,61 +228,9 @@ def test_earlier_runs_of_a_programme_are_not_written_over(bench: Served, tmp_pat
     assert {path.read_text() for path in runs.iterdir()} == {"precious"}
 
 
-def test_who_attaches_does_the_same_through_the_owner(bench: Served) -> None:
-    with open_bench(bench.file) as opened, owned(opened) as station:
-        with pytest.raises(UsageError, match="either to a cable length or by a change"):
-            station.move("A", None, None)
-        station.move("all", None, 0.05, 0.3)
-        while station.moving("all"):
-            time.sleep(0.02)
-        assert [item.winch for item in station.scan()] == ["A", "B"]
-        assert {item.heartbeat for item in station.scan()} == {"operational"}
-        told = station.upload("A", 0x6007, 0)
-        assert told is not None
-        assert told[0] == bench.number(0x6007)
-        assert station.upload("A", 0x5FFF, 0) is None
-        # The other commands of this process go through the owner as well.
-        assert "mode CSV" in invoke("info", "A", "-b", bench.file).stdout
-        refused = invoke("config", "store", "A", "-b", bench.file, "--yes")
-        assert refused.exit_code == 5
-        assert "is owned by another process" in refused.stderr
-        lss = invoke("lss", "list", "-b", bench.file)
-        assert lss.exit_code == 5
-
-
-def test_whoever_goes_away_during_a_homing_stops_it(bench: Served) -> None:
-    with open_bench(bench.file) as opened, owned(opened) as station:
-        begun = length(bench, "B")
-        station.home("B", 33, None, 0.05)
-        while abs(length(bench, "B") - begun) < 5e-3:
-            assert station.homing()
-            time.sleep(0.01)
-        station.close()
-        deadline = time.monotonic() + 10
-        while opened.axes["B"].mode != "CSV":
-            assert time.monotonic() < deadline, "it is still in HM"
-            time.sleep(0.02)
-        assert opened.winch["B"].snapshot.phase is Phase.DISABLED
-        assert length(bench, "B") == pytest.approx(begun, abs=0.2)
-
-
-@contextmanager
-def owned(bench: Bench) -> Iterator[RemoteStation]:
-    """A station as another process would have it."""
-    station = attach(bench.spec)
-    assert station is not None
-    try:
-        yield station
-    finally:
-        station.close()
-
-
 def test_stop_says_in_json_who_has_confirmed(bench: Served) -> None:
     alone = invoke("stop", "-b", bench.file, "--json")
     assert alone.exit_code == 0, alone.output
     told = {item["winch"]: item for item in json.loads(alone.stdout)["stopped"]}
     assert set(told) == {"A", "B"}
     assert all(item["confirmed"] for item in told.values())
-    with open_bench(bench.file) as opened, owned(opened):
-        through = invoke("stop", "-b", bench.file)
-        assert through.stdout.count("the bench's owner confirms it at rest") == 2
