@@ -59,10 +59,11 @@ DISK_FULL = "disk full"
 OWNER_FAULTS = ("SIGKILL", "SIGSTOP", "loop hung", "key repeat stalled", DISK_FULL)
 FAULTS = (*OWNER_FAULTS, *COMMAND_FAULTS)
 RAMPED = DEAD_MAN + SPEED / ACCELERATION + FIRST_STOP + SETTLING
-RAMP_ENDS = 15.0
-"""Of the motor, rad/s: a drive may be disabled while it creeps."""
-RAMP_RATE = ACCELERATION / 0.06 * 20.4
-"""Of the motor, rad/s^2: by so much its speed changes while this process is late."""
+RAMP_ENDS = 1.0
+"""Of the motor, rad/s: a drive is disabled at rest, below the resolution of 606Ch."""
+UNANSWERED = 5 * 0.004
+"""s: where this process, and with it the drive, is late by five cycles, a ramp rightly ends in a
+quick stop (docs/safety.md)."""
 MOVES_ON = 2.0
 """Beside a full disk, s: longer than a log takes to find it."""
 DISK = "512k"
@@ -148,8 +149,8 @@ def command_trial(running: SlavesOnBus, bench_file: Path, fault: str, moment: fl
         commands.inject()
         rest, seen = until_rest(running)
         problems = list(commands.problems(running.worst_gap))
-    late = RAMP_ENDS + RAMP_RATE * running.worst_gap
-    if seen.get(State.QUICK_STOP, 0.0) > late:
+    answered = running.worst_gap < UNANSWERED
+    if answered and seen.get(State.QUICK_STOP, 0.0) > RAMP_ENDS:
         problems.append(f"quick stop at {seen[State.QUICK_STOP]:.1f} rad/s and not the ramp")
     return Stop(fault, rest, RAMPED, running.worst_gap, tuple(problems))
 

@@ -78,11 +78,11 @@ def test_no_stop_takes_an_energising_transition_with_any_605a(
     word = previous
     for cycle in range(30):
         known, state, moving = seen[0]
-        fresh = cycle - known <= 1
-        word = control_word(state, wish, previous=word, fresh=fresh, at_rest=not moving)
+        age = cycle - known
+        word = control_word(state, wish, previous=word, age=age, at_rest=not moving)
         if word & 0x0F == 0x0F:
             assert wish in (Wish.RUN_DOWN, Wish.HALT)
-            assert fresh
+            assert age <= 5
             assert state is State.OPERATION_ENABLED
         drive.take(word)
         if cycle not in lost:
@@ -120,7 +120,7 @@ def test_a_quick_stop_that_stays_is_left_downwards_only(option: int, delay: int)
     word = 0x0F
     for _ in range(20):
         state, moving = seen.popleft()
-        word = control_word(state, Wish.DISABLE, previous=word, fresh=True, at_rest=not moving)
+        word = control_word(state, Wish.DISABLE, previous=word, at_rest=not moving)
         drive.take(word)
         seen.append((drive.state, drive.moving))
     assert drive.taken == [11, 12]

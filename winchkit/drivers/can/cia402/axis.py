@@ -330,7 +330,7 @@ class Cia402Axis:
             self.state,
             wish,
             previous=self._previous,
-            fresh=feedback.sync >= self._cycle[0] - 1,
+            age=self._cycle[0] - feedback.sync,
             at_rest=self.at_rest,
         )
         command = Command(wish, velocity, angle, torque, start)

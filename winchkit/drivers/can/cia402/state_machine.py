@@ -127,6 +127,10 @@ _STATUS: tuple[tuple[int, int, State], ...] = (
 _ENABLING = {
     row.source: row.control for row in TRANSITIONS if row.number in (2, 3, 4) and row.control
 } | {State.OPERATION_ENABLED: ENABLE_OPERATION}
+_FRESH = 1
+"""A status word of the SYNC before is the newest where the answer to this one is on its way."""
+_RAMP_AGE = 5
+"""SYNCs. A ramp survives late or lost answers as long as motion does (condition ``feedback``)."""
 _STAYING = {Wish.RUN_DOWN: ENABLE_OPERATION, Wish.HALT: ENABLE_OPERATION | HALT}
 
 
@@ -153,7 +157,7 @@ def state_of(status: int) -> State:
 
 
 def control_word(
-    state: State, wish: Wish, *, previous: int = 0, fresh: bool = True, at_rest: bool = False
+    state: State, wish: Wish, *, previous: int = 0, age: int = 0, at_rest: bool = False
 ) -> int:
     """Control word 6040h that leads from ``state`` towards ``wish``.
 
@@ -162,12 +166,14 @@ def control_word(
 
     ``previous`` is the word sent last: a fault reset is an edge of bit 7, and a ramp is not taken
     up again after a quick stop, which 0Fh would revoke in a drive that stays in quick stop active
-    (605Ah from 5) while an older status word still says enabled. ``fresh`` says whether the state
-    comes from a status word of this SYNC, ``at_rest`` whether the motor stands still.
+    (605Ah from 5) while an older status word still says enabled. ``age`` is the age of the status
+    word in SYNCs, ``at_rest`` says whether the motor stands still.
     """
+    fresh = age <= _FRESH
     if wish is Wish.ENABLE and state in _ENABLING:
         return _ENABLING[state]
-    if fresh and state is State.OPERATION_ENABLED and wish in _STAYING and _enables(previous):
+    stays = wish in _STAYING and state is State.OPERATION_ENABLED and age <= _RAMP_AGE
+    if stays and _enables(previous):
         return _STAYING[wish]
     if fresh and state is State.FAULT and wish is Wish.RESET and not previous & FAULT_RESET:
         return FAULT_RESET
