@@ -53,6 +53,7 @@ class Commands:
         self._jog: subprocess.Popen[bytes] | None = None
         self._words = ("jog", "A", "-b", bench_file)
         self._speed = f"{speed} m/s"
+        self._owner: int | None = None
 
     def __enter__(self) -> Commands:
         return self
@@ -87,6 +88,7 @@ class Commands:
         jog = self._jog
         if not self._until(lambda: self._hold() and (moving() or jog.poll() is not None)):
             raise NotMoving("the winch did not move within 30 s")
+        self._owner = owner_process(read_bench(self._bench_file))
         end = time.monotonic() + moment
         while time.monotonic() < end:
             self._hold()
@@ -103,9 +105,8 @@ class Commands:
             os.close(self._terminal)
             self._terminal = None
         elif "bench process" in self._fault:
-            process = owner_process(read_bench(self._bench_file))
-            assert process is not None, "the bench process has written it"
-            os.kill(process, number)
+            assert self._owner is not None, "the bench process has written it"
+            os.kill(self._owner, number)
         else:
             os.kill(self._jog.pid, number)
 

@@ -67,6 +67,8 @@ quick stop (docs/safety.md)."""
 MOVES_ON = 2.0
 """Beside a full disk, s: longer than a log takes to find it."""
 DISK = "512k"
+PRIORITY = 60
+"""Of the slave under SCHED_FIFO: above the bench's."""
 
 
 class OwnerStopped(Exception):
@@ -260,7 +262,7 @@ def case(bench_file: Path, text: str, port: int, fault: str, moment: float) -> S
         # A trip of the case before is none of this one's.
         bench_file.with_name("bench.trip.json").unlink(missing_ok=True)
         slaves = [Slave.from_file(GENERIC, 1)]
-        with SlavesOnBus(slaves, GROUP, "udp_multicast", port=port) as running:
+        with SlavesOnBus(slaves, GROUP, "udp_multicast", port=port, priority=PRIORITY) as running:
             try:
                 if fault in COMMAND_FAULTS:
                     return command_trial(running, bench_file, fault, moment)

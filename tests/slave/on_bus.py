@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import can
 
@@ -19,7 +21,8 @@ _WAIT = 5e-4
 class SlavesOnBus:
     """Runs slaves on a channel until closed; a context manager.
 
-    Hold ``lock`` to look at a slave or to inject a fault.
+    Hold ``lock`` to look at a slave or to inject a fault. With a ``priority`` the thread runs under
+    SCHED_FIFO where that is permitted, as a drive does not wait for the computer of its bench.
     """
 
     def __init__(
@@ -29,12 +32,14 @@ class SlavesOnBus:
         interface: str = "virtual",
         clock: Callable[[], float] = time.monotonic,
         port: int | None = None,
+        priority: int | None = None,
     ) -> None:
         self.slaves = slaves
         self.lock = threading.RLock()
         self.heard: list[tuple[float, Frame]] = []
         """Every frame from the bus with its time."""
         self._clock = clock
+        self._priority = priority
         self.worst_gap = 0.0
         """Longest time between two turns of the thread, s: this computer was busy elsewhere."""
         options = {} if port is None else {"port": port}
@@ -62,6 +67,9 @@ class SlavesOnBus:
             self.slaves[slave].mend(name)
 
     def _run(self) -> None:
+        if self._priority is not None:
+            with suppress(PermissionError):
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(self._priority))
         last = self._clock()
         while not self._stopping.is_set():
             message = self._bus.recv(_WAIT)
