@@ -36,11 +36,11 @@ class Measured:
     swivel: Array
     """(p, n), rad, each line with a zero of its own."""
     cable_length: Array
-    """By an instrument at the rope, (p, n), m, each with an offset of its own."""
+    """By an instrument at the cable, (p, n), m, each with an offset of its own."""
     tension: Array
     """(p, n), N."""
     temperature: Array
-    """Of the ropes, (p, n), degrees Celsius."""
+    """Of the cables, (p, n), degrees Celsius."""
     run: NDArray[np.intp]
     """Which of the runs each pose is from, (p,)."""
     place: NDArray[np.str_]

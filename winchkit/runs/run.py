@@ -79,7 +79,7 @@ class Run:
 
     @property
     def load_mass(self) -> float | None:
-        """The known weight on the rope, kg, from the metadata ``load_mass``."""
+        """The known weight on the cable, kg, from the metadata ``load_mass``."""
         text = self.metadata.get("load_mass")
         return None if text is None else parse(text, "mass")
 

@@ -164,7 +164,7 @@ class CyclicVelocity(SetPoints):
     """CSV: target velocity 60FFh and its offset 60B1h.
 
     ``smoothing`` (s) averages the targets, as drives can: it keeps the jitter of a master's
-    cycle out of the rope.
+    cycle out of the cable.
     """
 
     cyclic = True

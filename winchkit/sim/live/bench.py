@@ -102,7 +102,7 @@ class LiveBench:
     # What a user does.
 
     def write_bench_file(self, path: str | Path) -> Path:
-        """Write the wiring file to connect to; returns its path."""
+        """Write the bench file to connect to; returns its path."""
         return write_bench(self.bench_spec, Path(path))
 
     def answer(self, step: Step) -> None:

@@ -1,4 +1,4 @@
-"""Writes the wiring file of a live simulated bench."""
+"""Writes the bench file of a live simulated bench."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Talks to a simulated bench in another process, found beside its wiring file.
+"""Talks to a simulated bench in another process, found beside its bench file.
 
 ``winchkit sim serve`` writes ``BENCH.toml.sim`` next to ``BENCH.toml``: the host and port on
 which it takes lines such as ``load A 32 kg``. No file, no simulation.
@@ -20,13 +20,13 @@ _TIMEOUT = 5.0
 
 
 def address_file(bench_file: str | Path) -> Path:
-    """Where the address of the simulation behind a wiring file stands."""
+    """Where the address of the simulation behind a bench file stands."""
     path = Path(bench_file)
     return path.with_name(path.name + ".sim")
 
 
 def is_simulated(bench_file: str | Path) -> bool:
-    """Whether ``sim serve`` wrote this wiring file and has not ended."""
+    """Whether ``sim serve`` wrote this bench file and has not ended."""
     return address_file(bench_file).is_file()
 
 

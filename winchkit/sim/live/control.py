@@ -17,7 +17,7 @@ __all__ = ["HELP", "ControlServer", "obey"]
 
 HELP = """\
 load WINCH MASS     hang another load, e.g. load A 32 kg (WINCH may be all)
-warm WINCH TEMP     bring rope and machine to a temperature, e.g. warm A 35 degC
+warm WINCH TEMP     bring cable and machine to a temperature, e.g. warm A 35 degC
 fault TARGET KIND   make a device go wrong, e.g. fault A.cell silence
 recover TARGET      end its lasting faults, e.g. recover A.cell
 status              what is true now

@@ -42,7 +42,7 @@ def instruments_of(
 
 
 def device_of(ref: DeviceRef, beside: str) -> tuple[Path, DeviceSpec]:
-    """The device file that a wiring file refers to, and where it stands."""
+    """The device file that a bench file refers to, and where it stands."""
     from winchkit.schema.read import read_device
 
     path = find("devices", ref.device, beside=beside or None)

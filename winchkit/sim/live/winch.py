@@ -29,7 +29,7 @@ _QUANTITIES = {
     "length": "cable_length",
     "temperature": "temperature",
 }
-"""What the instrument in each role of a wiring file measures."""
+"""What the instrument in each role of a bench file measures."""
 _SMOOTHING = 0.024
 """Set-point filter of the drives, s: an ordinary computer's cycle jitters by a millisecond."""
 _TO_ALL, _NODE = 0x080, 0x07F
@@ -42,7 +42,7 @@ _AT_REST = 0.5
 
 
 class LiveWinch:
-    """Advances drive, rope and instruments together; not safe for threads by itself."""
+    """Advances drive, cable and instruments together; not safe for threads by itself."""
 
     def __init__(
         self,
@@ -118,7 +118,7 @@ class LiveWinch:
         self.plant.hang(mass)
 
     def warm(self, temperature: float) -> None:
-        """Bring rope and machine to a temperature (degC); NotPermitted while the winch moves."""
+        """Bring cable and machine to a temperature (degC); NotPermitted while the winch moves."""
         self._at_rest("the temperature")
         self.plant.warm(temperature)
 

@@ -35,7 +35,7 @@ _MOTOR_STANDSTILL = 0.5
 
 
 def rope_direction(state: State) -> float:
-    """Direction of the rope, +1 winding in, smooth within about 1 mm/s of standstill."""
+    """Direction of the cable, +1 winding in, smooth within about 1 mm/s of standstill."""
     return tanh(state.rope_speed / _ROPE_STANDSTILL)
 
 
@@ -81,7 +81,7 @@ class Physics:
         raise NotImplementedError
 
     def stretch(self, state: State, dt: float) -> float:
-        """Length added to the rope that is no linear spring, m."""
+        """Length added to the cable that is no linear spring, m."""
         raise NotImplementedError
 
     def weight(self, state: State) -> float:
@@ -97,7 +97,7 @@ class Physics:
         raise NotImplementedError
 
     def gear(self, state: State, torque: float) -> float:
-        """Torque at the motor that carries ``torque`` of the rope, N m."""
+        """Torque at the motor that carries ``torque`` of the cable, N m."""
         raise NotImplementedError
 
     def motor(self, state: State) -> float:

@@ -1,4 +1,4 @@
-"""Physics of the rope and what carries it: stretch, creep, heat, weight, frame."""
+"""Physics of the cable and what carries it: stretch, creep, heat, weight, frame."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _WARM = 20.0
 
 @dataclass
 class ElasticRope(Physics):
-    """The rope is a spring of stiffness EA over all of its stressed length."""
+    """The cable is a spring of stiffness EA over all of its stressed length."""
 
     axial_stiffness: PositiveForce = 300e3
     size: ClassVar[str] = "axial_stiffness"
@@ -43,7 +43,7 @@ class ElasticRope(Physics):
 
 @dataclass
 class SoftFrame(Physics):
-    """The frame yields, however long the rope is."""
+    """The frame yields, however long the cable is."""
 
     stiffness: Stiffness = 60e3
     size: ClassVar[str] = "stiffness"
@@ -56,7 +56,7 @@ class SoftFrame(Physics):
 
 @dataclass
 class WarmRope(Physics):
-    """The rope lengthens with temperature above 20 degC."""
+    """The cable lengthens with temperature above 20 degC."""
 
     expansion: Expansion = 1.1e-5
     size: ClassVar[str] = "expansion"
@@ -109,11 +109,11 @@ class LaggingRope(Physics):
 
 @dataclass
 class HeavyRope(Physics):
-    """The hanging rope weighs on everything above the platform."""
+    """The hanging cable weighs on everything above the platform."""
 
     mass_per_length: LinearDensity = 0.15
     size: ClassVar[str] = "mass_per_length"
 
     def weight(self, state: State) -> float:
-        """Weight of the free rope along its slope."""
+        """Weight of the free cable along its slope."""
         return self.mass_per_length * GRAVITY * state.unstrained * sin(state.inclination)

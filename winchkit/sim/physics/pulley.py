@@ -42,7 +42,7 @@ class StickyPulleys(Physics):
 
 @dataclass
 class PreslidingPulleys(Physics):
-    """Friction that gives elastically before it slides: Dahl, over the rope's travel."""
+    """Friction that gives elastically before it slides: Dahl, over the cable's travel."""
 
     friction: Number = 0.012
     stiffness: Stiffness = 500.0
@@ -89,11 +89,11 @@ class CreepPulleys(Physics):
 
 @dataclass
 class HeavyPulleys(Physics):
-    """Inertia of the sheaves, as a mass that moves with the rope."""
+    """Inertia of the sheaves, as a mass that moves with the cable."""
 
     equivalent_mass: Mass = 1.0
     size: ClassVar[str] = "equivalent_mass"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Force proportional to the rope's acceleration."""
+        """Force proportional to the cable's acceleration."""
         return self.equivalent_mass * state.rope_acceleration

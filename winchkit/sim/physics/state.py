@@ -24,12 +24,12 @@ class State:
     wound_angle: float = 0.0
     """Total on the drum, rad."""
     arm: float = 0.0
-    """Rope wound in per motor radian, m/rad, signed."""
+    """Cable wound in per motor radian, m/rad, signed."""
     rope_speed: float = 0.0
     """Positive winds in, m/s."""
     rope_acceleration: float = 0.0
     unstrained: float = 0.0
-    """Free rope as it comes off the drum, before it stretches, m."""
+    """Free cable as it comes off the drum, before it stretches, m."""
     dead_length: float = 0.0
     inclination: float = 0.0
     cable_length: float = 0.0

@@ -97,7 +97,7 @@ def _in_order(pieces: Iterable[Physics]) -> list[Physics]:
 
 
 def declared(profile: WinchProfile, pieces: Sequence[Physics]) -> list[Physics]:
-    """Add what the profile itself declares by shorthand: elastic rope, its weight, efficiency."""
+    """Add what the profile itself declares by shorthand: elastic cable, its weight, efficiency."""
     own: list[Physics] = []
     if profile.cable.axial_stiffness is not None:
         own.append(rope.ElasticRope(profile.cable.axial_stiffness))

@@ -87,7 +87,7 @@ class EccentricDrum(Physics):
 
 @dataclass
 class GuideOffset(Physics):
-    """The guide stands off the rope's place on the drum, so the rope takes a longer way."""
+    """The guide stands off the cable's place on the drum, so the cable takes a longer way."""
 
     offset: Length = 0.03
     mismatch: Length = 0.002

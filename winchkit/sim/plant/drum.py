@@ -1,4 +1,4 @@
-"""Laws of the drum: rope wound over the total wound angle, and back; plain floats."""
+"""Laws of the drum: cable wound over the total wound angle, and back; plain floats."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ __all__ = ["Drum", "drum_of"]
 
 _TURN = 2 * pi
 CLIMB = 0.1
-"""Angle over which a rope climbs to the next turn of a spiral, rad; Eq. 2 has it in a point."""
+"""Angle over which a cable climbs to the next turn of a spiral, rad; Eq. 2 has it in a point."""
 
 
 class Drum(ABC):
-    """Rope on a drum: all angles are the total wound angle in rad, all lengths in m."""
+    """Cable on a drum: all angles are the total wound angle in rad, all lengths in m."""
 
     @abstractmethod
     def wound(self, angle: float) -> tuple[float, float]:

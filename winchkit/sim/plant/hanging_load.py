@@ -10,7 +10,7 @@ from winchkit.sim.physics.state import GRAVITY
 __all__ = ["HangingLoad"]
 
 _DAMPING_RATIO = 0.4
-"""Of a fibre rope with its load; a steel rope would swing for longer."""
+"""Of a fibre cable with its load; a steel cable would swing for longer."""
 _STIFF = 1.0
 """A spring of a natural angular frequency above this, in 1/step, is followed without its swing."""
 
@@ -28,16 +28,16 @@ class HangingLoad:
     """At the platform, N."""
 
     def rest(self, rope_end: float, compliance: float) -> None:
-        """Hang still below a rope that ends at ``rope_end`` while unloaded."""
+        """Hang still below a cable that ends at ``rope_end`` while unloaded."""
         self.tension = self.mass * GRAVITY
         self.position = rope_end + compliance * self.tension
         self.speed = 0.0
 
     def step(self, rope_end: float, rope_speed: float, compliance: float, dt: float) -> None:
-        """Advance by ``dt`` s to a rope that ends at ``rope_end``, sinking at ``rope_speed``.
+        """Advance by ``dt`` s to a cable that ends at ``rope_end``, sinking at ``rope_speed``.
 
         The spring-damper is stepped by the trapezoidal rule, solved in closed form; a slack
-        rope lets the load fall freely.
+        cable lets the load fall freely.
         """
         mass = self.mass
         if compliance * mass < (dt / _STIFF) ** 2:
@@ -59,7 +59,7 @@ class HangingLoad:
         self.tension = tension
 
     def _follow(self, rope_end: float, rope_speed: float, compliance: float, dt: float) -> None:
-        """A rope too stiff to swing: the load moves with it, and is never pushed."""
+        """A cable too stiff to swing: the load moves with it, and is never pushed."""
         self.tension = max(0.0, self.mass * (GRAVITY - (rope_speed - self.speed) / dt))
         self.speed = rope_speed
         self.position = rope_end + compliance * self.tension

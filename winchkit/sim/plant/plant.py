@@ -1,4 +1,4 @@
-"""One simulated winch with its rope, pulleys, load and instruments, integrated in time."""
+"""One simulated winch with its cable, pulleys, load and instruments, integrated in time."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class WinchPlant:
 
     @property
     def load_mass(self) -> float:
-        """What hangs on the rope, kg."""
+        """What hangs on the cable, kg."""
         return self._load.mass
 
     @property
@@ -182,7 +182,7 @@ class WinchPlant:
         state.motor_speed = state.motor_acceleration = 0.0
         state.rope_speed = state.rope_acceleration = 0.0
         state.load_mass = load.mass
-        # Compliance needs the rope's end and a stretch may need the tension: settle in two goes.
+        # Compliance needs the cable's end and a stretch may need the tension: settle in two goes.
         for _ in range(2):
             self._wind(0.0)
             compliance = sum(hook(state) for hook in self._compliance)
@@ -223,7 +223,7 @@ class WinchPlant:
         self._sense(dt)
 
     def _wind(self, dt: float) -> float:
-        """Motor angle to unstrained rope; returns the speed at which it is wound in."""
+        """Motor angle to unstrained cable; returns the speed at which it is wound in."""
         state, chain = self._state, self._kinematics
         slope, rate = 1.0, 0.0
         state.drum_angle = (state.motor_angle - chain.motor_reference) * chain.gain
