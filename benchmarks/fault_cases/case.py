@@ -44,7 +44,7 @@ class Case:
     """Whether a reset is tried while the fault lasts."""
     real_time: bool = False
     independent: bool = False
-    """Whether the slaves of ``tests/slave`` are its drives."""
+    """Whether the slaves of ``tests/support/slave`` are its drives."""
 
 
 def cases(number: int, seed: int, *, real_time_share: float = 0.0) -> list[Case]:

@@ -13,6 +13,8 @@ from fault_cases.world import LIMITS, Sample
 
 __all__ = ["Verdict", "judge"]
 
+_STALLS = {"computer stalls 0.1 s": 0.1, "computer stalls 0.5 s": 0.5}
+"""s."""
 _MOVES = 0.004
 """Cable speed above which a winch moves, m/s."""
 _SETTLES = 0.05
@@ -77,12 +79,33 @@ def _must_stop(record: Record) -> tuple[float, float] | None:
     found = []
     for planned, onset in record.onsets:
         kind = KINDS[planned.kind]
-        if not kind.stops or (planned.span is not None and planned.span < kind.least):
+        if not kind.stops or _span(record, planned, onset) < kind.least:
             continue
         start = _crossing(record, planned, kind, onset)
         if start is not None:
-            found.append((start, kind.bound))
+            found.append((start, _bound(record, start, kind.bound)))
     return min(found, key=sum, default=None)
+
+
+def _span(record: Record, planned: Planned, onset: float) -> float:
+    """How long a fault lasted, s: until its own end, or that of another fault of the same part."""
+    part = KINDS[planned.kind].part
+    own = math.inf if planned.span is None else planned.span
+    ends = [
+        moment - onset
+        for other, winch, moment in record.recoveries
+        if part and other == part and moment >= onset and (part == "line" or winch == planned.winch)
+    ]
+    return min([own, *ends])
+
+
+def _bound(record: Record, start: float, bound: float) -> float:
+    """A bound that ends while the computer stands still is that of the drives' own watchdogs."""
+    for planned, onset in record.onsets:
+        stall = _STALLS.get(planned.kind, 0.0)
+        if onset < start + bound < onset + stall:
+            bound = max(bound, onset + KINDS["computer stalls 0.5 s"].bound - start)
+    return bound
 
 
 def _crossing(record: Record, planned: Planned, kind: Kind, onset: float) -> float | None:
@@ -127,7 +150,8 @@ def _judge_stop(record: Record, reference: tuple[float, float] | None) -> tuple[
 def _judge_release(record: Record) -> str:
     """After the release, and after a dead-man that was released, everything comes to rest."""
     moments = [record.released] if record.case.motion == "jog" else []
-    moments += [onset for planned, onset in record.onsets if planned.kind == "released"]
+    if record.case.motion == "jog":  # a move and a programme hold no key
+        moments += [onset for planned, onset in record.onsets if planned.kind == "released"]
     for moment in moments:
         for name, samples in record.truth.items():
             before = _between(samples, moment - 0.05, moment + _DEAD_MAN + 0.15)

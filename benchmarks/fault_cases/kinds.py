@@ -45,6 +45,8 @@ class Kind:
     """``in`` or ``out`` where it can only happen in that direction."""
     real_time: bool = True
     """Whether it can be made in real time."""
+    part: str = ""
+    """What recovers where a fault of it ends, from its other faults too: servo, cell, line."""
 
 
 def _nothing() -> None:
@@ -209,7 +211,7 @@ _WIRES = ("nmt", "boot-up", "heartbeat", "feedback", "state", "fault", "deaf")
 _LOST = ("feedback", "heartbeat", "state", "fault", "nmt", "slowing down", "deviation", "deaf")
 
 _ROWS = (
-    Kind("enable input open", _drive("enable input open"), ("state",), least=0.0),
+    Kind("enable input open", _drive("enable input open"), ("state",), least=0.0, part="servo"),
     Kind("second master: 6040h = 00h", _write(0x6040, 2, 0x00), _MASTER, least=0.0),
     Kind("second master: 6040h = 06h", _write(0x6040, 2, 0x06), _MASTER, least=0.0),
     Kind("second master: 6040h = 02h", _write(0x6040, 2, 0x02), _MASTER, least=0.0),
@@ -218,26 +220,41 @@ _ROWS = (
     Kind("stranger: NMT stopped", _nmt(0x02), ("second master", *_WIRES), least=0.0),
     Kind("stranger: NMT reset node", _nmt(0x81), ("second master", *_WIRES), least=0.0),
     Kind("stranger: NMT reset communication", _nmt(0x82), ("second master", *_WIRES), least=0.0),
-    Kind("reboot", _drive("reboot"), _WIRES, least=0.0),
+    Kind("reboot", _drive("reboot"), _WIRES, least=0.0, part="servo"),
     Kind("RPDO 1 lost", _lost(0x200), _LOST, stops=False),
     Kind("RPDOs lost", _lost(0x200, 0x300, 0x400, 0x500), _LOST, stops=False),
     Kind("TPDOs lost", _lost(0x180, 0x280, 0x380, 0x480), _LOST, least=_COMMUNICATION),
     Kind("SYNC lost", _lost(shared=(0x080,)), _LOST, least=_COMMUNICATION),
-    Kind("drive's heartbeat lost", _drive("heartbeat stop"), ("heartbeat",), least=0.2),
+    Kind(
+        "drive's heartbeat lost", _drive("heartbeat stop"), ("heartbeat",), least=0.2, part="servo"
+    ),
     Kind("host's heartbeat lost", _host_heartbeat, _LOST, least=0.2),
     Kind("host frames lost", _host_frames, _LOST, least=0.2),
     Kind("cut wire", _cut, _LOST, least=0.2),
-    Kind("drive silent", _drive("silence"), _LOST, least=0.2),
-    Kind("PDO mapping lost", _drive("map lost"), _LOST, least=0.0),
+    Kind("drive silent", _drive("silence"), _LOST, least=0.2, part="servo"),
+    Kind("PDO mapping lost", _drive("map lost"), _LOST, least=0.0, part="servo"),
     *(
-        Kind(f"drive fault: {kind}", _drive(kind), ("fault", "state"), least=0.0)
+        Kind(f"drive fault: {kind}", _drive(kind), ("fault", "state"), least=0.0, part="servo")
         for kind in ("over-current", "over-temperature", "encoder", "following error")
     ),
-    Kind("cell silent", _cell("silence"), ("cell stale",), _CELL_AGE + _BYTES, least=0.5),
-    Kind("cell refuses", _cell("exception"), ("cell stale",), _CELL_AGE + _BYTES, least=0.5),
-    Kind("cell broken", _cell("sensor break"), ("cell", "cell stale"), 0.15, least=0.2),
-    Kind("cell overloaded", _cell("overload"), ("cell", "cell stale"), 0.15, least=0.2),
-    Kind("cell frozen", _cell("frozen"), ("cell frozen", "frozen"), stops=False),
+    Kind(
+        "cell silent", _cell("silence"), ("cell stale",), _CELL_AGE + _BYTES, least=0.5, part="cell"
+    ),
+    Kind(
+        "cell refuses",
+        _cell("exception"),
+        ("cell stale",),
+        _CELL_AGE + _BYTES,
+        least=0.5,
+        part="cell",
+    ),
+    Kind(
+        "cell broken", _cell("sensor break"), ("cell", "cell stale"), 0.15, least=0.2, part="cell"
+    ),
+    Kind(
+        "cell overloaded", _cell("overload"), ("cell", "cell stale"), 0.15, least=0.2, part="cell"
+    ),
+    Kind("cell frozen", _cell("frozen"), ("cell frozen", "frozen"), stops=False, part="cell"),
     Kind(
         "cell: wrong unit",
         _reply(lambda data: data[:6] + bytes((data[6] ^ 0x20,)) + data[7:]),
@@ -245,6 +262,7 @@ _ROWS = (
         _CELL_AGE + _BYTES,
         least=0.5,
         real_time=False,
+        part="line",
     ),
     Kind(
         "cell: wrong transaction",
@@ -253,6 +271,7 @@ _ROWS = (
         _CELL_AGE + _BYTES,
         least=0.5,
         real_time=False,
+        part="line",
     ),
     Kind(
         "cell: short",
@@ -261,6 +280,7 @@ _ROWS = (
         _CELL_AGE + _BYTES,
         least=0.5,
         real_time=False,
+        part="line",
     ),
     Kind(
         "over-tension",

@@ -40,6 +40,8 @@ class Record:
     """Frames of strangers that the drive did not hear; the host hears them and stops it."""
     frames: list[tuple[tuple[Planned, float], Strange]] = field(default_factory=list)
     """The stranger's frame of a fault that is one."""
+    recoveries: list[tuple[str, str, float]] = field(default_factory=list)
+    """Part, winch and moment of each end of a fault before the mending, s."""
     mended: float = 0.0
     reset: float = math.inf
     """When the first reset that succeeded began, or the last one, s."""
@@ -160,7 +162,11 @@ def _schedule(
         if fault.span is None:
             ends.append(end)
         else:
-            world.call_at(world.now + fault.span, end)
+            world.call_at(world.now + fault.span, partial(finish, fault, end))
+
+    def finish(fault: Planned, end: Callable[[], None]) -> None:
+        end()
+        record.recoveries.append((KINDS[fault.kind].part, fault.winch, world.now))
 
     for fault in record.case.faults:
         world.call_at(record.begun + fault.at, lambda fault=fault: begin(fault))  # type: ignore[misc]
