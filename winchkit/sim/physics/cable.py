@@ -1,4 +1,4 @@
-"""Physics of the cable and what carries it: stretch, creep, heat, weight, frame."""
+"""Physics of the cable and the frame: elongation, creep, thermal expansion, weight."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ElasticRope(Physics):
 
 @dataclass
 class SoftFrame(Physics):
-    """The frame yields, however long the cable is."""
+    """The frame is compliant, independent of the cable length."""
 
     stiffness: Stiffness = 60e3
     size: ClassVar[str] = "stiffness"
@@ -86,7 +86,7 @@ class CreepingRope(Physics):
 
 @dataclass
 class LaggingRope(Physics):
-    """Inner friction of the strands holds back strain: a loop of strain over tension.
+    """Internal friction of the strands withholds strain: a hysteresis of strain over tension.
 
     The friction takes half of a change of tension from rest, all of it after a full reversal,
     and at most ``fraction`` of the tension.
@@ -100,7 +100,7 @@ class LaggingRope(Physics):
     _SLOPE: ClassVar[float] = 0.5
 
     def stretch(self, state: State, dt: float) -> float:
-        """Strain that the friction holds back, over the stressed length; a Dahl law in tension."""
+        """Strain withheld by friction, times the stressed length; a Dahl law in tension."""
         change = 0.0 if self._before is None else state.load - self._before
         self._before = state.load
         self._held = relax(self._held, change, self.fraction * state.load, self._SLOPE, 1.0)
@@ -109,7 +109,7 @@ class LaggingRope(Physics):
 
 @dataclass
 class HeavyRope(Physics):
-    """The hanging cable weighs on everything above the platform."""
+    """Weight of the free cable."""
 
     mass_per_length: LinearDensity = 0.15
     size: ClassVar[str] = "mass_per_length"
