@@ -43,6 +43,7 @@ def test_a_thread_that_waits_for_the_processor_shows() -> None:
     assert float(run.stdout) > 0.05
 
 
+@pytest.mark.realtime
 def test_processor_time_and_locks_of_the_program_are_no_stall(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
