@@ -94,7 +94,7 @@ class Series:
     """Samples of one source, kept as long as the interpolation needs them."""
 
     def __init__(self, max_gap: float, width: int = 1) -> None:
-        """``width`` values per sample; intervals above ``max_gap`` (s) are not interpolated."""
+        """``width`` values per sample; intervals above ``max_gap`` (s) are gaps."""
         self._max_gap = max_gap
         self._times: Array = np.empty(0)
         self._values: Array = np.empty((0, width))
@@ -105,7 +105,7 @@ class Series:
         return float(self._times[-1]) if len(self._times) else -np.inf
 
     def append(self, times: Array, values: Array) -> None:
-        """Add samples, values (n, width); samples that are not newer than all before are skipped."""
+        """Add samples, values (n, width); samples not newer than all before are skipped."""
         newer = rising(times, self.last)
         self._times = np.concatenate([self._times, times[newer]])
         self._values = np.concatenate([self._values, values[newer]])
@@ -115,7 +115,7 @@ class Series:
         return self.last >= time
 
     def at(self, moments: Array) -> Array:
-        """Values at moments, shape (m, width); see :func:`values_at`."""
+        """Values at times, shape (m, width); see :func:`values_at`."""
         return values_at(self._times, self._values, moments, self._max_gap)
 
     def forget(self, before: float) -> None:
@@ -143,7 +143,7 @@ class Aligner:
         self._moments: Array = np.empty(0)
 
     def add(self, topic: str, times: Array, values: Array) -> None:
-        """Take samples of a source, values (n, signals); samples that are not newer are skipped."""
+        """Take samples of a source, values (n, signals); older ones are skipped."""
         known = np.isfinite(times)
         self._series[topic].append(times[known], values[known][:, self._used[topic]])
         if topic == self._base:
