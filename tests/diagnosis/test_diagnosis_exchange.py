@@ -13,7 +13,7 @@ ONE_WAY = Ride(samples=1500, rate=25.0, period=100.0)
 
 
 @pytest.mark.parametrize("radius_error", [-1e-3, -5e-4, 1e-3])
-def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
+def test_an_equivalent_effect_is_found_though_the_others_compensate(
     radius_error: float,
 ) -> None:
     """On a grooved drum a wrong radius and a wrong ratio do the same to the last digit."""
@@ -31,7 +31,7 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
     assert set(confusion_of(engine, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
 
 
-def test_held_as_it_is_a_hypothesis_keeps_its_values() -> None:
+def test_a_fixed_hypothesis_keeps_its_values() -> None:
     creep = term("cable-creep", creep_stiffness=7e5, time_constant=20.0)
     engine = engine_for([creep], ONE_WAY)
     begin, noise = engine.fit_with_noise(engine.initial_model)

@@ -31,7 +31,7 @@ def with_play(dataset: Dataset) -> Hypothesis:
 
 
 @pytest.mark.parametrize("load_mass", [10.0, None], ids=["weight", "measured"])
-def test_a_weight_is_jerked_and_a_measured_force_is_known(load_mass: float | None) -> None:
+def test_impacts_exclude_torque_and_under_a_known_weight_tension(load_mass: float | None) -> None:
     dataset = dataset_of(load_mass)
     calm = without_impacts(dataset, with_play(dataset))
     assert calm is not None
@@ -48,7 +48,7 @@ def test_a_weight_is_jerked_and_a_measured_force_is_known(load_mass: float | Non
     assert any("gear-backlash jerks" in note for note in calm.notes)
 
 
-def test_without_a_play_everything_stays() -> None:
+def test_without_backlash_no_sample_is_excluded() -> None:
     dataset = dataset_of(10.0)
     rubbing = Hypothesis().with_term(term("pulley-coulomb", friction=0.1), 2)
     assert without_impacts(dataset, Hypothesis()) is None
@@ -57,7 +57,7 @@ def test_without_a_play_everything_stays() -> None:
     assert without_impacts(dataset, none) is None
 
 
-def test_what_jerks_all_the_time_leaves_too_little_to_do_without() -> None:
+def test_permanent_impacts_exclude_no_sample() -> None:
     """A play as small as the encoder's noise, in a winch that stands, parts and meets for ever."""
     standing = Ride(samples=600, stroke=1e-5)
     dataset = prepare([made(seed, load_mass=10.0, ride=standing) for seed in range(2)], GROOVED)
@@ -65,7 +65,7 @@ def test_what_jerks_all_the_time_leaves_too_little_to_do_without() -> None:
     assert without_impacts(dataset, tiny) is None
 
 
-def test_the_play_is_found_and_fitted_without_these_moments() -> None:
+def test_backlash_is_found_and_fitted_without_its_impacts() -> None:
     runs = [
         made(int(mass) + seed, GROOVED, (PLAY,), load_mass=mass, ride=RIDE)
         for mass in (10.0, 25.0)
