@@ -1,4 +1,4 @@
-"""Whether a gain holds out of sample, against fits that really leave the data out."""
+"""Cross-validation against fits that leave the data out."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def problem_of(
 
 
 def even(regression: TimeSeriesRegression) -> Noise:
-    """The noise that is there, known exactly."""
+    """The true noise."""
     power = np.array([NOISE[output] ** 2 for output, _, _ in regression.bands])
     return Noise(power, np.full(len(power), 1e9), dict(NOISE), from_repeats=True)
 

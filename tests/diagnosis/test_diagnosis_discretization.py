@@ -1,4 +1,4 @@
-"""What samples round: a winch moves between them, and its values must not be told too surely."""
+"""The discretisation error of sampled motion, and intervals that cover it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rival in the place of an effect: what makes up for the effect must not keep the rival out."""
+"""Exchange of an effect for a rival, whose start must not be a compensated model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Moments in which teeth part and meet are not compared once a play is found."""
+"""Samples near backlash impacts are excluded once backlash is in the model."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_without_backlash_no_sample_is_excluded() -> None:
 
 
 def test_permanent_impacts_exclude_no_sample() -> None:
-    """A play as small as the encoder's noise, in a winch that stands, parts and meets for ever."""
+    """Backlash below the encoder's noise gives impacts at standstill throughout."""
     standing = Ride(samples=600, stroke=1e-5)
     dataset = prepare([made(seed, load_mass=10.0, ride=standing) for seed in range(2)], GROOVED)
     tiny = Hypothesis().with_term(term("gear-backlash", gap=5e-6), 2)

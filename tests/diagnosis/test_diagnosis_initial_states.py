@@ -1,4 +1,4 @@
-"""Effects with a memory: what changes within the runs names them, not how the runs began."""
+"""Effects with memory are selected by changes within the runs, not by initial states."""
 
 from __future__ import annotations
 

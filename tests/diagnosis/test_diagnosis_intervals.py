@@ -1,4 +1,4 @@
-"""How sure fitted values are: intervals that hold the truth as often as they say."""
+"""Intervals of fitted values and their coverage."""
 
 from __future__ import annotations
 

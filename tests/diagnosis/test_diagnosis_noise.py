@@ -1,4 +1,4 @@
-"""The noise from repeats, and whether anything else is there."""
+"""Noise variance from repeats, and the lack-of-fit test."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def test_known_differences_between_repeats_are_not_noise() -> None:
 
 
 def test_unknowns_per_run_do_not_reduce_the_noise_variance() -> None:
-    """A level for each run takes the slowest noise; the power that is told stays as it was."""
+    """An offset per run absorbs the slowest noise; the estimated variance stays the same."""
     random = np.random.default_rng(5)
     whole, bare, told = [], [], []
     for _ in range(60):

@@ -1,4 +1,4 @@
-"""Two effects that hide each other, so that neither helps alone."""
+"""Pairs of effects that mask each other."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_no_pair_is_added_beside_an_addition_on_the_same_output() -> None:
 
 
 def test_an_effect_that_imitates_a_pair_is_exchanged_for_it() -> None:
-    """Another stays beside it; what is there already need not be the first that was taken."""
+    """Another effect stays beside it; the imitating effect need not be the first addition."""
     hidden = (
         term("pulley-inertia", equivalent_mass=6.5),
         term("cell-gain", gain_error=-0.05),

@@ -1,4 +1,4 @@
-"""What runs could have shown, and which run would show more."""
+"""Detectable sizes, and programmes that separate effects."""
 
 from __future__ import annotations
 

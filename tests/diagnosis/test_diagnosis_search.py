@@ -1,4 +1,4 @@
-"""What a search may try at all, and what it takes for proof."""
+"""Candidates that selection may try."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the search fits anew once more is explained: it may have come to rest elsewhere before."""
+"""Effects fitted again, and signatures updated, after another effect was added."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shapes that a fit drives to their ends, and values that cannot be."""
+"""Shape parameters at their bounds, and starting values."""
 
 from __future__ import annotations
 

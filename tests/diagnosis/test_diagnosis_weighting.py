@@ -1,4 +1,4 @@
-"""Values of runs that nobody repeated: by the noise where that is noise, else evenly."""
+"""Weights for runs without repeats: inverse noise variance, or equal."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def warming_up() -> Array:
 
 
 def test_a_missing_effect_gets_equal_weights() -> None:
-    """Quick reversals, where the friction's width is told, would have it too small."""
+    """Fast reversals alone would underestimate the friction."""
     engine, present, noise = with_friction(rides([warming_up(), warming_up()]))
     best = reweighted(engine, present, noise)
     sign = np.tanh(RATE / 0.5)
