@@ -24,14 +24,14 @@ _FORCES = ("tension", "motor_torque")
 _MOST = 0.25
 
 
-def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
+def without_impacts(dataset: Dataset, hypothesis: Hypothesis) -> Dataset | None:
     """Data set without force and torque near impacts of the fitted effects.
 
     Parameters
     ----------
     dataset
         Runs of one winch.
-    found
+    hypothesis
         Fitted hypothesis.
 
     Returns
@@ -40,12 +40,12 @@ def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
         None where no sample is affected, or more than a quarter of all are.
     """
     recordings = tuple(
-        _without_impacts(recording, started(found, run))
+        _without_impacts(recording, started(hypothesis, run))
         for run, recording in enumerate(dataset.recordings)
     )
     if all(a is b for a, b in zip(recordings, dataset.recordings, strict=True)):
         return None
-    names = ", ".join(t.label for t in found.terms if t.effect.shakes is not None)
+    names = ", ".join(t.label for t in hypothesis.terms if t.effect.shakes is not None)
     share = 1 - _compared(recordings) / max(1, _compared(dataset.recordings))
     if share > _MOST:
         return None  # The remaining samples would not determine the effects.

@@ -295,12 +295,12 @@ def _ends(
     for index, name in enumerate(coordinates.names):
         if name in (coordinates.effect.polar or ()):
             continue
-        told = []
+        at_ends = []
         for end in ends:
             moved = vector.copy()
             moved[index] = end[index]
-            told.append(coordinates.values(moved, base)[name])
-        out[name] = min(told), max(told)
+            at_ends.append(coordinates.values(moved, base)[name])
+        out[name] = min(at_ends), max(at_ends)
     return out
 
 

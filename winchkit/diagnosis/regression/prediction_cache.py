@@ -122,8 +122,8 @@ class Predictor:
             if len(kept) > _KEPT:
                 kept.popitem(last=False)
         kept.move_to_end(key)
-        found: Part = kept[key]
-        return found
+        value: Part = kept[key]
+        return value
 
 
 def masked(recording: Recording, output: str, signal: Array) -> Array:
