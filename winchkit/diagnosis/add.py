@@ -168,9 +168,9 @@ def grow(
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
     (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
-    calm = without_impacts(dataset, final.hypothesis)
-    if calm is not None:
-        engine = selection_engine(calm, candidates)
+    reduced = without_impacts(dataset, final.hypothesis)
+    if reduced is not None:
+        engine = selection_engine(reduced, candidates)
         (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
     best = reweighted(engine, final, final_noise)
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)

@@ -167,10 +167,10 @@ def diagnose(
     engine = selection_engine(dataset, catalogue)
     progress("searching", 0.4)
     result = stepwise_selection(engine)
-    calm = without_impacts(dataset, result.last_model)
-    if calm is not None:
+    reduced = without_impacts(dataset, result.last_model)
+    if reduced is not None:
         progress("searching again without the jerks", 0.6)
-        engine = selection_engine(calm, catalogue)
+        engine = selection_engine(reduced, catalogue)
         result = stepwise_selection(engine)
     progress("naming", 0.8)
     return _answer(engine, result)
