@@ -40,8 +40,8 @@ NOISE = {"motor_torque": 2e-3, "cable_length": 3e-4, "tension": 0.2}
 def sampled(seed: int, terms: tuple[Term, ...], every: int = FINER) -> Run:
     """A fine run of which an instrument keeps every sixteenth sample."""
     run = made(seed, GROOVED, terms, NOISE, ride=FINE, encoder=0.0)
-    thin = {n: replace(c, values=c.values[::every]) for n, c in run.channels.items()}
-    return replace(run, time=run.time[::every], channels=thin)
+    decimate = {n: replace(c, values=c.values[::every]) for n, c in run.channels.items()}
+    return replace(run, time=run.time[::every], channels=decimate)
 
 
 def fitted(terms: tuple[Term, ...], every: int = FINER) -> tuple[TimeSeriesRegression, Fit, Noise]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import Ride, engine_for, term
 
-from winchkit.diagnosis.verdict.equivalence import confusion_of
+from winchkit.diagnosis.verdict.equivalence import equivalence_set
 
 ONE_WAY = Ride(samples=1500, rate=25.0, period=100.0)
 """Wound in once and not quite out again: a creep can look like a wrong length of rope."""
@@ -28,7 +28,7 @@ def test_an_equivalent_effect_is_found_though_the_others_compensate(
     final, noise = engine.fit_with_noise(start)
     alone = engine.refit(final.hypothesis.without(0), noise).hypothesis.terms[0]
     assert abs(np.log(alone.values["creep_stiffness"] / 7e5)) > 1.0
-    assert set(confusion_of(engine, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
+    assert set(equivalence_set(engine, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
 
 
 def test_a_fixed_hypothesis_keeps_its_values() -> None:

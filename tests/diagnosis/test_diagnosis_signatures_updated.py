@@ -11,7 +11,7 @@ from diagnosis_runs import CATALOGUE, Ride, engine_for, term
 from winchkit.diagnosis.selection.exchange import pair_exchange
 from winchkit.diagnosis.selection.signatures import Signatures, updated_signatures
 from winchkit.diagnosis.selection.stepwise import _exchanged_terms
-from winchkit.diagnosis.verdict.equivalence import confusion_of
+from winchkit.diagnosis.verdict.equivalence import equivalence_set
 from winchkit.effects.term import Term
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
@@ -61,7 +61,7 @@ def test_stribeck_friction_outside_the_speed_range_is_equivalent_to_coulomb_fric
     present, noise = engine.fit_with_noise(
         engine.initial_model.with_term(wide, engine.regression.n_runs)
     )
-    told = confusion_of(engine, present, noise, 0).effects
+    told = equivalence_set(engine, present, noise, 0).effects
     assert "motor-stribeck" in told
     assert ("motor-coulomb" not in told) is alone
 

@@ -47,8 +47,8 @@ def test_a_stribeck_speed_is_visible_where_a_run_passes_it() -> None:
     for effect, rate in (("motor-stribeck", motion.motor_rate), ("pulley-stribeck", motion.speed)):
         visible = CATALOGUE[effect].visible
         assert visible is not None
-        for share, seen in ((0.5, True), (0.8, False)):
-            assert visible(motion, {"stribeck_speed": share * abs(rate).max()}) is seen
+        for share, range_of_runs in ((0.5, True), (0.8, False)):
+            assert visible(motion, {"stribeck_speed": share * abs(rate).max()}) is range_of_runs
 
 
 def test_times_and_orders_have_other_minima_and_time_constants_do_not() -> None:

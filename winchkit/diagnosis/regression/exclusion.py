@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset, Recording
-from winchkit.diagnosis.data.transients import around
+from winchkit.diagnosis.data.transients import with_neighbours
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.effects.term import Term
 
@@ -65,15 +65,15 @@ def _compared(recordings: Sequence[Recording]) -> int:
 def _without_impacts(recording: Recording, terms: Sequence[Term]) -> Recording:
     """Run without torque near impacts and, under a known weight, without tension."""
     at = recording.raw.at
-    shaken = np.zeros(len(at.time), dtype=bool)
+    impacts = np.zeros(len(at.time), dtype=bool)
     for term in terms:
         if term.effect.shakes is not None:
-            shaken |= term.effect.shakes(at, term.values)
+            impacts |= term.effect.shakes(at, term.values)
     known_weight = recording.raw.load_mass is not None
     left = set(_FORCES if known_weight else _FORCES[1:]) & recording.valid.keys()
-    if not shaken.any() or not left:
+    if not impacts.any() or not left:
         return recording
-    near = around(shaken, at.time)
+    near = with_neighbours(impacts, at.time)
     valid = {
         output: good & ~near if output in left else good for output, good in recording.valid.items()
     }

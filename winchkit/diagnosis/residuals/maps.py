@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import by_chance, kept_rows, variables_of
+from winchkit.diagnosis.residuals.attribution import chance_share, kept_rows, variables_of
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 from winchkit.plain_json import significant
 
@@ -92,7 +92,7 @@ def residual_maps(regression: TimeSeriesRegression, residual: Array) -> list[Res
             for pair in PAIRS
             if (places := _places(regression, known, output, pair)) is not None
             and (drawn := _map_of(output, places, error, kept)) is not None
-            and drawn.share > by_chance(int(np.isfinite(drawn.mean).sum()), kept)
+            and drawn.share > chance_share(int(np.isfinite(drawn.mean).sum()), kept)
         ]
         out += sorted(found, key=lambda m: -m.share)
     return out

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.robot.errors import Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.robot import angles_of
@@ -41,7 +41,7 @@ class _Share:
 
     share: float
     """η² less its expectation by chance."""
-    by_chance: float
+    chance_share: float
     """Three standard deviations of the share by chance."""
     column: int
     """Line or axis with the largest part of it."""
@@ -49,7 +49,7 @@ class _Share:
     """Whether that line has more than half of it."""
 
 
-def follows_of(regression: PoseRegression, errors: Errors) -> list[Followed]:
+def follows_of(regression: PoseRegression, errors: Errors) -> list[Attribution]:
     """Variables that explain the errors of each output, the largest share first.
 
     Parameters
@@ -72,9 +72,9 @@ def follows_of(regression: PoseRegression, errors: Errors) -> list[Followed]:
             if values.shape[1] not in (1, error.shape[1]):
                 continue
             taken = _taken(np.broadcast_to(values, error.shape), error)
-            if taken.share > max(_WORTH, taken.by_chance):
+            if taken.share > max(_WORTH, taken.chance_share):
                 line = lines[taken.column] if taken.alone else None
-                found.append(Followed(output, name, taken.share, line=line))
+                found.append(Attribution(output, name, taken.share, line=line))
         if output != "platform_position":
             found += _constants(regression, output, error)
         out += sorted(found, key=lambda f: -f.share)
@@ -145,17 +145,17 @@ def _taken(values: Array, error: Array) -> _Share:
     return _Share(max(0.0, share), _SURE * float(np.sqrt(2 * bins)) / count, most, alone)
 
 
-def _constants(regression: PoseRegression, output: str, error: Array) -> list[Followed]:
+def _constants(regression: PoseRegression, output: str, error: Array) -> list[Attribution]:
     """Shares of a constant per line and of a constant per pose."""
     known, out = np.isfinite(error), []
     winch = np.broadcast_to(np.arange(error.shape[1]), error.shape)
     pose = np.broadcast_to(regression.dataset.pose[:, None], error.shape)
     for name, values in (("winch", winch), ("pose", pose)):
         taken = _category_share(values[known], error[known])
-        if taken.share > max(_WORTH, taken.by_chance):
+        if taken.share > max(_WORTH, taken.chance_share):
             own = name == "winch" and taken.alone
             line = regression.dataset.names[taken.column] if own else None
-            out.append(Followed(output, name, taken.share, line=line))
+            out.append(Attribution(output, name, taken.share, line=line))
     return out
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.diagnosis.robot.attribution import follows_of
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
@@ -32,7 +32,7 @@ class RobotCompared:
     comparison: Comparison
     regression: PoseRegression
     errors: Errors
-    followed: Mapping[str, Followed]
+    followed: Mapping[str, Attribution]
     """By output the variable with the largest share of its error."""
 
 
@@ -92,7 +92,7 @@ def compared_robot(
         )
         for name, error in errors.items()
     }
-    most: dict[str, Followed] = {}
+    most: dict[str, Attribution] = {}
     for followed in follows:
         most.setdefault(followed.output, followed)
     return RobotCompared(Comparison(outputs, None, dataset.notes), regression, errors, most)
@@ -110,8 +110,8 @@ def _noise(errors: Errors, dataset: RobotDataset) -> dict[str, float]:
     many = [group for group in groups if len(group) > 1]
     if not many:
         return {}
-    apart = {
+    differences = {
         name: np.concatenate([contrasts(error[group])[1] for group in many])
         for name, error in errors.items()
     }
-    return {name: rms(name, values) for name, values in apart.items()}
+    return {name: rms(name, values) for name, values in differences.items()}

@@ -128,7 +128,7 @@ def _mean_pull(tension: Array) -> Array:
 
 def _alike(row: int, other: int, scaled: Array, pull: Array) -> bool:
     with np.errstate(invalid="ignore"):
-        apart = scaled[row] - scaled[other]
-    if not np.sqrt(np.mean(apart**2)) < _ANGLES_AGREE:
+        difference = scaled[row] - scaled[other]
+    if not np.sqrt(np.mean(difference**2)) < _ANGLES_AGREE:
         return False
     return bool(abs(pull[row] - pull[other]) <= _TENSIONS_AGREE * max(abs(pull[row]), 1e-9))

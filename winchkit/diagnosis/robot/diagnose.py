@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from winchkit.diagnosis.design.detectability import Bar, detectable
+from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.diagnose import (
     Answer,
     ProgressCallback,
@@ -38,7 +38,7 @@ from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.verdict.decision import Judgement, judge
-from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
+from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
@@ -72,7 +72,7 @@ class RobotAnswer(Answer):
     engine: PoseSelection
 
     def __init__(
-        self, selection: RobotSelection, sets: Sequence[Confusion], diagnosis: RobotDiagnosis
+        self, selection: RobotSelection, sets: Sequence[EquivalenceSet], diagnosis: RobotDiagnosis
     ) -> None:
         super().__init__(selection.engine, selection.judgement.shown, diagnosis, sets)
         self.selection = selection
@@ -162,7 +162,7 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     engine, judgement, preparation = selection.engine, selection.judgement, selection.preparation
     shown, verdict = judgement.shown, judgement.verdict
     added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
-    sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
+    sets = [equivalence_set(engine, shown.final, shown.noise, index) for index in added]
     steps = tuple(map(plain_step, steps_of(engine, shown, sets))) if sets else ()
     outputs = figures(selection.initial_model, selection.final, preparation.noise)
     if selection.geometry_is_free and verdict in ("adequate", "explained"):
@@ -174,7 +174,8 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
         steps=steps,
         candidates=candidates_of(engine, selection.result),
         detectable=detectable(
-            selection.result.scores, Bar(engine.penalty_per_parameter, selection.result.threshold)
+            selection.result.scores,
+            DetectionThreshold(engine.penalty_per_parameter, selection.result.threshold),
         ),
         unexplained_share=judgement.share,
         where=_places(selection) if selection.result.lack_of_fit else (),

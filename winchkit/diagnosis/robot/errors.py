@@ -149,8 +149,8 @@ def signals(regression: PoseRegression) -> dict[str, float]:
     out = {}
     for name, array in values.items():
         known = np.isfinite(array).all(axis=1)
-        apart = array[known] - array[known].mean(axis=0) if known.any() else array[known]
-        out[name] = rms(name, apart) if known.any() else float("nan")
+        centred = array[known] - array[known].mean(axis=0) if known.any() else array[known]
+        out[name] = rms(name, centred) if known.any() else float("nan")
     return out
 
 

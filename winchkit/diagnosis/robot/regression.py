@@ -182,8 +182,8 @@ class PoseRegression(Regression):
         dataset = self.dataset
         sizes = np.bincount(dataset.measured.run)
         together = [set(dataset.pose[dataset.measured.run == n]) for n in range(len(sizes))]
-        apart = sum(map(len, together)) == len(set().union(*together))
-        if len(sizes) > 1 and sizes.min() >= _RUN_LEAST and apart:
+        disjoint = sum(map(len, together)) == len(set().union(*together))
+        if len(sizes) > 1 and sizes.min() >= _RUN_LEAST and disjoint:
             return self._folded(dataset.measured.run, len(sizes))
         return self._folded(dataset.pose % _GROUPS, _GROUPS)
 

@@ -11,7 +11,7 @@ from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.residuals.error_statistics import Skirt
+from winchkit.diagnosis.residuals.error_statistics import StopBandLeakage
 from winchkit.diagnosis.results import OutputFit, Verdict
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
@@ -195,9 +195,12 @@ def output_fits(
     before, after = _rms(regression, initial_model[0]), _rms(regression, final[0])
     held_before = held_out_rms(regression, *initial_model, folds)
     held_after = held_out_rms(regression, *final, folds)
-    noise, skirt = final[1], Skirt(regression)
-    beyond = skirt.residual(initial_model[0].hypothesis), skirt.residual(final[0].hypothesis)
-    noise_beyond = skirt.noise(final[0].hypothesis)
+    noise, leakage = final[1], StopBandLeakage(regression)
+    beyond = (
+        leakage.residual(initial_model[0].hypothesis),
+        leakage.residual(final[0].hypothesis),
+    )
+    noise_beyond = leakage.noise(final[0].hypothesis)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         output: OutputFit(

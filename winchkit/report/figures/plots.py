@@ -11,7 +11,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import Followed, variables_of
+from winchkit.diagnosis.residuals.attribution import Attribution, variables_of
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.plain_json import significant
 from winchkit.report.figures.reduction import bin_edges, bin_means, strongest, thin, thin_points
@@ -62,7 +62,7 @@ class OutputPlots:
     scale: Scale
     over_time: Plot
     over_variable: Plot | None
-    followed: Followed | None
+    followed: Attribution | None
     """What the residual is drawn over; None where it follows nothing that was measured."""
 
 
@@ -168,7 +168,9 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves) -> Plot:
     )
 
 
-def _over_variable(regression: TimeSeriesRegression, curves: _Curves, followed: Followed) -> Plot:
+def _over_variable(
+    regression: TimeSeriesRegression, curves: _Curves, followed: Attribution
+) -> Plot:
     """Samples as dots and means over bins as lines."""
     variable, label, logarithmic = _axis(regression, curves, followed)
     before = np.concatenate(curves.before)
@@ -214,7 +216,7 @@ def _spread(values: Array) -> Array:
 
 
 def _axis(
-    regression: TimeSeriesRegression, curves: _Curves, followed: Followed
+    regression: TimeSeriesRegression, curves: _Curves, followed: Attribution
 ) -> tuple[Array, str, bool]:
     """Values of a variable along the runs as people read them, its label, and if it is a power."""
     recordings = regression.dataset.recordings

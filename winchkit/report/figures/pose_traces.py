@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.robot.attribution import (
     AXES,
     follows_of,
@@ -35,7 +35,7 @@ _POOLED = ("winch", "pose", NUMBER)
 class Trace:
     """Errors of one output along one variable, SI; a value per pose and line, or axis."""
 
-    over: Followed
+    over: Attribution
     x: Array
     """(k,), finite."""
     before: Array
@@ -75,19 +75,21 @@ def unit_of(variable: str) -> str:
 
 def traces(regression: PoseRegression, before: Errors, after: Errors | None = None) -> list[Trace]:
     """Per output its errors over what they follow most, before anything was added."""
-    found: dict[str, Followed] = {}
+    found: dict[str, Attribution] = {}
     for followed in follows_of(regression, before):
         if followed.variable != "pose":
             found.setdefault(followed.output, followed)
     return [
-        trace_over(regression, found.get(name, Followed(name, NUMBER, float("nan"))), before, after)
+        trace_over(
+            regression, found.get(name, Attribution(name, NUMBER, float("nan"))), before, after
+        )
         for name in UNITS
         if name in before
     ]
 
 
 def trace_over(
-    regression: PoseRegression, over: Followed, before: Errors, after: Errors | None = None
+    regression: PoseRegression, over: Attribution, before: Errors, after: Errors | None = None
 ) -> Trace:
     """Errors of one output over one variable, of the line that shows it most."""
     name = over.output
@@ -107,7 +109,7 @@ def trace_over(
     return Trace(over, x[known], error[known], None if then is None else then[known], line)
 
 
-def _values(regression: PoseRegression, over: Followed, error: Array) -> Array:
+def _values(regression: PoseRegression, over: Attribution, error: Array) -> Array:
     count, lines = error.shape
     if over.variable == "winch":
         return np.arange(1.0, lines + 1)[None, :]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.report.comparison_rows import HEAD, followed, offset_text, size_rows
 from winchkit.report.figures.plots import AT_NOISE
@@ -25,7 +25,7 @@ _NEXT = (
 
 def comparison_sections(
     comparison: Comparison,
-    over: Mapping[str, Followed],
+    over: Mapping[str, Attribution],
     figures: Sequence[Markup],
     command: Command,
 ) -> Markup:
@@ -46,7 +46,7 @@ def comparison_sections(
     )
 
 
-def distance_text(name: str, error: OutputError, over: Followed | None) -> str:
+def distance_text(name: str, error: OutputError, over: Attribution | None) -> str:
     """How far one output is off, beside its noise, and what the error follows."""
     off = f"The {OUTPUT_NAMES.get(name, name)} is off by {quantity(error.rms, error.unit)} rms"
     if error.noise_rms is None:
@@ -59,7 +59,7 @@ def distance_text(name: str, error: OutputError, over: Followed | None) -> str:
     return f"{off}, {beside} {noise}; {_following(over)}."
 
 
-def _following(over: Followed | None) -> str:
+def _following(over: Attribution | None) -> str:
     if over is None:
         return "it hardly follows anything that was measured"
     share = f"({percent(over.share)} of the error)"
@@ -68,7 +68,7 @@ def _following(over: Followed | None) -> str:
     return f"it follows the {VARIABLE_NAMES.get(over.variable, over.variable)} {share}"
 
 
-def _lead(comparison: Comparison, over: Mapping[str, Followed]) -> Markup:
+def _lead(comparison: Comparison, over: Mapping[str, Attribution]) -> Markup:
     outputs = comparison.outputs
     told = [distance_text(name, error, over.get(name)) for name, error in outputs.items()]
     rows = [

@@ -48,7 +48,7 @@ def sections(
             section(
                 "confusion",
                 f"What these {diagnosis.data} cannot tell apart",
-                tables.confusion(diagnosis, effects),
+                tables.equivalence(diagnosis, effects),
             ),
             section(
                 "detectable",

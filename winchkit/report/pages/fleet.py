@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.diagnosis.fleet.anova import SharedError, SharedFollowed
+from winchkit.diagnosis.fleet.anova import SharedAttribution, SharedError
 from winchkit.diagnosis.fleet.meta_analysis import Pooled, SharedEffect
 from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Step
 from winchkit.report.html.markup import Markup, compact, details, element, section, table
@@ -123,14 +123,16 @@ def error_texts(shared: Mapping[str, SharedError]) -> list[str]:
     return out
 
 
-def _followed(one: SharedFollowed) -> str:
+def _followed(one: SharedAttribution) -> str:
     name = "winch, a level of its own" if one.variable == "winch" else VARIABLE_NAMES[one.variable]
     told = f"{name} {percent(one.share)}"
     if one.variable != "winch":
         if one.common >= _ALL * one.share:
             return f"{told}, alike in all"
         told += f", {percent(one.common)} alike in all"
-    return f"{told}, most of the difference in {listed(list(one.apart))}" if one.apart else told
+    return (
+        f"{told}, most of the difference in {listed(list(one.outlying))}" if one.outlying else told
+    )
 
 
 def _found(one: Diagnosis) -> str:
@@ -161,15 +163,15 @@ def _where(shared: SharedEffect) -> str:
 
 def _likeness(shared: SharedEffect) -> str:
     """Whether the winches have it alike, all parameters together."""
-    apart = dict.fromkeys(name for p in shared.parameters.values() for name in p.apart)
-    if all(p.alike for p in shared.parameters.values()):
+    outlying = dict.fromkeys(name for p in shared.parameters.values() for name in p.outlying)
+    if all(p.homogeneous for p in shared.parameters.values()):
         return "alike"
-    return f"alike but for {listed(list(apart))}" if apart else "of different sizes"
+    return f"alike but for {listed(list(outlying))}" if outlying else "of different sizes"
 
 
 def _value(name: str, one: Pooled) -> str:
     told = estimate_text(name, Estimate(one.value, one.std, one.unit))
-    if one.alike or one.apart:
+    if one.homogeneous or one.outlying:
         return told
     return f"{told} in the mean, {quantity(one.spread, one.unit, 2)} from winch to winch"
 
