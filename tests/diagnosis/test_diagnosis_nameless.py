@@ -21,7 +21,7 @@ from winchkit.diagnosis.verdict.specification_test import (
     SpecificationTest,
     _BasisProducts,
     best_curve,
-    tested_judgement,
+    judge_with_specification_test,
 )
 from winchkit.diagnosis.verdict.spline_alternatives import (
     PLACES,
@@ -165,7 +165,7 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
         (),
         0.0,
     )
-    judged = tested_judgement(engine, result)
+    judged = judge_with_specification_test(engine, result)
     assert judged.verdict == "explained"
     assert judged.shown.final.labels == ("motor-coulomb",)
     (note,) = judged.notes

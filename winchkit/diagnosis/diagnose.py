@@ -32,7 +32,7 @@ from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_sele
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.decision import Judgement, reweighted_judgement
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
-from winchkit.diagnosis.verdict.specification_test import tested_judgement
+from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -178,7 +178,7 @@ def diagnose(
 
 def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
     """Verdict, equivalence sets, intervals and next programmes of a selection."""
-    judgement = tested_judgement(engine, result)
+    judgement = judge_with_specification_test(engine, result)
     shown = judgement.shown
     added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
     sets = [equivalence_set(engine, shown.final, shown.noise, index) for index in added]

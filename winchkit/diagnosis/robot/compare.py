@@ -11,13 +11,13 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
+from winchkit.diagnosis.robot.adjustment import placed
 from winchkit.diagnosis.robot.attribution import follows_of
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
-from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
 from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.variance_components import START
-from winchkit.effects.bind_robot import robot_terms, robot_with_effects
+from winchkit.effects.bind_robot import robot_terms
 from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
@@ -70,11 +70,10 @@ def compared_robot(
 ) -> RobotCompared:
     """As :func:`compare_robot`, with regression and errors."""
     dataset = prepare_poses(runs, profile)
-    robot = robot_with_effects(profile, catalogue)
-    equations = Equations(dataset, start_pose(dataset), robot)
-    pose = placed_by(equations, robot, START)
+    terms = robot_terms(profile, catalogue)
+    pose = placed(dataset, terms, START)
     regression = PoseRegression(LinearizationPoint(dataset, pose, START))
-    errors = errors_of(regression, regression.residuals(robot_terms(profile, catalogue)))
+    errors = errors_of(regression, regression.residuals(terms))
     noise = _noise(errors, dataset)
     follows = follows_of(regression, errors)
     size = signals(regression)

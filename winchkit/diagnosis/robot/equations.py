@@ -17,14 +17,15 @@ residuals are model less measurement by kind, in SI. Here
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.model.line import Line
 from winchkit.model.robot import (
     Pose,
@@ -37,28 +38,26 @@ from winchkit.model.robot import (
     swivel_sensitivities,
 )
 from winchkit.model.robot.constraints import (
+    by_geometry,
     by_pose,
+    closure_by_geometry,
     closure_residual,
     force_basis,
     position,
     rotation_by_pose,
     rotation_residual,
     swivel_residual,
+    winding_of,
     wrench_residual,
 )
-from winchkit.model.robot.pose_estimation import Iteration, estimated_pose
 from winchkit.model.robot.pose_estimation import start_pose as completed
 from winchkit.model.robot.robot import standing
 from winchkit.model.stages import At, Stage
 
-__all__ = ["POSED", "Equations", "placed_by", "start_pose"]
+__all__ = ["POSED", "Equations", "start_pose"]
 
-Sigma = Mapping[str, float]
 POSED = ("rope", "position", "rotation", "swivel", "gauge")
 """Kinds that depend on the pose, in their order."""
-_PLACING = Iteration(damping=0.0, relative_damping=1e-9, tolerance=1e-9, steps=25)
-_PLACED_BY = ("rope", "position", "rotation")
-"""Kinds by which poses are estimated: the zeros of the other instruments are unknown."""
 _INVERTING, _SMALL_FORCE, _FLATTEST, _INVERTED = 8, 1e-4, 0.05, 1e-9
 
 
@@ -154,6 +153,33 @@ class Equations:
             "gauge": length,
         }
 
+    def by_geometry(self, robot: Robot, geometry: Sequence[GeometryPrior]) -> dict[str, Array]:
+        """Derivatives of the residuals by numbers of the geometry, (p, k, g), by kind.
+
+        They are those of the robot without effects in the length by the drum, and cable forces are
+        constant: relative errors of the order of the cables' strain.
+        """
+        pose, home, angle = self.pose, robot.home, self.dataset.measured.motor_angle
+        length = sensitivities(robot.geometry, pose.position, pose.rotation)
+        at_home = sensitivities(robot.geometry, home.position, home.rotation)
+        winding = winding_of(robot.winches, angle)
+        radius = np.array([winch.drum.winding_radius for winch in robot.winches])
+        of_line, of_all = closure_by_geometry(length, at_home, winding, radius, np.ones_like(angle))
+        swivel = swivel_sensitivities(robot.geometry, pose.position, pose.rotation)
+        by_kind = {
+            "rope": {**of_line, "layer_growth": of_all["layer_growth"][..., 0]},
+            "swivel": by_geometry(swivel),
+            "gauge": by_geometry(length),
+        }
+        out = {kind: np.zeros((*angle.shape, len(geometry))) for kind in by_kind}
+        for index, item in enumerate(geometry):
+            lines = [robot.names.index(item.line)] if item.line else slice(None)
+            for kind, fields in by_kind.items():
+                if (part := fields.get(item.field)) is not None:
+                    own = part[..., "xyz".index(item.parameter)] if part.ndim == 3 else part
+                    out[kind][:, lines, index] = own[:, lines]
+        return out
+
     @cached_property
     def _rotation(self) -> Array:
         return rotation_residual(self.pose.rotation, self.dataset.measured.angles)
@@ -187,37 +213,6 @@ def start_pose(dataset: RobotDataset) -> Pose:
     """Measured positions and angles, completed by those of the home pose."""
     measured = dataset.measured
     return completed(measured.position, measured.angles, home_of(dataset.robot))
-
-
-def placed_by(equations: Equations, robot: Robot, sigma: Sigma) -> Pose:
-    """Least-squares estimate of the poses with the robot given.
-
-    Parameters
-    ----------
-    equations : Equations
-        At the poses where the iteration starts.
-    robot : Robot
-        With its effects.
-    sigma : mapping
-        Standard deviation by kind, SI.
-
-    Returns
-    -------
-    Pose
-        The p estimated poses.
-    """
-
-    def whitened(pose: Pose) -> tuple[Array, Array]:
-        here = replace(equations, pose=pose)
-        values, by = here.residuals(robot), here.by_pose(robot)
-        rows, slope = [], []
-        for kind in _PLACED_BY:
-            known = np.isfinite(values[kind])
-            rows.append(np.where(known, values[kind], 0.0) / sigma[kind])
-            slope.append(np.where(known[..., None], by[kind], 0.0) / sigma[kind])
-        return np.concatenate(rows, axis=1), np.concatenate(slope, axis=1)
-
-    return estimated_pose(whitened, equations.pose, _PLACING)
 
 
 def _force_behind(line: Line, at: At, shown: Array) -> Array:

@@ -267,7 +267,7 @@ def pose_offers(
         The final model of the diagnosis.
     questions : sequence of Question
         To be answered.
-    needed : sequence of float
+    required : sequence of float
         Whitened squares (χ²) at which each question counts as answered.
     count : int
         Poses per offer.

@@ -257,7 +257,7 @@ def _sign_flip_p_value(excess_losses: Array) -> float:
 
     Parameters
     ----------
-    worse : (blocks,) array
+    excess_losses : (blocks,) array
         Held-out χ² of the rival less that of the named effect.
 
     Notes

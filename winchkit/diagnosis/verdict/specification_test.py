@@ -32,7 +32,7 @@ __all__ = [
     "PartialRegression",
     "SpecificationTest",
     "best_curve",
-    "tested_judgement",
+    "judge_with_specification_test",
 ]
 
 _UNIDENTIFIABLE = 1e-7
@@ -143,7 +143,9 @@ _MARGIN_WITH_LACK_OF_FIT = 2e-4
 """The same where lack of fit remains."""
 
 
-def tested_judgement(engine: TimeSeriesSelection, result: SelectionResult) -> Judgement:
+def judge_with_specification_test(
+    engine: TimeSeriesSelection, result: SelectionResult
+) -> Judgement:
     """Verdict after the specification test.
 
     Notes
@@ -160,7 +162,7 @@ def tested_judgement(engine: TimeSeriesSelection, result: SelectionResult) -> Ju
     if curve := test.outperforming_curve(test.added):
         pair = with_pair(engine, result)
         if pair is not None:
-            return tested_judgement(engine, pair)
+            return judge_with_specification_test(engine, pair)
         return withheld(engine, result, 1.0, _withheld_note(terms, terms, curve))
     for index in reversed(test.added) if len(terms) > 1 else ():
         curve = test.outperforming_curve([index])
@@ -177,7 +179,7 @@ def _without_outperformed(test: SpecificationTest, index: int, curve: Curve) -> 
     """Verdict without an outperformed effect, or without any name where that effect is needed."""
     engine, result = test.engine, test.result
     outperformed = result.final.hypothesis.terms[index : index + 1]
-    without = tested_judgement(engine, without_term(engine, result, index))
+    without = judge_with_specification_test(engine, without_term(engine, result, index))
     if without.shown.final.labels[engine.n_initial_terms :]:
         return replace(
             without, notes=(*without.notes, _withheld_note(outperformed, outperformed, curve))
