@@ -24,10 +24,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
-from campaign.truth import Situation, show
-from campaign.winch import Winch, turns_for, write_profile
 from scipy.signal import oaconvolve
 
+from campaign.truth import Situation, show
+from campaign.winch import Winch, turns_for, write_profile
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.fleet.diagnose import diagnose_each

@@ -18,10 +18,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
+
 from campaign.case import Case, Plan, make_case
 from campaign.rivals import RIVALS, regression_of
 from campaign.sizes import CATALOGUE, OUTSIDE
-
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.read import read_run
 from winchkit.schema.read import read_winch

@@ -2,13 +2,13 @@
 
     python benchmarks/process_faults.py --times 25 --json
 
-The drive is the slave of tests/slave, which shares no code with winchkit, in a thread of this
-process; the bench is open in another process, which jogs. CAN between them is UDP multicast.
-SIGTERM, SIGHUP and a closed terminal meet ``winchkit jog`` beside ``winchkit log``: ramp without
-quick stop, exit code, a log that is whole up to rest. A full disk (a tmpfs) stops nothing, is told
-in a warning, and leaves whole rows. Each
-case: the drive has left operation enabled (or ramps down) no later than the bound of its fault,
-and stands still a ramp later. ``lateness`` is by how much this process itself was late meanwhile.
+The drive is the slave of tests/support/slave, which shares no code with winchkit, in a thread
+of this process; the bench is open in another process, which jogs. CAN between them is UDP
+multicast. SIGTERM, SIGHUP and a closed terminal meet ``winchkit jog`` beside ``winchkit log``: ramp
+without quick stop, exit code, a log that is whole up to rest. A full disk (a tmpfs) stops nothing,
+is reported in a warning, and leaves whole rows. Each case: the drive has left operation enabled (or
+ramps down) no later than the bound of its fault, and stands still a ramp later. ``lateness`` is by
+how much this process itself was late meanwhile.
 Exits 1 where one drive stopped too late.
 """
 
@@ -34,8 +34,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from process_commands import COMMAND_FAULTS, Commands, NotMoving, log_problems
 
-TESTS = Path(__file__).parents[1] / "tests"
-sys.path.insert(0, str(TESTS))
+SUPPORT = Path(__file__).parents[1] / "tests" / "support"
+sys.path.insert(0, str(SUPPORT))
 
 from slave import Slave, State  # noqa: E402 - from the tests' folder
 from slave.on_bus import SlavesOnBus  # noqa: E402

@@ -15,7 +15,6 @@ import time
 from pathlib import Path
 
 from recording.synthetic import SyntheticBench
-
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.drivers.clock import MonotonicClock

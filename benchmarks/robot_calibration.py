@@ -22,9 +22,9 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+
 from robot_poses.nested import ITERATIONS, NestedProblem, nominal
 from robot_poses.truth import Noise, Truth, csv, poses
-
 from winchkit.calibration.robot.calibrate import Calibrated, calibrate
 from winchkit.calibration.robot.prediction import rms
 from winchkit.catalog import find

@@ -24,9 +24,9 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 
 from click.testing import CliRunner
+
 from robot_poses.cases import CASES
 from robot_poses.hidden import Case, profile_text, record
-
 from winchkit.cli import main
 
 __all__ = ["answer", "calibrated", "covered", "named", "summary", "wrong"]

@@ -1,9 +1,10 @@
 """Eight winches at 250 Hz for a long time: memory, lost samples, missed cycles that nobody told.
 
-``python benchmarks/soak.py --minutes 30 --json``. The drives (the slaves of ``tests/slave``, over a
-pair of datagram sockets) and the load cells (Modbus TCP) run in a process of their own, the bench
-with its recorder in this one. Prints one JSON object; exit 1 where memory grows by more than
-1 MB/h, a sample is lost or a missed cycle is not reported. See benchmarks/README.md.
+``python benchmarks/soak.py --minutes 30 --json``. The drives (the slaves of
+``tests/support/slave``, over a pair of datagram sockets) and the load cells (Modbus TCP) run in a
+process of their own, the bench with its recorder in this one. Prints one JSON object; exit 1 where
+memory grows by more than 1 MB/h, a sample is lost or a missed cycle is not reported. See
+benchmarks/README.md.
 """
 
 from __future__ import annotations
@@ -29,7 +30,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 from soak_devices import Wire, serve
-
 from winchkit.bench.bench import Bench, open_bench
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.drivers.clock import MonotonicClock

@@ -16,7 +16,7 @@ from winchkit.schema.read import read_device
 from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of
 from winchkit.sim.instruments.modbus_line import ModbusLine
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 
 from slave import Declared, Slave
 from slave.frames import Frame

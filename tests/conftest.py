@@ -5,12 +5,9 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Generator
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 from stalls import StallWatch
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from random import Random
 
 from fault_cases.kinds import KINDS
@@ -44,7 +44,7 @@ class Case:
     """Whether a reset is tried while the fault lasts."""
     real_time: bool = False
     independent: bool = False
-    """Whether the slaves of ``tests/slave`` are its drives."""
+    """Whether the slaves of ``tests/support/slave`` are its drives."""
 
 
 def cases(number: int, seed: int, *, real_time_share: float = 0.0) -> list[Case]:
@@ -83,6 +83,7 @@ def _case(seed: str, name: str, *, real_time: bool) -> Case:
             for k in range(3)
         ]
     paying_out = {"in": False, "out": True}.get(first.moving, random.random() < 0.5)
+    faults = [replace(one, span=None) if KINDS[one.kind].lasts else one for one in faults]
     motion = "jog" if first.moving or name == "released" else random.choice(_MOTIONS)
     return Case(
         seed,

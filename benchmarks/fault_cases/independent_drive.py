@@ -1,4 +1,4 @@
-"""The misbehaving slave of ``tests/slave`` in the place of a simulated drive.
+"""The misbehaving slave of ``tests/support/slave`` in the place of a simulated drive.
 
 The slave was written from CiA 301 and CiA 402 and shares nothing with winchkit: what stops it is
 no idea of our own simulator. Its motor turns the simulated winch, whose instruments show it.
@@ -19,7 +19,7 @@ from winchkit.sim.plant.servo import DriveCommand
 
 __all__ = ["IndependentDrive", "replace_drives"]
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "support"))
 
 from slave import Declared, Slave
 from slave.frames import Frame, kind_from_host

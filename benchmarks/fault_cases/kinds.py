@@ -45,6 +45,8 @@ class Kind:
     """``in`` or ``out`` where it can only happen in that direction."""
     real_time: bool = True
     """Whether it can be made in real time."""
+    lasts: bool = False
+    """Whether it goes on until it is mended, whatever span is drawn."""
     part: str = ""
     """What recovers where a fault of it ends, from its other faults too: servo, cell, line."""
 
@@ -232,7 +234,7 @@ _ROWS = (
     Kind("host frames lost", _host_frames, _LOST, least=0.2),
     Kind("cut wire", _cut, _LOST, least=0.2),
     Kind("drive silent", _drive("silence"), _LOST, least=0.2, part="servo"),
-    Kind("PDO mapping lost", _drive("map lost"), _LOST, least=0.0, part="servo"),
+    Kind("PDO mapping lost", _drive("map lost"), _LOST, least=0.0, lasts=True, part="servo"),
     *(
         Kind(f"drive fault: {kind}", _drive(kind), ("fault", "state"), least=0.0, part="servo")
         for kind in ("over-current", "over-temperature", "encoder", "following error")

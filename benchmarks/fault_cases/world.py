@@ -197,7 +197,7 @@ def opened_world(
 ) -> Iterator[World]:
     """A bench of ``spiral-bench``'s winches with a heartbeat of 50 ms, opened.
 
-    ``independent``: with the slaves of ``tests/slave`` for drives.
+    ``independent``: with the slaves of ``tests/support/slave`` for drives.
     """
     folder.mkdir(parents=True, exist_ok=True)
     bench = declared(None, {name: {} for name in "ABCDEFGH"[:winches]}, folder)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 
 import pytest
+
 from bus_rig import Rig, opened
 
 ON_SOCKETCAN = "WINCHKIT_TEST_CAN" in os.environ

@@ -6,9 +6,9 @@ import itertools
 from collections.abc import Iterator
 
 import pytest
+
 from bus_rig import Rig, Seen
 from drive_server import NODE
-
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.motion import DEAD_MAN
 from winchkit.errors import DriveFault, LimitTripped

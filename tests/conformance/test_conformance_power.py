@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+
 from bus_rig import Rig
 from drive_server import NODE
 from master import Master
-
 from winchkit.drivers.can.cia402.state_machine import State, Wish
 from winchkit.errors import NotPermitted
 

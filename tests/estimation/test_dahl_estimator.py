@@ -10,11 +10,11 @@ from math import cos, isnan, pi, sqrt
 
 import numpy as np
 import pytest
-from estimation_plant import WRAPS, cell_readings, wander
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from estimation_plant import WRAPS, cell_readings, wander
 from winchkit.errors import UsageError
 from winchkit.estimation import PLAIN, DahlEstimator, PulleyGroup, compiled, fastest
 

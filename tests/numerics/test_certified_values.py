@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from strd import LINEAR, NONLINEAR, Dataset, digits, regression_of, start_of
 
+from strd import LINEAR, NONLINEAR, Dataset, digits, regression_of, start_of
 from winchkit.diagnosis.regression.gls import Fit, fit
 
 CERTIFIED = 6

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from strd import Dataset, regression_of, start_of
 
+from strd import Dataset, regression_of, start_of
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.projection import explained_ss, explained_ss_of_sets, orthonormal

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from can_bridge import Bridge
 from npm_install import install
-
 from winchkit import catalog
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState

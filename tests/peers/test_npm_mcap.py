@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from npm_install import install
 
+from npm_install import install
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
 from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recover import recover

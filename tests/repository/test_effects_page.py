@@ -6,8 +6,8 @@ import runpy
 from collections.abc import Callable
 
 import pytest
-from snippets import ROOT
 
+from snippets import ROOT
 from winchkit.effects import Catalogue, load_catalogue
 from winchkit.effects.card import card
 

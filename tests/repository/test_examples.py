@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from snippets import ROOT
 
+from snippets import ROOT
 from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.effects import load_catalogue

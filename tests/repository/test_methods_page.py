@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+
 from constants_of import Constants, numbers_of, table_of
 from snippets import ROOT
 

@@ -7,7 +7,6 @@ import runpy
 from collections.abc import Callable
 
 from snippets import ROOT
-
 from winchkit.bench.control.conditions import BENCH_CONDITIONS
 
 

@@ -9,8 +9,8 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from snippets import ROOT
 
+from snippets import ROOT
 from winchkit.cli import COMMANDS
 
 _FULLEST_FOLDER = 20

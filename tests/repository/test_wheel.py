@@ -10,6 +10,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+
 from snippets import ROOT
 
 pytestmark = pytest.mark.skipif(

@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+
 from snippets import ROOT
 from texts_of import Text, texts_of
 

@@ -19,7 +19,7 @@ predicted change
     bound of s here; the noise of the count at which the run began is beyond 6.07 s with 6e-10.
 
 The threshold -ln(1e-9), higher for cells above 278 conversions per second, keeps false trips
-below one in 1000 h; see tests/bench/test_frozen_cell.py and benchmarks/frozen_cell.py.
+below one in 1000 h; see tests/bench/control/test_frozen_cell.py and benchmarks/frozen_cell.py.
 """
 
 from __future__ import annotations

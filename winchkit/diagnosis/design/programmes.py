@@ -187,4 +187,4 @@ def _as_run(
         if output in predicted:
             channels[output] = Channel(predicted[output], "")
     metadata = {} if mass is None else {"load_mass": f"{mass!r} kg"}
-    return Run("imagined", time, channels, metadata)
+    return Run("simulated", time, channels, metadata)

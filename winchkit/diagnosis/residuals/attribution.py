@@ -92,7 +92,7 @@ def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attr
 
     Returns
     -------
-    list of Followed
+    list of Attribution
         Those whose share exceeds 2 % and three standard deviations of its null distribution.
     """
     times = regression.in_time(residual)
@@ -139,7 +139,7 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribu
 
     Returns
     -------
-    list of Followed
+    list of Attribution
         Orders 1 to 40 with a share above 2 %, largest share first.
     """
     times = regression.in_time(residual)

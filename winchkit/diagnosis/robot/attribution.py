@@ -61,7 +61,7 @@ def follows_of(regression: PoseRegression, errors: Errors) -> list[Attribution]:
 
     Returns
     -------
-    list of Followed
+    list of Attribution
         ``winch`` is the share of a constant per line, ``pose`` that of a constant per pose.
     """
     variables, out = variables_of_poses(regression), []

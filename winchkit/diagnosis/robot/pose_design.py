@@ -104,7 +104,7 @@ def simulated_poses(
         With the poses so far.
     robot : Robot
         With the effects of the final model.
-    kind : PoseKind
+    kind : PoseCandidates
         Of the poses.
 
     Returns

@@ -50,8 +50,8 @@ class GeometryPrior:
         return FIELDS[base_of(self.term.effect)]
 
     @property
-    def line(self) -> str | None:
-        """Line of the number; None for one of all lines."""
+    def line(self) -> str:
+        """Line of the number; empty for one of all lines."""
         return line_of_effect(self.term.effect)
 
     @property

@@ -1,0 +1,144 @@
+"""The fault campaign in small: each case is judged from the truth, on both kinds of drives."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import fault_campaign
+from fault_cases.case import Case, Planned, cases
+from fault_cases.judge import judge
+from fault_cases.kinds import KINDS
+from fault_cases.play import play
+
+
+def case(kind: str, **changes: object) -> Case:
+    """A jog that one lasting fault meets."""
+    first = KINDS[kind]
+    plain = Case(
+        seed="small/1",
+        winches=1,
+        motion="jog",
+        speed=0.2,
+        paying_out=first.moving == "out",
+        faults=(Planned(kind, "A", 0.6, None),),
+        resets_early=False,
+    )
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("kind", "independent", "resets_early"),
+    [
+        ("enable input open", True, True),
+        ("second master: 6040h = 00h", False, False),
+        ("stranger: NMT pre-operational", True, False),
+        ("TPDOs lost", True, True),
+        ("SYNC lost", False, False),
+        ("cut wire", True, False),
+        ("cell silent", False, True),
+        ("over-tension", False, False),
+        ("computer stalls 0.5 s", True, False),
+        ("exception in the loop", True, False),
+        ("released", True, False),
+    ],
+)
+def test_a_fault_stops_the_winch_and_nothing_moves_again(
+    kind: str, independent: bool, resets_early: bool
+) -> None:
+    verdict = judge(play(case(kind, independent=independent, resets_early=resets_early)))
+    assert verdict.good, verdict
+
+
+def test_a_winch_that_goes_on_is_found() -> None:
+    """The judge does not depend on what winchkit says: here nothing must stop, and nothing does."""
+    record = play(case("recorder fails"))
+    assert judge(record).good
+    blamed = replace(record.case, faults=(Planned("cut wire", "A", 0.6, None),))
+    record.case = blamed
+    record.onsets = [(blamed.faults[0], record.onsets[0][1])]
+    verdict = judge(record)
+    assert "followed set-points" in verdict.stopped
+    assert "enabled" in verdict.moved_after_trip
+    assert verdict.cause == "nothing was told"
+
+
+@pytest.mark.parametrize("independent", [True, False])
+def test_a_frame_that_no_drive_hears_is_heard_by_the_host(independent: bool) -> None:
+    """A drive that is off the bus for 20 ms (case 172/138) stays operational; the host stops it."""
+    kind = "stranger: NMT pre-operational"
+    silence = Planned("drive silent", "A", 0.600, 0.02)
+    for after, unheard in ((0.005, True), (0.05, False)):
+        stranger = Planned(kind, "A", silence.at + after, None)
+        record = play(case(kind, faults=(silence, stranger), independent=independent))
+        assert (record.unheard == [stranger]) == unheard
+        assert record.trips
+        assert judge(record).good, judge(record)
+        ends = [s.follows for s in record.truth["A"] if s.time < record.mended][-1]
+        assert not ends, "the truth: it is stopped, by itself or by the host"
+
+
+def test_a_case_is_the_same_whenever_it_is_played() -> None:
+    """With cells that lose connections, whose transactions are otherwise drawn anew each time."""
+    again = case("cell: short", independent=True)
+    first, second = play(again), play(again)
+    assert first.truth == second.truth
+    assert (first.trips, first.log_end) == (second.trips, second.log_end)
+
+
+def test_processes_give_the_same_verdicts_in_the_same_order() -> None:
+    found = [case("cut wire"), case("released"), case("drive silent", independent=True)]
+    alone, together = list(fault_campaign.each(found, 1)), list(fault_campaign.each(found, 2))
+    assert [repr(item) for item in together] == [repr(item) for item in alone]
+    assert [item[0] for item in together] == found
+
+
+def running(group: int) -> int:
+    """Processes of a group that have not ended."""
+    number = 0
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, of_group = stat.read_text().rpartition(") ")[2].split()[:3]
+            number += of_group == str(group) and state != "Z"
+    return number
+
+
+def reaches(group: int, low: int, high: int) -> bool:
+    """Whether so many processes of a group run within 20 s."""
+    for _ in range(400):
+        if low <= running(group) <= high:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts processes in /proc")
+def test_ctrl_c_ends_every_process() -> None:
+    words = [sys.executable, fault_campaign.__file__, "--cases", "40", "--jobs", "2"]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True) as campaign:
+        try:
+            assert reaches(campaign.pid, 3, 9), "it has begun its two processes"
+            time.sleep(1.0)
+            os.killpg(campaign.pid, signal.SIGINT)
+            assert campaign.wait(20.0) == 130
+            assert reaches(campaign.pid, 0, 0), "a process of the campaign goes on"
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(campaign.pid, signal.SIGKILL)
+
+
+def test_the_same_seed_draws_the_same_cases() -> None:
+    assert cases(50, 3) == cases(50, 3)
+    assert cases(50, 3) != cases(50, 4)
+    assert {c.faults[0].kind for c in cases(len(KINDS), 1)} <= set(KINDS)
+    real = [c for c in cases(100, 1, real_time_share=0.05) if c.real_time]
+    assert len(real) == 5
+    assert all(KINDS[fault.kind].real_time for c in real for fault in c.faults)

@@ -1,0 +1,239 @@
+"""Jogs, moves and stops through the real control loop with a fake drive, in simulated time."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fake_axis import CYCLE, Rig, StraightLine
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.motion import DEAD_MAN, Jog, Move, Trim
+from winchkit.bench.control.snapshot import Phase
+from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.errors import NotPermitted
+from winchkit.schema.bench import LimitSpec
+
+LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0))
+ENERGISING = {0x06, 0x07}
+
+
+def jog(rig: Rig, speed: float, hold: float = DEAD_MAN) -> Jog:
+    source = Jog(rig.rope(), rig.limits)
+    source.refresh(speed, rig.now + hold)
+    rig.controller().begin(source)
+    return source
+
+
+def test_a_jog_without_refresh_ends_by_itself_and_disables() -> None:
+    rig = Rig(LIMITS)
+    jog(rig, 0.1)
+    rig.run(0.15)
+    assert rig.speeds[-1] == pytest.approx(0.1)
+    rig.run(0.3)
+    assert rig.axes["A"].velocity == 0
+    assert rig.controller().phase is Phase.DISABLED
+    assert rig.axes["A"].state is State.SWITCH_ON_DISABLED
+    moved = 4.0 - rig.rope().at(rig.axes["A"].angle)[0]
+    assert 0 < moved <= 0.1 * (DEAD_MAN + 0.1)
+
+
+def test_a_refreshed_jog_goes_on_and_its_speed_ramps() -> None:
+    rig = Rig(LIMITS)
+    source = jog(rig, 0.3)
+    for _ in range(20):
+        source.refresh(0.3, rig.now + DEAD_MAN)
+        rig.run(0.1)
+    assert rig.speeds[-1] == pytest.approx(0.3)
+    changes = [abs(b - a) for a, b in zip(rig.speeds, rig.speeds[1:], strict=False)]
+    assert max(changes) <= LIMITS.acceleration * CYCLE * 1.001
+
+
+def test_a_jog_slows_down_before_a_length_limit() -> None:
+    rig = Rig(LimitSpec(0.5, 1.0, (3.8, 9.0)))
+    source = jog(rig, 0.5)
+    for _ in range(20):
+        source.refresh(0.5, rig.now + DEAD_MAN)
+        rig.run(0.1)
+    length = rig.rope().at(rig.axes["A"].angle)[0]
+    assert 3.8 - 1e-3 <= length < 3.81
+    assert not rig.supervisor.tripped
+
+
+@pytest.mark.parametrize("pays_out", [True, False])
+@pytest.mark.parametrize(
+    ("speed", "acceleration", "response", "lag"),
+    [
+        (0.45, 1.5, 0.06, 0.027),
+        (0.45, 1.5, 0.06, 0.001),
+        (0.1, 0.3, 0.06, 0.027),
+        (1.0, 3.0, 0.1, 0.045),
+        (1.0, 1.0, 0.2, 0.08),
+        (0.6, 2.0, 0.02, 0.009),
+    ],
+)
+def test_a_held_jog_stays_within_its_length_whatever_lag_is_declared(
+    speed: float, acceleration: float, response: float, lag: float, pays_out: bool
+) -> None:
+    """Cases 172/91 and 172/148: at 0.45 m/s a lag of 27 ms ran past the limit, and tripped."""
+    limits = LimitSpec(speed, acceleration, (3.0, 5.0), response_time=response)
+    rig = Rig(limits)
+    rig.axes["A"].lag = lag
+    source = jog(rig, -speed if pays_out else speed)
+    lengths = []
+    for _ in range(round((1.0 / speed + speed / acceleration + 1.0) / 0.1)):
+        source.refresh(-speed if pays_out else speed, rig.now + DEAD_MAN)
+        rig.run(0.1)
+        lengths.append(4.0 - 0.005 * rig.axes["A"].angle)
+    assert not rig.supervisor.tripped
+    assert min(lengths) >= 3.0 - 1e-3
+    assert max(lengths) <= 5.0 + 1e-3
+    assert abs(lengths[-1] - (5.0 if pays_out else 3.0)) < 0.015, "it goes as far as it may"
+
+
+@pytest.mark.parametrize("position_mode", [False, True])
+@pytest.mark.parametrize("target", [3.0, 4.8, 4.0])
+def test_a_move_arrives(target: float, position_mode: bool) -> None:
+    rig = Rig(LIMITS)
+    rig.axes["A"].position_mode = position_mode
+    move = Move(StraightLine(), LIMITS, target, speed=0.4)
+    move.prepare(0.0)
+    rig.controller().begin(move)
+    rig.run(move.duration + 1.2)
+    length = 4.0 - 0.005 * rig.axes["A"].angle
+    assert length == pytest.approx(target, abs=1e-3)
+    assert max(map(abs, rig.speeds)) <= 0.5
+    assert rig.controller().done
+    assert rig.controller().phase is Phase.DISABLED
+
+
+class SoftLine(StraightLine):
+    """The same, and the rope is longer once the winch has come to where it was sent."""
+
+    longer = 0.0
+
+    def cable_length(self, motor_angle: float) -> float:
+        return super().cable_length(motor_angle) + self.longer
+
+
+@pytest.mark.parametrize("longer", [8e-3, -8e-3, 5e-5, 0.5])
+def test_a_trim_corrects_what_the_rope_became_on_the_way(longer: float) -> None:
+    """Small corrections at rest; what is within 0.1 mm, or beyond belief, is left alone."""
+    rig, line = Rig(LIMITS), SoftLine()
+    move = Move(line, LIMITS, 3.0, trim=Trim(RopeMap(line), 3.0, LIMITS))
+    move.prepare(0.0)
+    rig.controller().begin(move)
+    rig.run(move.duration / 2)
+    line.longer = longer
+    rig.run(move.duration / 2 + 4.0)
+    left = 4.0 - 0.005 * rig.axes["A"].angle + longer - 3.0
+    corrected = 1e-4 < abs(longer) < 0.1
+    assert left == pytest.approx(0.0 if corrected else longer, abs=1.5e-4)
+    assert rig.controller().phase is Phase.DISABLED
+    changes = [abs(b - a) for a, b in zip(rig.speeds, rig.speeds[1:], strict=False)]
+    assert max(changes) <= LIMITS.acceleration * CYCLE * 1.1
+
+
+def test_a_held_move_stays_enabled_until_stopped() -> None:
+    rig = Rig(LIMITS)
+    move = Move(StraightLine(), LIMITS, 3.5, holds=True)
+    move.prepare(0.0)
+    rig.controller().begin(move)
+    rig.run(move.duration + 2.0)
+    assert rig.controller().done
+    assert rig.axes["A"].state is State.OPERATION_ENABLED
+    rig.controller().run_down()
+    rig.run(0.1)
+    assert rig.controller().phase is Phase.DISABLED
+
+
+def test_a_move_begun_during_a_jog_waits_for_rest_and_no_speed_jumps() -> None:
+    rig = Rig(LIMITS)
+    jog(rig, 0.3, hold=1.0)
+    rig.run(0.5)
+    move = Move(StraightLine(), LIMITS, 4.2)
+    rig.controller().begin(move)
+    rig.run(4.0)
+    assert 4.0 - 0.005 * rig.axes["A"].angle == pytest.approx(4.2, abs=1e-3)
+    changes = [abs(b - a) for a, b in zip(rig.speeds, rig.speeds[1:], strict=False)]
+    assert max(changes) <= 0.02
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    orders=st.lists(
+        st.tuples(st.sampled_from(["jog", "stop", "run_down", "wait"]), st.floats(0.0, 0.3)),
+        min_size=1,
+        max_size=12,
+    )
+)
+def test_after_a_stop_nothing_energises_whatever_came_before(
+    orders: list[tuple[str, float]],
+) -> None:
+    rig = Rig(LIMITS)
+    for order, duration in orders:
+        if order == "jog":
+            jog(rig, 0.4, hold=0.5)
+        elif order == "stop":
+            rig.controller().stop()
+        elif order == "run_down":
+            rig.controller().run_down()
+        rig.run(duration)
+    axis = rig.axes["A"]
+    rig.controller().stop()
+    before = len(axis.words)
+    rig.run(3.0)
+    assert not ENERGISING & set(axis.words[before:])
+    assert 0x0F not in axis.words[before:]
+    assert axis.state is State.SWITCH_ON_DISABLED
+    assert rig.controller().phase is Phase.DISABLED
+
+
+@settings(max_examples=40, deadline=None)
+@given(moment=st.floats(0.0, 1.0))
+def test_a_run_down_with_stale_feedback_becomes_a_quick_stop(moment: float) -> None:
+    """0Fh is repeated during a ramp for five SYNCs without a status word, and then no more."""
+    rig = Rig(LIMITS)
+    jog(rig, 0.5, hold=1.0)
+    rig.run(moment)
+    axis = rig.axes["A"]
+    axis.alive = False
+    rig.controller().run_down()
+    rig.step(7)
+    before = len(axis.words)
+    rig.run(0.2)
+    assert not {0x06, 0x07, 0x0F} & set(axis.words[before:])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"length": 9.5}, "beyond the limits"),
+        ({"length": 5.0, "speed": 0.6}, "limit of 0.5 m/s"),
+        ({"length": 5.0, "acceleration": -1.0}, "limit of 1 m/s"),
+        ({"length": math.nan}, "beyond the limits"),
+    ],
+)
+def test_moves_beyond_the_limits_are_refused(arguments: dict[str, float], words: str) -> None:
+    with pytest.raises(NotPermitted, match=words):
+        Move(StraightLine(), LIMITS, **arguments)  # type: ignore[arg-type]
+
+
+@settings(max_examples=80, deadline=None)
+@given(pause=st.floats(0.0, 0.6), order=st.sampled_from(["expire", "stop", "run_down"]))
+def test_a_new_press_moves_again_whenever_it_comes(pause: float, order: str) -> None:
+    rig = Rig(LIMITS)
+    jog(rig, 0.1, hold=0.3)
+    rig.run(0.25)
+    if order == "stop":
+        rig.controller().stop()
+    elif order == "run_down":
+        rig.controller().run_down()
+    rig.run(pause)
+    before = rig.axes["A"].angle
+    jog(rig, 0.1, hold=0.7)
+    rig.run(0.5)
+    assert rig.axes["A"].angle - before > 0.1 * 0.2 / 0.005
+    rig.run(2.0)
+    assert rig.controller().phase is Phase.DISABLED
+    assert rig.controller().done

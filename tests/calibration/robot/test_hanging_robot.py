@@ -1,0 +1,156 @@
+"""A hanging robot of four ropes: poses where its weight is lowest, found by another program."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.linalg import null_space
+from scipy.optimize import brentq, minimize
+
+from calibration_cases import Truth, robot
+from robot_poses.truth import HOME, turn
+from winchkit.arrays import Array
+from winchkit.calibration.robot import pose_design as robot_next
+from winchkit.calibration.robot.calibrate import calibrate, split
+from winchkit.calibration.robot.prediction import rms
+from winchkit.errors import UsageError
+from winchkit.model.robot import Robot, lengths, robot_of, rotation_of
+from winchkit.runs.poses import Measured
+
+CENTRE = np.array([0.0, 0.0, -0.05])
+ROPES, COUNT = 4, 60
+TRACKER, ENCODER, ANGLE = 2e-5, 1e-4, 1e-3
+
+
+def truth() -> Truth:
+    """The upper ropes of the paper's robot, led to points above its platform."""
+    whole = Truth()
+    anchor = tuple((x, y, 0.0635 + 0.002 * i) for i, (x, y, _) in enumerate(whole.anchor[:ROPES]))
+    return replace(whole, exit=whole.exit[:ROPES], anchor=anchor)
+
+
+def ropes(pose: Array) -> Array:
+    x, y, z, *angles = pose.tolist()
+    return np.array([truth().length(i, (x, y, z), turn(*angles)) for i in range(ROPES)])
+
+
+def height(pose: Array) -> float:
+    """Of the centre of mass."""
+    return float(pose[2] + (np.array(turn(*pose[3:].tolist())) @ CENTRE)[2])
+
+
+def rest(given: Array, start: Array) -> Array:
+    """The pose of the lowest weight with ropes of these lengths."""
+    found = minimize(
+        height,
+        start,
+        method="SLSQP",
+        constraints={"type": "eq", "fun": lambda pose: ropes(pose) - given},
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    assert np.max(np.abs(ropes(found.x) - given)) < 1e-9
+    return np.asarray(found.x)
+
+
+def wound_in(line: int, shorter: float) -> float:
+    """Drum angle since home at which the rope is that much shorter."""
+    begin = 2 * pi * truth().turns
+    at_home = truth().wound(line, begin)
+    return float(brentq(lambda a: truth().wound(line, begin + a) - at_home - shorter, -20, 20))
+
+
+@lru_cache(maxsize=1)
+def hanging() -> tuple[Robot, Measured]:
+    """The robot as it is believed to be, and what was measured of the true one."""
+    rng = np.random.default_rng(3)
+    home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
+    poses = []
+    for _ in range(COUNT):
+        about = home + np.concatenate([rng.uniform(-0.1, 0.1, 3), np.zeros(3)])
+        poses.append(rest(ropes(about) + rng.uniform(-0.012, 0.012, ROPES), about))
+    shorter = ropes(home) - np.array([ropes(pose) for pose in poses])
+    motor = np.array([[wound_in(i, s) for i, s in enumerate(row)] for row in shorter.tolist()])
+    seen = np.array(poses)
+    nothing = np.full((COUNT, ROPES), np.nan)
+    measured = Measured(
+        motor_angle=motor + rng.normal(0, ENCODER, motor.shape),
+        position=seen[:, :3] + rng.normal(0, TRACKER, (COUNT, 3)),
+        angles=seen[:, 3:] + rng.normal(0, ANGLE, (COUNT, 3)),
+        swivel=nothing,
+        cable_length=nothing,
+        tension=nothing,
+        temperature=nothing,
+        run=np.zeros(COUNT, dtype=np.intp),
+        place=np.array([f"row {n + 1}" for n in range(COUNT)]),
+    )
+    return believed(home), measured
+
+
+def believed(home: Array) -> Robot:
+    """The profile's own points, the anchors a few millimetres off, and the pose measured first."""
+    profile = robot().profile
+    lines = tuple(
+        replace(line, anchor_point=(line.anchor_point[0], line.anchor_point[1], 0.066))
+        for line in profile.line[:ROPES]
+    )
+    place, angles = (tuple(part.tolist()) for part in (home[:3], home[3:]))
+    return robot_of(
+        replace(
+            profile,
+            line=lines,
+            home=replace(profile.home, position=place, rotation=angles),
+            platform=replace(profile.platform, center_of_mass=tuple(CENTRE.tolist())),
+        )
+    )
+
+
+@pytest.mark.parametrize("rotations", [True, False])
+def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None:
+    believed, measured = hanging()
+    if not rotations:
+        measured = replace(measured, angles=np.full_like(measured.angles, np.nan))
+    fit, held = split(measured)
+    found = calibrate(believed, fit, held)
+    assert found.solution.converged
+    assert found.observed.free == 33
+    assert found.validation_after.unfound == 0
+    before, after = rms(found.validation_before.distance), rms(found.validation_after.distance)
+    assert before > 2e-3
+    assert after < before / (10 if rotations else 3)
+
+
+def test_proposed_poses_are_such_that_it_rests_there() -> None:
+    """No motion that keeps the ropes' lengths moves the centre of mass up or down."""
+    believed, measured = hanging()
+    fit, held = split(measured)
+    found = calibrate(believed, fit, held)
+    geometry = found.equations.geometry(found.values)
+    proposed = robot_next.next_poses(found, 3)
+    assert len(proposed) == 3
+    for pose in proposed:
+        at = np.array([*pose.position, *pose.angles])
+
+        def given(x: Array) -> Array:
+            return lengths(geometry, x[None, :3], rotation_of(*x[3:, None]))[0]
+
+        steps = np.eye(6) * 1e-6
+        slope = np.array([(given(at + d) - given(at - d)) / 2e-6 for d in steps])
+        rise = np.array([(height(at + d) - height(at - d)) / 2e-6 for d in steps])
+        free = null_space(slope.T)
+        assert free.shape == (6, 2)
+        np.testing.assert_allclose(free.T @ rise, 0.0, atol=1e-6)
+
+
+def test_motor_angles_alone_are_not_enough_for_four_ropes() -> None:
+    believed, measured = hanging()
+    blind = replace(
+        measured,
+        position=np.full_like(measured.position, np.nan),
+        angles=np.full_like(measured.angles, np.nan),
+    )
+    with pytest.raises(UsageError, match="measure more at each"):
+        calibrate(believed, blind, blind)

@@ -1,0 +1,236 @@
+"""``move``, ``home``, ``reset``, ``stop`` and dry runs on simulated drives in simulated time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from can_commands import Served, invoke, length, served, without_trip
+from winchkit.bench.programme import earlier_runs
+from winchkit.schema.programme import Programme
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with served(tmp_path_factory.mktemp("moving"), "AB") as found:
+        yield found
+
+
+@pytest.fixture
+def bench(running: Served) -> Served:
+    """The served bench, without a trip that another test has left latched."""
+    return without_trip(running)
+
+
+def test_move_to_and_by(bench: Served) -> None:
+    before = length(bench, "B")
+    done = invoke("move", "A", "--to", "3.8 m", "--speed", "0.4 m/s", "-b", bench.file, "--json")
+    assert done.exit_code == 0, done.output
+    assert length(bench) == pytest.approx(3.8, abs=5e-3)
+    status = json.loads(done.stdout)
+    assert status["winch"]["A"]["phase"] == "disabled"
+    back = invoke("move", "A", "--pay-out", "0.1 m", "-b", bench.file)
+    assert back.exit_code == 0, back.output
+    assert length(bench) == pytest.approx(3.9, abs=5e-3)
+    assert length(bench, "B") == pytest.approx(before, abs=1e-3)
+
+
+def test_move_all(bench: Served) -> None:
+    done = invoke("move", "all", "--to", "3.7 m", "-b", bench.file)
+    assert done.exit_code == 0, done.output
+    for winch in "AB":
+        assert length(bench, winch) == pytest.approx(3.7, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("A",), 2, "give one of --to, --pay-out and --wind-in"),
+        (("A", "--to", "1m", "--pay-out", "1m"), 2, "give one of"),
+        (("A", "--pay-out", "1m", "--wind-in", "1m"), 2, "opposite directions"),
+        (("A", "--pay-out", "-50mm"), 2, "must be above zero"),
+        (("A", "--wind-in", "0.1m/s"), 2, "is a speed here and must be a length"),
+        (("A", "--wind-in", "3kg"), 2, "is no speed or length"),
+        (("A", "--to", "1"), 2, "has no unit"),
+        (("--to", "1 m"), 2, "which winch?"),
+        (("C", "--to", "1 m"), 2, "no winch 'C'"),
+        (("A", "--to", "20 m"), 5, "is beyond the limits 0.5 m to 4.7 m"),
+        (("A", "--to", "3 m", "--speed", "2 m/s"), 5, "speed 2 m/s is not within"),
+        (("A", "--to", "3 m", "--speed", "-1 m/s"), 5, "speed -1 m/s is not within"),
+    ],
+)
+def test_moves_that_cannot_be_meant(
+    bench: Served, arguments: tuple[str, ...], code: int, words: str
+) -> None:
+    result = invoke("move", *arguments, "-b", bench.file)
+    assert result.exit_code == code, result.output
+    assert words in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--speed", "-0.1 m/s", "--for", "1s"), "--for needs --pay-out SPEED or --wind-in SPEED"),
+        (("--wind-in", "0.1 m/s"), "--wind-in SPEED needs --for TIME"),
+        (("--wind-in", "50 mm", "--for", "1s"), "is a length here and must be a speed"),
+        (("--pay-out", "-0.1 m/s", "--for", "1s"), "must be above zero"),
+        (("--pay-out", "50mm", "--speed", "-0.1m/s"), "--speed -0.1m/s: must be above zero"),
+        (("--pay-out", "0.1m/s", "--for", "1s", "--speed", "1m/s"), "does not belong to --for"),
+        (("--pay-out", "0.1m/s", "--wind-in", "0.1m/s", "--for", "1s"), "opposite directions"),
+    ],
+)
+def test_a_jog_without_one_direction_is_refused(
+    bench: Served, arguments: tuple[str, ...], words: str
+) -> None:
+    result = invoke("jog", "A", *arguments, "-b", bench.file)
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+
+
+@pytest.mark.parametrize("option", ["--step", "--by"])
+def test_signed_options_are_gone(bench: Served, option: str) -> None:
+    for command in ("jog", "move"):
+        result = invoke(command, "A", option, "0.05 m", "-b", bench.file)
+        assert result.exit_code == 2
+        assert "No such option" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["jog", "move"])
+@pytest.mark.parametrize(("option", "sign"), [("--pay-out", 1), ("--wind-in", -1)])
+def test_jog_and_move_agree_on_each_direction(
+    bench: Served, command: str, option: str, sign: int
+) -> None:
+    before = length(bench)
+    done = invoke(command, "A", option, "30mm", "--speed", "0.2 m/s", "-b", bench.file)
+    assert done.exit_code == 0, done.output
+    assert length(bench) - before == pytest.approx(0.03 * sign, abs=3e-3)
+
+
+def test_home_here_defines_the_length_and_moves_nothing(bench: Served) -> None:
+    before = length(bench, "B")
+    done = invoke("home", "B", "--here", "2.5 m", "-b", bench.file, "--json")
+    assert done.exit_code == 0, done.output
+    shown = json.loads(done.stdout)["winch"]["B"]["cable_length"]
+    assert shown == pytest.approx(2.5, abs=2e-3)
+    assert length(bench, "B") == pytest.approx(before, abs=1e-3)
+    # The drive keeps it: the bench, opened anew, still sees it, and so does a move.
+    assert invoke("move", "B", "--wind-in", "0.1 m", "-b", bench.file).exit_code == 0
+    assert length(bench, "B") == pytest.approx(before - 0.1, abs=0.01)
+
+
+def test_home_by_the_index_finds_a_zero(bench: Served) -> None:
+    done = invoke("home", "B", "--method", "34", "--at", "3 m", "-b", bench.file, "--json")
+    assert done.exit_code == 0, done.output
+    status = json.loads(done.stdout)["winch"]["B"]
+    assert status["phase"] == "disabled"
+    assert status["cable_length"] == pytest.approx(3.0, abs=0.02)
+    assert bench.live.winches["B"].drive.objects.number(0x6061) == 9, "back in its mode, CSV"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        ((), 2, "give either --here LENGTH or --method NUMBER"),
+        (("--here", "1 m", "--at", "1 m"), 2, "--at belongs to --method"),
+        (("--method", "99"), 4, "refused to write 99"),
+        (("--method", "999"), 2, "999 is not in the range"),
+        (("--method", "34", "--speed", "3 m/s"), 5, "is not within its limit"),
+    ],
+)
+def test_homings_that_cannot_be(
+    bench: Served, arguments: tuple[str, ...], code: int, words: str
+) -> None:
+    result = invoke("home", "A", *arguments, "-b", bench.file)
+    assert result.exit_code == code, result.output
+    assert words in result.stderr
+
+
+def test_a_homing_that_fails_leaves_the_drive_disabled_in_its_mode(bench: Served) -> None:
+    """There is no limit switch on this winch to search for."""
+    result = invoke("home", "A", "--method", "17", "-b", bench.file)
+    assert result.exit_code == 5
+    assert "homing failed" in result.stderr
+    objects = bench.live.winches["A"].drive.objects
+    assert objects.number(0x6041) & 0x6F != 0x27
+    assert objects.number(0x6061) == 9
+
+
+def test_reset_clears_a_fault_and_enables_nothing(bench: Served) -> None:
+    bench.live.inject("A.servo", "over-current")
+    tripped = invoke("move", "A", "--pay-out", "0.1 m", "-b", bench.file)
+    assert tripped.exit_code == 5, tripped.output
+    done = invoke("reset", "-b", bench.file)
+    assert done.exit_code == 0, done.output
+    *cleared, last = done.stdout.splitlines()
+    assert last == "reset: nothing is tripped"
+    assert any("winch A: drive fault: error 2310h" in line for line in cleared)
+    assert bench.live.winches["A"].drive.objects.number(0x6041) & 0x4F == 0x40
+    assert invoke("move", "A", "--pay-out", "0.05 m", "-b", bench.file).exit_code == 0
+
+
+def test_a_rehearsed_move_touches_no_drive(bench: Served) -> None:
+    before = length(bench)
+    done = invoke("move", "A", "--pay-out", "0.1 m", "-b", bench.file, "--dry-run", "--json")
+    assert done.exit_code == 0, done.output
+    frames = json.loads(done.stdout)["frames"]
+    words = [f["values"]["6040h"] for f in frames if f["kind"] == "RPDO" and f["node"] == 1]
+    order = [word for word, last in zip(words, [None, *words], strict=False) if word != last]
+    assert [word for word in order if word in (0x06, 0x07, 0x0F)] == [0x06, 0x07, 0x0F]
+    assert order[-1] in (0x00, 0x02)
+    others = {f["values"]["6040h"] for f in frames if f["kind"] == "RPDO" and f["node"] == 2}
+    assert others <= {0x00, 0x02}, "B is never enabled"
+    assert length(bench) == pytest.approx(before, abs=1e-4)
+    assert bench.number(0x1016, 1) == 0
+
+
+def test_a_rehearsal_in_words(bench: Served) -> None:
+    shown = invoke(
+        "jog", "A", "--for", "0.2s", "--wind-in", "50mm/s", "-b", bench.file, "--dry-run"
+    )
+    assert shown.exit_code == 0, shown.output
+    assert "winch A: 6040h Controlword 0Fh enable operation" in shown.stdout
+    assert "dry run: nothing was sent" in shown.stderr
+    stop = invoke("stop", "-b", bench.file, "--dry-run")
+    assert stop.stdout.count("= 02h quick stop") == 2
+
+
+def test_a_programme_is_rehearsed_move_by_move(bench: Served, tmp_path: Path) -> None:
+    programme = tmp_path / "p.toml"
+    programme.write_text(
+        'schema = 1\nkind = "programme"\n[[step]]\nwinch = "all"\nby = "0.05 m"\n'
+        'speed = "0.3 m/s"\n[[step]]\nhold = "30 s"\n'
+    )
+    shown = invoke("run", programme, "-b", bench.file, "-o", tmp_path / "runs", "--dry-run")
+    assert shown.exit_code == 0, shown.output
+    assert "0Fh enable operation" in shown.stdout
+    assert not (tmp_path / "runs").exists()
+
+
+def test_earlier_runs_of_a_programme_are_not_written_over(bench: Served, tmp_path: Path) -> None:
+    programme, runs = tmp_path / "p.toml", tmp_path / "runs"
+    programme.write_text(
+        'schema = 1\nkind = "programme"\nname = "tiny"\n'
+        '[[step]]\nwinch = "all"\nby = "0.02 m"\nspeed = "0.2 m/s"\n'
+    )
+    runs.mkdir()
+    for name in ("tiny-10kg-1.csv", "tiny-2b.csv", "tiny-1.mcap", "tinyer-1.csv", "mine.csv"):
+        (runs / name).write_text("precious")
+    assert [p.name for p in earlier_runs(Programme("tiny", ()), runs)] == [
+        "tiny-10kg-1.csv",
+        "tiny-2b.csv",
+    ]
+    refused = invoke("run", programme, "-b", bench.file, "-o", runs)
+    assert refused.exit_code == 2, refused.output
+    assert "tiny-10kg-1.csv holds an earlier run of 'tiny'" in refused.stderr
+    assert {path.read_text() for path in runs.iterdir()} == {"precious"}
+
+
+def test_stop_says_in_json_who_has_confirmed(bench: Served) -> None:
+    alone = invoke("stop", "-b", bench.file, "--json")
+    assert alone.exit_code == 0, alone.output
+    told = {item["winch"]: item for item in json.loads(alone.stdout)["stopped"]}
+    assert set(told) == {"A", "B"}
+    assert all(item["confirmed"] for item in told.values())

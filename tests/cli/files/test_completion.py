@@ -1,0 +1,136 @@
+"""Completion by the shell, and the environment variables of every option."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+
+from can_commands import invoke
+from winchkit import catalog
+from winchkit.cli import COMMANDS, main
+
+BENCH = 'schema = 1\nkind = "bench"\n[winch.left]\n[winch.right]\n[winch."a b"]\n'
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "bench.toml").write_text(BENCH)
+    (tmp_path / "lift.toml").write_text('schema = 1\nkind = "programme"\n')
+    (tmp_path / "broken.toml").write_text('kind = "bench"\n[winch')
+    (tmp_path / "deep").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def complete(line: str, **environment: str) -> list[str]:
+    """What bash is offered at the end of a line."""
+    done = subprocess.run(
+        [sys.executable, "-c", "from winchkit.cli import main; main(prog_name='winchkit')"],
+        env={
+            **os.environ,
+            "COMP_WORDS": line,
+            "COMP_CWORD": str(len(line.split(" ")) - 1),
+            "_WINCHKIT_COMPLETE": "bash_complete",
+            **environment,
+        },
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    return [item.partition(",")[2] for item in done.stdout.splitlines() if item]
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("winchkit mo", {"move", "monitor"}),
+        ("winchkit config st", {"store"}),
+        ("winchkit move -b be", {"bench.toml"}),
+        ("winchkit move -b ", {"bench.toml", "broken.toml", "deep/"}),
+        ("winchkit move -b bench.toml ", {"left", "right", "a b"}),
+        ("winchkit move -b bench.toml r", {"right"}),
+        ("winchkit move -b broken.toml ", set()),
+        ("winchkit move -b none.toml ", set()),
+        ("winchkit run l", {"lift.toml"}),
+        ("winchkit busload be", {"bench.toml"}),
+        ("winchkit info --device generic-cia402", {"generic-cia402"}),
+    ],
+)
+def test_what_a_shell_is_offered(line: str, offered: set[str]) -> None:
+    assert set(complete(line)) == offered
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_bench_in_the_environment_has_winches_too() -> None:
+    assert set(complete("winchkit move ", WINCHKIT_MOVE_BENCH="bench.toml")) == {
+        "left",
+        "right",
+        "a b",
+    }
+    assert "programme-demo" in complete("winchkit run pro")
+    assert catalog.names("devices")[0] in complete("winchkit info --device ")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_of_each_shell(shell: str) -> None:
+    result = invoke("completion", shell)
+    assert result.exit_code == 0
+    assert f"_WINCHKIT_COMPLETE={shell}_complete" in result.stdout
+    if shell == "bash":
+        subprocess.run(["bash", "-n"], input=result.stdout, text=True, check=True)
+
+
+def test_an_unknown_shell() -> None:
+    result = invoke("completion", "ksh")
+    assert result.exit_code == 2
+    assert "'bash', 'zsh', 'fish'" in result.stderr
+
+
+def every_option() -> Iterator[tuple[str, click.Option]]:
+    """Each option of each command, with the command's words."""
+    context = click.Context(main, info_name="winchkit", auto_envvar_prefix="WINCHKIT")
+    for name in COMMANDS:
+        command = main.get_command(context, name)
+        assert command is not None
+        yield from options_of(context, command, name)
+
+
+def options_of(
+    context: click.Context, command: click.Command, words: str
+) -> Iterator[tuple[str, click.Option]]:
+    for option in command.params:
+        if isinstance(option, click.Option):
+            yield words, option
+    if isinstance(command, click.Group):
+        inner = click.Context(command, parent=context, info_name=words.rpartition(" ")[2])
+        for name in command.list_commands(inner):
+            below = command.get_command(inner, name)
+            assert below is not None
+            yield from options_of(inner, below, f"{words} {name}")
+
+
+def test_every_option_has_an_environment_variable() -> None:
+    seen = set()
+    for words, option in every_option():
+        if id(option) in seen:
+            continue  # a command that stands in two groups keeps its first name
+        typed = max(option.opts, key=len).lstrip("-")
+        expected = f"WINCHKIT_{words}_{typed}".replace(" ", "_").replace("-", "_").upper()
+        assert option.envvar == expected, (words, option.opts)
+        seen.add(id(option))
+    assert len(seen) > 60
+
+
+def test_an_environment_variable_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WINCHKIT_CONFIG_SAVE_BENCH", "none.toml")
+    result = invoke("config", "save", "A", "-o", "a.json")
+    assert result.exit_code == 3
+    assert "none.toml: there is no such file" in result.stderr

@@ -1,0 +1,99 @@
+"""``--html`` of compare, diagnose and add: a page beside the answer, and never instead of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from report_answers import recorded
+from report_parsed import Page
+from winchkit.cli import main
+from winchkit.runs import write_run
+
+COMMANDS = ["compare", "diagnose", "add"]
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder = tmp_path_factory.mktemp("runs")
+    paths = []
+    for run in recorded("demo-elastic-rope")[:2]:
+        paths.append(str(folder / f"{run.name}.csv"))
+        write_run(run, paths[-1])
+    return paths
+
+
+def asked(command: str, runs: list[str], html: Path, *more: str) -> Result:
+    words = [command, *runs, "--profile", "bench-spiral"]
+    if command == "add":
+        better = str(html.parent / "better.toml")
+        words = ["add", "cable-elongation-linear", "--fit", *runs, "-p", "bench-spiral"]
+        words += ["-o", better if html.parent.is_dir() else str(Path(runs[0]).parent / "b.toml")]
+    return CliRunner().invoke(main, [*words, "--html", str(html), *more])
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_page_is_written_into_a_new_folder(
+    command: str, runs: list[str], tmp_path: Path
+) -> None:
+    html = tmp_path / "new" / "page.html"
+    result = asked(command, runs, html, "--json")
+    assert result.exit_code == 0
+    assert result.stderr.splitlines()[-1] == f"report: {html}"
+    page = Page(html.read_text(encoding="utf-8"))
+    raw = next(word for word in page.words if word.startswith("{"))
+    printed = json.loads(result.stdout)
+    assert json.loads(raw).keys() == printed.keys()
+    assert json.loads(raw)["outputs"] == printed["outputs"]
+    assert " ".join(runs) in page.text
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_page_that_cannot_be_written_costs_no_answer(
+    command: str, runs: list[str], tmp_path: Path
+) -> None:
+    html = tmp_path / "no" / "such" / "page.html"
+    result = asked(command, runs, html)
+    assert result.exit_code == 3
+    assert result.stderr.splitlines()[-1] == (
+        f"{html}: the page cannot be written: No such file or directory; "
+        "name another file for --html"
+    )
+    assert "cable length" in result.stdout
+    assert not html.parent.exists()
+
+
+def test_a_folder_is_no_page(runs: list[str], tmp_path: Path) -> None:
+    result = asked("compare", runs, tmp_path)
+    assert result.exit_code == 3
+    assert "Is a directory" in result.stderr
+
+
+def test_a_run_named_by_mistake_stays_what_it_is(runs: list[str]) -> None:
+    taken = Path(runs[0])
+    held = taken.read_bytes()
+    result = asked("compare", runs, taken)
+    assert result.exit_code == 3
+    assert "holds something else than a page and was left alone" in result.stderr
+    assert taken.read_bytes() == held
+
+
+def test_a_page_replaces_an_earlier_page(runs: list[str], tmp_path: Path) -> None:
+    html = tmp_path / "page.html"
+    html.touch()
+    assert asked("compare", runs, html).exit_code == 0
+    earlier = html.read_text(encoding="utf-8")
+    assert asked("compare", runs[:1], html).exit_code == 0
+    assert html.read_text(encoding="utf-8") != earlier
+
+
+def test_the_page_repeats_the_options_that_it_was_asked_with(
+    runs: list[str], tmp_path: Path
+) -> None:
+    html = tmp_path / "page.html"
+    assert asked("compare", runs, html, "--band", "7.5").exit_code == 0
+    page = Page(html.read_text(encoding="utf-8"))
+    assert "--profile bench-spiral --band 7.5 --html report.html" in page.text

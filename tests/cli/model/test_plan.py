@@ -1,0 +1,123 @@
+"""Plan, run, diagnose again: the loop closes without leaving the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from model_files import answer, invoke, record_files
+from winchkit.catalog import find
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.design.plan import programme_of
+from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES
+from winchkit.runs import read_run, write_csv
+from winchkit.schema.programme import Programme
+from winchkit.schema.read import read_programme, read_simbench, read_winch
+from winchkit.sim.bench import profiles_of
+from winchkit.sim.live.bench_file import write_bench
+from winchkit.sim.record import record
+
+BENCH = read_simbench(find("sim", "demo-fat-drum"))
+PROFILE = find("profiles", "bench-spiral")
+
+
+def recorded(programme: Programme, folder: Path, seed: int) -> list[Path]:
+    out = []
+    for run in record(BENCH, profiles_of(BENCH), programme, seed=seed):
+        out.append(folder / f"{seed}-{run.name}.csv")
+        write_csv(run, out[-1])
+    return out
+
+
+@pytest.fixture(scope="module")
+def fat(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("fat")
+    names = ("programme-demo-fast", "programme-demo-slow")
+    return [path for n in names for path in recorded(read_programme(find("sim", n)), folder, 0)]
+
+
+def test_the_plan_is_a_programme_that_tells_them_apart(fat: list[Path], tmp_path: Path) -> None:
+    before = answer("diagnose", *fat, "-p", "bench-spiral")
+    (step,) = before["steps"]
+    assert "drum-radius" in step["effects"]
+    assert len(step["effects"]) == 2
+    next_file = tmp_path / "next.toml"
+    told = answer("plan", *fat, "-p", "bench-spiral", "-o", next_file)
+    best = told["offers"][0]
+    assert [set(p["effects"]) for p in best["separates"]] == [set(step["effects"])]
+    assert best["separates"][0]["power"] > 0.9
+    assert best["minutes"] == min(
+        o["minutes"] for o in told["offers"] if o["separates"][0]["power"] > 0.9
+    )
+    programme = read_programme(next_file)
+    assert programme.repeat == 2
+    reached = [step.to for step in programme.step if step.to is not None]
+    assert min(reached) == pytest.approx(1.5, abs=0.01)
+    assert max(reached) == pytest.approx(2.8, abs=0.01)
+    assert invoke("check", next_file).exit_code == 0
+
+    more = [path for seed in range(4) for path in recorded(programme, tmp_path, seed)]
+    after = answer("diagnose", *fat, *more, "-p", "bench-spiral")
+    assert after["verdict"] == "explained"
+    assert [s["effects"] for s in after["steps"]] == [["drum-radius"]]
+
+
+def test_where_nothing_is_to_be_told_apart_it_shows_something_new(tmp_path: Path) -> None:
+    runs = record_files(tmp_path)
+    told = answer("plan", *runs, "-p", "bench-spiral")
+    assert told["programme"] is None
+    best = told["offers"][0]
+    assert best["separates"] == []
+    assert best["shows"]
+    rates = [len(offer["shows"]) / offer["minutes"] for offer in told["offers"]]
+    assert rates == sorted(rates, reverse=True)
+    # Warming a machine through takes an operator most of an hour, twice.
+    minutes = {offer["kind"]: offer["minutes"] for offer in told["offers"]}
+    assert minutes["full stroke, warmed up by 15 K"] > 40
+    assert minutes["full stroke, one load"] < 2
+    text = invoke("plan", *runs, "-p", "bench-spiral").stdout
+    assert text.startswith("what to run next (nothing to tell apart")
+    for offer in told["offers"]:
+        assert f"\n  {offer['kind']}  " in text
+
+
+def test_a_place_that_cannot_be_written_is_a_bad_file(fat: list[Path]) -> None:
+    done = invoke("plan", *fat, "-p", "bench-spiral", "-o", "/no/such/folder/next.toml")
+    assert done.exit_code == 3
+    assert "cannot be written" in done.stderr
+
+
+def test_with_a_bench_the_plan_uses_the_room_that_its_limits_leave(
+    fat: list[Path], tmp_path: Path
+) -> None:
+    bench = write_bench(BENCH.bench, tmp_path / "bench.toml")
+    next_file = tmp_path / "wide.toml"
+    told = invoke("plan", *fat, "-p", "bench-spiral", "-b", bench, "-o", next_file)
+    assert told.exit_code == 0, told.stderr
+    limits = BENCH.bench.winch["A"].limits
+    assert limits.length is not None
+    programme = read_programme(next_file)
+    reached = [step.to for step in programme.step if step.to is not None]
+    span = limits.length[1] - limits.length[0]
+    assert min(reached) == pytest.approx(limits.length[0] + 0.05 * span, abs=1e-3)
+    assert max(reached) == pytest.approx(limits.length[1] - 0.05 * span, abs=1e-3)
+    assert max(step.speed or 0.0 for step in programme.step) <= limits.speed
+    loads = [step.load_mass for step in programme.step if step.load_mass is not None]
+    assert all(load * 9.80665 < (limits.tension_high or 0.0) for load in loads)
+    wrong = invoke("plan", *fat, "-p", "bench-spiral", "-b", bench, "--winch", "B")
+    assert wrong.exit_code == 2
+    assert "has no winch 'B'; it has A" in wrong.stderr
+
+
+def test_a_warmed_programme_asks_for_temperatures_that_a_simulation_obeys(tmp_path: Path) -> None:
+    dataset = prepare([read_run(p) for p in record_files(tmp_path)], read_winch(PROFILE))
+    warmed = next(kind for kind in CANDIDATE_PROGRAMMES if len(kind.temperature_rises) > 1)
+    programme = programme_of(dataset, warmed, "warm")
+    asked = [step.temperature for step in programme.step if step.temperature is not None]
+    assert len(asked) == 2
+    assert asked[1] == pytest.approx(asked[0] + 15.0)
+    runs = list(record(BENCH, profiles_of(BENCH), programme, rate=10.0))
+    assert len(runs) == 4
+    means = [float(run["temperature"].mean()) for run in runs]
+    assert means == pytest.approx([asked[0], asked[1]] * 2, abs=0.1)

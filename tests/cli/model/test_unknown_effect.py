@@ -1,0 +1,67 @@
+"""What no effect explains: a curve of it can be added, and a file for the physics begun."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from model_files import answer, invoke, record_files
+from winchkit.schema.read import read_winch
+
+
+@pytest.fixture(scope="module")
+def cornered(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("cornered")
+    return record_files(folder, "five-cornered drum, amplitude=0.3 mm")
+
+
+def test_the_curve_is_offered_added_and_marked(cornered: list[Path], tmp_path: Path) -> None:
+    found = answer("diagnose", *cornered, "-p", "bench-spiral")
+    assert found["verdict"] == "unknown"
+    offered = found["unexplained"]["empirical"]
+    assert "empirical-motor-torque-drum-angle" in offered
+    assert (
+        f"winchkit add {offered[0]}" in invoke("diagnose", *cornered, "-p", "bench-spiral").stdout
+    )
+    new = tmp_path / "new.toml"
+    added = answer(
+        "add",
+        "empirical-motor-torque-drum-angle",
+        "-p",
+        "bench-spiral",
+        "--fit",
+        *cornered,
+        "-o",
+        new,
+    )
+    torque = added["outputs"]["motor_torque"]
+    assert torque["heldout_rms_after"] < 0.8 * torque["heldout_rms_before"]
+    (table,) = read_winch(new).effect
+    assert table.values["order"] == 5.0
+    assert "Not understood" in invoke("effects", table.id).stdout
+
+
+def test_a_file_begun_from_the_runs_explains_them(cornered: list[Path], tmp_path: Path) -> None:
+    mine = tmp_path / "my_drum.py"
+    assert invoke("effects", "new", mine, "-p", "bench-spiral", "--fit", *cornered).exit_code == 0
+    found = answer("diagnose", *cornered, "-p", "bench-spiral", "--effects", mine)
+    assert found["verdict"] == "explained"
+    (step,) = found["steps"]
+    assert step["effects"] == ["my-drum"]
+    size = step["parameters"]["my-drum"]["amplitude"]
+    assert abs(size["value"] - 0.3e-3) < 5 * size["std"]
+    again = invoke("effects", "new", mine, "-p", "bench-spiral", "--fit", *cornered)
+    assert again.exit_code == 3
+    assert "is there already" in again.stderr
+
+
+def test_a_curve_of_ones_choice_and_one_that_is_none(cornered: list[Path], tmp_path: Path) -> None:
+    mine = tmp_path / "speed.py"
+    common = ("-p", "bench-spiral", "--fit", *cornered, "--curve")
+    done = invoke("effects", "new", mine, *common, "empirical-motor-torque-speed", "--id", "drag")
+    assert done.exit_code == 0
+    assert "drag" in invoke("effects", "--effects", mine).stdout
+    wrong = invoke("effects", "new", tmp_path / "x.py", *common, "motor-coulomb")
+    assert wrong.exit_code == 2
+    assert "no empirical effect" in wrong.stderr

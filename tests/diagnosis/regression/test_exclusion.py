@@ -1,0 +1,79 @@
+"""Samples near backlash impacts are excluded once backlash is in the model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term, with_channel
+from winchkit.diagnosis.add import add
+from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.regression.exclusion import without_impacts
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+
+RIDE = Ride(samples=600, stroke=400.0, period=6.0)
+PLAY = term("gear-backlash", gap=0.02, held=0.0)
+
+
+def dataset_of(load_mass: float | None) -> Dataset:
+    runs = [made(seed, load_mass=10.0, ride=RIDE) for seed in range(2)]
+    if load_mass is None:
+        force = np.full(RIDE.samples, 98.0665)
+        runs = [with_channel(run, "load", force) for run in runs]
+        runs = [type(run)(run.name, run.time, run.channels, {}) for run in runs]
+    return prepare(runs, GROOVED)
+
+
+def with_play(dataset: Dataset) -> Hypothesis:
+    engine = selection_engine(dataset, CATALOGUE)
+    return engine.initial_model.with_term(PLAY, engine.regression.n_runs)
+
+
+@pytest.mark.parametrize("load_mass", [10.0, None], ids=["weight", "measured"])
+def test_impacts_exclude_torque_and_under_a_known_weight_tension(load_mass: float | None) -> None:
+    dataset = dataset_of(load_mass)
+    calm = without_impacts(dataset, with_play(dataset))
+    assert calm is not None
+    for before, after in zip(dataset.recordings, calm.recordings, strict=True):
+        left = {name: before.valid[name] & ~after.valid[name] for name in before.valid}
+        assert not left["cable_length"].any()
+        assert left["tension"].any() == (load_mass is not None)
+        assert 0.005 < left["motor_torque"].mean() < 0.2
+        # The motor turns back every half period: the teeth part there, and meet soon after.
+        turned = before.raw.at.motor_rate
+        backs = np.flatnonzero(np.diff(np.sign(np.where(np.abs(turned) > 5.0, turned, 0.0))) != 0)
+        for index in np.flatnonzero(left["motor_torque"]):
+            assert np.min(np.abs(backs - index)) < 60
+    assert any("gear-backlash jerks" in note for note in calm.notes)
+
+
+def test_without_backlash_no_sample_is_excluded() -> None:
+    dataset = dataset_of(10.0)
+    rubbing = Hypothesis().with_term(term("pulley-coulomb", friction=0.1), 2)
+    assert without_impacts(dataset, Hypothesis()) is None
+    assert without_impacts(dataset, rubbing) is None
+    none = Hypothesis().with_term(term("gear-backlash", gap=0.0), 2)
+    assert without_impacts(dataset, none) is None
+
+
+def test_permanent_impacts_exclude_no_sample() -> None:
+    """Backlash below the encoder's noise gives impacts at standstill throughout."""
+    standing = Ride(samples=600, stroke=1e-5)
+    dataset = prepare([made(seed, load_mass=10.0, ride=standing) for seed in range(2)], GROOVED)
+    tiny = Hypothesis().with_term(term("gear-backlash", gap=5e-6), 2)
+    assert without_impacts(dataset, tiny) is None
+
+
+def test_backlash_is_found_and_fitted_without_its_impacts() -> None:
+    runs = [
+        made(int(mass) + seed, GROOVED, (PLAY,), load_mass=mass, ride=RIDE)
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    found = diagnose(runs, GROOVED).diagnosis
+    assert [step.effects for step in found.steps] == [("gear-backlash",)]
+    assert found.steps[0].parameters["gear-backlash"]["gap"].value == pytest.approx(0.02, rel=0.02)
+    assert any("gear-backlash jerks" in note for note in found.notes)
+    added = add("gear-backlash", runs, GROOVED)
+    assert any("gear-backlash jerks" in note for note in added.notes)

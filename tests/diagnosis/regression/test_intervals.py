@@ -1,0 +1,186 @@
+"""Intervals of fitted values and their coverage."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.intervals import estimates, profile_ends, spread_of
+from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+
+RIDE = Ride(samples=400)
+GAIN = term("cell-gain", gain_error=0.01)
+CASES = 150
+REPEATS = 6
+
+
+def white(random: np.random.Generator, count: int) -> Array:
+    return np.asarray(random.standard_normal(count))
+
+
+def coloured(random: np.random.Generator, count: int) -> Array:
+    """First-order noise of the same size, correlated over ten samples."""
+    out, state = np.empty(count), random.standard_normal()
+    for index, kick in enumerate(random.standard_normal(count)):
+        state = 0.9 * state + np.sqrt(1 - 0.9**2) * kick
+        out[index] = state
+    return out
+
+
+@pytest.mark.parametrize("kind", [white, coloured])
+def test_intervals_cover_the_truth_in_95_of_100_cases(
+    kind: Callable[[np.random.Generator, int], Array],
+) -> None:
+    """A linear toy: the gain of a cell, on repeats enough to know the noise."""
+    runs = [made(seed, GROOVED, (GAIN,), {"tension": 0.0}, ride=RIDE) for seed in range(REPEATS)]
+    regression = TimeSeriesRegression(prepare(runs, GROOVED))
+    clean = regression.nominal_residual.copy()
+    start = Hypothesis().with_term(term("cell-gain"), REPEATS)
+    blocks = regression.blocks
+    off, said = [], []
+    for seed in range(CASES):
+        random = np.random.default_rng(seed)
+        regression.nominal_residual = clean + np.concatenate(
+            [regression._masked(s, 0.8 * kind(random, s.band.count)) for s in regression.segments]
+        )
+        first = fit(regression, start, np.ones(regression.n_rows))
+        noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
+        found = fit(regression, start, noise.inverse_sigma(regression))
+        spread = spread_of(regression, found, noise, blocks)
+        ((_, values),) = estimates(regression, found, spread)
+        off.append(values["gain_error"].value - 0.01)
+        said.append(values["gain_error"].std)
+    ratio = np.array(off) / np.array(said)
+    # The larger of two estimates is on the safe side: from 95 % of 150, less three deviations.
+    assert np.mean(np.abs(ratio) < 2) > 0.90
+    # And no more than twice too wide.
+    assert 0.5 < np.sqrt(np.mean(ratio**2)) < 1.2
+    assert abs(np.mean(off)) < 4 * np.std(off) / np.sqrt(CASES)
+
+
+def test_estimates_have_the_units_and_parameters_of_the_files() -> None:
+    terms = (term("cable-elongation-linear", axial_stiffness=2e5), GAIN)
+    runs = [
+        made(int(mass) + seed, GROOVED, terms, load_mass=mass, ride=RIDE)
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    regression = TimeSeriesRegression(prepare(runs, GROOVED))
+    start = Hypothesis()
+    for item in terms:
+        start = start.with_term(item, 4)
+    first = fit(regression, start, np.ones(regression.n_rows))
+    noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
+    found = fit(regression, start, noise.inverse_sigma(regression))
+    spread = spread_of(regression, found, noise, regression.blocks)
+    (rope, stretch), (cell, gain) = estimates(regression, found, spread)
+    assert (rope.effect.id, cell.effect.id) == ("cable-elongation-linear", "cell-gain")
+    stiffness = stretch["axial_stiffness"]
+    assert (stiffness.unit, gain["gain_error"].unit) == ("N", "1")
+    # A compliance of relative deviation s is a stiffness of the same.
+    coordinate = regression.nuisance_columns.shape[1]
+    assert stiffness.std / stiffness.value == pytest.approx(
+        float(spread.std[coordinate] / found.vector[coordinate]), rel=0.01
+    )
+    assert abs(stiffness.value - 2e5) < 4 * stiffness.std
+    assert abs(gain["gain_error"].value - 0.01) < 4 * gain["gain_error"].std
+
+
+def _settled(regression: TimeSeriesRegression, start: Hypothesis) -> tuple[Fit, Noise]:
+    first = fit(regression, start, np.ones(regression.n_rows))
+    noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
+    return fit(regression, start, noise.inverse_sigma(regression)), noise
+
+
+def test_profile_ends_agree_with_full_refits() -> None:
+    """Against scipy's own least squares with the coordinate held: a weak, crooked friction."""
+    friction = term("motor-stribeck", torque=0.006, stribeck_speed=8.0)
+    runs = [made(seed, GROOVED, (friction,), {"motor_torque": 6e-3}, ride=RIDE) for seed in (1, 2)]
+    regression = TimeSeriesRegression(prepare(runs, GROOVED))
+    found, noise = _settled(regression, Hypothesis().with_term(friction, 2))
+    inverse_sigma = noise.inverse_sigma(regression)
+    whitened = found.jacobian * inverse_sigma[:, None]
+    covariance = np.linalg.inv(whitened.T @ whitened)
+    low, high = profile_ends(
+        regression, found, inverse_sigma, covariance, np.full(len(covariance), 1.96)
+    )
+
+    def risen(index: int, at: float) -> float:
+        others = np.arange(len(found.vector)) != index
+
+        def residual(free: Array) -> Array:
+            vector = found.vector.copy()
+            vector[index], vector[others] = at, free
+            return (
+                regression.residual(regression.hypothesis(vector, found.hypothesis)) * inverse_sigma
+            )
+
+        best = least_squares(residual, found.vector[others], x_scale="jac")
+        return 2 * float(best.cost) - found.chi_square
+
+    first = regression.nuisance_columns.shape[1]
+    for index in range(first, len(found.vector)):
+        for end in (low[index], high[index]):
+            assert risen(index, float(end)) == pytest.approx(1.96**2, rel=0.35)
+    # The logarithm of the speed at which it fades is no parabola's: the two sides differ.
+    speed = first + 1
+    below, above = found.vector[speed] - low[speed], high[speed] - found.vector[speed]
+    assert abs(below / above - 1) > 0.05
+
+
+def test_contradicting_outputs_widen_an_interval() -> None:
+    """The length says one radius, the torque another: the truth may be either."""
+    one, other = term("drum-radius", radius_error=6e-4), term("drum-radius", radius_error=9e-4)
+    runs = []
+    for mass in (10.0, 25.0):
+        for seed in range(2):
+            run = made(int(mass) + seed, GROOVED, (one,), load_mass=mass, ride=RIDE)
+            torque = made(int(mass) + seed, GROOVED, (other,), load_mass=mass, ride=RIDE)
+            runs.append(with_channel(run, "motor_torque", torque["motor_torque"], "N m"))
+    regression = TimeSeriesRegression(prepare(runs, GROOVED))
+    start = Hypothesis().with_term(one, 4)
+    found, noise = _settled(regression, start)
+    blocks = regression.blocks
+    ((_, told),) = estimates(regression, found, spread_of(regression, found, noise, blocks))
+    low, high = told["radius_error"].interval or (np.nan, np.nan)
+    assert low < 6e-4 < high
+    # The same runs without the contradiction know it far better.
+    whole = [
+        made(int(mass) + seed, GROOVED, (one,), load_mass=mass, ride=RIDE)
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    regression = TimeSeriesRegression(prepare(whole, GROOVED))
+    found, noise = _settled(regression, start)
+    ((_, sure),) = estimates(regression, found, spread_of(regression, found, noise, blocks))
+    assert sure["radius_error"].std < 0.5 * told["radius_error"].std
+
+
+def test_an_unidentifiable_parameter_is_undetermined_without_warning() -> None:
+    """Which share of the torque is held within the play, where the length alone was recorded."""
+    play = term("gear-backlash", gap=0.02, held=1.0)
+    noise = {"cable_length": 3e-4}
+    runs = [made(seed, GROOVED, (play,), noise, ride=RIDE) for seed in range(2)]
+    regression = TimeSeriesRegression(prepare(runs, GROOVED))
+    start = Hypothesis().with_term(play, 2)
+    first = fit(regression, start, np.ones(regression.n_rows))
+    known = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
+    found = fit(regression, start, known.inverse_sigma(regression))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        spread = spread_of(regression, found, known, regression.blocks)
+        ((_, values),) = estimates(regression, found, spread)
+    assert np.isnan(values["held"].std)
+    assert values["held"].interval is None
+    low, high = values["gap"].interval or (np.nan, np.nan)
+    assert low < 0.02 < high
+    assert values["gap"].std < 0.01

@@ -1,0 +1,71 @@
+"""What an error follows: the plainest variable that tells it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import pytest
+
+from diagnosis_runs import recorded
+from winchkit.catalog import find
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.diagnose import selection_engine
+from winchkit.diagnosis.residuals.attribution import attributions, ranked
+from winchkit.effects import load_catalogue
+from winchkit.schema.read import read_winch
+
+
+@dataclass(frozen=True)
+class Told:
+    """A variable and what it tells."""
+
+    variable: str
+    share: float
+
+
+def first_followed(*physics: str) -> dict[str, str]:
+    """Per output the variable that its error follows most."""
+    profile = read_winch(find("profiles", "bench-spiral"))
+    engine = selection_engine(prepare(recorded(*physics), profile), load_catalogue())
+    present, _ = engine.fit_with_noise(engine.initial_model)
+    out: dict[str, str] = {}
+    for found in attributions(engine.regression, present.residual):
+        out.setdefault(found.output, found.variable)
+    return out
+
+
+def test_what_rubs_at_one_place_is_located_by_place_and_direction() -> None:
+    first = first_followed("sticky place")
+    assert first["tension"] == "directed_length"
+    assert first["motor_torque"] == "directed_length"
+
+
+@pytest.mark.parametrize(
+    ("physics", "output"), [("sticky pulleys", "tension"), ("motor drag", "motor_torque")]
+)
+def test_what_turns_with_the_direction_alone_is_told_by_it(physics: str, output: str) -> None:
+    assert first_followed(physics)[output] == "direction"
+
+
+def test_what_grows_with_the_length_is_not_told_by_direction_too() -> None:
+    assert first_followed("fat drum")["cable_length"] != "directed_length"
+
+
+@pytest.mark.parametrize(
+    ("found", "kept"),
+    [
+        (
+            [Told("directed_length", 0.9), Told("cable_length", 0.3)],
+            ["directed_length", "cable_length"],
+        ),
+        ([Told("cable_length", 0.88), Told("directed_length", 0.9)], ["cable_length"]),
+        ([Told("directed_length", 0.5), Told("direction", 0.48)], ["direction"]),
+        ([Told("directed_length", 0.5)], ["directed_length"]),
+        ([Told("time", 0.4), Told("speed", 0.41)], ["speed", "time"]),
+    ],
+)
+def test_two_variables_at_once_must_tell_clearly_more(
+    found: Sequence[Told], kept: Sequence[str]
+) -> None:
+    assert [item.variable for item in ranked(found)] == kept

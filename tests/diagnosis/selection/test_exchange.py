@@ -1,0 +1,112 @@
+"""Effects fitted again, and signatures updated, after another effect was added."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis_runs import CATALOGUE, Ride, engine_for, term
+from winchkit.diagnosis.selection.exchange import pair_exchange
+from winchkit.diagnosis.selection.signatures import Signatures, updated_signatures
+from winchkit.diagnosis.selection.stepwise import _exchanged_terms
+from winchkit.diagnosis.verdict.equivalence import equivalence_set
+from winchkit.effects.term import Term
+
+RIDE = Ride(samples=1200, rate=25.0, period=12.0)
+
+
+def test_a_slip_fitted_at_a_wrong_time_is_refitted_at_the_true_time() -> None:
+    late = term("length-time-offset", delay=0.01)
+    engine = engine_for([term("encoder-slip", step=0.01, time=14.7), late], RIDE)
+    runs = engine.regression.n_runs
+    wrong = engine.initial_model.with_term(term("encoder-slip", step=0.008, time=20.5), runs)
+    present, noise = engine.fit_with_noise(wrong.with_term(late, runs))
+    stuck = present.hypothesis.terms[0].values["time"]
+    assert abs(stuck - 14.7) > 1.0
+    found = _exchanged_terms(engine, present, noise).hypothesis.terms
+    assert sorted(t.label for t in found) == ["encoder-slip", "length-time-offset"]
+    slip = next(t for t in found if t.label == "encoder-slip")
+    assert slip.values["time"] == pytest.approx(14.7, abs=0.1)
+    assert slip.values["step"] == pytest.approx(0.01, rel=0.05)
+
+
+def test_an_effect_that_explained_two_is_refitted_beside_the_second() -> None:
+    """A slip makes a creep seem slow and soft; beside the slip it is neither."""
+    hidden = (
+        term("cable-creep", creep_stiffness=3e5, time_constant=6.0),
+        term("encoder-slip", step=-0.04, time=14.7),
+    )
+    engine = engine_for(hidden, RIDE)
+    alone = term("cable-creep", creep_stiffness=2e5, time_constant=20.0)
+    present, noise = engine.fit_with_noise(
+        engine.initial_model.with_term(alone, engine.regression.n_runs)
+    )
+    terms = {t.label: t.values for t in pair_exchange(engine, present, noise, 1).hypothesis.terms}
+    assert set(terms) == {"cable-creep", "encoder-slip"}
+    assert terms["encoder-slip"]["time"] == pytest.approx(14.7, abs=0.1)
+    assert terms["cable-creep"]["time_constant"] == pytest.approx(6.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("share", "alone"), [(0.9, False), (0.2, True)])
+def test_stribeck_friction_outside_the_speed_range_is_equivalent_to_coulomb_friction(
+    share: float, alone: bool
+) -> None:
+    fastest = max(
+        abs(at.motor_rate).max() for at in engine_for([], RIDE).regression.dataset.motions
+    )
+    wide = term("motor-stribeck", torque=0.1, stribeck_speed=share * fastest)
+    engine = engine_for([wide], RIDE)
+    present, noise = engine.fit_with_noise(
+        engine.initial_model.with_term(wide, engine.regression.n_runs)
+    )
+    told = equivalence_set(engine, present, noise, 0).effects
+    assert "motor-stribeck" in told
+    assert ("motor-coulomb" not in told) is alone
+
+
+def columns_of(found: Signatures) -> dict[str, np.ndarray]:
+    """By effect and the values of a usual size."""
+    return {
+        f"{candidate.effect.id} {candidate.shape} {usual_step}": found.columns[:, index]
+        for candidate in found.candidates
+        for index, usual_step in enumerate(candidate.usual_steps, candidate.columns.start)
+    }
+
+
+def test_updated_signatures_equal_newly_computed_ones() -> None:
+    """A wrong ratio reaches every output, a stretching rope the length alone."""
+    for grown in (
+        term("gear-ratio", ratio_error=0.02),
+        term("cable-elongation-linear", axial_stiffness=3e5),
+    ):
+        engine = engine_for([], RIDE)
+        before = {name: column.copy() for name, column in columns_of(engine.signatures).items()}
+        present = engine.initial_model.with_term(grown, engine.regression.n_runs)
+        again = updated_signatures(engine.regression, present, engine.signatures)
+        assert again is not None
+        told, wanted = columns_of(again), columns_of(engine._signatures(present))
+        assert set(told) == set(wanted) == set(before)
+        changed = [
+            name for name, column in wanted.items() if not np.array_equal(column, before[name])
+        ]
+        assert changed
+        assert all(np.array_equal(told[name], wanted[name]) for name in wanted)
+        assert np.allclose(again.gram, engine._signatures(present).gram)
+
+
+@pytest.mark.parametrize(
+    ("grown", "anew"),
+    [
+        (term("pulley-coulomb", friction=0.05), True),
+        (term("cable-elongation-linear", axial_stiffness=3e5), False),
+    ],
+    ids=["on its way", "elsewhere"],
+)
+def test_a_new_signature_requires_all_to_be_computed_again(grown: Term, anew: bool) -> None:
+    engine = engine_for([], RIDE)
+    lag = CATALOGUE["cell-lag"]
+    silent = replace(engine.signatures, without_signature=((lag, {"time_constant": 0.05}),))
+    present = engine.initial_model.with_term(grown, engine.regression.n_runs)
+    assert (updated_signatures(engine.regression, present, silent) is None) is anew

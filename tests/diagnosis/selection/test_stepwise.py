@@ -1,0 +1,47 @@
+"""Candidates that selection may try."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
+
+RIDE = Ride(samples=400)
+
+
+def test_a_candidate_with_infeasible_sign_scores_zero() -> None:
+    """A rotor of negative inertia is made; nothing that exists does that."""
+    impossible = term("rotor-inertia", inertia=-2e-3)
+    runs = [
+        made(int(mass) + seed, GROOVED, (impossible,), load_mass=mass, ride=RIDE)
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    present, noise = engine.fit_with_noise(engine.initial_model)
+    told = {score.candidate.effect.id: score for score in engine.scores(present, noise)}
+    rotor = told["rotor-inertia"]
+    assert rotor.explained_ss == 0.0
+    assert rotor.net_gain < 0.0
+    assert not rotor.amplitudes.any()
+    # It is still listed, and the list is still sorted.
+    values = [score.net_gain for score in engine.scores(present, noise)]
+    assert values == sorted(values, reverse=True)
+    found = diagnose(runs, GROOVED).diagnosis
+    assert all("rotor-inertia" not in step.effects for step in found.steps)
+
+
+def test_a_candidate_with_feasible_sign_scores() -> None:
+    real = term("rotor-inertia", inertia=2e-3)
+    runs = [
+        made(int(mass) + seed, GROOVED, (real,), load_mass=mass, ride=RIDE)
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    present, noise = engine.fit_with_noise(engine.initial_model)
+    best = engine.scores(present, noise)[0]
+    assert best.candidate.effect.id == "rotor-inertia"
+    assert np.all(best.amplitudes > 0.0)

@@ -1,0 +1,96 @@
+"""A miniature of benchmarks/diagnosis_campaign.py: cases made by another physics than the model."""
+
+from pathlib import Path
+
+import pytest
+
+from campaign.case import Plan
+from campaign.run import run_case
+from campaign.sizes import CATALOGUE
+
+NOTHING = (101, 102, 103, 104, 105, 106)
+ONE = {
+    "layer-thickness": 201,
+    "drum-eccentricity": 202,
+    "frame-compliance": 203,
+    "length-time-offset": 204,
+    "pulley-coulomb": 205,
+    "cell-gain": 206,
+    "cell-drift": 207,
+    "torque-constant": 208,
+    "motor-coulomb": 209,
+    "cable-elongation-linear": 210,
+}
+STRANGE = {"outside-harmonic": 301, "outside-sticky-place": 302, "outside-crosstalk": 303}
+
+
+@pytest.mark.parametrize("seed", NOTHING)
+def test_nothing_hidden_nothing_named(seed: int, tmp_path: Path) -> None:
+    score = run_case(seed, Plan("none", 3.0, small=True), tmp_path)
+    assert score is not None
+    assert score.verdict == "adequate"
+    assert score.steps == ()
+
+
+@pytest.mark.parametrize(("effect", "seed"), ONE.items())
+def test_one_effect_is_in_the_first_set(effect: str, seed: int, tmp_path: Path) -> None:
+    score = run_case(seed, Plan("single", 3.0, (effect,), small=True), tmp_path)
+    assert score is not None
+    assert score.verdict == "explained"
+    assert effect in score.steps[0]
+    assert len(score.steps) == 1
+
+
+@pytest.mark.parametrize(("kind", "seed"), STRANGE.items())
+def test_what_no_effect_explains_gets_no_name(kind: str, seed: int, tmp_path: Path) -> None:
+    score = run_case(seed, Plan("outside", 3.0, (kind,), small=True), tmp_path)
+    assert score is not None
+    assert score.verdict in {"unknown", "partly"}
+    assert score.steps == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "effects", "drawn", "seed"),
+    [
+        # Its lag is so long that five terms of the wrong sign imitate it better.
+        ("single", ("torque-lag",), 42, 2100082),
+        # The delay shows in few blocks, but in every group of runs.
+        ("pair", (), 42, 2300010),
+        # An offset stands for both until the second is there.
+        ("pair", (), 42, 2300004),
+        # Creep with a tenth of the speed does nearly what a creep and an offset do.
+        ("pair", (), 44, 12800032),
+        # Coulomb's friction does so for a Stribeck curve and grease, each at another shape.
+        ("pair", (), 44, 12700028),
+        # Without the loop its rounding is fitted beyond all measure, and the loop from there.
+        ("single", ("cell-hysteresis",), 44, 12700062),
+        # What an engaging tooth leaves is taken for more than the small loss beside it.
+        ("pair", (), 44, 12700044),
+        # It jerks a weight by more than it explains otherwise.
+        ("single", ("gear-backlash",), 44, 13100008),
+    ],
+    ids=[
+        "wrong signs",
+        "few blocks",
+        "one for two",
+        "slower",
+        "other shape",
+        "wild rounding",
+        "teeth",
+        "jerk",
+    ],
+)
+def test_what_searches_once_missed(
+    kind: str,
+    effects: tuple[str, ...],
+    drawn: int,
+    seed: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # A seed means the same effects only while as many are drawn from.
+    monkeypatch.setattr("campaign.case.CATALOGUE", CATALOGUE[:drawn])
+    score = run_case(seed, Plan(kind, 1.0, effects, small=True), tmp_path)
+    assert score is not None
+    assert score.verdict == "explained"
+    assert score.found == len(score.truth) == len(score.steps)

@@ -1,0 +1,114 @@
+"""What another physics hides is found: recorded by the plant, which knows no effect.
+
+Every case is the demo's two programmes under two loads, twice; nothing of the truth is told.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from diagnosis_runs import CATALOGUE, recorded
+from winchkit.catalog import find
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.results import Diagnosis
+from winchkit.schema.read import read_winch
+
+PROFILE = read_winch(find("profiles", "bench-spiral"))
+HIDDEN = {
+    "fat drum": "drum-radius",
+    "thick layers": "layer-thickness",
+    "elastic rope": "cable-elongation-linear",
+    "heavy rope": "cable-weight",
+    "sticky pulleys": "pulley-coulomb",
+    "stretched cell": "cell-gain",
+    "shifted cell": "cell-offset",
+    "motor drag": "motor-coulomb",
+    "motor grease": "motor-viscous",
+    "heavy rotor": "rotor-inertia",
+    "weak motor": "torque-constant",
+    "lossy gear": "gear-efficiency",
+}
+SIZES = {
+    "elastic rope": ("axial_stiffness", 250e3, "N"),
+    "stretched cell": ("gain_error", 0.02, "1"),
+    "motor drag": ("torque", 0.03, "N m"),
+}
+"""Numbers that the plant is told, the values that must come out, and their unit."""
+TOLD = {
+    "elastic rope": "elastic rope, axial_stiffness=250 kN",
+    "stretched cell": "stretched cell, gain_error=0.02",
+    "motor drag": "motor drag, torque=30 mN m",
+}
+OUTSIDE = ("five-cornered drum", "clipping cell", "sticky place")
+
+
+@cache
+def answer(physics: str = "none") -> Diagnosis:
+    return diagnose(recorded(TOLD.get(physics, physics)), PROFILE, CATALOGUE).diagnosis
+
+
+@pytest.mark.parametrize("physics", HIDDEN)
+def test_what_is_hidden_is_named_first(physics: str) -> None:
+    found = answer(physics)
+    assert found.verdict == "explained"
+    assert HIDDEN[physics] in found.steps[0].effects
+    assert len(found.steps) == 1
+    assert len(found.steps[0].effects) <= 3
+    for output in found.outputs.values():
+        assert output.noise_rms is not None
+        assert output.heldout_rms_after < 1.3 * output.noise_rms
+        assert output.heldout_rms_after <= 1.02 * output.heldout_rms_before
+    assert found.candidates[0].score > 0
+    assert found.unexplained_share < 0.1
+
+
+@pytest.mark.parametrize("physics", SIZES)
+def test_its_size_comes_out_within_its_deviation(physics: str) -> None:
+    name, true, unit = SIZES[physics]
+    estimate = answer(physics).steps[0].parameters[HIDDEN[physics]][name]
+    assert estimate.unit == unit
+    assert abs(estimate.value - true) < 5 * estimate.std
+    assert estimate.std < 0.1 * true
+
+
+def test_of_nothing_hidden_nothing_is_named() -> None:
+    found = answer()
+    assert found.verdict == "adequate"
+    assert found.steps == ()
+    assert found.next_runs == ()
+    assert found.unexplained_share == 0.0
+    for output in found.outputs.values():
+        assert output.noise_rms is not None
+        assert output.rms_before == pytest.approx(output.noise_rms, rel=0.1)
+
+
+def test_an_adequate_model_comes_with_what_would_have_been_seen() -> None:
+    """What was hidden elsewhere, and found, is above the size said to be the smallest seen."""
+    smallest = {item.effect: item for item in answer().detectable}
+    assert smallest["cell-gain"].smallest < 0.02
+    assert smallest["motor-coulomb"].smallest < 0.03
+    assert smallest["cable-elongation-linear"].smallest > 250e3
+    sizes = [item.smallest for item in smallest.values()]
+    assert np.mean(np.isfinite(sizes)) > 0.7
+    for effect, item in smallest.items():
+        if np.isfinite(item.smallest):
+            parameter = CATALOGUE[effect].parameter(item.parameter)
+            assert parameter.low <= item.smallest <= parameter.high
+
+
+@pytest.mark.parametrize("physics", OUTSIDE)
+def test_of_what_no_effect_describes_nothing_is_named(physics: str) -> None:
+    found = answer(physics)
+    assert found.verdict in {"unknown", "partly"}
+    assert found.steps == ()
+    assert found.unexplained_share > 0
+    assert found.where
+    assert found.where == tuple(sorted(found.where, key=lambda where: -where.share))
+
+
+def test_the_corners_of_a_drum_are_counted() -> None:
+    orders = {(w.variable, w.order) for w in answer("five-cornered drum").where if w.order}
+    assert ("drum_angle", 5) in orders

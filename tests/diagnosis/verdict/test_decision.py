@@ -1,0 +1,137 @@
+"""The four verdicts, each reached, and what an answer then holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.results import Diagnosis
+from winchkit.effects.term import Term
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import EffectTable
+
+RIDE = Ride(samples=400)
+DRAG = term("motor-coulomb", torque=0.02)
+
+
+def runs(
+    terms: tuple[Term, ...] = (), repeats: int = 2, beside: Mapping[str, Array] | None = None
+) -> list[Run]:
+    """Two loads, each driven ``repeats`` times, and what lies beside any effect."""
+    out = []
+    for mass in (10.0, 25.0):
+        for seed in range(repeats):
+            run = made(int(10 * mass) + seed, GROOVED, terms, load_mass=mass, ride=RIDE)
+            for output, strange in (beside or {}).items():
+                unit = run.channels[output].unit
+                run = with_channel(run, output, run[output] + strange, unit)
+            out.append(run)
+    return out
+
+
+def strange_length(size: float) -> Array:
+    """What no effect does: a wobble of the instrument at every second."""
+    return size * np.asarray(np.sin(2 * np.pi * RIDE.time / 1.03) ** 3)
+
+
+def verdict_of(found: Diagnosis, name: str) -> Diagnosis:
+    assert found.verdict == name
+    return found
+
+
+def test_adequate() -> None:
+    found = verdict_of(diagnose(runs(), GROOVED).diagnosis, "adequate")
+    assert found.steps == found.where == found.next_runs == ()
+
+
+def test_explained() -> None:
+    found = verdict_of(diagnose(runs((DRAG,)), GROOVED).diagnosis, "explained")
+    (step,) = found.steps
+    assert step.effects == ("motor-coulomb",)
+    torque = found.outputs["motor_torque"]
+    assert torque.rms_after < 0.4 * torque.rms_before
+    assert torque.heldout_rms_after < 0.4 * torque.heldout_rms_before
+    length = found.outputs["cable_length"]
+    assert length.rms_after == pytest.approx(length.rms_before, rel=1e-6)
+    assert found.unexplained_share < 0.1
+
+
+def test_unknown() -> None:
+    strange = {"cable_length": strange_length(2e-3)}
+    found = verdict_of(diagnose(runs(beside=strange), GROOVED).diagnosis, "unknown")
+    assert found.steps == ()
+    assert found.unexplained_share > 0.5
+    assert {where.output for where in found.where} == {"cable_length"}
+    told = [where.frequency for where in found.where if where.frequency]
+    assert any(abs(frequency - 1 / 1.03) < 0.5 for frequency in told)
+
+
+def test_partly() -> None:
+    """A large drag is found beside a wobble that no effect explains: neither is named for both."""
+    strange = {"cable_length": strange_length(1e-3)}
+    found = verdict_of(diagnose(runs((DRAG,), beside=strange), GROOVED).diagnosis, "partly")
+    assert found.steps == ()
+    (note,) = (note for note in found.notes if note.startswith("closest"))
+    assert "motor-coulomb" in note
+    assert 0 < found.unexplained_share <= 0.5
+
+
+def test_without_repeats_the_answer_says_what_it_rests_on() -> None:
+    found = verdict_of(diagnose(runs((DRAG,), repeats=1), GROOVED).diagnosis, "explained")
+    assert found.steps[0].effects[0] == "motor-coulomb"
+    assert {output.noise_source for output in found.outputs.values()} == {"saturated fit"}
+    assert any("cannot be excluded" in note for note in found.notes)
+
+
+def test_effects_that_a_profile_has_are_refitted_and_not_named_again() -> None:
+    table = EffectTable("motor-coulomb", {"torque": "5 mN m"})
+    better = replace(GROOVED, effect=(table,))
+    found = verdict_of(diagnose(runs((DRAG,)), better).diagnosis, "adequate")
+    assert found.steps == ()
+    assert "motor-coulomb" not in {item.effect for item in found.candidates}
+    torque = found.outputs["motor_torque"]
+    assert torque.noise_rms is not None
+    assert torque.rms_before == pytest.approx(torque.noise_rms, rel=0.1)
+
+
+def test_two_hidden_effects_are_both_named() -> None:
+    both = (DRAG, term("cell-gain", gain_error=0.02))
+    found = verdict_of(diagnose(runs(both), GROOVED).diagnosis, "explained")
+    named = [step.effects for step in found.steps]
+    assert sorted(effects[0] for effects in named) == ["cell-gain", "motor-coulomb"]
+
+
+def test_the_order_of_runs_does_not_matter() -> None:
+    given = runs((DRAG,))
+    one, other = (diagnose(order, GROOVED).diagnosis for order in (given, given[::-1]))
+    assert one.verdict == other.verdict
+    assert [s.effects for s in one.steps] == [s.effects for s in other.steps]
+    value = "motor-coulomb", "torque"
+    sizes = [d.steps[0].parameters[value[0]][value[1]].value for d in (one, other)]
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-3)
+
+
+def test_a_clock_that_starts_elsewhere_changes_nothing() -> None:
+    given = runs((DRAG,))
+    later = [replace(run, time=run.time + 1000.0 * n) for n, run in enumerate(given)]
+    one, other = (diagnose(some, GROOVED).diagnosis for some in (given, later))
+    assert [s.effects for s in one.steps] == [s.effects for s in other.steps]
+    for output, fitted in one.outputs.items():
+        assert other.outputs[output].rms_after == pytest.approx(fitted.rms_after, rel=1e-3)
+
+
+def test_candidates_are_ranked_and_the_first_ones_fitted() -> None:
+    found = diagnose(runs((DRAG,)), GROOVED).diagnosis
+    scores = [item.score for item in found.candidates]
+    assert scores == sorted(scores, reverse=True)
+    assert len({item.effect for item in found.candidates}) == len(scores)
+    best = found.candidates[0]
+    assert best.heldout_rms["motor_torque"] == pytest.approx(
+        found.outputs["motor_torque"].heldout_rms_after, rel=0.05
+    )
+    assert found.candidates[-1].heldout_rms == {}

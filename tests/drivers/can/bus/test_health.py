@@ -1,0 +1,351 @@
+"""What a bus counts, how it dies, and how it is opened again under the same objects."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import can
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drive_on_bus import DriveOnBus, bus_spec, device
+from winchkit.drivers.can.bus import bus as bus_module
+from winchkit.drivers.can.bus.bus import CanBus, FrameTime
+from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
+from winchkit.drivers.can.bus.interface import Frame, parse_socketcan
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.commission import WatchSpec
+from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.clock import MonotonicClock
+from winchkit.errors import ConnectionLost
+
+CLOCK = MonotonicClock()
+_TIMESTAMPNS, _RXQ_OVFL = 35, 40
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for something that is bound to happen soon."""
+    deadline = time.monotonic() + 5.0
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come to that"
+        time.sleep(0.002)
+
+
+# Error frames as the kernel's header can/error.h lays them out.
+
+
+@pytest.mark.parametrize(
+    ("identifier", "detail", "state", "counts"),
+    [
+        (0x004, 0x01, BusState.ACTIVE, (0, 0, 1)),  # receive buffer overflow
+        (0x004, 0x04, BusState.WARNING, (0, 0, 0)),
+        (0x004, 0x08, BusState.WARNING, (0, 0, 0)),
+        (0x004, 0x10, BusState.PASSIVE, (0, 1, 0)),
+        (0x004, 0x20, BusState.PASSIVE, (0, 1, 0)),
+        (0x040, 0x00, BusState.OFF, (1, 0, 0)),
+        (0x0AA, 0x00, BusState.ACTIVE, (0, 0, 0)),  # protocol, transceiver, acknowledge
+    ],
+)
+def test_error_frames_of_socketcan(
+    identifier: int, detail: int, state: BusState, counts: tuple[int, int, int]
+) -> None:
+    tally = ErrorTally()
+    tally.take(identifier, bytes((0, detail, 0, 0, 0, 0, 0, 0)))
+    assert tally.state is state
+    assert (tally.bus_off, tally.error_passive, tally.overruns) == counts
+    assert tally.frames == 1
+
+
+def test_a_controller_that_recovers_is_active_again() -> None:
+    tally = ErrorTally()
+    for identifier, detail in ((4, 0x10), (4, 0x10), (0x40, 0), (0x100, 0), (4, 0x20), (4, 0x40)):
+        tally.take(identifier, bytes((0, detail)))
+    assert tally.state is BusState.ACTIVE
+    assert (tally.error_passive, tally.bus_off) == (2, 1)
+
+
+@given(st.lists(st.tuples(st.integers(0, 0x1FF), st.binary(max_size=8)), max_size=30))
+def test_no_error_frame_ends_the_counting(frames: list[tuple[int, bytes]]) -> None:
+    tally = ErrorTally()
+    for identifier, data in frames:
+        tally.take(identifier, data)
+    assert tally.frames == len(frames)
+    assert tally.overruns <= len(frames)
+
+
+# Raw frames of a CAN socket.
+
+
+def ancillary(stamp: tuple[int, int] | None, drops: int | None) -> list[tuple[int, int, bytes]]:
+    found = []
+    if stamp is not None:
+        found.append((socket.SOL_SOCKET, _TIMESTAMPNS, struct.pack("@qq", *stamp)))
+    if drops is not None:
+        found.append((socket.SOL_SOCKET, _RXQ_OVFL, struct.pack("=I", drops)))
+    return found
+
+
+def test_frames_of_a_can_socket() -> None:
+    raw = struct.pack("=IB3x8s", 0x181, 3, b"abcgarba")
+    frame, drops = parse_socketcan(raw, ancillary((12, 500_000_000), None))
+    assert frame == Frame(0x181, b"abc", 12.5)
+    assert drops is None
+    frame, drops = parse_socketcan(raw, ancillary((12, 0), 7))
+    assert frame is not None
+    assert drops == 7
+    error = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
+    assert parse_socketcan(error, [])[0] == Frame(0x40, bytes(8), 0.0, error=True)
+
+
+@pytest.mark.parametrize("identifier", [0x80000181, 0x40000181, 0xC0000181])
+def test_long_identifiers_and_remote_frames_are_nobody_s(identifier: int) -> None:
+    raw = struct.pack("=IB3x8s", identifier, 0, bytes(8))
+    assert parse_socketcan(raw, []) == (None, None)
+    assert parse_socketcan(raw[:9], []) == (None, None)
+
+
+# Time stamps of another clock.
+
+
+@given(
+    offset=st.floats(-1e9, 1e9),
+    delays=st.lists(st.floats(0.0, 0.005), min_size=30, max_size=100),
+    drift=st.floats(-1e-4, 1e-4),
+)
+def test_stamps_are_mapped_within_the_least_delay_and_never_into_the_future(
+    offset: float, delays: list[float], drift: float
+) -> None:
+    """Two clocks, one of them 100 ppm off at most; frames handed over up to 5 ms late."""
+    times, mapped, best = FrameTime(), 0.0, 1.0
+    for number, delay in enumerate(delays):
+        sent = 1000.0 + 0.004 * number
+        now = sent + delay
+        best = min(best, delay)
+        mapped = times.map(2e9 + offset + sent * (1 + drift), now)
+        assert mapped <= now + 1e-6
+        elapsed = 0.004 * number
+        assert sent - 2e-6 - 1e-4 * elapsed <= mapped + 1e-6
+        assert mapped <= sent + best + 4e-4 * elapsed + 2e-6
+
+
+def test_a_frame_that_was_read_late_is_as_old_as_it_is() -> None:
+    """A receive thread that was held up for 60 ms, then a backlog, then nothing special."""
+    times = FrameTime()
+    assert times.map(500.0, 10.0) == 10.0
+    for stamp in (500.010, 500.020, 500.060):
+        assert times.map(stamp, 10.070) == pytest.approx(stamp - 490.0, abs=3e-5)
+    assert times.map(500.100, 10.101) == pytest.approx(10.1, abs=3e-5)
+
+
+@pytest.mark.parametrize("step", [-3600.0, -0.5, 0.5, 3600.0])
+def test_a_clock_that_is_set_is_followed_within_a_quarter_of_a_second(step: float) -> None:
+    """And meanwhile no frame looks older than a tenth: a heartbeat is not lost by it."""
+    times = FrameTime()
+    off = 0.0
+    for number in range(400):
+        sent = 0.004 * number
+        stamp = 9000.0 + sent + (step if number >= 100 else 0.0)
+        mapped = times.map(stamp, sent)
+        assert sent - 0.1 - 1e-9 <= mapped <= sent + 1e-9
+        if number < 100 or number > 170:
+            off = max(off, abs(mapped - sent))
+    assert off < 1e-4
+    assert times.map(0.0, 14.0) == 14.0, "no stamp"
+
+
+# A bus that dies and comes back.
+
+
+class Interface:
+    """An interface whose troubles the test makes up."""
+
+    def __init__(self) -> None:
+        self.library: Any = can.Bus(interface="virtual", channel=f"unused-{id(self)}")
+        self.dropped = 0
+        self.frames: list[Frame] = []
+        self.sent: list[tuple[int, bytes]] = []
+        self.trouble: Exception | None = None
+        self.closed = False
+        self.controller: BusState | None = None
+
+    def receive(self, timeout: float) -> Frame | None:
+        if self.trouble is not None:
+            raise self.trouble
+        if not self.frames:
+            time.sleep(0.001)
+            return None
+        return self.frames.pop(0)
+
+    def send(self, identifier: int, data: bytes) -> None:
+        if self.trouble is not None:
+            raise self.trouble
+        self.sent.append((identifier, data))
+
+    def state(self) -> BusState | None:
+        return self.controller
+
+    def close(self) -> None:
+        self.closed = True
+        self.trouble = can.CanOperationError("Cannot operate on a closed bus")
+        self.library.shutdown()
+
+
+@pytest.fixture
+def interfaces(monkeypatch: pytest.MonkeyPatch) -> list[Interface]:
+    opened: list[Interface] = []
+
+    def open_one(*_: object) -> Interface:
+        opened.append(Interface())
+        return opened[-1]
+
+    monkeypatch.setattr(bus_module, "open_interface", open_one)
+    return opened
+
+
+@pytest.fixture
+def bus(interfaces: list[Interface]) -> Iterator[CanBus]:
+    bus = CanBus(bus_spec(), "can", CLOCK)
+    yield bus
+    bus.close()
+
+
+def test_everything_that_goes_wrong_is_counted(bus: CanBus, interfaces: list[Interface]) -> None:
+    port = interfaces[0]
+    bus.sync()
+    port.dropped = 3
+    port.frames += [
+        Frame(0x181, b""),
+        Frame(0x004, bytes((0, 0x01)), error=True),
+        Frame(0x004, bytes((0, 0x10)), error=True),
+        Frame(0x701, b"\x05"),
+    ]
+    until(lambda: bus.received == 2)
+    health = bus.health
+    assert (health.received, health.sent, health.dropped, health.overruns) == (2, 1, 3, 1)
+    assert (health.error_frames, health.error_passive, health.state) == (2, 1, BusState.PASSIVE)
+    assert not health.lossless
+    assert "error passive: received 2, sent 1, error frames 2" in str(health)
+    assert bus.nodes == {1}
+    assert BusHealth().lossless
+
+
+def test_bus_off_is_a_fault_until_it_is_opened_again(
+    bus: CanBus, interfaces: list[Interface]
+) -> None:
+    interfaces[0].frames += [Frame(0x040, bytes(8), error=True)]
+    until(lambda: bus.fault is not None)
+    assert "bus off" in str(bus.fault)
+    interfaces[0].frames += [Frame(0x100, bytes(8), error=True)]
+    until(lambda: bus.health.state is BusState.ACTIVE)
+    assert bus.fault is not None, "a restart of the controller makes nothing right by itself"
+    bus.reopen()
+    assert bus.fault is None
+    assert bus.health.bus_off == 1
+
+
+def test_a_controller_s_own_word_counts_where_it_gives_one(
+    bus: CanBus, interfaces: list[Interface]
+) -> None:
+    interfaces[0].controller = BusState.PASSIVE
+    until(lambda: bus.health.state is BusState.PASSIVE)
+
+
+@pytest.mark.parametrize(
+    "trouble",
+    [can.CanOperationError("gone", 100), OSError(19, "No such device"), ValueError("closed")],
+)
+def test_an_unplugged_adapter_is_told_and_replaced(
+    bus: CanBus, interfaces: list[Interface], trouble: Exception
+) -> None:
+    heard: list[bytes] = []
+    bus.on(0x181, lambda data, _now: heard.append(data))
+    interfaces[0].trouble = trouble
+    until(lambda: bus.fault is not None)
+    until(lambda: bus.health.state is BusState.DOWN)
+    with pytest.raises(ConnectionLost, match="bus 'can': cannot send"):
+        bus.sync()
+    assert bus.health.unsent == 1
+    bus.reopen()
+    assert interfaces[0].closed
+    assert bus.fault is None
+    assert interfaces[1].sent == [], "opening a bus says nothing on it"
+    interfaces[1].frames.append(Frame(0x181, b"alive"))
+    until(lambda: heard == [b"alive"])
+    bus.sync()
+    assert interfaces[1].sent == [(0x080, b"")]
+    assert (bus.health.reopened, bus.health.state) == (1, BusState.ACTIVE)
+
+
+def test_an_interface_that_stays_away_is_told_each_time(
+    bus: CanBus, interfaces: list[Interface], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object) -> Interface:
+        raise ConnectionLost("bus 'can': cannot open it")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(bus_module, "open_interface", gone)
+        for _ in range(2):
+            with pytest.raises(ConnectionLost, match="cannot open it"):
+                bus.reopen()
+            assert bus.fault is not None
+            with pytest.raises(ConnectionLost):
+                bus.sync()
+    bus.reopen()
+    assert bus.fault is None
+
+
+def test_a_drive_is_found_again_after_its_bus_was_reopened() -> None:
+    """Axis and handlers stay; nothing is enabled by it; the drive has stopped by itself."""
+    spec = bus_spec()
+    with DriveOnBus(spec) as drive:
+        bus = CanBus(spec, "can", CLOCK)
+        axis = Cia402Axis(bus, 1, device(), WatchSpec(127, 0.05, 0.004, True), CLOCK)
+        try:
+            axis.commission()
+            cycle(bus, axis, Wish.ENABLE, 25, velocity=3.0)
+            assert axis.state is State.OPERATION_ENABLED
+            last = bus.sent
+            until(lambda: drive.frames[-1][0] == 0x201)
+            before = len(drive.frames)
+            bus.reopen()
+            assert bus.sent == last
+            until(lambda: abs(drive.shaft.motor_velocity) < 0.05)
+            until(lambda: drive.drive.state.name == "SWITCH_ON_DISABLED")
+            assert drive.frames[before:] == []
+            axis.commission()
+            cycle(bus, axis, Wish.ENABLE, 25, velocity=-3.0)
+            assert drive.shaft.motor_velocity == pytest.approx(-3.0, rel=0.05)
+        finally:
+            bus.close()
+
+
+def cycle(bus: CanBus, axis: Cia402Axis, wish: Wish, count: int, velocity: float) -> None:
+    """A control loop in miniature."""
+    for number in range(count):
+        axis.begin_cycle(number, CLOCK.now())
+        bus.sync()
+        bus.heartbeat(127, 5)
+        time.sleep(0.006)
+        axis.send(wish, velocity=velocity)
+
+
+def test_sending_from_several_threads_loses_nothing(
+    bus: CanBus, interfaces: list[Interface]
+) -> None:
+    threads = [
+        threading.Thread(target=lambda n=n: [bus.send(0x200 + n, bytes((k,))) for k in range(200)])
+        for n in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for number in range(4):
+        data = [d[0] for i, d in interfaces[0].sent if i == 0x200 + number]
+        assert data == list(range(200))

@@ -1,0 +1,180 @@
+"""6064h counted over any number of turns, both ways; judged by integers that do not wrap."""
+
+from __future__ import annotations
+
+import math
+import struct
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hand_made import NODE, RPDO, SCALE, TPDO, Bus, Clock, HandMade, codec
+from winchkit import catalog
+from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo import PdoCodec
+from winchkit.drivers.can.cia402.position_counter import PositionCounter
+from winchkit.drivers.can.cia402.state_machine import Wish
+from winchkit.errors import NotPermitted
+from winchkit.schema.devices.servo import PdoSpec
+
+ENABLED = 0x0237
+I32 = (-(2**31), 2**31 - 1)
+
+
+def shown(true: int, low: int, high: int) -> int:
+    """What a counter shows of a count that has no end."""
+    return (true - low) % (high - low + 1) + low
+
+
+@given(
+    st.sampled_from([I32, (0, 2**24 - 1), (-(2**23), 2**23 - 1), (0, 4095)]),
+    st.integers(-(2**33), 2**33),
+    st.lists(st.floats(-0.499, 0.499), min_size=1, max_size=60),
+)
+def test_any_way_shorter_than_half_the_range_a_step_is_counted(
+    limits: tuple[int, int], start: int, steps: list[float]
+) -> None:
+    low, high = limits
+    counter = PositionCounter(low, high)
+    true = start
+    first = counter.take(shown(true, low, high), 0.0)
+    for number, step in enumerate(steps, 1):
+        true += int(step * (high - low + 1))
+        assert counter.take(shown(true, low, high), 0.004 * number) - first == true - start
+        assert counter.known
+
+
+def test_a_long_gap_makes_the_turns_unknown() -> None:
+    """At 1000 counts/s half of 4096 counts may pass within 2.048 s."""
+    counter = PositionCounter(0, 4095, fastest=1000.0)
+    counter.take(100, 0.0)
+    counter.take(100, 2.0)
+    assert counter.known
+    counter.take(100, 4.1)
+    assert not counter.known
+    counter.suspend()
+    assert counter.take(5, 4.2) == 5
+    counter.resume(homed=False)
+    assert not counter.known, "a homing that found nothing changes nothing"
+    counter.suspend()
+    counter.resume(homed=True)
+    assert counter.known
+
+
+def test_a_drive_that_restarts_after_a_crossing_has_lost_its_turns() -> None:
+    counter = PositionCounter(0, 4095)
+    counter.take(4000, 0.0)
+    counter.restart(forgotten=True)
+    counter.take(3, 0.1)
+    assert (counter.known, counter.offset) == (True, 0)
+    counter.take(4000, 0.2)
+    assert counter.offset == -4096
+    counter.restart(forgotten=False)
+    assert counter.take(4001, 0.3) == -95
+    counter.restart(forgotten=True)
+    assert counter.take(7, 0.4) == 7
+    assert not counter.known
+
+
+def frames_of(made: HandMade, count: int, velocity: int = 0) -> None:
+    """A whole answer with 6064h as the drive shows it."""
+    made.begin()
+    made.bus.deliver(0x180 + NODE, struct.pack("<Hib", ENABLED, count, 9))
+    made.bus.deliver(0x280 + NODE, struct.pack("<ihH", velocity, 0, 0))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_an_axis_counts_on_over_three_ends_of_32_bits(way: int) -> None:
+    """Each step is a quarter of the range; twelve of them cross the end three times."""
+    made = HandMade()
+    step = way * 2**30
+    for number in range(13):
+        frames_of(made, shown(number * step, *I32))
+        feedback = made.axis.feedback
+        assert feedback is not None
+        assert feedback.angle == pytest.approx(number * step * SCALE.angle, rel=1e-12)
+        assert feedback.shown == shown(number * step, *I32)
+        assert feedback.turns_known
+
+
+def test_a_velocity_mode_goes_on_beyond_the_end() -> None:
+    """607Ah cannot hold the angle; it is not sent in CSV, so nothing is converted."""
+    made = HandMade(rpdo=(RPDO[0], codec(2, 0x607A)))
+    for number in range(9):
+        frames_of(made, shown(number * 2**30, *I32))
+        made.bus.sent.clear()
+        made.axis.send(Wish.ENABLE, velocity=1.0)
+        assert [identifier for identifier, _ in made.bus.sent] == [0x200 + NODE]
+    assert made.bus.sent[-1][1] == struct.pack("<Hi", 0x0F, 1000)
+
+
+def test_a_mapped_target_position_holds_what_the_drive_shows() -> None:
+    """607Ah stands in the same RPDO as 60FFh here: it gets the drive's own count, which fits."""
+    made = HandMade(rpdo=(codec(1, 0x6040, 0x60FF), codec(2, 0x607A, 0x6060)))
+    for number in range(9):
+        frames_of(made, shown(number * 2**30, *I32))
+        made.bus.sent.clear()
+        made.axis.send(Wish.ENABLE, velocity=-1.0)
+        sent = dict(made.bus.sent)
+        assert sent[0x300 + NODE] == struct.pack("<ib", shown(number * 2**30, *I32), 9)
+
+
+@pytest.mark.parametrize("angle", [2.2e6, -2.2e6, math.nan, math.inf])
+def test_a_position_mode_does_not_cross_the_end(angle: float) -> None:
+    """2.2e6 rad are 2.2e9 counts here, beyond 2^31."""
+    made = HandMade(mode="CSP")
+    frames_of(made, 0)
+    with pytest.raises(NotPermitted):
+        made.axis.permit_angle(angle)
+    with pytest.raises(NotPermitted):
+        made.axis.send(Wish.ENABLE, angle=angle)
+    made.axis.permit_angle(2.1e6)
+
+
+def unsigned(folder: Path, *indices: int) -> Path:
+    """The generic EDS with some objects declared UNSIGNED32."""
+    text = (catalog.find("devices", "generic-cia402").parent / "generic-cia402.eds").read_text()
+    for index in indices:
+        begin = text.index(f"[{index:04X}]\n")
+        end = text.index("\n\n", begin)
+        text = text[:begin] + text[begin:end].replace("0x0004", "0x0007") + text[end:]
+    path = folder / "unsigned.eds"
+    path.write_text(text)
+    return path
+
+
+def test_an_unsigned_60ffh_is_written_as_twos_complement(tmp_path: Path) -> None:
+    """Roboteq's EDS files declare it UNSIGNED32; -1000 is FFFF FC18h on the bus, RPDO and SDO."""
+    bus = Bus(Clock())
+    node = SdoNode(bus, NODE, unsigned(tmp_path, 0x60FF, 0x6064))  # type: ignore[arg-type]
+    assert node.dictionary[0x60FF].data_type == 7
+    spec = PdoSpec(1, ("0x6040", "0x60FF"))
+    made = HandMade(
+        rpdo=(PdoCodec(spec, [node.mapped(0x6040, 0), node.mapped(0x60FF, 0)]),),
+        tpdo=(
+            PdoCodec(TPDO[0].spec, [node.mapped(index, 0) for index in (0x6041, 0x6064, 0x6061)]),
+            TPDO[1],
+        ),
+    )
+    frames_of(made, -5)
+    assert made.axis.feedback is not None
+    assert made.axis.feedback.angle == pytest.approx(-5 * SCALE.angle)
+    made.axis.send(Wish.ENABLE, velocity=-1.0)
+    assert made.bus.sent[-1] == (0x200 + NODE, bytes.fromhex("0f0018fcffff"))
+    written: list[bytes] = []
+    node.download = lambda _index, _sub, data: written.append(data)  # type: ignore[method-assign]
+    node.write(0x60FF, 0, -1000)
+    assert written == [bytes.fromhex("18fcffff")]
+    with pytest.raises(NotPermitted, match="does not fit into its 32 bits"):
+        node.write(0x60FF, 0, 2**31)
+    node.write(0x1400, 1, 0x80000201)
+    assert written[-1] == bytes.fromhex("01020080")
+
+
+def test_a_speed_beyond_the_range_is_refused_by_name() -> None:
+    made = HandMade()
+    frames_of(made, 0)
+    with pytest.raises(NotPermitted, match="beyond the drive's range"):
+        made.axis.send(Wish.ENABLE, velocity=3e6)

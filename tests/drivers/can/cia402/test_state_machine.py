@@ -1,0 +1,120 @@
+"""The control word for every state and wish, against the standard's own bit patterns."""
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from cia402_table import STOPS, transition
+from winchkit.drivers.can.cia402.state_machine import (
+    ENABLE_OPERATION,
+    FAULT_RESET,
+    QUICK_STOP,
+    TRANSITIONS,
+    State,
+    Wish,
+    control_word,
+    state_of,
+)
+
+states = st.sampled_from(list(State))
+words = st.integers(0, 0xFFFF)
+ages = st.integers(0, 12)
+"""Of a status word, SYNCs."""
+
+
+@given(
+    believed=states,
+    true=states,
+    wish=st.sampled_from(STOPS),
+    previous=words,
+    age=ages,
+    at_rest=st.booleans(),
+)
+def test_no_stop_ever_energises(
+    believed: State, true: State, wish: Wish, previous: int, age: int, at_rest: bool
+) -> None:
+    """Not even when the drive is in another state than the host believes."""
+    word = control_word(believed, wish, previous=previous, age=age, at_rest=at_rest)
+    assert word & 0x0F != 0x07
+    if word & 0x0F == 0x0F:
+        assert age <= 5
+        assert believed is State.OPERATION_ENABLED
+        assert wish in (Wish.RUN_DOWN, Wish.HALT)
+        true = believed
+    assert transition(true, previous, word) not in (2, 3, 4, 16)
+
+
+@given(
+    believed=states, wish=st.sampled_from(STOPS), previous=words, age=ages, at_rest=st.booleans()
+)
+def test_a_stale_state_gets_a_quick_stop(
+    believed: State, wish: Wish, previous: int, age: int, at_rest: bool
+) -> None:
+    """A ramp goes on for five SYNCs without an answer, everything else for one."""
+    assume(age > (5 if wish in (Wish.RUN_DOWN, Wish.HALT) else 1))
+    word = control_word(believed, wish, previous=previous, age=age, at_rest=at_rest)
+    assert word == QUICK_STOP
+
+
+@given(true=states, wish=st.sampled_from(STOPS), previous=words)
+def test_no_stop_lets_a_moving_drive_coast(true: State, wish: Wish, previous: int) -> None:
+    """Transitions 9 and 12 take the torque away; a moving drive never gets them."""
+    word = control_word(true, wish, previous=previous, at_rest=False)
+    assert transition(true, previous, word) not in (8, 9, 12)
+
+
+@pytest.mark.parametrize("start", [s for s in State if s not in (State.UNKNOWN,)])
+def test_enabling_climbs_one_step_at_a_time_and_never_leaves_a_fault(start: State) -> None:
+    after = {row.number: row.target for row in TRANSITIONS}
+    state, seen, previous = start, [], 0
+    for _ in range(8):
+        word = control_word(state, Wish.ENABLE, previous=previous, at_rest=True)
+        number = transition(state, previous, word)
+        if number is not None:
+            seen.append(number)
+            state = after[number]
+        previous = word
+    if start in (State.FAULT, State.FAULT_REACTION_ACTIVE, State.NOT_READY_TO_SWITCH_ON):
+        assert (state, seen) == (start, [])
+    else:
+        assert state is State.OPERATION_ENABLED
+        assert seen == [12, 2, 3, 4][4 - len(seen) :]
+
+
+def test_reset_is_an_edge_and_stays_disabled() -> None:
+    first = control_word(State.FAULT, Wish.RESET, previous=FAULT_RESET)
+    assert not first & FAULT_RESET
+    second = control_word(State.FAULT, Wish.RESET, previous=first)
+    assert second == FAULT_RESET
+    for state in State:
+        if state is not State.FAULT:
+            assert control_word(state, Wish.RESET, previous=second) == QUICK_STOP
+
+
+@pytest.mark.parametrize(
+    ("status", "state"),
+    [
+        (0x0000, State.NOT_READY_TO_SWITCH_ON),
+        (0x0250, State.SWITCH_ON_DISABLED),
+        (0x0231, State.READY_TO_SWITCH_ON),
+        (0x0233, State.SWITCHED_ON),
+        (0x1637, State.OPERATION_ENABLED),
+        (0x0217, State.QUICK_STOP_ACTIVE),
+        (0x021F, State.FAULT_REACTION_ACTIVE),
+        (0x0218, State.FAULT),
+        (0x0024, State.UNKNOWN),
+    ],
+)
+def test_status_words_of_real_drives(status: int, state: State) -> None:
+    assert state_of(status) is state
+
+
+@given(status=words)
+def test_every_status_word_is_one_state_whatever_the_other_bits(status: int) -> None:
+    assert state_of(status) is state_of(status & 0x6F)
+
+
+def test_a_moving_quick_stop_is_not_left_for_enabling() -> None:
+    word = control_word(State.QUICK_STOP_ACTIVE, Wish.ENABLE, at_rest=False)
+    assert word == QUICK_STOP
+    assert control_word(State.OPERATION_ENABLED, Wish.ENABLE) == ENABLE_OPERATION

@@ -1,0 +1,214 @@
+"""A polled instrument against a peer that misbehaves: never a wrong number, always a count."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from modbus_peer import Peer
+from winchkit import catalog
+from winchkit.drivers.clock import MonotonicClock
+from winchkit.drivers.modbus.instrument import Instrument
+from winchkit.drivers.modbus.line import ModbusLine
+from winchkit.drivers.reading import Reading
+from winchkit.drivers.slow import SlowDevices
+from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
+from winchkit.schema.bench import BusSpec
+from winchkit.schema.read import read_device
+
+CLOCK = MonotonicClock()
+
+
+def cell(unit: int = 1) -> Instrument:
+    spec = read_device(catalog.find("devices", "laumas-tlb"))
+    return Instrument(f"cell {unit}", spec, unit, CLOCK, rate=100.0, timeout=0.1)
+
+
+def weigh(peer: Peer, counts: int, status: int = 1 << 11) -> None:
+    peer.registers[6] = status
+    for register in (7, 9):
+        peer.registers[register], peer.registers[register + 1] = counts >> 16, counts & 0xFFFF
+
+
+@contextmanager
+def polled(peer: Peer, *instruments: Instrument, timeout: float = 0.1) -> Iterator[SlowDevices]:
+    spec = BusSpec("modbus-tcp", host="127.0.0.1", port=peer.port, timeout=timeout)
+    slow = SlowDevices([ModbusLine("cells", spec, instruments, CLOCK)])
+    try:
+        yield slow
+    finally:
+        slow.close()
+
+
+def until(condition: Callable[[], bool], within: float = 3.0) -> None:
+    deadline = time.monotonic() + within
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come to that"
+        time.sleep(0.005)
+
+
+def collected(instrument: Instrument) -> list[Reading]:
+    readings: list[Reading] = []
+    instrument.listeners.append(readings.append)
+    return readings
+
+
+def test_readings_come_with_their_times() -> None:
+    instrument = cell()
+    with Peer() as peer:
+        weigh(peer, 19_613)
+        readings = collected(instrument)
+        with polled(peer, instrument):
+            until(lambda: len(readings) > 20)
+    for reading in readings:
+        assert reading.value == pytest.approx(196.13)
+        assert reading.t_sample < reading.t_request <= reading.t_receive
+        assert reading.t_uncertainty < 0.1
+    assert instrument.counters.duplicates >= 19
+    lengths = {count for _, _, _, count in peer.requests}
+    assert lengths == {7, 8}
+
+
+def test_a_late_reply_is_never_taken_for_the_next_request() -> None:
+    """Every third answer comes late and with a value of its own, which must never be seen."""
+    instrument = cell()
+
+    def late(_unit: int, number: int, pdu: bytes) -> tuple[float, bytes]:
+        if number % 3 or len(pdu) < 6:
+            return 0.0, pdu
+        poisoned = bytearray(pdu)
+        struct.pack_into(">HH", poisoned, 2 + 2 * 3, 0, 55_555)
+        return 0.13, bytes(poisoned)
+
+    with Peer(behave=late) as peer:
+        weigh(peer, 1000)
+        readings = collected(instrument)
+        with polled(peer, instrument, timeout=0.05):
+            until(lambda: instrument.counters.timeouts >= 5, within=6.0)
+        assert peer.connections > 5, "after each timeout the connection is a new one"
+    assert instrument.counters.reconnects >= 4
+    assert {reading.raw for reading in readings} == {1000}
+
+
+def test_a_short_reply_is_refused() -> None:
+    instrument = cell()
+
+    def short(_unit: int, number: int, pdu: bytes) -> tuple[float, bytes]:
+        return 0.0, pdu if number < 4 else bytes((3, 4)) + b"\x12\x34\x56\x78"
+
+    with Peer(behave=short) as peer:
+        weigh(peer, 1000)
+        readings = collected(instrument)
+        with polled(peer, instrument):
+            until(lambda: instrument.counters.malformed >= 1)
+        assert isinstance(instrument.problem, NoReply)
+    assert {reading.raw for reading in readings} == {1000}
+
+
+def test_a_device_that_refuses_longer_blocks_is_read_without_them() -> None:
+    instrument = cell()
+    with Peer(end=13) as peer:
+        weigh(peer, 1000)
+        readings = collected(instrument)
+        with polled(peer, instrument):
+            until(lambda: len(readings) > 10)
+        assert sum(count == 8 for *_, count in peer.requests) == 1
+    assert instrument.counters.exceptions == 0
+
+
+def test_an_exception_is_counted_and_told() -> None:
+    instrument = cell()
+    with Peer(end=5) as peer, polled(peer, instrument):
+        until(lambda: instrument.counters.exceptions >= 1)
+        assert isinstance(instrument.problem, DeviceRefused)
+        assert "illegal address" in str(instrument.problem)
+    assert instrument.latest is None
+
+
+def test_one_dead_device_does_not_stop_the_others() -> None:
+    alive, dead = cell(1), cell(2)
+
+    def silent(unit: int, _number: int, pdu: bytes) -> tuple[float, bytes] | None:
+        return None if unit == 2 else (0.0, pdu)
+
+    with Peer(behave=silent) as peer:
+        weigh(peer, 1000)
+        with polled(peer, alive, dead):
+            until(lambda: dead.counters.timeouts >= 2, within=5.0)
+            before = alive.counters.readings
+            until(lambda: alive.counters.readings > before + 30, within=5.0)
+        assert peer.connections > 1
+    assert alive.counters.timeouts == alive.counters.drops == 0
+    assert isinstance(dead.problem, NoReply)
+    assert "unit 2" in str(dead.problem)
+
+
+def test_a_lost_connection_is_opened_again() -> None:
+    instrument = cell()
+    with Peer() as peer:
+        weigh(peer, 1000)
+        readings = collected(instrument)
+        with polled(peer, instrument):
+            until(lambda: len(readings) > 5)
+            peer.hang_up()
+            until(lambda: peer.connections == 2)
+            count = len(readings)
+            until(lambda: len(readings) > count + 5)
+    assert {reading.raw for reading in readings} == {1000}
+
+
+def test_nobody_listens() -> None:
+    instrument = cell()
+    with Peer() as peer:
+        pass
+    with polled(peer, instrument):
+        until(lambda: instrument.problem is not None)
+        assert isinstance(instrument.problem, ConnectionLost)
+        assert f"127.0.0.1:{peer.port}" in str(instrument.problem)
+
+
+def obey(peer: Peer, address: int, value: int) -> None:
+    """Tare sets the bit of the net value in the status."""
+    if (address, value) == (5, 7):
+        peer.registers[6] |= 1 << 10
+
+
+def test_commands_reach_the_device_between_polls_and_are_seen_obeyed() -> None:
+    instrument = cell()
+    with Peer(written=obey) as peer:
+        weigh(peer, 1000)
+        with polled(peer, instrument) as slow:
+            until(lambda: instrument.latest is not None)
+            slow.command(instrument, "tare")
+            assert (1, 16, 5, 7) in peer.requests
+            assert instrument.tared
+            with pytest.raises(NotPermitted, match=r"no command .weigh.; its device file has tare"):
+                slow.command(instrument, "weigh")
+
+
+def test_a_command_that_is_taken_and_not_obeyed_is_told() -> None:
+    instrument = cell()
+    with Peer() as peer:
+        weigh(peer, 1000)
+        with polled(peer, instrument) as slow:
+            until(lambda: instrument.latest is not None)
+            with pytest.raises(DeviceRefused, match=r"did not obey within 1 s.*'net' to come"):
+                slow.command(instrument, "tare")
+
+
+def test_the_eeprom_is_written_on_purpose_only() -> None:
+    instrument = cell()
+    with Peer() as peer:
+        weigh(peer, 1000)
+        with polled(peer, instrument) as slow:
+            until(lambda: instrument.latest is not None)
+            with pytest.raises(NotPermitted, match="EEPROM"):
+                slow.command(instrument, "store")
+            assert not any(function == 16 for _, function, _, _ in peer.requests)
+            instrument.may_store = True
+            slow.command(instrument, "store")
+            assert (1, 16, 5, 99) in peer.requests

@@ -1,0 +1,168 @@
+"""The page of a comparison: one state only, in plain sentences, whole and escaped."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from report_answers import recorded
+from report_parsed import HOSTILE, Page
+from winchkit.catalog import find
+from winchkit.diagnosis.compare import Compared, compare, compared
+from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.results import OutputError
+from winchkit.report.figures.plots import Residuals, plots_of
+from winchkit.report.pages.comparison import distance_text
+from winchkit.report.pages.pages import comparison_html
+from winchkit.schema.read import read_winch
+
+STRETCHED = OutputError("m", 100, None, 2.5, 1.6e-3, 4e-3, 0.0, 0.4e-3, (("load", 0.82),))
+
+
+@cache
+def held_against(bench: str) -> Compared:
+    return compared(recorded(bench), read_winch(find("profiles", "bench-spiral")))
+
+
+def page_of(bench: str) -> Page:
+    return Page(comparison_html(held_against(bench), bench, "my profile.toml"))
+
+
+def outputs_drawn(page: Page, kind: str) -> set[str]:
+    return {name.removeprefix(kind) for name in page.plots if name.startswith(kind)}
+
+
+def test_the_page_belongs_to_the_figures_of_the_comparison() -> None:
+    known = held_against("demo-elastic-rope")
+    profile = read_winch(find("profiles", "bench-spiral"))
+    assert known.comparison == compare(recorded("demo-elastic-rope"), profile)
+    raw = next(w for w in page_of("demo-elastic-rope").words if w.startswith("{"))
+    assert json.loads(raw) == json.loads(json.dumps(known.comparison.to_json()))
+
+
+@pytest.mark.parametrize("bench", ["demo-elastic-rope", "five-cornered-drum"])
+def test_the_page_is_whole_and_needs_nothing_else(bench: str) -> None:
+    page = page_of(bench)
+    assert page.count("h1") == 1
+    assert page.count("script") == 3
+    assert page.count("table") == page.count("caption")
+    for tag, attributes in page.elements:
+        assert tag not in {"link", "iframe", "object", "img"}
+        assert not {"src", "href", "action", "srcset"} & attributes.keys()
+    ids = [a["id"] for _, a in page.elements if "id" in a]
+    assert len(ids) == len(set(ids))
+    figures = {a["data-plot"] for _, a in page.elements if "data-plot" in a}
+    assert figures == page.plots.keys()
+
+
+def test_only_the_present_state_is_drawn() -> None:
+    page = page_of("demo-elastic-rope")
+    assert {one["name"] for plot in page.plots.values() for one in plot["series"]} == {"residual"}
+    assert outputs_drawn(page, "time-") == {"cable_length", "tension", "motor_torque"}
+    assert page.plots["over-cable_length"]["xLabel"] == "load [N]"
+
+
+def test_the_curves_are_the_residual_of_the_figures() -> None:
+    known = held_against("demo-elastic-rope")
+    plots = plots_of(Residuals(known.regression, known.residual, None, {}))
+    for own in plots:
+        (line,) = own.over_time.data["series"]
+        values = np.array([v for v in line["values"] if v is not None]) * own.scale.worth
+        error = known.comparison.outputs[own.output]
+        assert np.abs(values).max() == pytest.approx(error.max, rel=1e-3)
+        assert error.rms <= 1.001 * np.sqrt(np.mean(values**2))
+
+
+def test_every_output_gets_its_sentence_and_the_offset_is_told() -> None:
+    known = held_against("demo-elastic-rope").comparison
+    text = page_of("demo-elastic-rope").text
+    assert "Above the noise" in text
+    for name in ("cable length", "tension", "motor torque"):
+        assert f"The {name} is off by" in text
+    assert "it follows the load (" in text
+    assert known.offset is not None
+    assert f"fitted: {1000 * known.offset:.2f} mm." in text
+
+
+def test_a_true_profile_is_at_the_noise() -> None:
+    text = page_of("demo-adequate").text
+    assert "At the noise" in text
+    assert "times its noise" not in text
+
+
+def test_without_repeats_the_noise_is_not_invented() -> None:
+    first = [run for run in recorded("demo-adequate") if run.name.endswith("-1")]
+    known = compared(first, read_winch(find("profiles", "bench-spiral")))
+    page = Page(comparison_html(known, "x"))
+    assert "Noise unknown" in page.text
+    assert "its noise unknown without a repeated run" in page.text
+    assert {plot["noise"] for plot in page.plots.values()} == {None}
+
+
+@pytest.mark.parametrize(
+    ("error", "over", "text"),
+    [
+        (
+            STRETCHED,
+            Attribution("cable_length", "load", 0.82),
+            "The cable length is off by 1.60 mm rms, 4.0 times its noise of 0.400 mm; "
+            "it follows the load (82 % of the error).",
+        ),
+        (
+            STRETCHED,
+            Attribution("cable_length", "drum_angle", 0.5, order=5),
+            "The cable length is off by 1.60 mm rms, 4.0 times its noise of 0.400 mm; "
+            "it repeats 5 times per drum turn (50 % of the error).",
+        ),
+        (
+            replace(STRETCHED, noise_rms=1.5e-3),
+            Attribution("cable_length", "load", 0.82),
+            "The cable length is off by 1.60 mm rms, about its noise of 1.50 mm.",
+        ),
+        (
+            replace(STRETCHED, noise_rms=None),
+            None,
+            "The cable length is off by 1.60 mm rms, its noise unknown without a repeated run; "
+            "it hardly follows anything that was measured.",
+        ),
+        (
+            replace(STRETCHED, noise_rms=0.0),
+            None,
+            "The cable length is off by 1.60 mm rms, beside its noise of 0 m; "
+            "it hardly follows anything that was measured.",
+        ),
+    ],
+)
+def test_the_distance_in_words(error: OutputError, over: Attribution | None, text: str) -> None:
+    assert distance_text("cable_length", error, over) == text
+
+
+def test_the_commands_repeat_what_was_given_and_go_on() -> None:
+    options = ("--effects", "my effects.py", "--band", "10")
+    page = Page(comparison_html(held_against("demo-adequate"), "x", "p.toml", options=options))
+    given = "--profile p.toml --effects 'my effects.py' --band 10"
+    runs = " ".join(run.path or run.name for run in recorded("demo-adequate"))
+    assert f"winchkit compare {runs} {given}" in page.text
+    assert f"{given} --html report.html" in page.text
+
+
+def test_hostile_names_stay_text() -> None:
+    known = held_against("demo-adequate")
+    said = replace(known, comparison=replace(known.comparison, notes=(HOSTILE,)))
+    page = Page(comparison_html(said, HOSTILE, HOSTILE, options=(HOSTILE,)))
+    assert page.count("script") == 3
+    assert page.count("img") == 0
+    assert not any(key.startswith("on") for _, a in page.elements for key in a)
+    assert HOSTILE in "".join(page.words)
+
+
+def test_an_order_within_a_turn_is_told_where_no_trend_is() -> None:
+    known = held_against("five-cornered-drum").comparison
+    text = page_of("five-cornered-drum").text
+    assert known.outputs["tension"].follows == ()
+    assert "it repeats 5 times per drum turn" in text
+    assert "nothing that was measured" not in text

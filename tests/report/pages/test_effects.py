@@ -1,0 +1,65 @@
+"""The page of effects: every card whole, every signature drawn from its code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from report_parsed import Page
+from winchkit.cli.model.effects import command
+from winchkit.effects.card import signature
+from winchkit.effects.catalogue import load_catalogue
+from winchkit.report.pages.effects import effects_html
+
+CATALOGUE = load_catalogue()
+EFFECTS = tuple(CATALOGUE)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Page:
+    return Page(effects_html(EFFECTS, "all"))
+
+
+def test_every_effect_has_its_section_and_its_link(whole: Page) -> None:
+    ids = [a["id"] for tag, a in whole.elements if tag == "section"]
+    links = [a["href"] for tag, a in whole.elements if tag == "a"]
+    assert set(ids) == {e.id for e in EFFECTS} | {"contents"}
+    assert sorted(str(link) for link in links) == sorted(f"#{e.id}" for e in EFFECTS)
+
+
+def test_every_card_says_everything(whole: Page) -> None:
+    for effect in EFFECTS:
+        for words in (effect.what, effect.formula, effect.source, effect.looks_like):
+            assert " ".join(words.split()) in whole.text
+        assert effect.told_apart in whole.text
+
+
+def test_every_output_that_changes_is_drawn(whole: Page) -> None:
+    drawn = sum(1 + len(signature(e).changes) for e in EFFECTS)
+    assert whole.count("svg") == drawn
+    assert whole.count("script") == 0
+
+
+def test_a_picture_is_the_signature() -> None:
+    effect = CATALOGUE["motor-viscous"]
+    page = Page(effects_html([effect], effect.id))
+    lines = [str(a["points"]) for tag, a in page.elements if tag == "polyline"]
+    x, y = np.array([point.split(",") for point in lines[1].split()], dtype=float).T
+    drawn = signature(effect)
+    time = drawn.time[0] + (x - x[0]) / (x[-1] - x[0]) * (drawn.time[-1] - drawn.time[0])
+    change = np.interp(time, drawn.time, drawn.changes["motor_torque"])
+    # Pictures count downwards.
+    assert np.corrcoef(change, y)[0, 1] < -0.97
+    assert "change [N m]" in page.text
+
+
+def test_the_command_writes_the_page(tmp_path: Path) -> None:
+    for words in ([], ["cable-sag"]):
+        path = tmp_path / f"page{len(words)}.html"
+        result = CliRunner().invoke(command, [*words, "--html", str(path)])
+        assert result.exit_code == 0
+        assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert (tmp_path / "page1.html").stat().st_size < 40_000

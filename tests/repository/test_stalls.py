@@ -1,0 +1,113 @@
+"""A failure in real time is a failure, unless this computer did not run the test meanwhile."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from stalls import StallWatch
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="schedstat of Linux")
+pytest_plugins = ["pytester"]
+
+TESTS = Path(__file__).parents[1]
+SUPPORT = TESTS / "support"
+STARVED = """
+import os, subprocess, sys, time
+sys.path.insert(0, {tests!r})
+from stalls import StallWatch
+processor = min(os.sched_getaffinity(0))
+os.sched_setaffinity(0, [processor])
+busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range({busy})]
+os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+with StallWatch() as watch:
+    end = time.monotonic() + 2.0
+    while time.monotonic() < end:
+        time.sleep(0.001)
+for process in busy:
+    process.kill()
+    process.wait()
+print(watch.largest)
+"""
+
+
+def test_a_thread_that_waits_for_the_processor_shows() -> None:
+    """A process of the lowest class on one processor, beside busy ones."""
+    script = STARVED.format(tests=str(SUPPORT), busy=2)
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert float(run.stdout) > 0.05
+
+
+@pytest.mark.realtime
+def test_processor_time_and_locks_of_the_program_are_no_stall(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half a second of the sampling thread without the interpreter lock, then of waiting."""
+    proc = fake_proc(tmp_path, os.getpid(), wait=1.0)
+    with StallWatch(proc) as watch:
+        begun = time.process_time()
+        while time.process_time() - begun < 0.3:
+            sum(range(10**6))
+    assert watch.largest < 0.2
+
+
+def test_a_wait_of_a_process_with_the_mark_shows(tmp_path: Path) -> None:
+    proc = fake_proc(tmp_path, os.getpid(), wait=1.0)
+    with StallWatch(proc) as watch:
+        fake_proc(tmp_path, 4711, wait=2.0, mark=f"WINCHKIT_TESTS_OF={os.getpid()}")
+        fake_proc(tmp_path, 4712, wait=2.0, mark="WINCHKIT_TESTS_OF=1")
+        time.sleep(1.2)
+        fake_proc(tmp_path, 4712, wait=9.0)
+        time.sleep(0.1)
+        assert watch.largest < 0.5
+        fake_proc(tmp_path, 4711, wait=2.75)
+        time.sleep(0.1)
+    assert watch.largest == pytest.approx(0.75)
+
+
+def fake_proc(folder: Path, process: int, wait: float, mark: str = "") -> Path:
+    """What proc(5) shows of a process of one thread."""
+    task = folder / str(process) / "task" / str(process)
+    task.mkdir(parents=True, exist_ok=True)
+    (task / "schedstat").write_text(f"12345 {round(wait * 1e9)} 6\n")
+    if mark:
+        (folder / str(process) / "environ").write_bytes(f"A=1\0{mark}\0".encode())
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("stall", "body", "outcome"),
+    [
+        (0.0, "assert not 'wrong'", "failed"),
+        (0.2, "assert not 'wrong'", "skipped"),
+        (0.2, "pytest.fail('Timeout (>1.0s) from pytest-timeout.')", "failed"),
+        (0.2, "pass", "passed"),
+    ],
+)
+def test_what_a_stall_makes_of_a_test(
+    pytester: pytest.Pytester, stall: float, body: str, outcome: str
+) -> None:
+    pytester.makepyprojecttoml("[tool.pytest.ini_options]\nmarkers = ['realtime']\n")
+    text = (TESTS / "conftest.py").read_text()
+    pytester.makeconftest(
+        text.replace(
+            "from stalls import", f"sys.path.insert(0, {str(SUPPORT)!r})\nfrom stalls import"
+        )
+        + f"\nStallWatch._sample = lambda self: setattr(self, 'largest', {stall})\n"
+    )
+    pytester.makepyfile(
+        f"import pytest\n@pytest.mark.realtime\ndef test_it():\n    {body}\n"
+        "def test_of_no_real_time():\n    assert not 'wrong'\n"
+    )
+    result = pytester.runpytest_subprocess("-rs", "-p", "no:cacheprovider")
+    counts = result.parseoutcomes()
+    assert counts.pop("failed") == 1 + (outcome == "failed")
+    if outcome != "failed":
+        assert counts.pop(outcome) == 1
+    if outcome == "skipped":
+        result.stdout.fnmatch_lines(["*did not run the test's processes for 0.200 s*wrong*"])

@@ -1,0 +1,148 @@
+"""Logs that were cut off or damaged: everything whole is saved, wherever the cut was."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logs import DRIVE, written
+from winchkit.errors import FileError, RunError, UsageError
+from winchkit.runs import open_writer, read_run
+from winchkit.runs.read import read_log
+from winchkit.runs.recover import recover
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> bytes:
+    written(tmp_path / "a.mcap", duration=1.0)
+    return (tmp_path / "a.mcap").read_bytes()
+
+
+def test_recover_never_fails_on_a_cut_log(tmp_path: Path, data: bytes) -> None:
+    path, saved = tmp_path / "cut.mcap", tmp_path / "saved.mcap"
+    kept = -1
+    for length in [*range(0, 300), *range(300, len(data), 131), len(data)]:
+        path.write_bytes(data[:length])
+        found = recover(path, saved)
+        assert found.kept >= kept, "a longer file has as much"
+        assert found.dropped_pieces == 0
+        assert found.was_whole is (length == len(data))
+        kept = found.kept
+        if b"winchkit.log" in data[:length] and kept:
+            assert read_log(saved).closed
+            assert read_log(path).span == read_log(saved).span
+    assert kept == 250 + 50 + 11 + 1
+
+
+def test_a_damaged_chunk_is_left_out_and_the_others_are_kept(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "hurt.mcap"
+    whole = read_log(tmp_path / "a.mcap").samples[DRIVE]
+    third = [n for n in range(len(data)) if data.startswith(b"\x04\0\0\0zstd", n)][3]
+    hurt = bytearray(data)
+    hurt[third + 40] ^= 0x55
+    path.write_bytes(hurt)
+    with pytest.raises(RunError, match=r"damaged.*winchkit log recover"):
+        read_run(path)
+    found = recover(path)
+    assert found.output == str(tmp_path / "hurt.recovered.mcap")
+    assert (found.dropped_pieces, found.was_whole) == (1, False)
+    left = read_log(found.output).samples[DRIVE]
+    assert len(left) == len(whole) - 25
+    assert np.isin(left.times, whole.times).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_garbage_in_the_middle_costs_what_it_covers(tmp_path: Path, data: bytes, seed: int) -> None:
+    chance = random.Random(seed)
+    path = tmp_path / "hurt.mcap"
+    start = data.index(b"winchkit.log") + 3000
+    at = chance.randrange(start, len(data) - 4000)
+    hurt = data[:at] + chance.randbytes(300) + data[at + 300 :]
+    path.write_bytes(hurt)
+    found = recover(path)
+    left = read_log(found.output).samples[DRIVE]
+    assert len(left) >= 250 - 3 * 25
+    assert not found.was_whole
+
+
+def test_a_run_of_rows_is_recovered_too(tmp_path: Path) -> None:
+    path = tmp_path / "rows.mcap"
+    with open_writer(path, [("time", "s"), ("motor_angle", "rad")], {"a": "b"}) as writer:
+        for n in range(20):
+            writer.append({"time": n, "motor_angle": 2 * n})
+    path.write_bytes(path.read_bytes()[:-700])
+    cut = read_run(path)
+    found = recover(path)
+    again = read_run(found.output)
+    assert again["motor_angle"].tolist() == cut["motor_angle"].tolist()
+    assert again.notes == ()
+    assert cut.notes != ()
+
+
+def test_rows_of_text_are_recovered(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    with open_writer(path, [("time", "s"), ("motor_angle", "rad")], {"a": "b"}) as writer:
+        for n in range(20):
+            writer.append({"time": n / 7, "motor_angle": n / 3})
+    data = path.read_bytes()
+    for length in range(len(data) + 1):
+        path.write_bytes(data[:length])
+        found = recover(path)
+        assert found.dropped_pieces == 0
+        assert found.kept == max(data[:length].count(b"\n") - 3, 0)
+        assert found.dropped_bytes == length - data[:length].rfind(b"\n") - 1
+        if found.kept > 1:
+            run = read_run(found.output)
+            assert run["motor_angle"].tolist() == [n / 3 for n in range(found.kept)]
+            assert run.metadata["a"] == "b"
+
+
+def test_rows_that_a_failing_disk_left(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    path.write_bytes(
+        b"# a: b\ntime [s],motor_angle [rad]\n0,1\n0.1,\n"
+        b"\0\0\0\0\n0.2\n0.3,4\n0.2,4\nx,y\n0.4,5\n0.5"
+    )
+    found = recover(path)
+    assert (found.kept, found.dropped_pieces, found.dropped_bytes) == (4, 4, 3)
+    assert read_run(found.output).time.tolist() == [0.0, 0.1, 0.3, 0.4]
+
+
+def test_what_cannot_be_recovered(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "a.mcap"
+    with pytest.raises(UsageError, match="would replace"):
+        recover(path, path)
+    with pytest.raises(RunError, match="no such file"):
+        recover(tmp_path / "none.mcap")
+    with pytest.raises(FileError, match="cannot be written"):
+        recover(path, tmp_path / "nowhere" / "b.mcap")
+    (tmp_path / "b.mcap").write_text("time [s]\n")
+    with pytest.raises(RunError, match="no MCAP file"):
+        recover(tmp_path / "b.mcap")
+    (tmp_path / "b.txt").write_text("x")
+    with pytest.raises(RunError, match="no format of a log"):
+        recover(tmp_path / "b.txt")
+    assert path.read_bytes() == data
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full disk")
+def test_what_cannot_be_saved_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target = tmp_path / "a.mcap", tmp_path / "saved.mcap"
+    written(source, 0.3)
+    target.write_bytes(b"what was there")
+
+    def full(_self: Path, data: bytes) -> int:
+        with Path("/dev/full").open("wb", buffering=0) as disk:
+            return disk.write(data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        with pytest.raises(FileError, match="No space left"):
+            recover(source, target)
+    assert target.read_bytes() == b"what was there"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "saved.mcap"]

@@ -1,0 +1,91 @@
+"""A simulated drive on a virtual CAN bus in real time, for tests of the drivers and the bench."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+import time
+from pathlib import Path
+
+import can
+
+from flywheel import INERTIA, Flywheel
+from winchkit import catalog
+from winchkit.schema.bench import BusSpec
+from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.read import read_device
+from winchkit.sim.drive.drive import SimDrive
+from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
+
+__all__ = ["INERTIA", "DriveOnBus", "bus_spec", "device"]
+
+_channels = itertools.count()
+
+
+def bus_spec() -> BusSpec:
+    """A virtual bus of its own."""
+    channel = f"test-{os.getpid()}-{next(_channels)}"
+    return BusSpec("can", interface="virtual", channel=channel, heartbeat=0.1)
+
+
+def device() -> DeviceSpec:
+    """The generic drive."""
+    return read_device(catalog.find("devices", "generic-cia402"))
+
+
+class DriveOnBus:
+    """Runs a SimDrive in a thread of its own; a context manager."""
+
+    def __init__(self, bus: BusSpec, node: int = 1, *, brake: bool = True) -> None:
+        self._bus = can.Bus(interface="virtual", channel=bus.channel)
+        self.frames: list[tuple[int, bytes]] = []
+        self.shaft = Flywheel()
+        spec = device()
+        assert spec.servo is not None
+        self.drive = SimDrive(
+            self._send,
+            node,
+            spec.servo,
+            ObjectDictionary(read_eds(Path(spec.path).parent / spec.servo.eds, node)),
+            self.shaft,
+            brake=brake,
+            now=time.monotonic(),
+        )
+        self.drive.power_on(time.monotonic(), boot_time=0.02)
+        self.lock = threading.Lock()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> DriveOnBus:
+        self._thread.start()
+        while self.drive.nmt.name == "BOOTING":
+            time.sleep(0.005)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self._bus.shutdown()
+
+    def shout(self, identifier: int, data: bytes) -> None:
+        """Send any frame as if the drive had."""
+        self._send(identifier, data)
+
+    def words(self) -> list[int]:
+        """Control words that came in RPDO 1."""
+        node = self.drive.node
+        return [int.from_bytes(d[:2], "little") for i, d in self.frames if i == 0x200 + node]
+
+    def _send(self, identifier: int, data: bytes) -> None:
+        self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            message = self._bus.recv(0.001)
+            with self.lock:
+                now = time.monotonic()
+                if message is not None:
+                    self.frames.append((message.arbitration_id, bytes(message.data)))
+                    self.drive.receive(message.arbitration_id, bytes(message.data), now)
+                self.drive.tick(now)

@@ -1,0 +1,1 @@
+"""A virtual machine whose kernel has CAN interfaces, and what runs in it."""
