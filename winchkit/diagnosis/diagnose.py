@@ -1,4 +1,4 @@
-"""Diagnosis of a winch: data, stepwise selection, verdict, and programmes that would tell more."""
+"""Diagnosis of a winch: data, stepwise selection, verdict and the next motion programmes."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def diagnose(
     result = stepwise_selection(engine)
     reduced = without_impacts(dataset, result.last_model)
     if reduced is not None:
-        progress("searching again without the jerks", 0.6)
+        progress("searching again without impacts", 0.6)
         engine = selection_engine(reduced, catalogue)
         result = stepwise_selection(engine)
     progress("naming", 0.8)
@@ -179,17 +179,17 @@ def diagnose(
 def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
     """Verdict, equivalence sets, intervals and next programmes of a selection."""
     judgement = judge_with_specification_test(engine, result)
-    shown = judgement.shown
-    added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
-    sets = [equivalence_set(engine, shown.final, shown.noise, index) for index in added]
+    reported = judgement.reported
+    added = range(engine.n_initial_terms, len(reported.final.hypothesis.terms))
+    sets = [equivalence_set(engine, reported.final, reported.noise, index) for index in added]
     pairs = pairs_of(sets or _closest(engine, result, judgement))
     if sets:
         judgement = reweighted_judgement(engine, judgement)
-        shown = judgement.shown
+        reported = judgement.reported
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,
-        steps=steps_of(engine, shown, sets) if sets else (),
+        steps=steps_of(engine, reported, sets) if sets else (),
         candidates=candidates_of(engine, result),
         detectable=detectable(
             result.scores, DetectionThreshold(engine.penalty_per_parameter, result.threshold)
@@ -203,7 +203,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
             *judgement.notes,
         ),
     )
-    return WinchAnswer(engine, shown, diagnosis, sets, pairs)
+    return WinchAnswer(engine, reported, diagnosis, sets, pairs)
 
 
 def _closest(
@@ -310,9 +310,9 @@ def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[W
     out = [Where(f.output, f.variable, f.share, f.order) for f in places]
     excess_power = lack_of_fit_test.excess_power
     if excess_power.size and excess_power.max() > 0:
-        loudest = int(np.argmax(excess_power))
-        output, low, high = regression.bands[loudest]
+        largest = int(np.argmax(excess_power))
+        output, low, high = regression.bands[largest]
         middle = low if not np.isfinite(high) else (low + high) / 2
-        share = float(excess_power[loudest] / np.sum(np.maximum(excess_power, 0)))
+        share = float(excess_power[largest] / np.sum(np.maximum(excess_power, 0)))
         out.append(Where(output, "time", share, frequency=middle))
     return tuple(sorted(out, key=lambda w: -w.share)[:_WHERE])

@@ -45,7 +45,7 @@ def test_impacts_exclude_torque_and_under_a_known_weight_tension(load_mass: floa
         backs = np.flatnonzero(np.diff(np.sign(np.where(np.abs(turned) > 5.0, turned, 0.0))) != 0)
         for index in np.flatnonzero(left["motor_torque"]):
             assert np.min(np.abs(backs - index)) < 60
-    assert any("gear-backlash jerks" in note for note in calm.notes)
+    assert any("impacts of gear-backlash" in note for note in calm.notes)
 
 
 def test_without_backlash_no_sample_is_excluded() -> None:
@@ -74,6 +74,6 @@ def test_backlash_is_found_and_fitted_without_its_impacts() -> None:
     found = diagnose(runs, GROOVED).diagnosis
     assert [step.effects for step in found.steps] == [("gear-backlash",)]
     assert found.steps[0].parameters["gear-backlash"]["gap"].value == pytest.approx(0.02, rel=0.02)
-    assert any("gear-backlash jerks" in note for note in found.notes)
+    assert any("impacts of gear-backlash" in note for note in found.notes)
     added = add("gear-backlash", runs, GROOVED)
-    assert any("gear-backlash jerks" in note for note in added.notes)
+    assert any("impacts of gear-backlash" in note for note in added.notes)

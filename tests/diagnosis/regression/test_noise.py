@@ -125,8 +125,8 @@ def test_a_sine_in_all_repeats_is_a_lack_of_fit_in_its_band(frequency: float) ->
     regression = length_problem(runs, RIDE)
     found, noise = judged(regression)
     assert found.p_value < 1e-3
-    loudest = int(np.argmax(found.excess_power))
-    assert found.rejected[loudest]
+    largest = int(np.argmax(found.excess_power))
+    assert found.rejected[largest]
     for band in np.flatnonzero(found.rejected):
         _, low, high = regression.bands[band]
         # What a run of six seconds smears a line over.

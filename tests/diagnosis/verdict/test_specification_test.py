@@ -167,7 +167,7 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
     )
     judged = judge_with_specification_test(engine, result)
     assert judged.verdict == "explained"
-    assert judged.shown.final.labels == ("motor-coulomb",)
+    assert judged.reported.final.labels == ("motor-coulomb",)
     (note,) = judged.notes
     assert note.startswith("closest, but not named: gear-ratio; an unknown curve of the ")
     assert "over the cable length explains more" in note
@@ -198,5 +198,5 @@ def test_curves_are_sought_only_where_the_names_act() -> None:
     partial = SpecificationTest(engine, result).partial([0])
     curve = best_curve(engine.regression, partial, ["motor_torque"], engine.penalty_per_parameter)
     assert curve is not None
-    assert curve.place in {"motor_torque", "rope force"}
+    assert curve.place in {"motor_torque", "cable_force"}
     assert best_curve(engine.regression, partial, [], engine.penalty_per_parameter) is None

@@ -42,21 +42,21 @@ def missing_excitation(regression: TimeSeriesRegression) -> list[str]:
         )
     loads = [m for m in (mean_load(r.signals) for r in dataset.recordings) if m is not None]
     if not loads:
-        notes.append("no load and no tension: what depends on the rope's force cannot be seen")
+        notes.append("no load and no tension: effects of the cable force cannot be detected")
     elif max(loads) - min(loads) < _LEAST_LOAD_RANGE * max(abs(x) for x in loads):
         notes.append(
-            "one load only: rope elasticity and frame compliance, cell gain and offset are hard "
-            "to tell apart; repeat a run under another load"
+            "one load only: cable elasticity and frame compliance, cell gain and offset are hard "
+            "to distinguish; repeat a run under another load"
         )
     if loads and all(r.raw.load is None for r in dataset.recordings):
         notes.append(
-            "no load known: pulley friction and cell errors cannot be seen; give load_mass or "
+            "no load known: pulley friction and cell errors cannot be detected; give load_mass or "
             "a second cell"
         )
     notes += _motions([r.raw.at.speed for r in dataset.recordings])
     temperatures = [r.signals.temperature for r in dataset.recordings]
     if any(t is None for t in temperatures):
-        notes.append("no temperature measured: thermal effects cannot be seen")
+        notes.append("no temperature measured: thermal effects cannot be detected")
     elif (
         np.ptp(np.concatenate([t for t in temperatures if t is not None]))
         < _LEAST_TEMPERATURE_RANGE
@@ -76,8 +76,8 @@ def _motions(speeds: Sequence[Array]) -> list[str]:
     share_winding_in = float(np.mean(all_speeds > 0)) if len(all_speeds) else 0.0
     if not _LEAST_SHARE_OF_DIRECTION < share_winding_in < 1 - _LEAST_SHARE_OF_DIRECTION:
         notes.append(
-            "one direction only: friction and backlash cannot be told from gains and offsets; "
-            "run back as well"
+            "one direction only: friction and backlash cannot be distinguished from gains and "
+            "offsets; run back as well"
         )
     elif not any(np.any(np.diff(np.sign(run))) for run in moving):
         notes.append(

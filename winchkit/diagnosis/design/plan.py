@@ -200,7 +200,7 @@ def _temperature_step(dataset: Dataset, rise: float) -> list[Step]:
     if usual is None:
         return []
     target = float(round(usual + rise))
-    ask = f"bring rope and machine to {target:g} degC"
+    ask = f"bring cable and machine to {target:g} degC"
     return [Step(ask=ask, temperature=target)]
 
 

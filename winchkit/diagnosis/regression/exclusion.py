@@ -50,8 +50,8 @@ def without_impacts(dataset: Dataset, hypothesis: Hypothesis) -> Dataset | None:
     if share > _MOST:
         return None  # The remaining samples would not determine the effects.
     note = (
-        f"force and torque are not compared in the moments in which {names} jerks them "
-        f"({share:.1%} of the samples): how hard depends on what gives way"
+        f"force and torque are not compared at the impacts of {names} ({share:.1%} of the "
+        "samples): their size depends on compliances that the model does not have"
     )
     return replace(dataset, recordings=recordings, notes=(*dataset.notes, note))
 

@@ -12,7 +12,7 @@ from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.diagnosis.robot.adjustment import placed
-from winchkit.diagnosis.robot.attribution import follows_of
+from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
@@ -75,7 +75,7 @@ def compared_robot(
     regression = PoseRegression(LinearizationPoint(dataset, pose, START))
     errors = errors_of(regression, regression.residuals(terms))
     noise = _noise(errors, dataset)
-    follows = follows_of(regression, errors)
+    follows = pose_attributions(regression, errors)
     size = signals(regression)
     outputs = {
         name: OutputError(

@@ -10,7 +10,7 @@ residuals are model less measurement by kind, in SI. Here
   effects they are those of :class:`winchkit.model.robot.constraints.Winding` up to rounding;
 * ``gauge`` are the rows ``cable_length`` and ``tension`` the rows ``balance`` of that module;
 * ``tension`` rows are whitened at the pose and geometry of one robot (``basis``), so that they
-  stay comparable between hypotheses, and forces are what stands behind the cells' readings;
+  stay comparable between hypotheses, and cable forces are computed from the cells' readings;
 * zeros of swivel angles and offsets of length instruments are no part of the residuals; the
   regression has them as nuisance parameters.
 """
@@ -58,7 +58,7 @@ __all__ = ["POSED", "Equations", "start_pose"]
 
 POSED = ("rope", "position", "rotation", "swivel", "gauge")
 """Kinds that depend on the pose, in their order."""
-_INVERTING, _SMALL_FORCE, _FLATTEST, _INVERTED = 8, 1e-4, 0.05, 1e-9
+_NEWTON_STEPS, _FORCE_STEP, _LEAST_SLOPE, _FORCE_TOLERANCE = 8, 1e-4, 0.05, 1e-9
 
 
 @dataclass(frozen=True)
@@ -222,12 +222,12 @@ def _force_behind(line: Line, at: At, shown: Array) -> Array:
     derivatives.
     """
     force, size = shown.copy(), max(float(np.nanmax(np.abs(shown), initial=0.0)), 1.0)
-    step = _SMALL_FORCE * size
-    for _ in range(_INVERTING):
+    step = _FORCE_STEP * size
+    for _ in range(_NEWTON_STEPS):
         here = line.shown_tension(at, force)
         missing = shown - here
-        if np.nanmax(np.abs(missing), initial=0.0) < _INVERTED * size:
+        if np.nanmax(np.abs(missing), initial=0.0) < _FORCE_TOLERANCE * size:
             break
         slope = (line.shown_tension(at, force + step) - here) / step
-        force = force + missing / np.maximum(slope, _FLATTEST)
+        force = force + missing / np.maximum(slope, _LEAST_SLOPE)
     return force

@@ -268,7 +268,7 @@ def pose_offers(
     questions : sequence of Question
         To be answered.
     required : sequence of float
-        Whitened squares (χ²) at which each question counts as answered.
+        χ² at which each question counts as answered.
     count : int
         Poses per offer.
 

@@ -47,7 +47,7 @@ __all__ = [
     "prepare_selection",
 ]
 
-_UNBALANCED = 0.2
+_MOST_IMBALANCE = 0.2
 _BALANCING = frozenset({"payload-mass", "payload-centre", "cell-offset", "cell-thermal"})
 """Effects that may explain an imbalance of tensions while its noise is estimated.
 
@@ -132,7 +132,7 @@ def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
     if not dataset.has_tension:
         return True
     spread = float(np.nanstd(dataset.measured.tension))
-    return noise.unexplained.get("tension", 0.0) <= _UNBALANCED * spread
+    return noise.unexplained.get("tension", 0.0) <= _MOST_IMBALANCE * spread
 
 
 def _columns(

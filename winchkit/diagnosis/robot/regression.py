@@ -36,8 +36,8 @@ __all__ = ["LinearizationPoint", "PoseRegression"]
 _COPIES = 5
 _GROUPS = 5
 _BLOCKS = 24
-_RUN_LEAST = 10
-_SEEN = 1e-9
+_LEAST_POSES_OF_RUN = 10
+_LEAST_SINGULAR_VALUE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class PoseRegression(Regression):
         sizes = np.bincount(dataset.measured.run)
         together = [set(dataset.pose[dataset.measured.run == n]) for n in range(len(sizes))]
         disjoint = sum(map(len, together)) == len(set().union(*together))
-        if len(sizes) > 1 and sizes.min() >= _RUN_LEAST and disjoint:
+        if len(sizes) > 1 and sizes.min() >= _LEAST_POSES_OF_RUN and disjoint:
             return self._folded(dataset.measured.run, len(sizes))
         return self._folded(dataset.pose % _GROUPS, _GROUPS)
 
@@ -250,7 +250,7 @@ class PoseRegression(Regression):
         slope = np.where(known[..., None], slope, 0.0)
         # Unmeasured coordinates get directions of their own, which are left out.
         left, size, _ = np.linalg.svd(slope, full_matrices=True)
-        rank = np.sum(size > _SEEN * np.maximum(size[:, :1], 1e-300), axis=1)
+        rank = np.sum(size > _LEAST_SINGULAR_VALUE * np.maximum(size[:, :1], 1e-300), axis=1)
         index = np.arange(slope.shape[1])
         self._basis = left
         keep = index >= rank[:, None]

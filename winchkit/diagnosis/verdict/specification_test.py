@@ -44,7 +44,7 @@ class Curve:
     """A curve over one variable and the net decrease of χ² by it."""
 
     place: str
-    """Output that it is added to, or ``rope force`` or ``winding``, which act on several."""
+    """Output that it is added to, or ``cable_force`` or ``winding``, which act on several."""
     variable: str
     net_gain: float
     """Decrease of χ² less the penalty of its parameters."""
@@ -156,7 +156,7 @@ def judge_with_specification_test(
     """
     judgement = judge(engine, result)
     test = SpecificationTest(engine, result)
-    if judgement.shown is not result or not test.added:
+    if judgement.reported is not result or not test.added:
         return judgement
     terms = test.terms
     if curve := test.outperforming_curve(test.added):
@@ -180,7 +180,7 @@ def _without_outperformed(test: SpecificationTest, index: int, curve: Curve) -> 
     engine, result = test.engine, test.result
     outperformed = result.final.hypothesis.terms[index : index + 1]
     without = judge_with_specification_test(engine, without_term(engine, result, index))
-    if without.shown.final.labels[engine.n_initial_terms :]:
+    if without.reported.final.labels[engine.n_initial_terms :]:
         return replace(
             without, notes=(*without.notes, _withheld_note(outperformed, outperformed, curve))
         )

@@ -175,7 +175,7 @@ PLACES: Mapping[str, Mapping[str, _ChangeByCurve]] = {
     "cable_length": {"cable_length": _direct_change},
     "tension": {"tension": _direct_change},
     "motor_torque": {"motor_torque": _direct_change},
-    "rope force": {"tension": _direct_change, "motor_torque": _torque_by_cable_force},
+    "cable_force": {"tension": _direct_change, "motor_torque": _torque_by_cable_force},
     "winding": {"cable_length": _direct_change, "motor_torque": _torque_by_winding},
 }
 """Where a curve may act, and the change of each output by it."""

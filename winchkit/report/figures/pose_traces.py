@@ -11,9 +11,9 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.robot.attribution import (
     AXES,
-    follows_of,
-    most_telling,
+    most_significant,
     on_cables,
+    pose_attributions,
     variables_of_poses,
 )
 from winchkit.diagnosis.robot.errors import UNITS, Errors
@@ -76,7 +76,7 @@ def unit_of(variable: str) -> str:
 def traces(regression: PoseRegression, before: Errors, after: Errors | None = None) -> list[Trace]:
     """Per output its errors over what they follow most, before anything was added."""
     found: dict[str, Attribution] = {}
-    for followed in follows_of(regression, before):
+    for followed in pose_attributions(regression, before):
         if followed.variable != "pose":
             found.setdefault(followed.output, followed)
     return [
@@ -99,7 +99,7 @@ def trace_over(
     line = None
     if over.variable not in _POOLED:
         lines = list(AXES if name == "platform_position" else regression.dataset.names)
-        column = lines.index(over.line) if over.line else most_telling(x, error)
+        column = lines.index(over.line) if over.line else most_significant(x, error)
         line = lines[column]
         x, error = x[:, [column]], error[:, [column]]
         then = None if then is None else then[:, [column]]
