@@ -1,11 +1,11 @@
 """What a diagnosis of a long recording of several winches costs, and whether it is right; JSON.
 
 ``python benchmarks/diagnosis_hour.py``: 60 minutes at 1 kHz of 8 winches, a programme of 30 minutes
-and its repeat, load measured, every winch with a rope that stretches and a motor that rubs, made by
-the campaign's own physics. The promise is 60 s after reading and 4 GB; exits 1 when it is not kept
-or an effect is not named. ``--minutes 4 --winches 1`` is small enough for CI; ``--full`` diagnoses
-the first winch a second time with every sample, to compare; ``--csv FOLDER`` writes the recording,
-reads it back and tells what reading costs.
+and its repeat, load measured. Every winch has an elastic cable and Coulomb friction of the motor,
+simulated by the campaign's own physics. The promise is 60 s after reading and 4 GB; exits 1 when it
+is not kept or an effect is not named. ``--minutes 4 --winches 1`` is small enough for CI;
+``--full`` diagnoses the first winch a second time with every sample, to compare; ``--csv FOLDER``
+writes the recording, reads it back and tells what reading costs.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def hidden(index: int) -> dict[str, dict[str, float]]:
 
 
 def motion(random: np.random.Generator, seconds: float) -> tuple[Array, Array]:
-    """Time (s) and rope wound in (m): moves between random places at 0.05 to 0.5 m/s, rests."""
+    """Time (s) and cable wound in (m): moves between random places at 0.05 to 0.5 m/s, rests."""
     count = round(seconds * RATE)
     speed, at, place = np.zeros(count), round(RATE), 0.0
     while at < count:

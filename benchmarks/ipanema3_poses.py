@@ -1,15 +1,15 @@
 """The 17 poses of the IPAnema 3 paper's Table 2: what its elongation model explains of them.
 
 ``python benchmarks/ipanema3_poses.py [--json]``: the averages of the table, the rows that its
-correction makes worse, and the deviation that linear ropes would cause without correction, beside
+correction makes worse, and the deviation that linear cables would cause without correction, beside
 the measured one. Forces by Eq. 8 with its sign put right, from the forces at a reference pose;
-every rope longer by Δf (l + l0)/EA; the pose that the stretched ropes lead to by least squares.
+every cable longer by Δf (l + l0)/EA; the pose that the stretched cables lead to by least squares.
 
-Assumed, since the paper does not say: k1 = 439.13 is N per mm of elongation and metre of rope
+Assumed, since the paper does not say: k1 = 439.13 is N per mm of elongation and metre of cable
 (EA = 439.13 kN); reference pose (0, 0, -0.5) m; forces there closest to 500 N; a platform of 50 kg;
-5 m of rope between drum and frame; no swivel pulleys. They trade off against each other: plausible,
-not proven. The corrected column cannot be computed: it is what the model leaves, and the paper
-prints neither its forces, nor its wrench, nor what else is wrong with the machine.
+5 m of cable between drum and frame; no swivel pulleys. These values are correlated: they are
+plausible, not proven. The corrected column cannot be computed: it is the residual of the paper's
+model, and the paper prints neither its forces, nor its wrench, nor the machine's other errors.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ TABLE_2 = np.array(
 
 @dataclass(frozen=True)
 class Outcome:
-    """What linear ropes would do to the 17 poses, m and N."""
+    """What linear cables would do to the 17 poses, m and N."""
 
     deviation: np.ndarray
     """(17,), m."""
     forces: np.ndarray
-    """(17, 8), N, as Eq. 8 estimates them; below zero where it leaves what a rope can bear."""
+    """(17, 8), N, as Eq. 8 estimates them; below zero where it leaves what a cable can bear."""
     share_along_z: float
     """Of the squared deviation."""
 
@@ -65,7 +65,7 @@ class Outcome:
 def predicted(middle_force: float = MIDDLE_FORCE, per_metre: bool = True) -> Outcome:
     """Deviation from the programmed position without correction.
 
-    ``per_metre`` off: k1 is N per mm of elongation, however long the rope.
+    ``per_metre`` off: k1 is N per mm of elongation, however long the cable.
     """
     robot = robot_of(read_robot(find("profiles", "ipanema3")))
     programmed = Pose(TABLE_2[:, :3] / 1e3, np.tile(np.eye(3), (len(TABLE_2), 1, 1)))

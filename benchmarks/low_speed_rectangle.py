@@ -9,7 +9,7 @@ the same winches and nothing of how the pulleys stand at the start.
 The paper: 17.9 +- 20.5 N with Dahl, 96 % alike.
 
 The paper gives the frame, the speed, the rectangle, the load and that there are three pulleys.
-Assumed here: where the ropes leave frame and platform, wraps, friction and its spread, noise.
+Assumed here: where the cables leave frame and platform, wraps, friction and its spread, noise.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ SPREAD = 0.15
 """How far pulleys of one make differ in friction and stiffness, one standard deviation."""
 CELL_NOISE, ENCODER = 2.0, 5e-6
 APPROACH = 0.02
-"""How far the rope may have come before the first sample, either way, m."""
+"""How far the cable may have come before the first sample, either way, m."""
 PAPER = {"mean": 17.9, "std": 20.5, "similarity": 0.96}
 METHODS = ("none", "coulomb", "dahl")
 
@@ -61,7 +61,7 @@ def robot() -> tuple[Array, Array]:
 
 
 def ropes(position: Array, acceleration: Array) -> tuple[Array, Array]:
-    """Rope lengths and tensions along positions (n, 3), each of shape (n, 8)."""
+    """Cable lengths and tensions along positions (n, 3), each of shape (n, 8)."""
     exits, anchors = robot()
     vectors = exits - (position[:, None, :] + anchors)
     lengths = np.linalg.norm(vectors, axis=2)
@@ -70,7 +70,7 @@ def ropes(position: Array, acceleration: Array) -> tuple[Array, Array]:
     needed = np.zeros((len(position), 6))
     needed[:, :3] = MASS * (acceleration + np.array([0, 0, GRAVITY]))
     tension = np.einsum("nij,nj->ni", np.linalg.pinv(wrench), needed)
-    assert np.all(tension > 0), "a rope would be slack"
+    assert np.all(tension > 0), "a cable would be slack"
     return lengths, tension
 
 
@@ -120,7 +120,7 @@ class Winch:
     def readings(self, platform: Array, length: Array) -> tuple[Array, Array]:
         """What the cell shows and what the encoder says is wound in.
 
-        Before the first sample the rope has come some way from somewhere.
+        Before the first sample the cable has come some way from somewhere.
         """
         pulleys = [PreslidingPulleys(*numbers, self.shape) for numbers in self.numbers]
         state, out = State(), []

@@ -1,6 +1,6 @@
 """What a cable robot's cycle costs, side by side in one run.
 
-``python benchmarks/robot_tick.py [--json] [--robot ipanema3]``: for one pose of eight ropes the
+``python benchmarks/robot_tick.py [--json] [--robot ipanema3]``: for one pose of eight cables the
 inverse kinematics with elongation and drums, the same with Eq. 8's forces and strains found anew,
 and the forward kinematics warm-started from a pose half a millimetre off, each in plain Python and
 compiled (where numba is installed, the ``fast`` extra); inverse and forward kinematics of many

@@ -33,7 +33,7 @@ from winchkit.sim.live.buses import Carried
 
 JOG = [sys.executable, "-c", "from winchkit.cli import main; main()", "jog", "A"]
 SPEED = 0.2
-"""Of the rope, m/s."""
+"""Of the cable, m/s."""
 SETTLING = 0.05
 """Set-point filter and inner loops of the simulated drive, s."""
 REST = 0.5

@@ -1,8 +1,8 @@
 """What an added effect buys: where a winch really ends, before and after its profile knows it.
 
-A simulated bench hides something. Runs are recorded, the missing effect is found and added, and the
-winch is sent to the same lengths with the bare profile and with the better one. What the rope's end
-then really does, only the simulation knows.
+A simulated bench has an effect that its profile lacks. Runs are recorded, the missing effect is
+identified and added, and the winch moves to the same lengths with the original profile and with the
+extended one. The position error is that of the cable's end in the simulation.
 
     python examples/better_position.py [BENCH [EFFECT]]
 """

@@ -1,4 +1,4 @@
-"""A control programme: the rope follows a heaving ship, on a simulated bench in this process.
+"""A control programme: the cable follows a heaving ship, on a simulated bench in this process.
 
 On a real bench only the first lines differ: ``with open_bench("bench.toml") as bench``.
 """

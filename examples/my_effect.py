@@ -29,7 +29,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "tension", "motor_torque"),
-    what="The drum is built of five segments, and the rope bends over their edges.",
+    what="The drum is built of five segments, and the cable bends over their edges.",
     formula="W + a (sin(5φ − p) + sin p)",
     source="first harmonic of a regular pentagon",
     looks_like="Five waves per drum turn, in length, torque and the load's acceleration.",

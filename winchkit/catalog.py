@@ -1,4 +1,4 @@
-"""Finds devices, profiles and simulated benches by name or path, installed or in a checkout."""
+"""Devices, profiles and simulated benches by name or path, installed or in a checkout."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Kind = Literal["devices", "profiles", "sim"]
 
 
 def folder(kind: Kind) -> Path:
-    """The folder of shipped declarations: inside the wheel, else the checkout's sibling."""
+    """The folder of shipped declarations: inside the wheel, else in the checkout."""
     package = Path(str(files("winchkit")))
     shipped = package / "_data" / kind
     return shipped if shipped.is_dir() else package.parent / kind
@@ -29,9 +29,26 @@ def names(kind: Kind) -> list[str]:
 
 
 def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
-    """Path of a declaration by shipped name or by path (relative ones also ``beside`` a file).
+    """Path of a declaration by shipped name or by path.
 
-    Raises FileError naming what is known when nothing is there.
+    Parameters
+    ----------
+    kind : str
+        ``devices``, ``profiles`` or ``sim``.
+    name : str
+        Shipped name, or path.
+    beside : str or Path, optional
+        File in whose folder relative paths are tried too.
+
+    Returns
+    -------
+    Path
+        An existing regular file.
+
+    Raises
+    ------
+    FileError
+        With the known names where there is none.
     """
     leaf = "device.toml" if kind == "devices" else ""
     base = Path(beside).parent if beside else Path()

@@ -45,8 +45,8 @@ CONTROL_CHARACTERS = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u0600-\u0605\u061c\u06dd\u070f\u180e\u200b-\u200f"
     "\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff\ufff9-\ufffb\U000e0000-\U000e007f]"
 )
-"""Control and format characters of Unicode (Cc, Cf, Zl, Zp) and lone surrogates, but for line feed
-and tab: what steers a terminal, or makes a text look like another."""
+"""Control and format characters of Unicode (Cc, Cf, Zl, Zp) and lone surrogates, except line feed
+and tab: they control a terminal, or make one text look like another."""
 
 
 class WinchkitError(Exception):
@@ -56,14 +56,14 @@ class WinchkitError(Exception):
 
 
 class UsageError(WinchkitError, ValueError):
-    """A call or a command line that cannot be meant: an unknown name, a value out of range."""
+    """An invalid call or command line: an unknown name, a value out of range."""
 
     exit_code = 2
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault of a file: where it stands and what is wrong."""
+    """One fault of a file: its place and a description."""
 
     message: str
     path: str = ""
@@ -89,7 +89,7 @@ class FileError(WinchkitError, ValueError):
 
 
 class RunError(FileError):
-    """A run that cannot answer the question: a missing column, a unit that does not fit."""
+    """A run that lacks the required data: a missing column, a unit of the wrong dimension."""
 
 
 class ConnectionLost(WinchkitError, OSError):
@@ -107,7 +107,7 @@ class DeviceRefused(ConnectionLost):
 
 
 class MotionError(WinchkitError, RuntimeError):
-    """Something refuses to move, or stopped moving."""
+    """A motion is refused or was ended."""
 
     exit_code = 5
 

@@ -1,4 +1,4 @@
-"""Values for JSON, which has no NaN and no infinity: null in their place."""
+"""Values for JSON: null in place of NaN and infinity, which JSON lacks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Opens regular files only: a FIFO would block for ever, and a device may act on being opened."""
+"""Opening of regular files only: a FIFO may block without end, and a device may start an action."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def read_text(path: str | os.PathLike[str], encoding: str = "utf-8") -> str:
 
 
 def file_kind(mode: int) -> str:
-    """Words for the kind of a file, of its ``st_mode``; empty for a regular file."""
+    """Description of a file's kind from its ``st_mode``; empty for a regular file."""
     return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "a special file")
 
 

@@ -1,8 +1,7 @@
 """Unit strings to SI floats and back: ``parse("60 mm", "length") == 0.06``.
 
 A dimension is a name (``"length"``) with a table of units; the first unit of a table is the
-SI one. Temperature is kept in degrees Celsius and its drift per hour, the two exceptions, as the
-field measures them.
+SI one. There are two exceptions: temperatures are in degrees Celsius and their drifts per hour.
 """
 
 from __future__ import annotations
@@ -71,7 +70,7 @@ def dimension_of(unit: str) -> str | None:
 
 
 def factor(unit: str, dimension: str) -> float:
-    """SI value of one ``unit``; raises UsageError naming the units that would do."""
+    """SI value of one ``unit``; raises UsageError with the valid units."""
     table = UNITS[dimension]
     if unit not in table:
         raise UsageError(
@@ -82,7 +81,7 @@ def factor(unit: str, dimension: str) -> float:
 
 
 def convert(value: float, unit: str, dimension: str) -> float:
-    """Bring ``value`` from ``unit`` to SI (degrees Celsius for a temperature)."""
+    """Convert ``value`` from ``unit`` to SI (degrees Celsius for a temperature)."""
     shift = -_ZERO_CELSIUS if unit == "K" and dimension == "temperature" else 0.0
     return value * factor(unit, dimension) + shift
 

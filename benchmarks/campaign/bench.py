@@ -57,7 +57,7 @@ def draw_bench(random: Random, repeats: bool, small: bool) -> Bench:
     rate = every * float(random.choice([20.0, 25.0, 50.0]))
     seconds = float(random.uniform(60, 100 if small else 200))
     stroke = float(random.uniform(0.5, 5))
-    # The rope stays on the drum and its first layer.
+    # The cable stays on the drum and its first layer.
     stroke = min(stroke, 0.8 * 2 * np.pi * winch.wound_turns * winch.radius)
     heaviest = float(random.uniform(15, 60))
     masses = tuple(

@@ -47,7 +47,7 @@ def lag(x: Array, time: Array, constant: float, start: float) -> Array:
 
 
 def stack(wound: Array, strain: Array) -> Array:
-    """Length by which rope wound in at ``strain`` is longer than rope at rest, while on the drum.
+    """Length by which cable wound in at ``strain`` is longer than cable at rest, while on the drum.
 
     ``wound`` in m; pieces are laid on a stack and taken off again in reverse order. What was
     there at the start has the run's mean strain.

@@ -12,7 +12,7 @@ __all__ = ["programme"]
 def programme(
     random: np.random.Generator, rate: float, seconds: float, stroke: float
 ) -> tuple[Array, Array]:
-    """Time (s) and rope wound in since the start (m, roughly; it begins at zero), both (n,).
+    """Time (s) and cable wound in since the start (m, roughly; it begins at zero), both (n,).
 
     Moves between random places of a ``stroke`` (m) below the start, at speeds from creep to
     fast, each with a smooth rise of the speed.

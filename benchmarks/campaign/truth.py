@@ -86,7 +86,7 @@ class _Line:
         return angle
 
     def _wound_in(self, angle: Array) -> Array:
-        """Rope taken up at a drum angle, the guide's detour and eccentricity included."""
+        """Cable taken up at a drum angle, the guide's detour and eccentricity included."""
         winch = self.winch
         dr = (self.get("drum-radius") or {}).get("radius_error", 0.0)
         dg = (self.get("layer-thickness") or {}).get("thickness_error", 0.0)
@@ -248,7 +248,7 @@ class _Line:
 
 
 def _wound(winch: Winch, total: Array, dr: float, dg: float) -> Array:
-    """Rope on the drum at the total wound angle, by the four winding laws."""
+    """Cable on the drum at the total wound angle, by the four winding laws."""
     r, g = winch.radius + dr, winch.growth + dg
     if winch.kind == "grooved":
         return total * np.sqrt(r**2 + (winch.growth / TURN) ** 2)

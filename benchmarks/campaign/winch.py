@@ -15,7 +15,7 @@ Random = np.random.Generator
 
 @dataclass(frozen=True)
 class Winch:
-    """Numbers of a winch and its rope, SI."""
+    """Numbers of a winch and its cable, SI."""
 
     kind: str
     radius: float

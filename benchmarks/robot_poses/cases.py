@@ -34,7 +34,7 @@ AT_ANCHOR = {"anchor-point/5.x": 1e-3, "anchor-point/5.y": 1e-3, "anchor-point/5
 
 
 def _waves(line: int, row: Row) -> float:
-    """A rope length that no effect of the catalogue has."""
+    """A cable length that no effect of the catalogue has."""
     return 3e-4 * math.sin(row.position[0] * 130 + line)
 
 
@@ -65,7 +65,7 @@ def _spanned(row: Row) -> Row:
 
 
 def _warmer(line: int, row: Row) -> float:
-    """Steel ropes, a metre of them, that grow with the hall."""
+    """Steel cables, a metre of them, that grow with the hall."""
     length = BASE.length(line, row.position, turn(*row.angles))
     return length * 1.1e-5 * (row.temperature - 20.0)
 

@@ -1,7 +1,7 @@
 """Robots with one thing hidden: poses, profiles and files that share no code with winchkit.
 
 Tensions carry the platform: random forces around a middle, corrected so that they balance its
-weight by virtual work on the generator's own rope lengths.
+weight by virtual work on the generator's own cable lengths.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ class Case:
     """Effects that may be named, with the line: ``exit-point/3``; none where nothing is hidden."""
     truth: Truth = BASE
     home: tuple[float, ...] = (0.0,) * 8
-    """Rope more than the profile asks for at home, m."""
+    """Cable more than the profile asks for at home, m."""
     mass: float = MASS
     centre: Vector = (0.0, 0.0, 0.0)
     beyond: Beyond | None = None
-    """Rope more than the profile asks for on a line at a pose, its tension known, m."""
+    """Cable more than the profile asks for on a line at a pose, its tension known, m."""
     seen: Seen | None = None
     """What instruments make of a row, before their noise."""
     values: Mapping[str, float] = field(default_factory=dict)
@@ -105,7 +105,7 @@ def _pulled(case: Case, row: Row, rng: random.Random) -> Row:
     slope, down = _slope(case.truth, row), np.array([0.0, 0.0, -case.mass * GRAVITY])
     rotation = np.array(turn(*row.angles))
     weight = np.concatenate([down, np.cross(rotation @ np.array(case.centre), down)])
-    # Virtual work: a rope that gets longer by L' as the platform moves pulls back with T L'.
+    # Virtual work: a cable that gets longer by L' as the platform moves pulls back with T L'.
     pull = start + np.linalg.pinv(slope) @ (weight - slope @ start)
     angles = []
     warm = 20.0 + (rng.uniform(-case.warm, case.warm) if case.warm else 0.0)
@@ -123,7 +123,7 @@ def _arm(truth: Truth, line: int, angle: float) -> float:
 
 
 def _slope(truth: Truth, row: Row) -> Array:
-    """Derivatives of the rope lengths by position and small turns, (6, 8)."""
+    """Derivatives of the cable lengths by position and small turns, (6, 8)."""
     turned, out = np.array(turn(*row.angles)), np.empty((6, 8))
     for k in range(6):
         ends = []

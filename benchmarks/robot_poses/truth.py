@@ -51,21 +51,21 @@ class Truth:
     home_tension: float = 0.0
 
     def length(self, line: int, position: Vector, rotation: Matrix) -> float:
-        """Rope from the point of the axis where it first touches the pulley to its anchor."""
+        """Cable from the point of the axis where it first touches the pulley to its anchor."""
         upright = 1.0 if line < UPPER else -1.0
         arm = _turned(rotation, self.anchor[line])
         seen = [position[k] + arm[k] - self.exit[line][k] for k in range(3)]
         away, along, radius = math.hypot(seen[0], seen[1]), upright * seen[2], self.swivel[line]
         centre = math.hypot(away - radius, along)
         free = math.sqrt(centre**2 - radius**2)
-        # The rope touches where the radius is square to it: half the angle between centre line
-        # and tangent, counted from the side at which the rope arrives.
+        # The cable touches where the radius is square to it: half the angle between centre line
+        # and tangent, counted from the side at which the cable arrives.
         towards = math.atan2(along, away - radius)
         touch = towards + math.acos(radius / centre)
         return free + radius * (math.pi - touch)
 
     def wound(self, line: int, angle: float) -> float:
-        """Rope on the drum, layer by layer."""
+        """Cable on the drum, layer by layer."""
         length, radius, left = 0.0, self.winding[line], angle
         while left > 2 * math.pi:
             length += 2 * math.pi * radius
@@ -74,7 +74,7 @@ class Truth:
         return length + left * radius
 
     def motor_angle(self, line: int, position: Vector, rotation: Matrix, tension: float) -> float:
-        """Drum angle since home, by bisection on the rope that is wound."""
+        """Drum angle since home, by bisection on the cable that is wound."""
         identity = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         at_home = self.length(line, HOME, identity) / (1 + self.home_tension / self.stiffness)
         here = self.length(line, position, rotation) / (1 + tension / self.stiffness)
@@ -94,7 +94,7 @@ class Noise:
     tracker: float = 2e-5
     encoder: float = 1e-4
     rope: float = 0.0
-    """Of the rope itself, m: what no model explains."""
+    """Of the cable itself, m: what no model explains."""
     angle: float = 1e-3
     swivel: float = 1e-3
     length: float = 1e-4
@@ -231,5 +231,5 @@ def csv(
 
 
 def elastic(truth: Truth, stiffness: float, home_tension: float) -> Truth:
-    """The same robot with ropes that stretch."""
+    """The same robot with cables that stretch."""
     return replace(truth, stiffness=stiffness, home_tension=home_tension)

@@ -1,6 +1,6 @@
-"""A control loop of one's own: hold a rope's tension by jogging its winch.
+"""A control loop of one's own: hold a cable's tension by jogging its winch.
 
-A chain hangs from the winch: the longer the rope, the heavier it gets. The loop pays out while
+A chain hangs from the winch: the longer the cable, the heavier it gets. The loop pays out while
 the load cell reads too little and winds in while it reads too much, with a speed in proportion.
 
     python tension_hold.py bench.toml 250 --for 10
@@ -17,7 +17,7 @@ from winchkit import Bench, open_bench
 from winchkit.bench.control.snapshot import BenchSnapshot
 
 GAIN = 0.01
-"""Rope speed per error, m/s per N."""
+"""Cable speed per error, m/s per N."""
 FASTEST = 0.3
 """m/s."""
 DEAD_BAND = 2.0
@@ -60,7 +60,7 @@ def hold(bench: Bench, winch: str, wanted: float) -> Callable[[], None]:
 def main() -> None:
     """Hold a tension for a while."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("bench", help="wiring file")
+    parser.add_argument("bench", help="bench file")
     parser.add_argument("tension", type=float, help="N")
     parser.add_argument("--winch", default="A")
     parser.add_argument("--for", dest="duration", type=float, default=10.0, help="s")

@@ -93,7 +93,7 @@ def test_nothing_is_energised_after_the_stop(sim: OpenedBench) -> None:
 
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[Path]:
-    """A simulated bench in a process of its own; the wiring file to connect to."""
+    """A simulated bench in a process of its own; the bench file to connect to."""
     path = tmp_path / "bench.toml"
     command = ["sim", "serve", "spiral-bench", "--hidden", CHAIN, "--bench-file", str(path)]
     with subprocess.Popen(

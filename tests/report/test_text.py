@@ -23,7 +23,7 @@ from winchkit.diagnosis.add import add
 from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.results import Comparison, Diagnosis, NextRun, OutputError
-from winchkit.report.detectability import unseen, visible
+from winchkit.report.detectability import untestable, visible
 from winchkit.report.text import addition_text, compare_text, report_text
 from winchkit.report.words.sentence import changes_text, sentence
 from winchkit.schema.read import read_winch
@@ -52,7 +52,7 @@ def test_every_verdict_tells_what_these_runs_could_show_and_what_not(bench: str)
     text = report_text(answer)
     rows = visible(answer)
     able = sum(row.share <= 1 for row in rows)
-    blind = [effect for effect, _ in unseen(answer)]
+    blind = [effect for effect, _ in untestable(answer)]
     head = f"would have shown {able} of {len(rows) + len(blind)} effects in their usual size"
     assert head in text
     faint = [row.effect for row in rows if not row.share <= 1]

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from declared import BENCH, WINCH
 from winchkit.cli import main
 from winchkit.errors import FileError, UsageError
-from winchkit.schema.bench_warnings import doubts
+from winchkit.schema.bench_warnings import bench_warnings
 from winchkit.schema.read import read_bench, read_device
 
 DEVICES = Path(__file__).parents[2] / "devices"
@@ -91,7 +91,7 @@ def test_a_bench_without_length_or_tension_limits_is_warned_of(bench: Path) -> N
     assert "there are no length limits" in result.stderr
     assert "there is no upper tension limit" in result.stderr
     assert "(warning)" in result.stderr
-    kept = [message for _, message in doubts(read_bench(bench))]
+    kept = [message for _, message in bench_warnings(read_bench(bench))]
     assert len(kept) == 2
     limited = checked(bench, LIMITED)
     assert "limits: there" not in limited.stderr

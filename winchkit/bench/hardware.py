@@ -33,7 +33,7 @@ from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import ConnectionLost, Fault, FileError
 from winchkit.model.line import GRAVITY
 from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
-from winchkit.schema.bench_warnings import doubts
+from winchkit.schema.bench_warnings import bench_warnings
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.version import __version__
 
@@ -191,7 +191,7 @@ def _tell_notes(
     spec: BenchSpec, axes: Mapping[str, Cia402Axis], buses: Mapping[str, CanBus]
 ) -> None:
     """Say which limits are missing, what was changed in the drives, and who else sends SYNC."""
-    notes = [f"{'.'.join(key)}: {message} (warning)" for key, message in doubts(spec)]
+    notes = [f"{'.'.join(key)}: {message} (warning)" for key, message in bench_warnings(spec)]
     notes += [note for axis in axes.values() if axis.drive for note in axis.drive.notes]
     notes += [note for bus in buses.values() if (note := bus.foreign_sync)]
     for note in notes:

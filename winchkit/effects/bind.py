@@ -1,4 +1,4 @@
-"""Binds effects to a profile: ``[[effect]]`` tables and shorthands become terms with values."""
+"""Binding of effects to a profile: ``[[effect]]`` tables and shorthands as terms with values."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list
             continue
         effect = catalogue[table.id]
         if effect.of_robots:
-            message = "only a robot can have it; it stands in the profile of kind 'robot'"
+            message = "is an effect of a robot; declare it in the profile of kind 'robot'"
             faults.append(Fault(message, table.path, table.line, f"effect {table.id}"))
             continue
         if not effect.repeatable and any(term.effect.id == effect.id for term in terms):
-            message = "stands twice; it has no order, so once is enough"
+            message = "is declared twice; only an effect with an order may be repeated"
             faults.append(Fault(message, table.path, table.line, f"effect {table.id}"))
         values, wrong = values_of(effect, table)
         faults.extend(wrong)
@@ -59,9 +59,9 @@ def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list
 
 
 def not_in(catalogue: Catalogue, effect_id: str) -> str:
-    """That there is no such effect, in words, and what to do."""
+    """Message on an unknown effect, with similar names and the way to load a user effect."""
     near = suggest(effect_id, [effect.id for effect in catalogue])
-    own = 'one of your own needs its file: --effects FILE.py, or effects = ["FILE.py"] in a bench'
+    own = 'a user effect needs its file: --effects FILE.py, or effects = ["FILE.py"] in a bench'
     return f"no effect '{effect_id}'{near}; {own}"
 
 
@@ -83,7 +83,7 @@ def _shorthand(effect: Effect, values: Mapping[str, float]) -> Term:
 
 
 def values_of(effect: Effect, table: EffectTable) -> tuple[dict[str, float], list[Fault]]:
-    """Values of a table in SI, missing ones at their null, and what is wrong with them."""
+    """Values of a table in SI, missing ones at their null, and their faults."""
     values, faults = dict(effect.null), []
     names = [p.name for p in effect.parameters]
     for key, raw in table.values.items():

@@ -1,7 +1,7 @@
-"""Binds effects to a robot: its ``[[effect]]`` tables and those of its winches become terms.
+"""Binding of effects to a robot: its ``[[effect]]`` tables and those of its winches as terms.
 
-A table with ``line = "1"`` acts on that line, one without on all lines or on the platform. Home
-lengths of several lines may stand in one table, ``length = { 1 = "0.4 mm", 2 = "-0.2 mm" }``.
+A table with ``line = "1"`` acts on that line, a table without it on all lines or on the platform.
+One table may have home lengths of several lines, ``length = { 1 = "0.4 mm", 2 = "-0.2 mm" }``.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def robot_with_effects(profile: RobotProfile, catalogue: Catalogue | None = None
 def robot_terms(profile: RobotProfile, catalogue: Catalogue | None = None) -> tuple[Term, ...]:
     """Terms of a robot and of its lines' winches. Raises FileError with every fault.
 
-    What a winch has that takes a motion to show, such as friction, is left out.
+    Effects of winches that need a motion, such as friction, are left out.
     """
     catalogue = catalogue or load_catalogue()
     terms = declared_terms(profile, catalogue)
@@ -89,7 +89,7 @@ def _bind(profile: RobotProfile, catalogue: Catalogue) -> tuple[list[Term], list
         elif (place := table.values.get("line")) is not None:
             effect = at_line(effect, str(place))
         if not wrong and any(term.effect.id == effect.id for term in terms):
-            message = "stands twice at one place; once is enough"
+            message = "is declared twice for one line or for all; declare it once"
             faulty = [*faulty, _fault(table, message, f"effect {effect.id}")]
         faults += faulty
         terms.append(Term(effect, values))
@@ -97,7 +97,7 @@ def _bind(profile: RobotProfile, catalogue: Catalogue) -> tuple[list[Term], list
 
 
 def _single(tables: Iterable[EffectTable]) -> Iterator[EffectTable]:
-    """Tables of one line each: home lengths of several lines are taken apart."""
+    """Tables of one line each: home lengths of several lines are separated."""
     for table in tables:
         lengths = table.values.get("length")
         if table.id == _HOME_LENGTH and isinstance(lengths, Mapping):
@@ -108,10 +108,12 @@ def _single(tables: Iterable[EffectTable]) -> Iterator[EffectTable]:
 
 
 def _misplaced(effect: Effect, line: object, names: list[str]) -> str:
-    """What is wrong with where a table puts an effect; empty where nothing is."""
+    """Fault of the place at which a table declares an effect; empty without a fault."""
     known = ", ".join(names)
     if not effect.on_robot:
-        return "acts in motion only, a robot's poses stand still; give it to the line's winch"
+        return (
+            "acts in motion only, and a robot's poses are static; declare it for the line's winch"
+        )
     if line is None and not effect.on_robot & {"all", "platform"}:
         return f'missing: this effect acts on one line, named as line = "{names[0]}"'
     if line is not None and "one" not in effect.on_robot:

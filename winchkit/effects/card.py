@@ -1,4 +1,4 @@
-"""An effect's card: its words, its parameters, and its signature drawn from its own code."""
+"""An effect's card: description, parameters, and signature computed by its code."""
 
 from __future__ import annotations
 
@@ -41,26 +41,36 @@ _FLAT = 1e-9
 
 @dataclass(frozen=True)
 class Signature:
-    """What an effect of usual size changes along the standard motion; arrays (n,), SI."""
+    """Changes by an effect of typical size along the standard motion; arrays (n,), SI."""
 
     values: Mapping[str, float]
     time: Array
     cable_length: Array
-    """Of the bare line, for orientation, m."""
+    """Free length of the nominal line, m."""
     changes: Mapping[str, Array]
-    """By output, only those that change."""
+    """Changed outputs."""
 
 
 def usual_values(effect: Effect) -> dict[str, float]:
-    """Values of a usual size: amplitudes at their typical, shapes at their default."""
+    """Values of typical size: amplitudes at their typical value, shapes at their default."""
     sizes = {p.name: p.typical for p in effect.parameters if p.role == "amplitude"}
     return effect.null | sizes | dict(effect.probes[-1] if effect.probes else {})
 
 
 def signature(effect: Effect, values: Values | None = None) -> Signature:
-    """Signature of an effect on the standard motion; of a robot's on the standard poses.
+    """Signature of an effect on the standard motion, or of a robot's effect on the standard poses.
 
-    Of a usual size unless ``values`` say otherwise.
+    Parameters
+    ----------
+    effect : Effect
+        Any effect of the catalogue or of the user.
+    values : mapping, optional
+        Parameter values, SI; by default those of typical size.
+
+    Returns
+    -------
+    Signature
+        Changes of the outputs.
     """
     values = usual_values(effect) if values is None else values
     if effect.of_robots:
@@ -82,7 +92,7 @@ def signature(effect: Effect, values: Values | None = None) -> Signature:
 def sparkline(values: Array, width: int = _WIDTH) -> str:
     """Values as ``width`` bars from their lowest to their highest; a gap where all are NaN.
 
-    Each bar is the value of its stretch that lies farthest from the median, so that spikes show.
+    Each bar is the value of its interval farthest from the median, so that spikes are visible.
     """
     finite = values[np.isfinite(values)]
     if not len(finite):
@@ -108,13 +118,13 @@ def card(effect: Effect) -> str:
         ("Formula", effect.formula),
         ("Source", effect.source),
         ("Changes", ", ".join(effect.outputs)),
-        ("Needs", ", ".join(effect.needs) or "nothing beside the motor angle"),
+        ("Needs", ", ".join(effect.needs) or "only the motor angle"),
         ("On a robot", ", ".join(_PLACES[p] for p in sorted(effect.on_robot))),
         ("Family", effect.family),
         ("Contains", ", ".join(effect.contains)),
         ("Looks like", effect.looks_like),
         ("Confused with", ", ".join(effect.confused_with)),
-        ("Told apart by", effect.told_apart),
+        ("Distinguished by", effect.told_apart),
         ("In control", in_control(effect)),
     ]
     lines = [effect.id, ""]
@@ -124,9 +134,9 @@ def card(effect: Effect) -> str:
 
 
 def in_control(effect: Effect) -> str:
-    """Whether a winch's length and tension use an effect, and else why not."""
+    """Whether the length and tension of an open winch use an effect, or the reason why not."""
     reason = effect.not_in_control
-    return f"left out: {reason}" if reason else "a winch's length or tension uses it"
+    return f"left out: {reason}" if reason else "used for a winch's length or tension"
 
 
 def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
@@ -170,7 +180,7 @@ def _paragraph(title: str, text: str) -> str:
 
 
 def _table(effect: Effect) -> list[str]:
-    rows = [("name", "unit", "vanishes at", "typical", "range", "kind")]
+    rows = [("name", "unit", "null value", "typical", "range", "kind")]
     for p in effect.parameters:
         kind = parameter_kind(effect, p)
         gone = f"{p.null:g}" if kind == "amplitude" else f"(default {p.null:g})"
@@ -183,7 +193,7 @@ def _table(effect: Effect) -> list[str]:
 
 
 def parameter_kind(effect: Effect, parameter: Parameter) -> str:
-    """What a parameter is: an amplitude, a phase, a shape, a whole order, or fixed."""
+    """Kind of a parameter: an amplitude, a phase, a shape, a whole order, or fixed."""
     if effect.polar and parameter.name == effect.polar[1]:
         return "phase"
     return "whole order" if parameter.whole else parameter.role
@@ -206,8 +216,8 @@ def _drawing(effect: Effect) -> list[str]:
         *wrap(f"under 15 kg, then under 45 kg), with {usual}", _COLUMNS),
     ]
     if effect.of_robots:
-        told = f"Signature over {len(drawn.time)} poses of the standard robot, on line 1, with"
-        over = wrap(f"{told} {usual}", _COLUMNS)
+        text = f"Signature over {len(drawn.time)} poses of the standard robot, on line 1, with"
+        over = wrap(f"{text} {usual}", _COLUMNS)
     lines = [
         *over,
         f"  {'moves':<13}{sparkline(drawn.cable_length)}  cable_length",

@@ -1,4 +1,4 @@
-"""The catalogue: every effect of this package, of entry points and of a user's own files."""
+"""The catalogue: all effects of this package, of entry points and of user files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ROOMS = ("on_length", "on_tension", "on_torque", "on_robot")
 class Catalogue:
     """Effects by id, in a fixed order: simple ones first.
 
-    Empirical ones are known by name and stand in no list: a curve explains anything.
+    Empirical effects are found by name and not listed, since a free curve fits any residual.
     """
 
     def __init__(self, effects: Iterable[Effect]) -> None:
@@ -48,10 +48,23 @@ class Catalogue:
 
 
 def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:
-    """All effects: the package's own, entry points ``winchkit.effects``, then ``files``.
+    """Load all effects: of the package, of entry points ``winchkit.effects``, then of files.
 
-    Raises FileError where a user's file cannot be loaded, holds no effect, or one that does
-    something at its null or gives no numbers.
+    Parameters
+    ----------
+    files : iterable of str or Path, optional
+        Python files with user effects.
+
+    Returns
+    -------
+    Catalogue
+        Effects by id.
+
+    Raises
+    ------
+    FileError
+        For a file that cannot be loaded or has no effect, and for an effect that changes its input
+        at the null or returns no finite value.
     """
     found: list[Effect] = []
     for room in _ROOMS:
@@ -83,7 +96,7 @@ def _from_file(path: Path) -> list[Effect]:
         line = getattr(error, "lineno", None)
         raise FileError(Fault(f"cannot be run: {error!r}", str(path), line)) from error
     effects = _effects_in(module, str(path))
-    # Cards are drawn with effects that are bound, and binding wants a catalogue.
+    # A card needs bound effects, and binding needs a catalogue.
     from winchkit.effects.user_effects import broken_promises
 
     faults = [
@@ -103,7 +116,7 @@ def _effects_in(thing: object, where: str) -> list[Effect]:
     else:
         effects = [value for value in vars(thing).values() if isinstance(value, Effect)]
     if not effects:
-        raise FileError(Fault("holds no winchkit.effects.effect.Effect", where))
+        raise FileError(Fault("has no object of class winchkit.effects.effect.Effect", where))
     faults = [
         Fault(f"effect '{effect.id}': {parameter.name}: {wrong}", where)
         for effect in effects
@@ -116,7 +129,7 @@ def _effects_in(thing: object, where: str) -> list[Effect]:
 
 
 def _wrong_with(parameter: Parameter) -> str:
-    """What its declaration contradicts, in words; empty where nothing."""
+    """Contradiction in the declaration of a parameter; empty without one."""
     if dimension_of(parameter.unit) is None:
         known = ", ".join(dict.fromkeys(next(iter(table)) for table in UNITS.values()))
         return (
@@ -126,6 +139,6 @@ def _wrong_with(parameter: Parameter) -> str:
     if not parameter.low <= parameter.null <= parameter.high:
         return (
             f"null {parameter.null:g} lies outside [{parameter.low:g}, {parameter.high:g}]; "
-            "the bounds must hold the value at which the effect vanishes"
+            "the bounds must contain the value at which the effect vanishes"
         )
     return ""

@@ -1,4 +1,4 @@
-"""Writes a Python file with an effect of a user's own, begun from what the data show."""
+"""Writing of a Python file with a user effect that is derived from data."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ __all__ = [
     "write_wave_on_drum",
 ]
 
-HEAD = '''"""{id}: found in the {output} over the {variable}, physics to be filled in.
+HEAD = '''"""{id}: residual of the {output} over the {variable}; its physics is to be filled in.
 
-Use it with --effects {file}. Written by winchkit effects new; change whatever you understand:
-the formula in apply, the stage at which it acts, the words.
+Use it with --effects {file}. Written by winchkit effects new; replace the formula in apply, the
+stage at which it acts, and the description.
 """
 
 import numpy as np
@@ -45,7 +45,7 @@ WAVE = '''ORDER = {order:g}
 
 
 def apply(value: Array, at: At, values: Values) -> Array:
-    """The {output} with a wave on it; exactly the value given at amplitude zero."""
+    """The {output} plus a sine; exactly the input at amplitude zero."""
     x = VARIABLES["{variable}"](at)
     return value + values["amplitude"] * np.sin(ORDER * x + values["phase"])
 
@@ -59,11 +59,11 @@ POLAR = ("amplitude", "phase")
 CURVE = '''X = np.array({x})
 """The {variable}, {own_unit}."""
 Y = np.array({y})
-"""What the {output} had too much there, {unit}."""
+"""Mean residual of the {output} there, {unit}."""
 
 
 def apply(value: Array, at: At, values: Values) -> Array:
-    """The {output} with the curve on it; exactly the value given at scale zero."""
+    """The {output} plus the curve; exactly the input at scale zero."""
     x = VARIABLES["{variable}"](at)
     return np.asarray(value + values["scale"] * np.interp(x, X, Y))
 
@@ -72,27 +72,27 @@ PARAMETERS = (Parameter("scale", "1", null=0.0, typical=1.0, low=-100.0, high=10
 POLAR = None
 '''
 FOOT = """
-# Where it acts. Control follows what happens to the rope (Stage.ROPE, FRAME, PULLEY, CELL), not
-# what an instrument or the torque shows: 'winchkit effects {id} --effects {file}' says which.
+# Stage at which it acts. Control uses effects on the cable (Stage.ROPE, FRAME, PULLEY, CELL), not
+# those on an instrument or the torque: 'winchkit effects {id} --effects {file}' prints which.
 EFFECT = Effect(
     id="{id}",
     stage=Stage.{stage},
     parameters=PARAMETERS,
     apply=apply,
     outputs=("{output}",),
-    what="To be understood: something over the {words}.",
+    what="Cause unknown: a curve over the {words}.",
     formula="as in apply",
-    source="the runs that it was found on",
+    source="the runs to which it was fitted",
     looks_like="An error of the {output_words} over the {words}.",
-    told_apart="To be found: which run would show it apart from what resembles it?",
+    told_apart="To be filled in: the run that distinguishes it from similar effects.",
     needs={needs},
     polar=POLAR,
 )
 """
-DRUM = '''"""{id}: a wave of {order} periods per drum turn, physics to be filled in.
+DRUM = '''"""{id}: a sine of {order} periods per drum turn; its physics is to be filled in.
 
-Use it with --effects {file}. Written by winchkit effects new because several outputs show the
-same order of the drum: what is wound in has the wave, and torque and tension follow by themselves.
+Use it with --effects {file}. Written by winchkit effects new since several outputs have the same
+order of the drum: the sine is added to the wound length, and torque and tension follow from it.
 """
 
 import numpy as np
@@ -105,7 +105,7 @@ ORDER = {order}
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Wound length (m) and torque arm (m) with a wave on them."""
+    """Wound length (m) and torque arm (m) with a sine."""
     size, phase = values["amplitude"], values["phase"]
     angle = ORDER * at.drum_angle + phase
     wave = size * (np.sin(angle) - np.sin(phase))
@@ -121,32 +121,32 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "tension", "motor_torque"),
-    what="To be understood: the drum winds in a wave of {order} periods per turn.",
+    what="Cause unknown: the wound length has a sine of {order} periods per drum turn.",
     formula="W + a (sin({order} φ + p) − sin p)",
-    source="the runs that it was found on",
-    looks_like="{order} waves per drum turn in length, torque and the load's acceleration.",
-    told_apart="To be found: which run would show it apart from what resembles it?",
+    source="the runs to which it was fitted",
+    looks_like="{order} periods per drum turn in length, torque and the load's acceleration.",
+    told_apart="To be filled in: the run that distinguishes it from similar effects.",
     polar=("amplitude", "phase"),
 )
 '''
 
 
-_THERE = "is there already; name another file, or remove it first"
+_THERE = "exists already; give another file name, or remove it first"
 
 
 _ID = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
 def check_own(effect_id: str, path: Path, taken: Container[object]) -> None:
-    """Refuse a name or a file before anything is worked out for it.
+    """Check the name and the file of a user effect before its computation.
 
-    Raises UsageError for an id that is none or taken, FileError where the file cannot be new.
+    Raises UsageError for an invalid or existing id, FileError for a file that exists.
     """
     if path.suffix != ".py":
-        raise UsageError(f"'{path}' is no Python file; name it {path.stem or 'mine'}.py")
+        raise UsageError(f"'{path}' is not a Python file; name it {path.stem or 'mine'}.py")
     if not _ID.fullmatch(effect_id):
         raise UsageError(
-            f"'{effect_id}' is no id of an effect: lower-case letters and digits, joined by "
+            f"'{effect_id}' is not an id of an effect: lower-case letters and digits, joined by "
             "hyphens, such as stuck-sheave; give one with --id"
         )
     if effect_id in taken:
@@ -156,9 +156,9 @@ def check_own(effect_id: str, path: Path, taken: Container[object]) -> None:
 
 
 def write_own(term: Term, effect_id: str, path: Path) -> None:
-    """Write an empirical term as a file of a user's own effect.
+    """Write an empirical term as a file of a user effect.
 
-    Raises FileError where the file is there already or cannot be written.
+    Raises FileError where the file exists or cannot be written.
     """
     effect = term.effect
     facts: dict[str, object] = {
@@ -177,7 +177,7 @@ def write_own(term: Term, effect_id: str, path: Path) -> None:
 
 
 def write_wave_on_drum(order: int, effect_id: str, path: Path) -> None:
-    """Write a wave of the wound length as a file of a user's own effect; raises as above."""
+    """Write a sine of the wound length as a file of a user effect; raises as above."""
     _write(DRUM.format(id=effect_id, order=order, file=path.name), path)
 
 
@@ -203,7 +203,7 @@ def _wave(effect: Effect, values: Mapping[str, float]) -> tuple[str, dict[str, o
 
 
 def _curve(term: Term) -> tuple[str, dict[str, object]]:
-    """The curve through the values that data determined; one that none touched stays at zero."""
+    """The curve through the values that data determine; the others are zero."""
     curve = zip(knots(term.values), heights(term.values), strict=True)
     points = [(x, v) for x, v in curve if v != 0.0]
     facts: dict[str, object] = {

@@ -1,7 +1,7 @@
-"""Empirical effects: a curve over one variable, for what is there and is not understood.
+"""Empirical effects: a free curve over one variable, for a residual of unknown cause.
 
-They are no candidates of a diagnosis, since a curve over something fits anything. A user adds one
-by name to see what it would buy, until the physics behind it is known.
+They are not candidates of a diagnosis, since a free curve fits any residual. A user adds one by
+name to see how far it reduces the error, until its cause is known.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from winchkit.model.variables import ANGLES, COMPOUND, VARIABLE_UNITS, VARIABLES
 __all__ = ["EMPIRICAL", "KNOTS", "empirical_id", "heights", "knots", "placed", "variable_of"]
 
 KNOTS = 9
-"""Of a curve over one variable; over two at once twice as many."""
+"""Knots of a curve over one variable; twice as many over two variables."""
 _VALUE = "value_"
 _ORDERS = tuple(float(order) for order in range(1, 41))
 _BOUND = 1e6
@@ -28,7 +28,7 @@ _AT: Mapping[Output, tuple[Stage, str, float]] = {
     "tension": (Stage.CELL, "N", 0.5),
     "motor_torque": (Stage.TORQUE_SIGNAL, "N m", 5e-3),
 }
-"""Where a curve is added, its unit, and a usual size of it."""
+"""Stage of a curve, its unit, and its typical size, by output."""
 _NEEDS: Mapping[str, tuple[Need, ...]] = {
     "load": ("rope_force",),
     "tension": ("rope_force",),
@@ -37,7 +37,7 @@ _NEEDS: Mapping[str, tuple[Need, ...]] = {
 
 
 def empirical_id(output: str, variable: str) -> str:
-    """How the curve of an output over a variable is called."""
+    """Id of the curve of an output over a variable."""
     return f"empirical-{output}-{variable}".replace("_", "-")
 
 
@@ -47,7 +47,7 @@ def variable_of(effect: Effect) -> str:
 
 
 def knots(values: Values) -> Array:
-    """Where the curve's values stand, (knots,)."""
+    """Knots of the curve, (knots,)."""
     return np.linspace(values["low"], values["high"], len(heights(values)))
 
 
@@ -57,7 +57,7 @@ def heights(values: Values) -> list[float]:
 
 
 def placed(effect: Effect, low: float, high: float) -> Effect:
-    """A spline over the range that data cover; an effect over an angle as it is."""
+    """A spline over the range of the data; an effect over an angle is unchanged."""
     ends = {"low": (low,), "high": (high,)}
     parameters = tuple(replace(p, grid=ends.get(p.name, p.grid)) for p in effect.parameters)
     return replace(effect, parameters=parameters)
@@ -108,7 +108,7 @@ def _spline(output: Output, variable: str) -> Effect:
 
 
 def _plain(output: Output, variable: str, formula: str) -> Effect:
-    """Words of an empirical effect."""
+    """Description of an empirical effect."""
     over = variable.replace("_", " ")
     return Effect(
         id=empirical_id(output, variable),
@@ -116,15 +116,15 @@ def _plain(output: Output, variable: str, formula: str) -> Effect:
         parameters=(),
         apply=lambda value, at, values: value,
         outputs=(output,),
-        what=f"Not understood: a curve over the {over}, as the data have it.",
+        what=f"Cause unknown: a curve over the {over}, fitted to the data.",
         formula=f"x = {over}: {formula}",
-        source="the user's own data; no physics stands behind it",
-        looks_like=f"Whatever the {output.replace('_', ' ')} still shows over the {over}.",
-        told_apart="Find the physics: 'winchkit effects new' writes a file to begin with.",
+        source="the user's data, without a physical model",
+        looks_like=f"The residual of the {output.replace('_', ' ')} over the {over}.",
+        told_apart="Find its cause: 'winchkit effects new' writes a file to start from.",
         needs=_NEEDS.get(variable, ()),
         repeatable=True,
         order=9,
-        left_out="it is not understood, and may be in the instrument",
+        left_out="its cause is unknown and may be the instrument",
     )
 
 

@@ -1,4 +1,4 @@
-"""The numbers in which an effect is fitted: near one in size, zero where it vanishes.
+"""Coordinates in which an effect is fitted: of order one, and zero where the effect vanishes.
 
 Amplitudes are fitted as (value − null)/scale, stiffnesses as compliances, an amplitude with its
 phase as a cosine and a sine amplitude, shapes that are positive by their logarithm.
@@ -22,7 +22,7 @@ __all__ = ["Coordinates"]
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Between an effect's values as files have them and a vector to fit."""
+    """Map between an effect's values in files and the vector of a fit."""
 
     effect: Effect
 
@@ -32,14 +32,14 @@ class Coordinates:
 
     @cached_property
     def amplitudes(self) -> tuple[Parameter, ...]:
-        """Parameters that make it larger or smaller; an amplitude and its phase count as two."""
+        """Parameters of its size; an amplitude and its phase count as two."""
         return tuple(
             p for p in self.effect.parameters if p.role == "amplitude" or p.name in self._polar
         )
 
     @cached_property
     def shapes(self) -> tuple[Parameter, ...]:
-        """Parameters that say how it looks and are refined by a fit."""
+        """Parameters of its form that a fit refines."""
         return tuple(
             p
             for p in self.effect.parameters
@@ -77,7 +77,7 @@ class Coordinates:
         return np.array(out)
 
     def values(self, vector: Array, base: Mapping[str, float]) -> dict[str, float]:
-        """Values at coordinates; what is not fitted comes from ``base``."""
+        """Values at coordinates; values that are not fitted come from ``base``."""
         out = dict(base)
         at = {p.name: float(x) for p, x in zip(self._fitted, vector, strict=True)}
         for parameter in self._fitted:
@@ -105,7 +105,7 @@ class Coordinates:
     def deviations(self, vector: Array, std: Array, base: Mapping[str, float]) -> dict[str, float]:
         """Standard deviations of values from those of coordinates, by the delta method.
 
-        To the side that moves a value more: at a bound it can move one way only.
+        The larger of both one-sided differences is taken: at a bound only one side is allowed.
         """
         here, out = self.values(vector, base), {p.name: 0.0 for p in self._fitted}
         for index, step in enumerate(std):
@@ -120,7 +120,7 @@ class Coordinates:
         return out
 
     def grid(self) -> list[dict[str, float]]:
-        """Combinations of coarse shape values to score at; at least the default."""
+        """Combinations of coarse shape values for the scores; at least the default."""
         shaped = [
             p
             for p in self.effect.parameters
@@ -130,7 +130,7 @@ class Coordinates:
         return [dict(zip((p.name for p in shaped), point, strict=True)) for point in combinations]
 
     def usual_steps(self) -> list[dict[str, float]]:
-        """Values of a usual size, one set per column of the effect's signature."""
+        """Values of typical size, one set per column of the effect's signature."""
         if self.effect.probes:
             return [dict(probe) for probe in self.effect.probes]
         out: list[dict[str, float]] = []

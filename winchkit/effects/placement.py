@@ -1,6 +1,6 @@
-"""An effect at a place of a robot is an effect: on one line, or on all lines alike.
+"""Placement of effects on a robot: on one line, or on all lines alike.
 
-Everything that searches, fits and names effects thereby works on robots as it does on winches.
+A placed effect is an effect too, so that selection, fit and report are the same as for winches.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 HOME = "home_length_"
-"""Parameters of a rope's law on a robot: a home length per line, named after it."""
+"""Prefix of the home lengths that a cable's law has on a robot, one per line."""
 _HOME_TYPICAL = 1e-3
 
 
@@ -43,10 +43,10 @@ def at_line(effect: Effect, line: str) -> LineEffect:
 
 
 def with_home_lengths(effect: Effect, lines: Sequence[str]) -> Effect:
-    """A law of the rope with a home length per line on which it acts, of those given.
+    """A law of the cable with a home length for each given line on which it acts.
 
-    The ropes were stretched at home too, by tensions that nobody knows: what the law adds is a
-    strain beyond that of home.
+    The cables are strained at home too, by unknown tensions. The law gives the strain relative to
+    home, and the home lengths absorb the difference.
     """
     place = line_of_effect(effect)
     on = [line for line in lines if place in ("", line)]
@@ -65,12 +65,12 @@ def base_of(effect: Effect) -> str:
 
 
 def line_of_effect(effect: Effect) -> str:
-    """Line on which an effect was placed; empty where it acts on all."""
+    """Line on which an effect is placed; empty where it acts on all."""
     return effect.line if isinstance(effect, LineEffect) else ""
 
 
 def placements(effect: Effect, lines: Sequence[str]) -> Iterator[Effect]:
-    """Every place that an effect can have on a robot at rest."""
+    """Every placement of an effect on a robot at rest."""
     if effect.on_robot & {"all", "platform"}:
         yield effect
     if "one" in effect.on_robot:

@@ -1,7 +1,7 @@
-"""The standard motion: one winch and one run on which every effect of the catalogue can show.
+"""The standard motion: a winch and a run that excite every effect of the catalogue.
 
-Two strokes, a fast and a slow one, are driven under a light and then a heavy load while it
-grows warmer; cards draw an effect's signature on it.
+The run has a fast and a slow stroke under a light and then a heavy load, at rising temperature. The
+signatures of cards are computed on it.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def standard_motion() -> Motion:
 
 
 def _ride() -> tuple[Array, Array]:
-    """Cable length and hanging mass, sample by sample; the mass changes while the winch holds."""
+    """Cable length and mass of the load per sample; the mass changes at standstill."""
     pieces: list[Array] = []
     here = STANDARD_PROFILE.reference.cable_length or 0.0
     for speed in _SPEEDS:

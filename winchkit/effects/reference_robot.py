@@ -1,4 +1,4 @@
-"""The standard robot: eight lines in a cube, and poses on which every effect of a robot shows."""
+"""The standard robot: eight lines in a cube, and poses that excite every effect of a robot."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ STANDARD_ROBOT = RobotProfile(
         for number, (x, y, z) in enumerate(_CORNERS, start=1)
     ),
 )
-"""A metre each way, ropes from every corner."""
+"""A cube of one metre to each side of its centre, with a cable from every corner."""
 
 
 def standard_poses() -> Pose:
-    """Poses along a closed path through the cube, turning as they go."""
+    """Poses along a closed path through the cube, with changing rotations."""
     at = np.linspace(0.0, 2 * np.pi, _POSES)
     place = 0.5 + 0.25 * np.stack([np.sin(at), np.sin(2 * at + 0.6), np.cos(3 * at)], axis=1)
     turned = rotation_of(0.15 * np.sin(2 * at), 0.15 * np.cos(at), 0.2 * np.sin(3 * at + 1.0))
@@ -61,10 +61,10 @@ def standard_poses() -> Pose:
 
 
 def robot_changes(effect: Effect, values: dict[str, float]) -> tuple[Array, dict[str, Array]]:
-    """Length of line 1 along the standard poses, and what an effect there changes, (p,), SI.
+    """Length of line 1 along the standard poses, and its changes by an effect, (p,), SI.
 
-    A length's change is what the rope by the drum gains against the rope by geometry; a
-    tension's, what the forces gain that balance the weight nearest to 40 N.
+    The change of a length is that of the length by the drum less that by geometry. The change of a
+    tension is that of the forces that balance the weight and are nearest to 40 N.
     """
     there = at_line(effect, "1") if "one" in effect.on_robot else effect
     bare = _shown(_bare())

@@ -1,4 +1,4 @@
-"""Terms: effects with values, ready to act on a line or on a robot."""
+"""Terms: effects with values, as modifiers of a line or a robot."""
 
 from __future__ import annotations
 
@@ -21,10 +21,28 @@ __all__ = ["Term", "act", "modifiers_of", "robot_with_terms"]
 
 
 def act(effect: Effect, values: Values, value: Any, at: At) -> Any:
-    """What an effect makes of the value of its stage.
+    """Apply an effect to the value of its stage.
 
-    Raises FileError with file and line where its function, perhaps a user's own, raises or does
-    not give as many numbers as it was given.
+    Parameters
+    ----------
+    effect : Effect
+        The effect.
+    values : mapping
+        Its parameter values, SI.
+    value : array or object
+        Value of the stage.
+    at : At
+        Further inputs.
+
+    Returns
+    -------
+    array or object
+        Of the type and shape of ``value``.
+
+    Raises
+    ------
+    FileError
+        With file and line where the function of the effect raises or returns another shape.
     """
     try:
         after = effect.apply(value, at, values)
@@ -32,7 +50,7 @@ def act(effect: Effect, values: Values, value: Any, at: At) -> Any:
         raise
     except Exception as error:
         place = extract_tb(error.__traceback__)[-1]
-        message = f"effect '{effect.id}': its function fails: {error!r}; mend it there"
+        message = f"effect '{effect.id}': its function fails: {error!r}; correct it there"
         raise FileError(Fault(message, place.filename, place.lineno)) from error
     if isinstance(value, np.ndarray) and np.shape(after) != value.shape:
         code = getattr(effect.apply, "__code__", None)
@@ -48,7 +66,7 @@ def act(effect: Effect, values: Values, value: Any, at: At) -> Any:
 
 @dataclass(frozen=True)
 class Term:
-    """An effect with its values, as one profile or one hypothesis has it."""
+    """An effect with its values, in a profile or a hypothesis."""
 
     effect: Effect
     values: Mapping[str, float]
@@ -60,7 +78,7 @@ class Term:
         return self.effect.id + (f"[{', '.join(orders)}]" if orders else "")
 
     def modifier(self) -> Modifier:
-        """The term ready to act on a line."""
+        """The term as modifier of a line."""
         apply = partial(act, self.effect, self.values)
         return Modifier(self.effect.stage, apply, self.effect.order)
 
@@ -71,7 +89,7 @@ def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:
 
 
 def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
-    """The robot with other effects than its own."""
+    """The robot with these effects in place of its own."""
     lines: dict[str, list[Modifier]] = {line.name: [] for line in profile.line}
     payload: list[Modifier] = []
     for term in terms:
@@ -87,7 +105,7 @@ def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
 
 
 class _Longer:
-    """A constant more of rope."""
+    """A constant additional cable length."""
 
     def __init__(self, offset: float) -> None:
         self.offset = offset

@@ -1,4 +1,4 @@
-"""Whether a user's own effect keeps what every effect promises, on the standard motion."""
+"""Check of a user effect on the standard motion: null value and finite results."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ _ROUNDING = 1e-9
 
 
 def broken_promises(effect: Effect) -> list[str]:
-    """What is wrong, in words: it does something at its null, or gives no numbers at a usual size.
+    """Messages on an effect that changes its input at the null or gives no finite values.
 
     Raises FileError where its function fails.
     """
-    # What a function of a user's own divides by is told in words below, not as a warning.
+    # Divisions by zero in a user's function are reported below, not as a warning.
     with np.errstate(all="ignore"):
         still, moved = signature(effect, effect.null), signature(effect)
     out = []
     for name, change in still.changes.items():
         by = float(np.max(np.abs(change)))
-        told = f"by up to {by:.3g} {UNITS[name]}" if np.isfinite(by) else "into no number"
+        size = f"by up to {by:.3g} {UNITS[name]}" if np.isfinite(by) else "to a value that is NaN"
         if not by <= _ROUNDING:
             out.append(
-                f"changes the {name.replace('_', ' ')} {told} where it should vanish "
-                f"({_told(effect, effect.null)}); at its null it must return the value as it is"
+                f"changes the {name.replace('_', ' ')} {size} where it should vanish "
+                f"({_listed(effect, effect.null)}); at its null it must return its input"
             )
     out += [
-        f"gives no number for the {name.replace('_', ' ')} anywhere on the standard motion, with "
-        f"{_told(effect, usual_values(effect))}; mend its formula or its typical values"
+        f"gives no finite {name.replace('_', ' ')} anywhere on the standard motion, with "
+        f"{_listed(effect, usual_values(effect))}; correct its formula or its typical values"
         for name, change in moved.changes.items()
         if name not in still.changes and not np.isfinite(change).any()
     ]
     return out
 
 
-def _told(effect: Effect, values: Values) -> str:
+def _listed(effect: Effect, values: Values) -> str:
     sizes = [p.name for p in effect.parameters if p.role == "amplitude"]
     return ", ".join(f"{name} = {values[name]:g}" for name in sizes)

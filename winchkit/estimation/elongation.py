@@ -203,7 +203,7 @@ class ElongationCorrection:
         ):
             raise UsageError(
                 f"{robot.profile.name}: the structure matrix is singular at the reference pose, so "
-                "that no rope forces follow from the wrench; choose another pose"
+                "that no cable forces follow from the wrench; choose another pose"
             )
         strains = []
         for name, law, force in zip(robot.names, self._laws, self._forces, strict=True):

@@ -1,6 +1,7 @@
-"""The physics of a winch and its rope, numpy only.
+"""The physics of a winch and its cable, numpy only.
 
-``drum`` turns drum angle into wound length; ``friction`` holds pulley laws, ``pulleys`` chains of
-them; ``recurrence`` holds what has memory; ``line`` chains all into predictions. ``capacity``,
-``guide``, ``gearbox`` and ``sizing`` tell what a winch must be for what it has to do.
+``drum`` computes the wound length from the drum angle; ``friction`` has the friction laws of a
+pulley, ``pulleys`` chains of pulleys; ``recurrence`` has the operators with memory; ``line``
+combines all of them into predictions of a winch, ``robot`` those of a cable robot. ``capacity``,
+``guide``, ``gearbox`` and ``sizing`` have the design equations of a winch.
 """

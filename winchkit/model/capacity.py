@@ -1,7 +1,7 @@
-"""How much rope a drum takes, and how much is left on it.
+"""Capacity of a drum: turns and length of cable that it takes, and dead wraps.
 
-A drum is full where its rope reaches the rim of the flange or the end of its width; it is empty,
-for safety, while the dead wraps that hold the rope by friction are still on it.
+A drum is full where its cable reaches the rim of the flange or the end of its width. It counts as
+empty when only the dead wraps, which hold the cable by friction, are left on it.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ __all__ = [
 ]
 
 DEAD_WRAPS = 2.0
-"""Turns that stay on the drum under load, at least (29 CFR 1910.179(h)(2)(iii)(a), wire ropes).
+"""Least number of turns on a drum under load (29 CFR 1910.179(h)(2)(iii)(a), wire ropes).
 
-Slippery fibre ropes need more: Samson asks for eight with AmSteel-Blue. ``wrap_ratio`` tells why.
+Fibre cables of low friction need more: Samson requires eight for AmSteel-Blue (:func:`wrap_ratio`).
 """
 _TURN = 2 * pi
 _ROUNDING = 1e-9
@@ -38,14 +38,14 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Capacity:
-    """What a drum takes."""
+    """Capacity of a drum."""
 
     turns: float
-    """At most on the drum; NaN where the profile tells neither width nor flange."""
+    """Most turns on the drum; NaN where the profile has neither width nor flange."""
     length: float
-    """Rope on the drum at that many turns, m; NaN likewise."""
+    """Cable on the drum at that many turns, m; NaN in the same case."""
     limited_by: Literal["width", "flange", ""]
-    """Which of the drum's sizes is reached first; empty where unknown."""
+    """Dimension of the drum that is reached first; empty where unknown."""
 
     def remaining(self, turns: float) -> float:
         """Turns that can still be wound in with ``turns`` on the drum; negative: overfilled."""
@@ -53,10 +53,22 @@ class Capacity:
 
 
 def capacity(profile: WinchProfile) -> Capacity:
-    """What the drum of a profile takes, by ``drum.width`` and ``drum.flange_radius``.
+    """Capacity of a profile's drum, by ``drum.width`` and ``drum.flange_radius``.
 
-    A grooved drum holds width/pitch turns in one layer (Eq. 12 of the winding device). On a
-    layered drum every turn lies on the one before; the rope's outer side may reach the flange.
+    Parameters
+    ----------
+    profile : WinchProfile
+        Its drum declares ``width`` (grooved) or ``flange_radius`` (layered), m.
+
+    Returns
+    -------
+    Capacity
+        NaN where the dimension is not declared.
+
+    Notes
+    -----
+    A grooved drum holds width/pitch turns in one layer (Eq. 12 of the winding-device paper). On a
+    layered drum every turn lies on the one before; the cable's outer side may reach the flange.
     """
     by_width, by_flange = _turns_in_width(profile), _turns_under_flange(profile)
     turns = min(by_width, by_flange)
@@ -67,7 +79,7 @@ def capacity(profile: WinchProfile) -> Capacity:
 
 
 def _turns_in_width(profile: WinchProfile) -> float:
-    """Grooves within the width; a layered drum is as wide as its rope and takes any number."""
+    """Grooves within the width; infinite for a layered drum, which is as wide as its cable."""
     drum = profile.drum
     if drum.width is None or drum.kind != "grooved" or not drum.groove_pitch:
         return inf
@@ -75,7 +87,7 @@ def _turns_in_width(profile: WinchProfile) -> float:
 
 
 def _turns_under_flange(profile: WinchProfile) -> float:
-    """Turns until the rope's outer side reaches the flange's rim."""
+    """Turns until the cable's outer side reaches the flange's rim."""
     drum = profile.drum
     if drum.flange_radius is None or drum.kind == "grooved":
         return inf
@@ -121,15 +133,34 @@ def length_at(profile: WinchProfile, turns: float) -> float:
 def safe_lengths(profile: WinchProfile) -> tuple[float, float]:
     """Free cable lengths between a full drum and the last two dead wraps, m.
 
-    The shorter one is NaN where neither width nor flange is told, both without a reference.
+    Parameters
+    ----------
+    profile : WinchProfile
+        With ``reference.cable_length``, m, and ``reference.wound_turns``.
+
+    Returns
+    -------
+    shortest, longest : float
+        m; ``shortest`` is NaN where neither width nor flange is declared, both are NaN without a
+        reference.
     """
     return length_at(profile, capacity(profile).turns), length_at(profile, DEAD_WRAPS)
 
 
 def wrap_ratio(friction: float, turns: float = DEAD_WRAPS) -> float:
-    """How many times the pull on its clamp the rope's tension may be, by ``turns`` dead wraps.
+    """Ratio of the cable's tension to the force on its clamp behind dead wraps.
 
-    Euler-Eytelwein, e^(2π μ n): two wraps at μ = 0.1 hold 3.5 times.
+    Parameters
+    ----------
+    friction : float
+        Coefficient μ between cable and drum.
+    turns : float
+        Dead wraps n.
+
+    Returns
+    -------
+    float
+        e^(2π μ n) (Euler-Eytelwein): 3.5 for two wraps at μ = 0.1.
     """
     return float(np.exp(_TURN * friction * turns))
 
@@ -137,11 +168,19 @@ def wrap_ratio(friction: float, turns: float = DEAD_WRAPS) -> float:
 def drum_warnings(
     profile: WinchProfile, shortest: float | None = None, longest: float | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Key and message for each end of the stroke that the drum is not made for.
+    """Warnings about ends of the stroke that exceed the drum's capacity.
 
-    ``shortest`` and ``longest`` are the free lengths (m) that the winch may be driven to; without
-    them the reference itself is looked at. Nothing is said about turns that a profile does not
-    tell (``reference.wound_turns`` left at zero).
+    Parameters
+    ----------
+    profile : WinchProfile
+        Without ``reference.wound_turns`` there are no warnings.
+    shortest, longest : float, optional
+        Free lengths to which the winch may move, m; by default that of the reference.
+
+    Yields
+    ------
+    tuple of str
+        Key of the profile, and message.
     """
     reference = profile.reference
     if not reference.wound_turns:
@@ -161,6 +200,6 @@ def drum_warnings(
         key = "drum.width" if room.limited_by == "width" else "drum.flange_radius"
         yield (
             key,
-            f"the drum takes {room.turns:.4g} turns ({room.length:.4g} m of rope) but holds "
+            f"the drum takes {room.turns:.4g} turns ({room.length:.4g} m of cable) but holds "
             f"{most:.4g}{where}; it is overfilled",
         )

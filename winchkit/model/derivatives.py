@@ -1,4 +1,4 @@
-"""Derivatives of sampled signals, with the noise of encoders and the jitter of clocks in mind."""
+"""Derivatives of sampled signals, robust against encoder noise and jitter of the time stamps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from winchkit.arrays import Array
 
 __all__ = [
     "Clock",
-    "is_calmer",
+    "is_smoother",
     "shifted",
     "smooth_sign",
     "with_turning_points",
@@ -27,11 +27,22 @@ _CALMER = 0.5
 
 
 def smooth_sign(rate: Array, creep: float, fastest: float) -> Array:
-    """Sign of a rate, smooth below ``creep``; narrower on a machine that is slow altogether.
+    """Sign of a rate, smooth at standstill.
 
-    A drive that never turns faster than the smoothing would have no direction at all; one that
-    stands still has none, whatever the rounding of its derivative. A machine that is ever fast
-    enough to leave the smoothing behind keeps to ``creep``; ``fastest`` says how fast it gets.
+    Parameters
+    ----------
+    rate : array
+        Rate, any shape and unit.
+    creep : float
+        Rate below which the sign is smooth, in the same unit.
+    fastest : float
+        Highest rate of the machine, in the same unit. The smoothing is narrower on a machine that
+        hardly exceeds ``creep``, which would otherwise have no direction at all.
+
+    Returns
+    -------
+    array
+        −1 to 1; zero at standstill, whatever the rounding of the derivative.
     """
     if fastest >= _LEAVES_BEHIND * creep:
         return np.asarray(np.tanh(rate / creep))
@@ -39,11 +50,11 @@ def smooth_sign(rate: Array, creep: float, fastest: float) -> Array:
     return np.asarray(np.tanh(rate / width))
 
 
-def is_calmer(measured: Array, differences: Array) -> bool:
-    """Whether a measured rate agrees with differences of the angle and is less rough.
+def is_smoother(measured: Array, differences: Array) -> bool:
+    """Whether a measured rate agrees with differences of the angle and has less noise.
 
-    Jitter of the time stamps roughens differences of the angle and leaves a drive's own velocity
-    alone; a velocity that is quantised or filtered is rougher, or does not agree.
+    Jitter of the time stamps adds noise to differences of the angle and none to the velocity that a
+    drive reports; a velocity that is quantised or filtered has more noise or does not agree.
     """
     spread = float(np.std(differences))
     if spread == 0.0 or float(np.std(measured - differences)) > _AGREES * spread:
@@ -53,7 +64,7 @@ def is_calmer(measured: Array, differences: Array) -> bool:
 
 @dataclass(frozen=True)
 class Clock:
-    """When samples were taken, and the derivatives of what was sampled then."""
+    """Sampling times, and derivatives of signals sampled at them."""
 
     time: Array
     """(n,), s."""
@@ -64,7 +75,7 @@ class Clock:
 
     @cached_property
     def reach(self) -> int:
-        """Samples to either side over which accelerations are taken: at least 20 ms and one."""
+        """Samples to either side of a difference for accelerations: at least 20 ms and one."""
         return max(1, round(_LOAD_SPAN / self._step))
 
     @property
@@ -85,10 +96,10 @@ class Clock:
         return np.pad(inner, step, mode="edge")
 
     def sharp_gradient(self, x: Array) -> Array:
-        """First derivative of sixth order over seven samples, (n,): for what carries no noise.
+        """First derivative of sixth order over seven samples, (n,), for signals without noise.
 
-        Taken by sample number and divided by that of time, so that straight lines stay exact on
-        uneven samples; of second order at the ends.
+        The derivative by sample number is divided by that of time, so that straight lines stay
+        exact on uneven samples; it is of second order at the ends.
         """
         return np.asarray(_by_number(x) / self._by_sample)
 
@@ -114,7 +125,7 @@ def _by_number(x: Array) -> Array:
 
 
 def shifted(signal: Array, time: Array, later: float) -> Array:
-    """The signal ``later`` seconds on, by cubic Hermite interpolation; held at the run's ends."""
+    """The signal ``later`` seconds later, by cubic Hermite interpolation; constant at the ends."""
     if later == 0.0 or len(time) < 2:
         return signal
     slope = np.gradient(signal, time)
@@ -128,10 +139,25 @@ def shifted(signal: Array, time: Array, later: float) -> Array:
 
 
 def with_turning_points(x: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Samples (n,) with the turning points between them, and where the samples stand in that.
+    """Insert the extrema between samples into a signal.
 
-    What turned between two samples went further than either, and a loop or a play remembers how
-    far: parabolas through the three samples about a turn tell.
+    Parameters
+    ----------
+    x : (n,) array
+        Signal.
+
+    Returns
+    -------
+    signal : (m,) array
+        Samples and extrema in order of time.
+    where : (n,) array of int
+        Indices of the samples in it.
+
+    Notes
+    -----
+    Between two samples a signal may exceed both, and the state of a hysteresis or a backlash
+    depends on its extremum. The extremum is that of the parabola through the three samples about
+    it.
     """
     step = np.diff(x)
     turns = 1 + np.flatnonzero(step[:-1] * step[1:] < 0)

@@ -1,7 +1,7 @@
 """Drums: wound length, torque arm and their closed-form inverse, for four winding laws.
 
 Angles are the total wound angle Φ in rad, lengths in m, arrays of any shape. Below Φ = 0 the
-first layer's radius goes on, so that a rope paid out too far still has a defined length.
+first layer's radius applies, so that a cable that is paid out too far still has a defined length.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Drum(Protocol):
 
     @property
     def winding_radius(self) -> float:
-        """Axis to rope centre on the first layer, m."""
+        """Axis to cable centre on the first layer, m."""
 
     def wound(self, angle: Array) -> Array:
         """Length on the drum at the wound angle, m."""
@@ -64,14 +64,14 @@ class Spiral:
         half = self.winding_radius - self.growth / 2
         turns = np.maximum(length, 0.0) / _TURN
         root = 2 * turns / (half + np.sqrt(half**2 + 2 * self.growth * turns))
-        # A hair above and below a whole turn the same length is found on either layer.
+        # Within rounding of a whole turn both layers give the same length.
         n = np.floor(root + 1e-12)
         return _TURN * n + (length - self._full(n)) / (self.winding_radius + n * self.growth)
 
 
 @dataclass(frozen=True)
 class Archimedean:
-    """The radius grows evenly with the angle: W = r Φ + g Φ²/4π."""
+    """The radius grows in proportion to the angle: W = r Φ + g Φ²/4π."""
 
     winding_radius: float
     growth: float
@@ -121,7 +121,7 @@ class Grooved:
 
 @dataclass(frozen=True)
 class Squared:
-    """The rope's own volume: r² = r0² + k W, hence W = r0 Φ + k Φ²/4."""
+    """Radius by the volume of the cable: r² = r0² + k W, hence W = r0 Φ + k Φ²/4."""
 
     winding_radius: float
     build_up: float
@@ -146,7 +146,7 @@ class Squared:
 
 
 def drum_of(profile: WinchProfile) -> Spiral | Archimedean | Grooved | Squared:
-    """The winding law that a profile declares; layers grow by the rope's diameter by default."""
+    """The winding law that a profile declares; its layers grow by the cable diameter by default."""
     spec = profile.drum
     growth = spec.layer_growth if spec.layer_growth is not None else profile.cable.diameter
     match spec.kind:

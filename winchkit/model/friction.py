@@ -1,9 +1,9 @@
-"""Friction of a rope on a pulley: dry, viscous, Stribeck, capstan, Dahl (Cable-winding device,
-Eq. 19–26, corrected as docs/papers.md tells).
+"""Friction of a cable on a pulley: Coulomb, viscous, Stribeck, capstan, Dahl.
 
-``before`` and ``after`` are the tensions on the two sides of a pulley, seen along the way that
-one walks over it; ``friction`` and ``drag`` are positive where the rope runs the same way. Walked
-the other way both signs turn, so that every law is its own inverse.
+The equations are 19 to 26 of the winding-device paper, with the corrections in docs/papers.md.
+``before`` and ``after`` are the tensions on the two sides of a pulley in the direction of
+computation; ``friction`` and ``drag`` are positive where the cable runs in that direction. In the
+opposite direction both signs change, so that every law is its own inverse.
 """
 
 from __future__ import annotations
@@ -41,11 +41,27 @@ def normal_force(before: Array, after: Array, wrap: float) -> Array:
 def tension_after(
     before: ArrayLike, wrap: float, friction: ArrayLike, drag: ArrayLike = 0.0
 ) -> Array:
-    """T1 with T1 − T0 = μ N(T0, T1) + d (Eq. 20–23), solved in closed form, N.
+    """Tension behind a pulley with Coulomb and viscous friction (Eq. 20–23).
 
-    ``before`` T0 in N, ``wrap`` in rad, ``friction`` μ signed and |μ| < 1, ``drag`` d signed, N
-    (viscous: F_v v); shapes broadcast. Squaring gives a quadratic in T1 whose root continues
-    through μ = 0 without a kink.
+    Parameters
+    ----------
+    before : array_like
+        T0, N. All shapes broadcast.
+    wrap : float
+        Wrap angle α, rad.
+    friction : array_like
+        Coefficient μ, signed, |μ| < 1.
+    drag : array_like
+        Viscous force d = F_v v, signed, N.
+
+    Returns
+    -------
+    array
+        T1 with T1 − T0 = μ N(T0, T1) + d, N.
+
+    Notes
+    -----
+    Squaring gives a quadratic in T1; the root that is smooth at μ = 0 is taken.
     """
     first, m = np.asarray(before, dtype=float), np.asarray(friction, dtype=float)
     pulled, square, cosine = first + np.asarray(drag, dtype=float), m**2, np.cos(wrap)
@@ -57,12 +73,12 @@ def tension_after(
 
 
 def coulomb_ratio(friction: Array, wrap: float) -> Array:
-    """T1/T0 over a pulley with dry friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1."""
+    """T1/T0 over a pulley with Coulomb friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1."""
     return tension_after(1.0, wrap, friction)
 
 
 def capstan_ratio(friction: Array, wrap: float) -> Array:
-    """T1/T0 of a rope that slides around ``wrap`` rad: e^(μ α), μ signed (Eq. 19)."""
+    """T1/T0 of a cable that slides around ``wrap`` rad: e^(μ α), μ signed (Eq. 19)."""
     return np.asarray(np.exp(friction * wrap))
 
 
@@ -73,19 +89,35 @@ def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float)
 
 
 def has_fallen(speed: Array, stribeck_speed: float) -> bool:
-    """Whether speeds get so high that the extra of a Stribeck curve falls to a tenth.
+    """Whether the excess of a Stribeck curve over μc falls to a tenth within the speeds.
 
-    Where it never does, it is a dry friction that is not quite constant.
+    Where it does not, the curve cannot be distinguished from Coulomb friction.
     """
     return bool(np.max(np.abs(speed), initial=0.0) > _FALLEN * stribeck_speed)
 
 
 def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape: float) -> float:
-    """Friction after a monotone move, exact for any shape β at a constant limit F_c (Eq. 25).
+    """Dahl friction after a monotone move, exact at a constant limit F_c (Eq. 25).
 
-    ``force`` and ``limit`` in N, ``moved`` in m (signed), ``stiffness`` σ in N/m.
+    Parameters
+    ----------
+    force : float
+        Friction before the move, N.
+    moved : float
+        Signed displacement, m.
+    limit : float
+        F_c, N.
+    stiffness : float
+        σ, N/m.
+    shape : float
+        Exponent β.
+
+    Returns
+    -------
+    float
+        N.
     """
-    # Plain floats and branches only: winchkit.estimation compiles this very function.
+    # Plain floats and branches only, since winchkit.estimation compiles this function.
     if limit <= 0.0:
         return 0.0
     sign = 1.0 if moved > 0.0 else -1.0
@@ -103,10 +135,29 @@ def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape:
 def dahl(
     position: Array, limit: Array, stiffness: float, shape: float = 1.0, start: float = 0.0
 ) -> Array:
-    """Dahl friction along ``position`` (m), with a limit F_c that may change (N); shapes (n,).
+    """Dahl friction along a motion, with a limit F_c that may change.
 
-    ``start`` is the force at the first sample as a share of the limit, −1 to 1. With β = 1 the
-    step is linear in the force and solved by a scan; else sample by sample.
+    Parameters
+    ----------
+    position : (n,) array
+        m.
+    limit : (n,) array
+        F_c, N.
+    stiffness : float
+        σ, N/m.
+    shape : float
+        Exponent β.
+    start : float
+        Force at the first sample as a share of the limit, −1 to 1.
+
+    Returns
+    -------
+    (n,) array
+        N.
+
+    Notes
+    -----
+    With β = 1 the step is linear in the force and solved by a scan, else sample by sample.
     """
     moved = np.diff(position, prepend=position[:1])
     first = start * limit[0] if len(limit) else 0.0
@@ -125,10 +176,12 @@ def dahl(
 def dahl_constant(
     position: Array, limit: float, stiffness: float, shape: float = 1.0, start: float = 0.0
 ) -> Array:
-    """Dahl friction along ``position`` (m) at a constant limit F_c (N); shape (n,).
+    """Dahl friction along a motion at a constant limit F_c, parameters as of :func:`dahl`.
 
-    The exact step holds over any monotone piece, so only the reversals are stepped through and
-    all samples between two of them follow at once. ``start`` as in :func:`dahl`.
+    Notes
+    -----
+    The step is exact over any monotone section: the loop runs over the reversals, and all samples
+    between two of them are computed together.
     """
     out = np.zeros(len(position))
     if limit <= 0.0 or not len(position):
@@ -146,7 +199,7 @@ def dahl_constant(
 
 
 def _along(gone: Array, force: float, limit: float, stiffness: float, shape: float) -> None:
-    """Turn ``gone``, the way along a monotone piece (m), into the force there, in place."""
+    """Replace ``gone``, the distance along a monotone section (m), by the force there, in place."""
     sign = 1.0 if len(gone) and gone[-1] > 0 else -1.0
     u = 1.0 - sign * force / limit
     if u == 0.0 or not len(gone) or gone[-1] == 0.0:

@@ -1,4 +1,4 @@
-"""Gearboxes: stages in a row, their ratio, efficiency both ways, and whether they lock.
+"""Gearboxes: stages in series, their ratio, efficiency in both directions, and self-locking.
 
 Ratios are motor turns per drum turn; efficiencies are shares of power, 0 to 1.
 """
@@ -21,18 +21,18 @@ class GearStage:
     efficiency: float = 1.0
     """From the motor to the drum."""
     back_efficiency: float | None = None
-    """From the drum to the motor; None: 2 − 1/η, the same torque lost either way."""
+    """From the drum to the motor; None: 2 − 1/η, the same loss of torque in both directions."""
 
     @property
     def backward(self) -> float:
-        """Share of the drum's power that reaches the motor; 0 where the stage holds."""
+        """Share of the drum's power that reaches the motor; 0 where the stage is self-locking."""
         if self.back_efficiency is not None:
             return max(0.0, self.back_efficiency)
         return max(0.0, 2.0 - 1.0 / self.efficiency)
 
     @property
     def self_locking(self) -> bool:
-        """Whether no torque at the drum turns the motor."""
+        """Whether a torque at the drum cannot turn the motor."""
         return self.backward == 0.0
 
 
@@ -63,10 +63,20 @@ class Gearbox:
         return any(stage.self_locking for stage in self.stages)
 
     def motor_torque(self, drum_torque: float, *, lowering: bool = False) -> float:
-        """Motor torque that moves a drum torque (N m) at a steady speed, N m.
+        """Motor torque against a drum torque at constant speed.
 
-        Lifting the motor gives more than the drum needs; lowering it holds back less. A gearbox
-        that locks must be driven down, by a torque that these numbers do not tell: NaN.
+        Parameters
+        ----------
+        drum_torque : float
+            N m.
+        lowering : bool
+            Whether the load drives the gearbox.
+
+        Returns
+        -------
+        float
+            N m: drum_torque/(u η) when lifting, drum_torque η'/u when lowering. NaN for lowering
+            with a self-locking gearbox, which needs a driving torque that η does not determine.
         """
         if lowering:
             held = drum_torque * self.back_efficiency / self.ratio
@@ -77,21 +87,49 @@ class Gearbox:
 def worm_stage(
     starts: int, teeth: int, lead_angle: float, friction: float, pressure_angle: float = 0.0
 ) -> GearStage:
-    """A worm (``starts`` threads) on a wheel (``teeth``): u = teeth/starts (Eq. 14, z swapped).
+    """Stage of a worm and a worm wheel, u = teeth/starts (Eq. 14 with z1 and z2 exchanged).
 
-    ``lead_angle`` γ in rad, ``friction`` μ on the flanks, ``pressure_angle`` α_n in rad. With
-    ρ = atan(μ / cos α_n): η = tan γ / tan(γ + ρ), backwards tan(γ − ρ) / tan γ; it locks for γ ≤ ρ.
-    Sources: Niemann, Winter, *Maschinenelemente* III, worm gears; the same as Shigley's
-    η = (cos α_n − μ tan γ)/(cos α_n + μ cot γ). Friction falls with speed, oil and vibration (Mott,
-    *Machine Elements in Mechanical Design*, 8-10, counts on locking below about 5° alone): a gear
-    that locks is no brake. Raises UsageError.
+    Parameters
+    ----------
+    starts : int
+        Threads of the worm.
+    teeth : int
+        Teeth of the wheel.
+    lead_angle : float
+        γ, rad.
+    friction : float
+        Coefficient μ on the flanks.
+    pressure_angle : float
+        α_n, rad.
+
+    Returns
+    -------
+    GearStage
+        Ratio and both efficiencies.
+
+    Raises
+    ------
+    UsageError
+        For values outside their ranges.
+
+    Notes
+    -----
+    With ρ = atan(μ / cos α_n): η = tan γ / tan(γ + ρ), from wheel to worm tan(γ − ρ) / tan γ; the
+    stage is self-locking for γ ≤ ρ. Friction decreases with speed, oil and vibration (Mott relies
+    on self-locking below about 5° only): a self-locking gear is no brake.
+
+    References
+    ----------
+    Niemann, Winter, *Maschinenelemente* III, worm gears. Shigley's η = (cos α_n − μ tan γ)/(cos α_n
+    + μ cot γ) is the same. Mott, *Machine Elements in Mechanical Design*, 8-10.
     """
-    rub = atan(friction / cos(pressure_angle))
-    if starts < 1 or teeth < 1 or friction < 0.0 or not 0.0 < lead_angle < pi / 2 - rub:
+    friction_angle = atan(friction / cos(pressure_angle))
+    if starts < 1 or teeth < 1 or friction < 0.0 or not 0.0 < lead_angle < pi / 2 - friction_angle:
         raise UsageError(
             f"a worm with {starts} starts, {teeth} teeth, a lead angle of {lead_angle:g} rad and "
-            f"friction {friction:g} cannot be; starts and teeth count from 1, friction is not "
-            f"negative, the angle lies between 0 and {pi / 2 - rub:.3g} rad"
+            f"friction {friction:g} is impossible; starts and teeth must be at least 1, friction "
+            f"at least 0, and the angle between 0 and {pi / 2 - friction_angle:.3g} rad"
         )
-    back = tan(lead_angle - rub) / tan(lead_angle) if lead_angle > rub else 0.0
-    return GearStage(teeth / starts, tan(lead_angle) / tan(lead_angle + rub), back)
+    forward = tan(lead_angle) / tan(lead_angle + friction_angle)
+    back = max(0.0, tan(lead_angle - friction_angle) / tan(lead_angle))
+    return GearStage(teeth / starts, forward, back)

@@ -1,4 +1,4 @@
-"""The lead-screw guide that lays the rope on the drum: its travel, its miss, the fleet angle.
+"""The lead-screw guide that lays the cable on the drum: travel, offset and fleet angle.
 
 Angles are the total wound angle Φ in rad, lengths in m; arrays of any shape.
 """
@@ -21,10 +21,10 @@ __all__ = ["FLEET_LIMIT", "Guide", "guide_of", "guide_warnings"]
 
 _TURN = 2 * pi
 FLEET_LIMIT = {"grooved": np.deg2rad(2.0), "smooth": np.deg2rad(1.5)}
-"""Fleet angle up to which a wire rope lies well, rad: 2° on grooves, 1.5° on a smooth drum.
+"""Largest recommended fleet angle of a wire rope, rad: 2° on grooves, 1.5° on a smooth drum.
 
 Source: wire rope users' handbooks, e.g. wirerope.net/jrscom/fleet-angle (Fig. 39). Makers differ:
-Gover allows 2.5° on grooves, Crane Ropes Australia 2° to 4° by the rope's construction.
+Gover allows 2.5° on grooves, Crane Cables Australia 2° to 4° by the cable's construction.
 """
 
 
@@ -33,38 +33,38 @@ class Guide:
     """A nut on a screw that a belt drives from the drum."""
 
     screw_lead: float
-    """m per screw turn."""
+    """Lead of the screw, m per turn."""
     belt_ratio: float = 1.0
     """Screw turns per drum turn."""
     distance: float = 0.4
     """From drum to guide, m."""
     pitch: float | None = None
-    """What the rope needs per drum turn, m: the groove's pitch; None on a drum of one lane."""
+    """Pitch of the groove, m per drum turn; None on a layered drum."""
 
     @property
     def lead(self) -> float:
-        """What the guide moves per drum turn, m."""
+        """Travel of the guide per drum turn, m."""
         return self.screw_lead * self.belt_ratio
 
     @property
     def mismatch(self) -> float:
-        """What the guide gains on the groove per drum turn, m."""
+        """Travel of the guide less groove pitch, per drum turn, m."""
         return self.lead - (self.pitch or 0.0)
 
     def position(self, angle: ArrayLike) -> Array:
-        """Way of the guide since an empty drum, m."""
+        """Travel of the guide since an empty drum, m."""
         return np.asarray(angle, dtype=float) * (self.lead / _TURN)
 
     def aside(self, angle: ArrayLike, offset: float = 0.0) -> Array:
-        """How far the guide stands beside the place where the rope winds, m."""
+        """Axial offset of the guide from the point where the cable winds, m."""
         return offset + np.asarray(angle, dtype=float) * (self.mismatch / _TURN)
 
     def fleet_angle(self, angle: ArrayLike, offset: float = 0.0) -> Array:
-        """Between the rope and the plane square to the drum's axis, signed, rad."""
+        """Angle between the cable and the plane perpendicular to the drum's axis, signed, rad."""
         return np.arctan2(self.aside(angle, offset), self.distance)
 
     def turns_within(self, fleet_angle: float, offset: float = 0.0) -> float:
-        """Drum turns from an empty drum until the fleet angle passes a limit (rad); inf: never."""
+        """Drum turns from an empty drum until the fleet angle exceeds a limit (rad), or inf."""
         reach = self.distance * np.tan(fleet_angle)
         if abs(offset) > reach:
             return 0.0
@@ -73,7 +73,7 @@ class Guide:
         return float((reach - np.sign(self.mismatch) * offset) / abs(self.mismatch))
 
     def turns_in(self, travel: float) -> float:
-        """Drum turns that a travel of the nut (m) allows."""
+        """Drum turns within a travel of the nut (m)."""
         return travel / self.lead
 
     def check(self, angle: float, travel: float) -> None:
@@ -98,10 +98,19 @@ def guide_of(profile: WinchProfile) -> Guide:
 def guide_warnings(
     profile: WinchProfile, shortest: float | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Key and message where a grooved drum's guide runs away from the rope on the way.
+    """Warnings about a fleet angle beyond the limit on a grooved drum.
 
-    It is taken to stand over the rope on an empty drum. ``shortest`` is the free length (m) down to
-    which the winch is driven; without it a full drum is looked at, or else the reference.
+    Parameters
+    ----------
+    profile : WinchProfile
+        Its guide is assumed to be above the cable on an empty drum.
+    shortest : float, optional
+        Shortest free length of the winch, m; by default that of a full drum, else the reference.
+
+    Yields
+    ------
+    tuple of str
+        Key of the profile, and message.
     """
     if profile.guide is None or not profile.drum.groove_pitch:
         return
@@ -116,7 +125,7 @@ def guide_warnings(
         angle = float(np.degrees(guide.fleet_angle(_TURN * turns)))
         yield (
             "guide.screw_lead",
-            f"with {turns:.4g} turns on the drum the guide stands {aside * 1e3:.1f} mm beside the "
-            f"rope, a fleet angle of {angle:.2g} deg; above {np.degrees(limit):g} deg, from "
-            f"{reach:.3g} turns on, ropes climb out of their grooves",
+            f"with {turns:.4g} turns on the drum the guide is {aside * 1e3:.1f} mm beside the "
+            f"cable, a fleet angle of {angle:.2g} deg; above {np.degrees(limit):g} deg, from "
+            f"{reach:.3g} turns on, a cable may leave its groove",
         )

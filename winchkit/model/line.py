@@ -1,7 +1,9 @@
-"""The line: one winch and its rope, from motor angle to cable length and from load to torque.
+"""The line: one winch and its cable, from motor angle to cable length and from load to torque.
 
-Two chains run through the same parts (DESIGN, "The line model"). Each has stages at which a
-modifier, made by an effect, may act; without modifiers the line is the nominal profile.
+Two chains of computation pass the same parts: motor angle, gearbox, drum, guide, cable, frame,
+cable length; and load, cable weight, pulleys, load cell, drum, gearbox, motor torque. Each has
+stages (:class:`~winchkit.model.stages.Stage`) at which the modifier of an effect may act. Without
+modifiers the line is the nominal profile.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.derivatives import Clock, is_calmer, smooth_sign
+from winchkit.model.derivatives import Clock, is_smoother, smooth_sign
 from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage, Way
 from winchkit.schema.profiles.winch import WinchProfile
@@ -29,25 +31,25 @@ _NEWTON_STEPS = 4
 
 @dataclass(frozen=True)
 class Motion:
-    """The nominal line along one run, computed once: what modifiers look at, and the load."""
+    """The nominal line along one run, computed once: inputs of the modifiers, and the load."""
 
     at: At
     clock: Clock
     load: Array | None
     """Tension at the platform end, N, where measured or known."""
     drum_tension: Array | None
-    """The cell's reading, which stands in for the drum-side tension without a load, N."""
+    """The cell's reading, used as the drum-side tension where no load is known, N."""
     load_mass: float | None = None
-    """The weight whose acceleration makes the load, kg, where no instrument measures it."""
+    """Mass from whose acceleration the load is computed, kg, where no instrument measures it."""
     rounding: Array | None = None
-    """Curvature of that load over the span of its differences, N: how far it may be rounded."""
+    """Curvature of that load over the span of its differences, N: bound of its smoothing error."""
     rounded: float = 0.0
-    """Of what the line adds to that load's acceleration, the share that is rounded, 0 to 1."""
+    """Share of the line's part of that load's acceleration that is smoothed, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A profile with modifiers: predicts what the instruments of a winch should show."""
+    """A profile with modifiers: predicts the readings of a winch's instruments."""
 
     profile: WinchProfile
     modifiers: Sequence[Modifier] = ()
@@ -73,14 +75,14 @@ class Line:
         return 2 * np.pi * self.profile.reference.wound_turns
 
     def _nominal_length(self, motor_angle: Array) -> tuple[Array, Array]:
-        """Drum angle and free length of the bare profile."""
+        """Drum angle and free length of the nominal profile."""
         drum_angle = self._gear(motor_angle).value
         phi = self._reference_wound
         wound = self._drum.wound(phi + drum_angle) - self._drum.wound(np.asarray(phi))
         return drum_angle, (self.profile.reference.cable_length or 0.0) - wound
 
     def _pace(self, motor_angle: Array) -> Array:
-        """Rope wound in per motor angle on the bare profile, m/rad."""
+        """Cable wound in per motor angle on the nominal profile, m/rad."""
         gear = self._gear(motor_angle)
         return np.asarray(self._drum.arm(self._reference_wound + gear.value) * gear.slope)
 
@@ -91,12 +93,23 @@ class Line:
         return Path(turned, np.full_like(turned, slope))
 
     def motion(self, signals: Signals) -> Motion:
-        """Derivatives, directions and rope force along a run, by central differences."""
+        """Derivatives, directions and cable force along a run, by central differences.
+
+        Parameters
+        ----------
+        signals : Signals
+            Measured channels of the run.
+
+        Returns
+        -------
+        Motion
+            Input of :meth:`predict`.
+        """
         time, angle = signals.time, signals.motor_angle
         drum_angle, length = self._nominal_length(angle)
         rate, speed = np.gradient(angle, time), -np.gradient(length, time)
         clock, pace = Clock(time - time[0]), self._pace(angle)
-        jitter = signals.motor_velocity is not None and is_calmer(signals.motor_velocity, rate)
+        jitter = signals.motor_velocity is not None and is_smoother(signals.motor_velocity, rate)
         if jitter and signals.motor_velocity is not None:
             speed = speed + pace * (signals.motor_velocity - rate)
             rate = signals.motor_velocity
@@ -129,7 +142,18 @@ class Line:
         return Motion(at, clock, load, drum_tension, mass, rounding)
 
     def predict(self, motion: Motion) -> dict[str, Array]:
-        """``cable_length``, ``motor_torque`` and, where a load is known, ``tension``."""
+        """Predict the outputs of a run.
+
+        Parameters
+        ----------
+        motion : Motion
+            Of the run, from :meth:`motion`.
+
+        Returns
+        -------
+        dict of (n,) array
+            ``cable_length``, m, ``motor_torque``, N m, and, where a load is known, ``tension``, N.
+        """
         at = motion.at
         way = self.way(at)
         out = {"cable_length": self.shown_length(at, way)}
@@ -140,7 +164,7 @@ class Line:
         return out
 
     def way(self, at: At) -> Way:
-        """What gearbox, drum and guide make of the motor's angle."""
+        """Drum angle, wound length and arm from the motor angle, by gearbox, drum and guide."""
         turned = self._through(Stage.DRUM_ANGLE, self._gear(at.motor_angle), at)
         wound_angle = self._reference_wound + turned.value
         at = replace(at, drum_angle=turned.value, wound_angle=wound_angle)
@@ -151,7 +175,7 @@ class Line:
         return Way(turned.value, free, path.slope * turned.slope)
 
     def shown_length(self, at: At, way: Way) -> Array:
-        """Length as its instrument shows it, m."""
+        """Reading of the length instrument, m."""
         at = replace(
             at,
             drum_angle=way.drum_angle,
@@ -164,12 +188,12 @@ class Line:
         return length
 
     def _load(self, motion: Motion, way: Way) -> Array:
-        """A known weight follows the rope as it is really paid out, kinematic effects included.
+        """Load of a known mass that moves with the cable, kinematic effects included.
 
-        How fast that is follows from the arm (m/rad) and the motor's rate, so that a ripple of
-        the arm is differentiated once only; what the arm does not know, such as a slip, is taken
-        from the length. What its strain adds is left out: a fourth derivative of the angle would
-        be mostly noise.
+        The cable speed is the arm (m/rad) times the motor's rate, so that a ripple of the arm is
+        differentiated once only. Motions that do not pass through the arm, such as slip, are
+        differentiated from the length. The acceleration by the cable's strain is left out: it would
+        need the fourth derivative of the angle, which is mostly noise.
         """
         load = motion.load
         assert load is not None
@@ -186,14 +210,14 @@ class Line:
         return load - motion.load_mass * added
 
     def drum_side(self, motion: Motion, way: Way) -> Array:
-        """Tension at the drum: from the load up the rope and back over the pulleys, N."""
+        """Tension at the drum: from the load along the cable and over the pulleys, N."""
         at = motion.at
         if motion.load is None:
             return np.zeros_like(at.time) if motion.drum_tension is None else motion.drum_tension
         return self._over_the_pulleys(self._load(motion, way), at)
 
     def _over_the_pulleys(self, load: Array, at: At) -> Array:
-        """Tension at the drum of one at the platform, N."""
+        """Tension at the drum from the tension at the platform, N."""
         tension = self._through(Stage.ROPE_WEIGHT, load, at)
         if Stage.PULLEY in self._stages:
             for index in reversed(range(len(self.profile.pulley))):
@@ -202,11 +226,11 @@ class Line:
         return np.asarray(tension)
 
     def shown_tension(self, at: At, drum_side: Array) -> Array:
-        """Tension as the cell shows it, N."""
+        """Reading of the load cell, N."""
         return np.asarray(self._through(Stage.CELL, drum_side, at))
 
     def shown_torque(self, at: At, way: Way, drum_side: Array) -> Array:
-        """Virtual work: rope force times the derivative of the wound length, as reported, N m."""
+        """Reported torque by virtual work: cable force times derivative of wound length, N m."""
         torque: Array = drum_side * way.arm
         for stage in (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL):
             torque = self._through(stage, torque, at)
@@ -220,10 +244,17 @@ class Line:
         tension: Array,
         temperature: Array,
     ) -> At:
-        """What modifiers look at where the motion is known sample by sample; shapes (n,), SI.
+        """Inputs of the modifiers for single samples without a time series.
 
-        Accelerations are taken for zero: a single sample has none. Nor has it a fastest speed by
-        which the creep at standstill could be judged.
+        Parameters
+        ----------
+        time, motor_angle, motor_rate, tension, temperature : (n,) array
+            s, rad, rad/s, N and degrees Celsius.
+
+        Returns
+        -------
+        At
+            With accelerations of zero, and with the smoothing of directions of a fast machine.
         """
         drum_angle, length = self._nominal_length(motor_angle)
         speed = self._pace(motor_angle) * motor_rate
@@ -248,7 +279,7 @@ class Line:
         return self.shown_length(at, self.way(at))
 
     def readings(self, load: Array, at: At) -> Array:
-        """What the cell shows under a tension at the platform end, N, shape (n,)."""
+        """Readings of the load cell under tensions at the platform end, N, shape (n,)."""
         return self.shown_tension(at, self._over_the_pulleys(load, at))
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
@@ -257,13 +288,13 @@ class Line:
         return float(self.shown_length(at, self.way(at))[0])
 
     def arm(self, motor_angle: float) -> float:
-        """Rope wound in per motor angle, signed by the gearbox's direction, m/rad."""
+        """Cable wound in per motor angle, signed by the gearbox's direction, m/rad."""
         return float(self.way(self._at_rest(motor_angle, 0.0)).arm[0])
 
     def motor_angle(self, cable_length: float, tension: float = 0.0) -> float:
-        """Motor angle at which the rope has ``cable_length`` under a tension, rad.
+        """Motor angle at a cable length (m) under a tension (N), rad.
 
-        Closed form for the nominal line; with effects a few Newton steps from there.
+        Closed form for the nominal line; with effects, Newton's method starting from it.
         """
         profile = self.profile
         phi = self._reference_wound
@@ -278,17 +309,17 @@ class Line:
         return angle
 
     def _at_rest(self, motor_angle: float, tension: float) -> At:
-        """One sample standing still, at 20 degrees Celsius."""
+        """One sample at rest, at 20 degrees Celsius."""
         angle, force, zero = np.array([motor_angle]), np.array([tension]), np.zeros(1)
         return self.moments(zero, angle, zero, force, np.array([20.0]))
 
     def lengths_and_arms(self, at: At) -> tuple[Array, Array]:
-        """Cable lengths at rest, (n,), m, and rope wound in per motor angle there, m/rad."""
+        """Cable lengths at rest, (n,), m, and cable wound in per motor angle there, m/rad."""
         way = self.way(at)
         return self.shown_length(at, way), way.arm
 
     @property
     def drum(self) -> Drum:
-        """The drum with the modifiers that act on it."""
+        """The drum with its modifiers."""
         drum: Drum = self._through(Stage.DRUM, self._drum, self._at_rest(0.0, 0.0))
         return drum

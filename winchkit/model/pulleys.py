@@ -1,9 +1,9 @@
 """Tension over a chain of pulleys, in both directions, without and with memory.
 
-One walks over the pulleys from a known tension to an unknown one: from the cell at the drum to
-the platform, or from the platform to the cell, with the wraps in that order. ``towards`` is the
-rope's motion in the direction of the walk. Rope wound in runs towards the cell, so that from the
-platform ``towards`` is what is wound in, and from the cell its negative.
+The computation starts at a known tension and passes the pulleys one by one: from the cell at the
+drum to the platform, or from the platform to the cell, with the wraps in that order. ``towards`` is
+the cable's motion in the direction of computation: from the platform it is positive for winding in,
+from the cell positive for paying out.
 """
 
 from __future__ import annotations
@@ -34,30 +34,30 @@ _NEWTON_STEPS = 8
 
 @dataclass(frozen=True)
 class Eyelets:
-    """The rope slides around surfaces that do not turn (Euler-Eytelwein, Eq. 19)."""
+    """The cable slides around surfaces that do not turn (Euler-Eytelwein, Eq. 19)."""
 
     friction: float
 
     def after(self, tension: Array, wrap: float, towards: Array) -> Array:
-        """Tension behind one of them at rope speeds ``towards`` (m/s), N."""
+        """Tension behind one of them at cable speeds ``towards`` (m/s), N."""
         return tension * capstan_ratio(np.sign(towards) * self.friction, wrap)
 
 
 @dataclass(frozen=True)
 class Bearings:
-    """Pulleys whose bearings rub dry and drag viscously (Eq. 20–23), more at creep (Stribeck)."""
+    """Pulleys with Coulomb and viscous friction in their bearings (Eq. 20–23), and Stribeck's."""
 
     friction: float = 0.0
     """μ of Coulomb friction, below 1."""
     viscosity: float = 0.0
     """F_pv of each pulley, N s/m."""
     static: float | None = None
-    """μ at standstill; None where it is that of motion."""
+    """μ at standstill; None for the same value as in motion."""
     stribeck_speed: float = 0.02
     """m/s."""
 
     def after(self, tension: Array, wrap: float, towards: Array) -> Array:
-        """Tension behind one of them at rope speeds ``towards`` (m/s), N."""
+        """Tension behind one of them at cable speeds ``towards`` (m/s), N."""
         static = self.friction if self.static is None else self.static
         friction = stribeck(towards, self.friction, static, self.stribeck_speed)
         return tension_after(tension, wrap, np.sign(towards) * friction, self.viscosity * towards)
@@ -66,7 +66,24 @@ class Bearings:
 def over_pulleys(
     tension: ArrayLike, wraps: Sequence[float], towards: ArrayLike, law: Eyelets | Bearings
 ) -> Array:
-    """Tension behind all pulleys at rope speeds ``towards`` (m/s); arrays (n,), N."""
+    """Tension behind a chain of pulleys without memory.
+
+    Parameters
+    ----------
+    tension : array_like, (n,)
+        Known tension in front of the first pulley, N.
+    wraps : sequence of float
+        Wrap angles in the order of computation, rad.
+    towards : array_like, (n,)
+        Cable speed in the direction of computation, m/s.
+    law : Eyelets or Bearings
+        Friction law of every pulley.
+
+    Returns
+    -------
+    (n,) array
+        Tension behind the last pulley, N.
+    """
     carried, speed = np.asarray(tension, dtype=float), np.asarray(towards, dtype=float)
     for wrap in wraps:
         carried = law.after(carried, wrap, speed)
@@ -74,10 +91,9 @@ def over_pulleys(
 
 
 def presliding_step(step: Step) -> PulleyStep:
-    """Dahl friction of one pulley over one move, built on ``step`` (:func:`dahl_step`).
+    """Build the Dahl friction of one pulley over one move from ``step`` (:func:`dahl_step`).
 
-    A factory, so that the same lines serve as plain Python and, over a compiled ``step``, can be
-    compiled themselves.
+    The same source runs as plain Python or, with a compiled ``step``, is compiled by numba.
     """
 
     def pulley_step(  # noqa: PLR0917 - numba takes no keywords
@@ -91,7 +107,7 @@ def presliding_step(step: Step) -> PulleyStep:
     ) -> tuple[float, float]:
         """New friction force and the normal force that limits it, N.
 
-        The limit μ N(T, T + F) holds the friction itself: one correction of order μ solves it.
+        The limit μ N(T, T + F) depends on the friction itself; one correction of order μ solves it.
         """
         normal = 0.0
         new = force
@@ -116,9 +132,9 @@ class Presliding:
     """β."""
 
     def over(self, tension: ArrayLike, wraps: Sequence[float], towards: ArrayLike) -> Array:
-        """Tension behind all pulleys along rope positions ``towards`` (m); arrays (n,), N.
+        """Tension behind all pulleys along cable positions ``towards`` (m); arrays (n,), N.
 
-        Starts without friction.
+        Friction is zero at the first sample.
         """
         carried, position = np.broadcast_arrays(
             np.asarray(tension, dtype=float), np.asarray(towards, dtype=float)
@@ -140,12 +156,32 @@ class Presliding:
 def eq27_tension(
     platform: ArrayLike, towards: ArrayLike, loss: Sequence[float], stiffness: float
 ) -> Array:
-    """The cell's tension T of Eq. 27, solved for; arrays (n,), N.
+    """Solve Eq. 27 of the winding-device paper for the tension at the load cell.
 
-    T + Σ s T λ_j (1 − e^(−σ|x|/(λ_j T))) = the tension at the ``platform``, N; ``towards`` x is
-    the rope's way to the platform since friction was zero, m, its sign s; ``loss`` λ_j > 0 with
-    Σ λ < 1. T is on both sides: Newton from the platform's own value, monotone since the left
-    side rises with T. Raises UsageError for losses that have no solution.
+    Parameters
+    ----------
+    platform : array_like, (n,)
+        Tension T_p at the platform, N.
+    towards : array_like, (n,)
+        Displacement x of the cable towards the platform since friction was zero, m.
+    loss : sequence of float
+        Loss factors λ_j > 0 of the pulleys, Σ λ < 1.
+    stiffness : float
+        Presliding stiffness σ, N/m.
+
+    Returns
+    -------
+    (n,) array
+        T, N, with T + Σ s T λ_j (1 − e^(−σ|x|/(λ_j T))) = T_p and s the sign of x.
+
+    Raises
+    ------
+    UsageError
+        For loss factors without a solution.
+
+    Notes
+    -----
+    Newton's method from T = T_p; it converges since the left side increases with T.
     """
     if not all(share > 0 for share in loss) or sum(loss) >= 1:
         raise UsageError(

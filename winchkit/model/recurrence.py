@@ -1,7 +1,7 @@
-"""What has memory, vectorised: recurrences solved by a scan of log₂ n passes instead of a loop.
+"""Recurrences (linear filter, backlash, first-order lag) solved by a parallel prefix scan.
 
-Each step of a recurrence is a small map y → f_k(y); maps of one kind compose into the same kind,
-so that all partial compositions follow from doubling (Hillis and Steele, 1986).
+Each step of a recurrence is a map y → f_k(y). Maps of one kind compose into the same kind, so that
+log₂ n passes over the arrays give all partial compositions (Hillis and Steele, 1986).
 """
 
 from __future__ import annotations
@@ -33,9 +33,21 @@ def linear(decay: Array, drive: Array, start: float) -> Array:
 
 
 def play(x: Array, gap: float, start: float = 0.0) -> Array:
-    """Follow ``x`` through a play of ``gap``; shape (n,), same unit.
+    """Output of a backlash (play operator).
 
-    ``start`` is where in the gap it begins, −½ to ½ of it, 0 in the middle.
+    Parameters
+    ----------
+    x : (n,) array
+        Input.
+    gap : float
+        Width of the backlash, in the unit of ``x``.
+    start : float
+        Initial position within the gap as a share of it, −½ to ½; 0 is the middle.
+
+    Returns
+    -------
+    (n,) array
+        In the unit of ``x``.
     """
     low = x - gap / 2
     high = x + gap / 2
@@ -43,7 +55,7 @@ def play(x: Array, gap: float, start: float = 0.0) -> Array:
         low[0] = high[0] = x[0] + gap * np.clip(start, -0.5, 0.5)
     step = 1
     while step < len(x):
-        # A clamp after a clamp is a clamp.
+        # The composition of two clamps is a clamp.
         earlier_low, earlier_high = low[:-step].copy(), high[:-step].copy()
         low[step:], high[step:] = (
             np.clip(earlier_low, low[step:], high[step:]),
@@ -56,9 +68,21 @@ def play(x: Array, gap: float, start: float = 0.0) -> Array:
 def first_order_lag(
     x: Array, time: Array, time_constant: float, start: float | None = None
 ) -> Array:
-    """First-order filter of ``x`` with ``time_constant`` (s), exact for x linear between samples.
+    """First-order low-pass, exact for an input that is linear between samples.
 
-    Starts at ``start``, by default at the first value. Zero gives x itself.
+    Parameters
+    ----------
+    x, time : (n,) array
+        Input, and its times, s.
+    time_constant : float
+        s; zero returns ``x``.
+    start : float, optional
+        Output at the first sample; by default the first input.
+
+    Returns
+    -------
+    (n,) array
+        In the unit of ``x``.
     """
     if time_constant <= 0 or not len(x):
         return x.copy()

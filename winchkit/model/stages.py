@@ -1,4 +1,4 @@
-"""The stages of a line, what passes through them, and what a modifier there may look at."""
+"""The stages of a line, the values at each, and the inputs of a modifier."""
 
 from __future__ import annotations
 
@@ -39,40 +39,40 @@ class Stage(IntEnum):
     WOUND = 3
     """Value: :class:`Path` of the wound length over the drum angle."""
     ROPE = 4
-    """Value: length with the rope's strain, m."""
+    """Value: length including the cable's strain, m."""
     FRAME = 5
     """Value: length at the exit point, m."""
     LENGTH_INSTRUMENT = 6
-    """Value: length as the instrument shows it, m."""
+    """Value: reading of the length instrument, m."""
     ROPE_WEIGHT = 7
     """Value: tension at the last pulley, N."""
     PULLEY = 8
     """Value: tension after one pulley, N; once per pulley, ``At.wrap`` and ``At.pulley`` set."""
     CELL = 9
-    """Value: tension as the cell shows it, N."""
+    """Value: reading of the load cell, N."""
     GEARBOX = 10
-    """Value: torque of the rope at the motor, N m."""
+    """Value: torque of the cable at the motor, N m."""
     TORQUE_CONSTANT = 11
-    """Value: as before, in the drive's units."""
+    """Value: torque of the cable at the motor, in the drive's units."""
     MOTOR = 12
     """Value: torque with the motor's own terms, N m."""
     TORQUE_SIGNAL = 13
-    """Value: torque as the drive reports it, N m."""
+    """Value: torque reported by the drive, N m."""
     LINE_PLACE = 14
     """Value: :class:`LinePlace` of a robot's line."""
     HOME_LENGTH = 15
-    """Value: rope of a robot's line at home, m."""
+    """Value: cable of a robot's line at home, m."""
     PAYLOAD = 16
     """Value: the :class:`~winchkit.schema.profiles.robot.PlatformSpec` of a robot."""
 
 
 ROBOT_STAGES = frozenset({Stage.LINE_PLACE, Stage.HOME_LENGTH, Stage.PAYLOAD})
-"""Where effects act that only a robot can have."""
+"""Stages of effects that only a robot can have."""
 
 
 @dataclass(frozen=True)
 class LinePlace:
-    """Where one line of a robot leaves the frame and meets the platform, SI."""
+    """Exit point and anchor point of one line of a robot, SI."""
 
     exit_point: Array
     """In the base frame, (3,)."""
@@ -91,18 +91,18 @@ class Path:
 
 @dataclass(frozen=True)
 class Way:
-    """How the motor's angle comes to the rope; every array of shape (n,)."""
+    """Kinematic chain from the motor angle to the cable; every array of shape (n,)."""
 
     drum_angle: Array
     free_length: Array
     """Unstrained, from exit point to attachment, m."""
     arm: Array
-    """Rope wound in per motor angle, m/rad."""
+    """Cable wound in per motor angle, m/rad."""
 
 
 @dataclass(frozen=True)
 class Signals:
-    """What was measured on one line; arrays of shape (n,), SI, None where not measured."""
+    """Measured channels of one line; arrays of shape (n,), SI, None where not measured."""
 
     time: Array
     motor_angle: Array
@@ -112,12 +112,12 @@ class Signals:
     temperature: Array | None = None
     motor_velocity: Array | None = None
     fastest: float | None = None
-    """How fast the motor gets in all runs of this machine, rad/s; None: as fast as in this one."""
+    """Highest motor speed in all runs of this machine, rad/s; None: that of this run."""
 
 
 @dataclass(frozen=True)
 class At:
-    """What a modifier may look at besides the value passing through; arrays (n,), SI."""
+    """Inputs of a modifier beside the value of its stage; arrays (n,), SI."""
 
     profile: WinchProfile
     time: Array
@@ -130,27 +130,27 @@ class At:
     drum_angle: Array
     wound_angle: Array
     speed: Array
-    """Winding-in speed of the rope, m/s."""
+    """Winding-in speed of the cable, m/s."""
     direction: Array
     """Tanh(v/1 mm/s)."""
     free_length: Array
     """Unstrained, from exit point to attachment, m."""
     tension: Array
-    """In the rope: the load, else the cell's, else zero, N."""
+    """Cable force: the load, else the cell's reading, else zero, N."""
     temperature: Array
-    """NaN where not measured, degrees Celsius."""
+    """degrees Celsius; NaN where not measured."""
     pulley: int = -1
     wrap: float = 0.0
 
     @property
     def stressed_length(self) -> Array:
-        """Free length and the stressed rope on the machine, m."""
+        """Free length and the stressed cable on the machine, m."""
         return self.free_length + self.profile.cable.dead_length
 
 
 @dataclass(frozen=True)
 class Modifier:
-    """One effect with its values, ready to act at its stage; lower ``order`` acts first."""
+    """One effect with its parameter values at its stage; lower ``order`` acts first."""
 
     stage: Stage
     apply: Callable[[Any, At], Any]

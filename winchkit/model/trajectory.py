@@ -1,4 +1,4 @@
-"""A move from rest to rest with limited speed, acceleration and jerk, in closed form."""
+"""Move from rest to rest with limited speed, acceleration and jerk (double S), in closed form."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Trajectory:
 
 
 def _peak_speed(distance: float, speed: float, acceleration: float, jerk: float) -> float:
-    """Highest speed of the move: the limit, else what the distance leaves room for."""
+    """Highest speed of the move: the limit, or less over a short distance."""
     if speed * _ramp(speed, acceleration, jerk)[1] <= distance:
         return speed
     corner = acceleration**2 / jerk
@@ -70,11 +70,29 @@ def _ramp(speed: float, acceleration: float, jerk: float) -> tuple[float, float]
 
 
 def plan(distance: float, speed: float, acceleration: float, jerk: float) -> Trajectory:
-    """The fastest rest-to-rest move over ``distance`` (m, signed) within the three limits.
+    """The fastest move from rest to rest within limits.
 
-    Limits are in m/s, m/s^2 and m/s^3 and positive. Raises UsageError otherwise. Derivation:
-    the double S of L. Biagiotti, C. Melchiorri, *Trajectory Planning for Automatic Machines
-    and Robots*, 2008, section 3.4, from rest to rest.
+    Parameters
+    ----------
+    distance : float
+        Signed, m.
+    speed, acceleration, jerk : float
+        Positive limits, m/s, m/s^2 and m/s^3.
+
+    Returns
+    -------
+    Trajectory
+        Seven phases of constant jerk.
+
+    Raises
+    ------
+    UsageError
+        For a limit that is not positive, or a distance that is not finite.
+
+    References
+    ----------
+    The double S of L. Biagiotti, C. Melchiorri, *Trajectory Planning for Automatic Machines and
+    Robots*, 2008, section 3.4, from rest to rest.
     """
     for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk)):
         if not 0 < value < float("inf"):

@@ -1,4 +1,4 @@
-"""The variables that an error may follow along a run, by the names that answers use."""
+"""Variables along a run to which a residual may be attributed, by their names in reports."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _direction(at: At) -> Array:
 def _reversal_distance(at: At) -> Array:
     """Logarithm (base 10) of the distance run since the last change of direction, m."""
     length = at.free_length
-    # A play of twice the creep length keeps encoder noise at standstill from counting as turns.
+    # A backlash of twice the creep length suppresses reversals by encoder noise at standstill.
     moved = np.diff(play(length, 2 * _CREEP), prepend=length[:1])
     index = np.arange(len(moved))
     sign = np.sign(moved)
@@ -45,10 +45,10 @@ VARIABLES: Mapping[str, Callable[[At], Array]] = {
     "tension": lambda at: at.tension,
     "temperature": lambda at: at.temperature,
 }
-"""Arrays (n,) along a run; ``load`` and ``tension`` are the rope's force, whichever is known.
+"""Arrays (n,) along a run; ``load`` and ``tension`` are the cable force, whichever is known.
 
 ``directed_length`` is the free length while winding in, its negative while paying out, and zero at
-rest: what rubs at one place of the stroke is a curve over it.
+rest: friction at one position of the stroke is a curve over it.
 """
 
 VARIABLE_UNITS: Mapping[str, str] = {
@@ -65,6 +65,6 @@ VARIABLE_UNITS: Mapping[str, str] = {
     "temperature": "degC",
 }
 ANGLES = ("drum_angle", "motor_angle")
-"""What repeats every turn."""
+"""Variables with a period of one turn."""
 COMPOUND: Mapping[str, tuple[str, ...]] = {"directed_length": ("cable_length", "direction")}
-"""What two variables tell at once."""
+"""Pairs of variables for residual maps."""

@@ -1,4 +1,4 @@
-"""A profile file as a document: its comments, order and shorthands stay the user's own."""
+"""A profile file as a TOML document with its comments, order and shorthand keys."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["effect_tables", "read_document", "shorthands", "tables", "write_docu
 
 
 def read_document(path: Path) -> Any:
-    """Parse a profile with everything a parser usually drops. Raises FileError."""
+    """Parse a profile with its comments and layout. Raises FileError."""
     try:
         return tomlkit.parse(read_text(path))
     except OSError as error:
         raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from error
     except (ParseError, UnicodeDecodeError) as error:
-        raise FileError(Fault(f"is no TOML: {error}", str(path))) from error
+        raise FileError(Fault(f"is not TOML: {error}", str(path))) from error
 
 
 def write_document(document: Any, path: Path) -> None:
@@ -39,7 +39,7 @@ def write_document(document: Any, path: Path) -> None:
 
 
 def tables(document: Any, name: str) -> AoT:
-    """The ``[[name]]`` tables of a document; made where there are none."""
+    """The ``[[name]]`` tables of a document, created if there are none."""
     there = document.get(name)
     if not isinstance(there, AoT):
         there = tomlkit.aot()
@@ -63,6 +63,6 @@ def shorthands(document: Any) -> dict[str, Any]:
 
 
 def written(value: float, unit: str) -> str | float:
-    """A quantity as files have it; a bare number only where there is no unit."""
+    """A quantity as text with its unit; a number where there is no unit."""
     text = format_quantity(value, unit, digits=8)
     return float(text) if unit == "1" else text

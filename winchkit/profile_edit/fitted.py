@@ -1,7 +1,6 @@
-"""Writes fitted effects into a copy of a profile file, with where their values came from.
+"""Writing of fitted effects into a copy of a profile file, with the origin of their values.
 
-Only values that were refitted change, a new effect comes at the end of the effects, and the
-ledger gets a line.
+Only refitted values change, a new effect is appended to the effects, and the ledger gets an entry.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ _HOME_LENGTH = "home-length"
 
 @dataclass(frozen=True)
 class Fitted:
-    """A term with the standard deviations of its values, and where they came from."""
+    """A term with the standard deviations of its values, and their origin."""
 
     term: Term
     std: Mapping[str, float]
@@ -80,7 +79,7 @@ def write_without(
 
 
 def _labels(table: Any) -> list[str]:
-    """What an effect's table is called: with its line where it has one, or several."""
+    """Labels of an effect's table: with its line, or each of its lines."""
     name = str(table["id"])
     if _of_lines(table):
         return [name, *(f"{name}/{line}" for line in table["length"])]
@@ -88,7 +87,7 @@ def _labels(table: Any) -> list[str]:
 
 
 def _take_out(document: Any, label: str) -> None:
-    """Delete the last table of this name, or one line's length out of it."""
+    """Delete the last table of this label, or the value of one line in it."""
     tables = effect_tables(document)
     last = max(index for index, table in enumerate(tables) if label in _labels(table))
     _, _, line = label.partition("/")
@@ -99,7 +98,7 @@ def _take_out(document: Any, label: str) -> None:
 
 
 def _put(document: Any, fitted: Sequence[Fitted]) -> None:
-    """Update the effects that are there and append the others."""
+    """Update the present effects and append the others."""
     unused = list(effect_tables(document))
     for item in fitted:
         if _update_shorthand(document, item):
@@ -123,7 +122,7 @@ def _put(document: Any, fitted: Sequence[Fitted]) -> None:
 
 
 def _put_home_lengths(document: Any, item: Fitted) -> None:
-    """What a rope's law brought along on a robot, as an effect of its own beside those there."""
+    """Write home lengths that were fitted with a cable's law on a robot, as an effect."""
     values = item.term.values
     homes = {n.removeprefix(HOME): values[n] for n in values if n.startswith(HOME)}
     if not homes:
@@ -147,9 +146,9 @@ def _of_lines(table: Any) -> bool:
 
 
 def _update_shorthand(document: Any, item: Fitted) -> bool:
-    """Put a refitted value where the profile has it as a shorthand; False where it has none.
+    """Write a refitted value to its shorthand key; False where the profile has no such key.
 
-    A value refitted to infinity (a rope that does not stretch) is a key left out.
+    For an infinite value (a rigid cable) the key is removed.
     """
     effect = item.term.effect
     key = next((key for key in shorthands(document) if SHORTHANDS[key] == effect.id), None)

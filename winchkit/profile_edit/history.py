@@ -1,4 +1,4 @@
-"""The history of a profile as a ladder: what each step left of the held-out error."""
+"""The history of a profile: the held-out error after each step of its ledger."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from winchkit.units import dimension_of, parse
 __all__ = ["LADDER_UNITS", "Rung", "ladder"]
 
 LADDER_UNITS: Mapping[str, str] = {**OUTPUT_UNITS, "platform_position": "m"}
-"""Outputs of winches and robots, in the order in which they are told, with their SI units."""
+"""Outputs of winches and robots, in the order of reports, with their SI units."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Rung:
     noise: Mapping[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """As ``winchkit ledger --json`` prints it."""
+        """The step as ``winchkit ledger --json`` prints it."""
         return {
             "did": self.did,
             "effect": self.effect,

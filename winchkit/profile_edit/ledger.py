@@ -1,4 +1,4 @@
-"""The ledger of a profile file: what was done to it, judged on what, and how to take it back."""
+"""The ledger of a profile file: steps, their held-out errors, and the data to undo them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["Judged", "note", "undo"]
 
 @dataclass(frozen=True)
 class Judged:
-    """On which runs a step was judged, and its held-out errors by output, SI."""
+    """Runs of a step, and its held-out errors by output, SI."""
 
     date: date
     runs: Sequence[str] = ()
@@ -36,7 +36,7 @@ class Judged:
 
 
 def note(document: Any, did: Literal["add", "remove"], effect_id: str, judged: Judged) -> None:
-    """Append a step to the ledger of a document that is still as it was before it."""
+    """Append a step to the ledger of a document before the step changes it."""
     entry = tomlkit.table()
     entry["did"], entry["effect"], entry["date"] = did, effect_id, judged.date
     if judged.runs:
@@ -57,9 +57,22 @@ def note(document: Any, did: Literal["add", "remove"], effect_id: str, judged: J
 
 
 def undo(source: Path, out: Path) -> str:
-    """Copy a profile with its last step taken back; returns what that was, in words.
+    """Copy a profile without its last step.
 
-    Raises FileError where the ledger is empty or a file cannot be read or written.
+    Parameters
+    ----------
+    source, out : Path
+        The profile, and its copy.
+
+    Returns
+    -------
+    str
+        Description of the undone step.
+
+    Raises
+    ------
+    FileError
+        Where the ledger is empty or a file cannot be read or written.
     """
     document = read_document(source)
     steps = tables(document, "ledger")
@@ -79,7 +92,7 @@ def undo(source: Path, out: Path) -> str:
 
 
 def _replace(document: Any, effects: Any) -> None:
-    """Put other effects where the present ones stand."""
+    """Replace the effects."""
     there = effect_tables(document)
     while len(there):
         del there[len(there) - 1]

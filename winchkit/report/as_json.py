@@ -10,7 +10,7 @@ from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.maps import residual_maps
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
-from winchkit.report.detectability import unseen
+from winchkit.report.detectability import untestable
 from winchkit.report.figures.pose_traces import traces
 from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.figures.waterfall import Waterfall, waterfall_of
@@ -20,7 +20,18 @@ __all__ = ["report_json"]
 
 
 def report_json(answer: Answer) -> dict[str, Any]:
-    """As ``winchkit diagnose --json`` prints it; figures in SI."""
+    """A diagnosis as ``winchkit diagnose --json`` prints it.
+
+    Parameters
+    ----------
+    answer : Answer
+        Of a winch or a robot.
+
+    Returns
+    -------
+    dict
+        Values in SI.
+    """
     diagnosis, ladder = answer.diagnosis, waterfall_of(answer)
     if isinstance(answer, RobotAnswer):
         drawn = _of_poses(answer)
@@ -31,7 +42,7 @@ def report_json(answer: Answer) -> dict[str, Any]:
         **diagnosis.to_json(),
         "sentence": sentence(diagnosis),
         "would_change": changes_text(diagnosis),
-        "not_looked_for": [{"effect": e, "needs": list(needs)} for e, needs in unseen(answer)],
+        "not_looked_for": [{"effect": e, "needs": list(needs)} for e, needs in untestable(answer)],
         "evidence_of_noise": max(answer.result.threshold, 0.0),
         "waterfall": None if ladder is None else _waterfall(ladder),
         **drawn,
@@ -43,7 +54,7 @@ def _of_runs(answer: WinchAnswer) -> dict[str, Any]:
 
 
 def _of_poses(answer: RobotAnswer) -> dict[str, Any]:
-    """Errors over what they followed before, beside those that are left."""
+    """Errors over the variables to which they were attributed, before and after."""
     selection = answer.selection
     drawn = traces(selection.final.regression, *selection.errors)
     after = [t.to_json(t.after) for t in drawn if t.after is not None]
@@ -54,7 +65,7 @@ def _of_poses(answer: RobotAnswer) -> dict[str, Any]:
 def _states(
     answer: WinchAnswer, drawn: Callable[[TimeSeriesRegression, Array], list[Any]]
 ) -> dict[str, Any]:
-    """What is drawn of the residual before, and after where something was named."""
+    """Curves or maps of the residual before, and after where an effect was named."""
     found, regression = answer.result, answer.engine.regression
     after = drawn(regression, found.final.residual) if answer.diagnosis.steps else None
     return {"before": drawn(regression, found.initial_model.residual), "after": after}

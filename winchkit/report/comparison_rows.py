@@ -1,4 +1,4 @@
-"""A comparison's figures in words, the same at the terminal and on the page."""
+"""Figures of a comparison as text, the same at the terminal and on the page."""
 
 from __future__ import annotations
 
@@ -27,39 +27,39 @@ def size_rows(comparison: Comparison) -> list[list[str]]:
 
 
 def followed(error: OutputError) -> str:
-    """``follows load 82 % and time 10 %; repeats 5 times per drum turn, 47 %``."""
+    """``load 82 % and time 10 %; 5 periods per drum turn 47 %``."""
     shares = [
         f"{VARIABLE_NAMES.get(variable, variable)} {percent(share)}"
         for variable, share in error.follows[:_FOLLOWED]
     ]
-    told = [f"follows {listed(shares)}"] if shares else []
-    told += [f"repeats {often_per_turn(a, order)}, {percent(s)}" for a, order, s in _clear(error)]
-    return "; ".join(told) or "follows nothing that was measured"
+    texts = [listed(shares)] if shares else []
+    texts += [f"{often_per_turn(a, order)} {percent(s)}" for a, order, s in _clear(error)]
+    return "; ".join(texts) or "no measured variable"
 
 
 def map_lines(comparison: Comparison) -> list[str]:
-    """Per output its most telling residual map in a line."""
+    """Per output its residual map with the largest share of variance, in a line."""
     out: dict[str, str] = {}
     for drawn in comparison.maps:
         error = comparison.outputs[drawn.output]
         name = OUTPUT_NAMES.get(drawn.output, drawn.output)
-        told = map_text(drawn, scale_for(3 * error.rms, error.unit))
-        out.setdefault(drawn.output, f"{name} {told}")
+        text = map_text(drawn, scale_for(3 * error.rms, error.unit))
+        out.setdefault(drawn.output, f"{name} {text}")
     return list(out.values())
 
 
 def offset_text(offset: float) -> str:
-    """The one value that a comparison fits."""
+    """The only value that a comparison fits."""
     return f"offset of the length instrument, fitted: {quantity(offset, 'm')}"
 
 
 def _noticeable(bias: float, rms: float) -> float:
-    """A bias, zero where it is only what rounding leaves of a fitted offset."""
+    """A bias; zero where it is the rounding error of a fitted offset."""
     return 0.0 if abs(bias) < 1e-6 * rms else bias
 
 
 def _clear(error: OutputError) -> list[tuple[str, int, float]]:
-    """The clearest order within a turn, where no trend says twice as much."""
+    """The strongest order within a turn, unless a trend explains more than twice its share."""
     trend = max((share for _, share in error.follows), default=0.0)
     orders = [o for o in error.orders if o[2] > CLEAR_ORDER and trend <= 2 * o[2]]
     return sorted(orders, key=lambda o: -o[2])[:1]

@@ -1,4 +1,4 @@
-"""What runs could have shown, in words: from which size on an effect would have been seen."""
+"""Detectability as text: the smallest size of each effect that the runs detect at 90 % power."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from winchkit.effects.effect import Effect, Parameter
 from winchkit.report.words.numbers import quantity
 from winchkit.report.words.vocabulary import parameter_name, parameter_unit
 
-__all__ = ["Visible", "effects_of", "smallest_shown", "unseen", "visible"]
+__all__ = ["Visible", "effects_of", "smallest_shown", "untestable", "visible"]
 
 _FEW = 4
 
 
 @dataclass(frozen=True)
 class Visible:
-    """One effect and the size from which on these runs would have shown it."""
+    """One effect and its smallest detectable size."""
 
     effect: str
     parameter: str
     text: str
     share: float
-    """Of the usual size; NaN where no size within the bounds would have been seen."""
+    """Multiple of the typical size; NaN where no size within the bounds is detectable."""
 
     @property
     def usual(self) -> bool:
-        """Whether its usual size would have been seen."""
+        """Whether its typical size is detectable."""
         return self.share <= 1.0
 
 
 def effects_of(answer: Answer) -> dict[str, Effect]:
-    """Every effect that a diagnosis tried or has, by id."""
+    """Every effect that a diagnosis tested or that its model has, by id."""
     tried = {score.candidate.effect.id: score.candidate.effect for score in answer.result.scores}
     present = {t.effect.id: t.effect for t in answer.result.final.hypothesis.terms}
     return tried | present
 
 
 def visible(answer: Answer) -> list[Visible]:
-    """All effects of a diagnosis, those that would have been seen soonest first."""
+    """All effects of a diagnosis, ordered by detectable size over typical size."""
     effects = effects_of(answer)
     placed: dict[tuple[str, bool, str], list[Visible]] = {}
     for item in answer.diagnosis.detectable:
@@ -58,9 +58,9 @@ def visible(answer: Answer) -> list[Visible]:
 
 
 def _on_any_line(rows: Sequence[Visible], elsewhere: bool) -> Visible:
-    """The line of a robot on which an effect must be largest to be seen, for all its lines.
+    """The row of the line with the largest detectable size, for all lines of a robot.
 
-    ``elsewhere`` says whether the same effect may be on one line and on all of them alike.
+    ``elsewhere``: whether the same effect may be on one line and on all lines alike.
     """
     worst = max(rows, key=lambda row: (isnan(row.share), row.share))
     name, _, line = worst.effect.partition("/")
@@ -71,13 +71,13 @@ def _on_any_line(rows: Sequence[Visible], elsewhere: bool) -> Visible:
 
 
 def smallest_shown(answer: Answer) -> list[str]:
-    """A few words each on the effects that these runs would have shown soonest."""
+    """Texts on the effects with the smallest detectable sizes relative to their typical ones."""
     seen = [row for row in visible(answer) if not isnan(row.share)]
     return [f"{row.effect}: {row.parameter} {row.text}" for row in seen[:_FEW]]
 
 
-def unseen(answer: Answer) -> list[tuple[str, list[str]]]:
-    """Effects of the catalogue that no run could show, each with what it lacks."""
+def untestable(answer: Answer) -> list[tuple[str, list[str]]]:
+    """Effects of the catalogue that cannot be tested, each with its missing parts or channels."""
     tried = {e.partition("/")[0] for e in effects_of(answer)}
     out = []
     for effect in load_catalogue():
@@ -102,7 +102,7 @@ def _row(item: Detectable, parameter: Parameter) -> Visible:
 
 
 def _digits(value: float, null: float) -> int:
-    """Digits that show how far a value is from a null that is neither zero nor infinite."""
+    """Digits that resolve the difference of a value from a finite null other than zero."""
     if null == 0 or isinf(null) or value == null:
         return 2
     return 1 + max(1, ceil(-log10(abs(value - null) / abs(null))))

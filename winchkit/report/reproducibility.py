@@ -1,4 +1,4 @@
-"""How to repeat what a page tells, and how to go on: the runs, the versions, the commands."""
+"""Reproduction of a result: runs, versions, and commands, also those that continue from it."""
 
 from __future__ import annotations
 
@@ -20,40 +20,40 @@ __all__ = ["Command", "repeat"]
 
 @dataclass(frozen=True)
 class Command:
-    """What a command was given: it writes itself again, and what may follow it."""
+    """Arguments of a command, from which it and further commands are written."""
 
     dataset: Dataset
     named: str = ""
-    """The profile as the user named it; empty where only its own name is known."""
+    """The profile as the user named it; empty where only the name within the file is known."""
     options: Sequence[str] = ()
 
     @property
     def profile(self) -> str:
-        """The profile to write into commands."""
+        """The profile as commands name it."""
         if isinstance(self.dataset, RobotDataset):
             return self.named or self.dataset.robot.name
         return self.named or self.dataset.profile.name
 
     def compare(self, profile: str) -> str:
-        """Hold the runs against a profile."""
+        """Command that compares the runs with a profile."""
         return f"winchkit compare {self._runs} --profile {_quoted(profile)}{self._options}"
 
     def diagnose(self, profile: str) -> str:
-        """Ask what a profile lacks."""
-        asked = f"winchkit diagnose {self._runs} --profile {_quoted(profile)}{self._options}"
-        return f"{asked} --html report.html"
+        """Command that diagnoses a profile."""
+        diagnose = f"winchkit diagnose {self._runs} --profile {_quoted(profile)}{self._options}"
+        return f"{diagnose} --html report.html"
 
     def add(self, effect: str, profile: str, better: str) -> str:
-        """Write the better profile."""
+        """Command that writes the extended profile."""
         named = f"{_quoted(effect)} --profile {_quoted(profile)}"
         return f"winchkit add {named} --fit {self._runs} -o {_quoted(better)}{self._options}"
 
     def calibrate(self, profile: str, better: str) -> str:
-        """Fit a robot's geometry anew."""
+        """Command that fits a robot's geometry."""
         return f"winchkit calibrate {_quoted(profile)} {self._runs} -o {_quoted(better)}"
 
     def begin_effect(self, profile: str, file: str) -> str:
-        """Begin an effect of one's own from what is left."""
+        """Command that creates a user effect from the residual."""
         named = f"{_quoted(file)} --profile {_quoted(profile)}"
         return f"winchkit effects new {named} --fit {self._runs}{self._options}"
 
@@ -69,12 +69,12 @@ class Command:
 
 
 def repeat(command: Command, commands: Sequence[str], what: str, raw: Mapping[str, Any]) -> Markup:
-    """The section on how to repeat all this; ``what`` names the answer that ``raw`` holds."""
+    """The section on reproduction; ``what`` is the name of the result ``raw``."""
     versions = ", ".join(f"{name} {version(name)}" for name in ("winchkit", "numpy", "scipy"))
     profile = element("code", command.profile)
     return section(
         "repeat",
-        "How to repeat this and go on",
+        "Commands to reproduce this result and to continue",
         _runs(command.dataset),
         element("p", "Profile: ", profile, f". {versions}, Python {python_version()}."),
         element("pre", element("code", "\n".join(commands)), tabindex="0"),
@@ -100,8 +100,8 @@ def _runs(dataset: Dataset) -> Markup:
                 f"{left_out}",
             ]
         )
-    head = ["run", "programme", "repeats", "samples", "length", "left out"]
-    return table("Runs used; runs of one set repeat each other.", head, rows, words=3)
+    head = ["run", "programme", "repeats", "samples", "length", "excluded"]
+    return table("Runs; those of one set are repeats of each other.", head, rows, words=3)
 
 
 def _poses(dataset: RobotDataset) -> Markup:
@@ -112,8 +112,8 @@ def _poses(dataset: RobotDataset) -> Markup:
         own = dataset.pose[dataset.measured.run == number]
         again = int(np.count_nonzero(often[own] > 1))
         rows.append([name, f"{len(own)}", f"{len(np.unique(own))}", f"{again}"])
-    head = ["run", "poses", "distinct", "taken more than once"]
-    return table("Runs used; a row of a run is a pose.", head, rows)
+    head = ["run", "poses", "distinct", "repeated"]
+    return table("Runs; a row of a run is a pose.", head, rows)
 
 
 def _quoted(text: str) -> str:

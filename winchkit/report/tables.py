@@ -1,4 +1,4 @@
-"""The tables of a report: figures, waterfall, candidates, confusion, what could be seen."""
+"""The tables of a report: errors, contributions, candidates, equivalence sets, detectability."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from math import degrees, isfinite
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect
-from winchkit.report.detectability import unseen, visible
+from winchkit.report.detectability import untestable, visible
 from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, join, table
 from winchkit.report.words.numbers import (
@@ -49,7 +49,7 @@ def output_scale(output: OutputFit) -> Scale:
 
 
 def figures(diagnosis: Diagnosis) -> Markup:
-    """Held-out error before and after per output, beside the noise."""
+    """Held-out error before and after, and noise, per output."""
     grown = bool(diagnosis.steps)
     head = ["output", "measured, rms", "error before"]
     head += ["error after"] if grown else []
@@ -66,7 +66,7 @@ def figures(diagnosis: Diagnosis) -> Markup:
         cells.append(f"{last / noise:.2f}" if noise else "–")
         rows.append(cells)
     caption = (
-        f"Held-out error, rms: each group of {diagnosis.data} predicted with values fitted "
+        f"Held-out error, rms: each group of {diagnosis.data} is predicted with values fitted "
         "without it."
     )
     return table(caption, [*head, "noise", "error / noise"], rows)
@@ -75,7 +75,7 @@ def figures(diagnosis: Diagnosis) -> Markup:
 def named(
     found: Iterable[tuple[Effect | None, str, Mapping[str, Estimate]]],
 ) -> Markup:
-    """What every named effect is, with its values, formula and source; one unknown has no words."""
+    """Every named effect with its values, formula and source; these are empty if it is unknown."""
     entries: list[Markup] = []
     for effect, effect_id, estimates in found:
         values = [_sure(name, estimate) for name, estimate in estimates.items()]
@@ -87,7 +87,7 @@ def named(
 
 
 def _sure(name: str, estimate: Estimate) -> str:
-    """A value with its deviation and, where it is known, its interval."""
+    """A value with its standard deviation and, where it is known, its interval."""
     interval = interval_text(name, estimate)
     return estimate_text(name, estimate) + (f" ({interval})" if interval else "")
 
@@ -106,12 +106,12 @@ def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
         ]
 
     head = ["model", *(OUTPUT_NAMES.get(name, name) for name in outputs)]
-    caption = "Held-out error, rms, as the model grew. The upright mark is the noise."
+    caption = "Held-out error, rms, after each added effect. The vertical mark is the noise."
     out = [table(caption, head, [row(label, errors) for label, errors in ladder.rungs])]
     if len(ladder.first) > 1:
         alone = [row(f"only {name}", errors) for name, errors in ladder.first.items()]
         without = [row(f"all but {name}", errors) for name, errors in ladder.last.items()]
-        caption = "Each effect added first, alone; and each dropped last, all others kept."
+        caption = "Each effect added alone; and each removed, with all others kept."
         out.append(table(caption, head, [*alone, *without]))
     return join(out)
 
@@ -123,7 +123,7 @@ def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
 
 
 def bar(error: float, longest: float, noise: float | None, scale: Scale, tone: str = "") -> Markup:
-    """A bar as a share of the longest, the noise marked on it, and the figure below.
+    """A bar as a share of the longest, with a mark at the noise, and the value below.
 
     ``tone`` is a colour of the page, else the table's own.
     """
@@ -142,28 +142,28 @@ def _part(value: float, full: float) -> str:
 
 
 def candidates(answer: Answer) -> Markup:
-    """Every effect that was tried beside the profile, the strongest evidence first."""
+    """Every candidate effect, the highest evidence first."""
     diagnosis = answer.diagnosis
     ranked = diagnosis.candidates
     if not ranked:
         return Markup("")
     outputs = diagnosis.outputs
     scales = {name: output_scale(output) for name, output in outputs.items()}
-    head = ["effect", "what it would mean", "evidence"]
+    head = ["effect", "meaning", "evidence"]
     head += [f"{OUTPUT_NAMES.get(n, n)} [{scale.label}]" for n, scale in scales.items()]
     rows = [_candidate(candidate, scales) for candidate in ranked]
     caption = (
-        "Evidence: whitened squares that an effect saves, less the price of its freedom; noise "
-        f"alone reaches {significant(max(answer.result.threshold, 0.0), 2)} once in a hundred "
-        "cases. The held-out error is that with this effect alone, where its evidence earned a fit."
+        "Evidence: reduction of χ² minus a penalty of ln n per parameter (BIC). 1 % false-alarm "
+        f"threshold: {significant(max(answer.result.threshold, 0.0), 2)}. The held-out error is "
+        "that with this effect alone, where it was fitted."
     )
-    return _shortened(caption, head, rows, "more, with less evidence")
+    return _shortened(caption, head, rows, "more, with lower evidence")
 
 
 def _shortened(
     caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], rest: str
 ) -> Markup:
-    """The first rows, the others to be opened; two columns of words."""
+    """A table of the first rows, and the others in a block to be opened."""
     top = table(caption, head, rows[:_TOP], words=2)
     if len(rows) <= _TOP:
         return top
@@ -172,7 +172,7 @@ def _shortened(
 
 
 def _times(share: float) -> str:
-    """A size in units of the usual one."""
+    """A size as a multiple of the typical one."""
     return f"{significant(share, 2)} ×" if isfinite(share) else "–"
 
 
@@ -188,7 +188,7 @@ def _candidate(candidate: CandidateScore, scales: Mapping[str, Scale]) -> list[s
 
 
 def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
-    """Sets that these runs cannot tell apart, with the angles between their signatures."""
+    """Equivalence sets, with the angles between the signatures of their effects."""
     out: list[Markup] = []
     for step in diagnosis.steps:
         if len(step.effects) < 2 or step.whole:
@@ -199,20 +199,20 @@ def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
             angle = step.angles.get(effect_id)
             shown = "–" if angle is None else f"{degrees(angle):.1f}°"
             effect = effects.get(effect_id)
-            tell = effect.told_apart if effect is not None else ""
-            rows.append([element("code", effect_id), ", ".join(values), tell, shown])
-        head = ["effect", "fitted values", "told apart by", "angle"]
+            distinguished = effect.told_apart if effect is not None else ""
+            rows.append([element("code", effect_id), ", ".join(values), distinguished, shown])
+        head = ["effect", "fitted values", "distinguished by", "angle"]
         caption = (
-            f"These {diagnosis.data} cannot tell {listed(list(step.effects))} apart. The angle is "
-            "that between the signatures of a rival and of the effect that the search took (–): "
-            "0° look alike."
+            f"{listed(list(step.effects))} cannot be distinguished with these {diagnosis.data}. "
+            "The angle is that between the signatures of an effect and of the selected effect (–); "
+            "at 0° they are proportional."
         )
         out.append(table(caption, head, rows, words=3))
     return join(out)
 
 
 def detectable(answer: Answer) -> Markup:
-    """What these runs could have shown at all, and how small."""
+    """Smallest detectable size of every effect."""
     rows = [
         [element("code", row.effect), parameter_name(row.parameter), row.text, _times(row.share)]
         for row in visible(answer)
@@ -220,14 +220,12 @@ def detectable(answer: Answer) -> Markup:
     if not rows:
         return Markup("")
     data = answer.diagnosis.data
-    caption = (
-        f"The smallest size of each effect that these {data} would have shown in 9 of 10 cases."
-    )
-    head = ["effect", "parameter", "would have been seen", "of its usual size"]
-    seen = _shortened(caption, head, rows, "more, seen less easily")
+    caption = f"Smallest size of each effect that is detectable with these {data} at 90 % power."
+    head = ["effect", "parameter", "detectable", "of its typical size"]
+    seen = _shortened(caption, head, rows, "more, with larger detectable sizes")
     blind = [
         element("li", element("code", effect), f" needs {listed(needs)}")
-        for effect, needs in unseen(answer)
+        for effect, needs in untestable(answer)
     ]
-    lost = details("Not looked for: a part or a channel is missing", element("ul", *blind))
+    lost = details("Not tested: a part or a channel is missing", element("ul", *blind))
     return join([seen, lost]) if blind else seen

@@ -17,12 +17,12 @@ from winchkit.report.comparison_rows import (
     offset_text,
     size_rows,
 )
-from winchkit.report.detectability import unseen, visible
-from winchkit.report.figures.rest import rest_of
+from winchkit.report.detectability import untestable, visible
+from winchkit.report.figures.unexplained import unexplained_curve
 from winchkit.report.figures.waterfall import waterfall_of
 from winchkit.report.words.columns import aligned, hanging, paragraph
 from winchkit.report.words.numbers import Scale, grouped, percent, scale_for, significant
-from winchkit.report.words.sentence import changes_text, sentence, telling, where_text
+from winchkit.report.words.sentence import changes_text, main_patterns, sentence, where_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -45,7 +45,18 @@ _BARS = 40
 
 
 def report_text(answer: Answer) -> str:
-    """The story of a diagnosis in at most 70 lines of at most 80 characters."""
+    """A diagnosis as text.
+
+    Parameters
+    ----------
+    answer : Answer
+        Of a winch or a robot.
+
+    Returns
+    -------
+    str
+        At most 70 lines of at most 80 characters.
+    """
     diagnosis = answer.diagnosis
     blocks = [
         [VERDICT_NAMES[diagnosis.verdict].upper(), *paragraph(sentence(diagnosis))],
@@ -61,22 +72,22 @@ def report_text(answer: Answer) -> str:
     ]
     lines = [line for block in blocks if block for line in (*block, "")][:-1]
     if len(lines) > _MOST_LINES:
-        lines = [*lines[: _MOST_LINES - 1], "… the rest is in --json and --html"]
+        lines = [*lines[: _MOST_LINES - 1], "… more in --json and --html"]
     return "\n".join(lines)
 
 
 def compare_text(comparison: Comparison) -> str:
-    """How far the profile is off per output, and what the error follows."""
-    followings: list[str] = []
+    """A comparison as text: errors per output, and their attribution to variables."""
+    attributed: list[str] = []
     for name, error in comparison.outputs.items():
-        told = f"{OUTPUT_NAMES.get(name, name)} {followed(error)}"
-        followings += paragraph(told, "  ", "    ")
+        text = f"{OUTPUT_NAMES.get(name, name)}: {followed(error)}"
+        attributed += paragraph(text, "  ", "    ")
     blocks = [aligned([HEAD, *size_rows(comparison)])]
-    if followings:
-        blocks.append(["what the errors follow", *followings])
-    maps = [line for told in map_lines(comparison) for line in paragraph(told, "  ", "    ")]
+    if attributed:
+        blocks.append(["share of the error's variance explained by", *attributed])
+    maps = [line for text in map_lines(comparison) for line in paragraph(text, "  ", "    ")]
     if maps:
-        blocks.append(["over two variables at once, mean error", *maps])
+        blocks.append(["mean error over two variables", *maps])
     if comparison.offset is not None:
         blocks.append([offset_text(comparison.offset)])
     blocks.append(_notes(comparison.notes))
@@ -84,13 +95,13 @@ def compare_text(comparison: Comparison) -> str:
 
 
 def addition_text(addition: Addition | Removal) -> str:
-    """What was fitted, and what the step did to the error out of sample."""
+    """An added or removed effect as text: fitted values, and held-out errors."""
     fitted = []
     for term, every in addition.terms:
         values = {name: e for name, e in every.items() if not name.startswith(HOME)}
-        told = ", ".join(estimate_text(name, value) for name, value in values.items())
-        beside = "; the lines' home lengths beside it" if len(values) < len(every) else ""
-        fitted.append([term.label, told + beside])
+        text = ", ".join(estimate_text(name, value) for name, value in values.items())
+        beside = "; with the home lengths of the lines" if len(values) < len(every) else ""
+        fitted.append([term.label, text + beside])
         sure = {n: interval_text(n, v) for n, v in values.items()}
         fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
     blocks = [
@@ -110,12 +121,12 @@ def _errors(outputs: Mapping[str, OutputFit], *, grown: bool, data: str = "runs"
         after = [scale.text(output.heldout_rms_after)] if grown else []
         before = scale.text(output.heldout_rms_before)
         rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
-    told = f"held out: each group of {data} is predicted with values fitted without it"
-    return [*aligned(rows), f"  ({told})"]
+    held_out = f"held out: each group of {data} is predicted with values fitted without it"
+    return [*aligned(rows), f"  ({held_out})"]
 
 
 def _ladder(answer: Answer) -> list[str]:
-    """What each of several effects buys: added first alone, and dropped last."""
+    """Contribution of each of several effects: added alone first, and removed last."""
     ladder = waterfall_of(answer)
     if ladder is None or len(ladder.first) < 2:
         return []
@@ -130,7 +141,7 @@ def _ladder(answer: Answer) -> list[str]:
     rows += [[label, *(scales[n].text(rms[n]) for n in scales)] for label, rms in states]
     noise = {name: output.noise_rms for name, output in outputs.items()}
     rows.append(["noise", *(_text_or_unknown(scales[n], noise[n]) for n in scales)])
-    return ["what each effect buys", *aligned(rows)]
+    return ["contribution of each effect", *aligned(rows)]
 
 
 def _text_or_unknown(scale: Scale, value: float | None) -> str:
@@ -138,29 +149,29 @@ def _text_or_unknown(scale: Scale, value: float | None) -> str:
 
 
 def _shown(answer: Answer) -> list[str]:
-    """Which effects these runs could show at all, and how small."""
-    rows, blind = visible(answer), [effect for effect, _ in unseen(answer)]
+    """Effects that are detectable with these runs, and their smallest sizes."""
+    rows, blind = visible(answer), [effect for effect, _ in untestable(answer)]
     if not rows:
         return []
     able, count = [row for row in rows if row.usual], len(rows) + len(blind)
     data = answer.diagnosis.data
     head = (
-        f"these {data} would have shown {len(able)} of {count} effects in their usual size, soonest"
+        f"detectable with these {data} (90 % power): {len(able)} of {count} effects at typical size"
     )
     soonest = [[row.effect, f"{row.parameter} {row.text}"] for row in able[:_SOONEST]]
     lines = [head, *aligned(soonest, words=2)]
     large = [f"{r.effect} ({significant(r.share, 2)} ×)" for r in rows if r.share > 1.0]
     if large:
-        told = f"only where larger than usual: {', '.join(large)}"
-        lines += paragraph(told, "  ", "    ")
+        text = f"only at a multiple of the typical size: {', '.join(large)}"
+        lines += paragraph(text, "  ", "    ")
     never = [row.effect for row in rows if isnan(row.share)]
     if never:
-        lines += paragraph(f"at no size that can be: {', '.join(never)}", "  ", "    ")
+        lines += paragraph(f"at no size within the bounds: {', '.join(never)}", "  ", "    ")
     if large or never:
-        lines.append("  'winchkit plan' proposes what shows most of them")
+        lines.append("  'winchkit plan' proposes runs that detect most of them")
     if blind:
         lines += paragraph(
-            f"not looked for, a part or channel lacks: {', '.join(blind)}", "  ", "    "
+            f"not tested, a part or a channel is missing: {', '.join(blind)}", "  ", "    "
         )
     return lines
 
@@ -170,14 +181,15 @@ def _confusion(diagnosis: Diagnosis) -> list[str]:
     for step in (step for step in diagnosis.steps if not step.whole):
         for effect, angle in step.angles.items():
             own = next(name for name in step.effects if name not in step.angles)
-            rows.append([f"{own} / {effect}", f"{degrees(angle):.1f}° apart"])
-    return [f"these {diagnosis.data} cannot tell apart", *aligned(rows, words=2)] if rows else []
+            rows.append([f"{own} / {effect}", f"{degrees(angle):.1f}° between signatures"])
+    head = f"cannot be distinguished with these {diagnosis.data}"
+    return [head, *aligned(rows, words=2)] if rows else []
 
 
 def _places(answer: Answer) -> list[str]:
-    """Where an unexplained rest lives, its shape, and how to go on with it."""
+    """Patterns of the unexplained residual, its shape, and commands to continue."""
     diagnosis, lines = answer.diagnosis, []
-    for where in telling(diagnosis.where)[:_FEW]:
+    for where in main_patterns(diagnosis.where)[:_FEW]:
         lines += paragraph(where_text(where), "  ", "    ")
         if not where.frequency and diagnosis.verdict in {"partly", "unknown"}:
             lines.append(f"    {_shape(answer, where)}")
@@ -186,17 +198,17 @@ def _places(answer: Answer) -> list[str]:
     if diagnosis.empirical:
         name = diagnosis.empirical[0]
         lines += paragraph(
-            f"'winchkit add {name}' adds it as a curve, marked as not understood; "
-            "'winchkit effects new' begins an effect of your own from it",
+            f"'winchkit add {name}' adds it as an empirical curve; 'winchkit effects new' creates "
+            "an effect of your own from it",
             "  ",
             "  ",
         )
-    return ["where the rest lives", *lines]
+    return ["unexplained residual", *lines]
 
 
 def _shape(answer: Answer, where: Where) -> str:
-    """The mean residual along where it lives, as bars from its lowest to its highest."""
-    _, mean = rest_of(answer, where)
+    """The mean residual over its variable, as bars from its lowest to its highest value."""
+    _, mean = unexplained_curve(answer, where)
     low, high = float(mean.min()), float(mean.max())
     scale = scale_for((low, high), LADDER_UNITS[where.output])
     bars = sparkline(mean, min(_BARS, len(mean)))
@@ -209,7 +221,7 @@ def _next(diagnosis: Diagnosis) -> list[str]:
         power = "" if isnan(run.power) else f" (power {percent(run.power)})"
         text = f"{' / '.join(run.separates)}: {run.programme}{power}"
         lines += paragraph(text, "  ", "    ")
-    return ["what to run next", *lines] if lines else []
+    return ["next runs", *lines] if lines else []
 
 
 def _candidates(answer: Answer) -> list[str]:
@@ -221,7 +233,7 @@ def _candidates(answer: Answer) -> list[str]:
         return []
     chance = significant(max(answer.result.threshold, 0.0), 2)
     rows = [[c.effect, grouped(c.score), clause(c.effect)] for c in best]
-    head = f"strongest evidence, each alone (noise reaches {chance} once in a hundred cases)"
+    head = f"highest evidence, each alone (1 % false-alarm threshold: {chance})"
     return [head, *hanging(rows)]
 
 

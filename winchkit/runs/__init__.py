@@ -1,4 +1,8 @@
-"""Runs: recordings of named channels with units and metadata, read from and written to files."""
+"""Runs: recordings of named channels with units and metadata.
+
+``formats`` reads and writes files, ``recording`` writes logs of a bench while they grow. The public
+functions are in ``read`` (runs and logs), ``writer``, ``export``, ``recover`` and ``info``.
+"""
 
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Channel, Run

@@ -1,8 +1,8 @@
-"""Signals with their own time stamps brought to common moments: the rows of a run.
+"""Interpolation of signals with separate time stamps at common times: the rows of a run.
 
-A row stands at a sample of the slowest instrument; every other signal is interpolated there
-between its own two neighbouring samples, and is NaN where it has none. A recorder that writes
-rows and a reader of a log by channels use the same code.
+A row is at a sample of the slowest instrument; every other signal is interpolated there between its
+two neighbouring samples, and is NaN without them. A recorder of rows and a reader of a log by
+channels use the same code.
 """
 
 from __future__ import annotations
@@ -17,16 +17,29 @@ __all__ = ["PATIENCE", "Aligner", "Moments", "Series", "values_at"]
 
 
 PATIENCE = 0.5
-"""A row waits no longer than this for a source that has gone silent, s."""
+"""Longest wait of a row for a source that sends no samples, s."""
 _MAY_LACK = "motor_torque"
-"""Unknown while a drive is unpowered: a run may begin without it."""
+"""Channel that is unknown while a drive is unpowered: a run may start without it."""
 
 
 def values_at(times: Array, values: Array, moments: Array, max_gap: float) -> Array:
-    """Values of samples at other moments, linearly between the two neighbours.
+    """Linear interpolation of samples.
 
-    ``times`` (n,) rise strictly, ``values`` are (n, k), ``moments`` (m,); the result is (m, k), NaN
-    where a neighbour is missing or they are further apart than ``max_gap`` (s).
+    Parameters
+    ----------
+    times : (n,) array
+        Strictly increasing times, s.
+    values : (n, k) array
+        Samples.
+    moments : (m,) array
+        Times of the result, s.
+    max_gap : float
+        Longest interval over which samples are interpolated, s.
+
+    Returns
+    -------
+    (m, k) array
+        NaN where a neighbouring sample is missing or the interval is longer.
     """
     found = np.full((len(moments), values.shape[1]), np.nan)
     if not len(times):
@@ -45,14 +58,14 @@ def values_at(times: Array, values: Array, moments: Array, max_gap: float) -> Ar
 
 
 class Moments:
-    """Picks the moments of rows from the samples of the source that sets them."""
+    """Selects the times of rows from the samples of the source that determines them."""
 
     def __init__(self, rule: RowRule) -> None:
         self._rule = rule
         self._last = -np.inf
 
     def of(self, times: Array) -> Array:
-        """Those of ``times`` at which a row stands: each newer than the one before."""
+        """The elements of ``times`` that are times of rows, strictly increasing."""
         times = times[np.isfinite(times) & (times >= self._rule.opened)]
         kept = times[rising(times, self._last)]
         if self._rule.period > 0:
@@ -62,7 +75,7 @@ class Moments:
 
 
 def rising(times: Array, last: float) -> NDArray[np.bool_]:
-    """Which of ``times`` are later than all before them and than ``last``."""
+    """Mask of ``times`` that are later than all earlier elements and than ``last``."""
     before = np.concatenate([[last], times[:-1]])[: len(times)]
     later: NDArray[np.bool_] = times > np.maximum.accumulate(before)
     return later
@@ -78,10 +91,10 @@ def _spaced(times: Array, period: float, last: float) -> Array:
 
 
 class Series:
-    """Samples of one source, remembered just long enough to interpolate them."""
+    """Samples of one source, kept as long as the interpolation needs them."""
 
     def __init__(self, max_gap: float, width: int = 1) -> None:
-        """Samples further apart than ``max_gap`` (s) are not bridged; ``width`` values each."""
+        """``width`` values per sample; intervals above ``max_gap`` (s) are gaps."""
         self._max_gap = max_gap
         self._times: Array = np.empty(0)
         self._values: Array = np.empty((0, width))
@@ -92,31 +105,31 @@ class Series:
         return float(self._times[-1]) if len(self._times) else -np.inf
 
     def append(self, times: Array, values: Array) -> None:
-        """Add samples, values (n, width); those that are not newer than all before are left."""
+        """Add samples, values (n, width); samples not newer than all before are skipped."""
         newer = rising(times, self.last)
         self._times = np.concatenate([self._times, times[newer]])
         self._values = np.concatenate([self._values, values[newer]])
 
     def reaches(self, time: float) -> bool:
-        """Whether a sample at or after ``time`` is there."""
+        """Whether there is a sample at or after ``time``."""
         return self.last >= time
 
     def at(self, moments: Array) -> Array:
-        """Values at moments, shape (m, width); see :func:`values_at`."""
+        """Values at times, shape (m, width); see :func:`values_at`."""
         return values_at(self._times, self._values, moments, self._max_gap)
 
     def forget(self, before: float) -> None:
-        """Drop what no moment after ``before`` can need."""
+        """Drop samples that no time after ``before`` needs."""
         first = max(int(np.searchsorted(self._times, before, side="right")) - 1, 0)
         self._times, self._values = self._times[first:], self._values[first:]
 
 
 class Aligner:
-    """Makes rows of what comes from the sources, as soon as a row can be complete."""
+    """Makes rows of the sources' samples as soon as a row is complete."""
 
     def __init__(self, layout: Layout) -> None:
         self.start = layout.rule.start
-        """Moment of the first row, s; None before there is one."""
+        """Time of the first row, s; None before it."""
         self._opened, self._base = layout.rule.opened, layout.rule.topic
         self._picked = Moments(layout.rule)
         self._series = {
@@ -130,18 +143,18 @@ class Aligner:
         self._moments: Array = np.empty(0)
 
     def add(self, topic: str, times: Array, values: Array) -> None:
-        """Take samples of a source, values (n, signals); what is not newer than before is left."""
+        """Take samples of a source, values (n, signals); older ones are skipped."""
         known = np.isfinite(times)
         self._series[topic].append(times[known], values[known][:, self._used[topic]])
         if topic == self._base:
             self._moments = np.concatenate([self._moments, self._picked.of(times)])
 
     def rows(self, now: float, *, ends: bool = False) -> Array:
-        """Rows that have become complete, time first, shape (n, columns).
+        """Rows that are complete by ``now``, time first, shape (n, columns).
 
-        A row waits for every source that has given something within the last half second; where
-        the log ``ends``, for none that is slower than the rows: it comes no more, and is NaN.
-        The first row is the first that lacks nothing, or the first after half a second.
+        A row waits for every source with a sample within the last half second. Where the log
+        ``ends``, it does not wait for sources slower than the rows, whose values are then NaN. The
+        first row is the first complete one, or the first after half a second.
         """
         left = self._slower if ends else ()
         awaited = [
@@ -166,5 +179,5 @@ class Aligner:
 
 
 def _columns(source: Source) -> list[int]:
-    """Which of a source's signals are columns of the run."""
+    """Indices of a source's signals that are columns of the run."""
     return [n for n, signal in enumerate(source.signals) if signal.column]

@@ -1,4 +1,4 @@
-"""Makes a run of columns as a file holds them: SI units, one time base, every fault collected."""
+"""Construction of a run from a file's columns: SI units, one time base, all faults collected."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ _LATEST = 9.2e9
 
 @dataclass
 class Recording:
-    """A file's columns before they are a run; ``line_of`` says where row ``i`` stands."""
+    """A file's columns before conversion; ``line_of`` gives the line of a row."""
 
     path: str
     header: Sequence[tuple[str, str]]
     """Name and unit of each column."""
     columns: Sequence[Array | None]
-    """Values in the file's units; None for an unknown column that holds text."""
+    """Values in the file's units; None for an unknown column with text."""
     line_of: Callable[[int], int | None]
     metadata: Mapping[str, str] = field(default_factory=dict)
     metadata_lines: Mapping[str, int] = field(default_factory=dict)
     header_line: int | None = None
     notes: Sequence[str] = ()
     faults: Sequence[Fault] = ()
-    """What was wrong with single cells."""
+    """Faults of single cells."""
     is_part: bool = False
     """Whether it is a part of a log, which may have no rows."""
 
@@ -68,7 +68,7 @@ def assemble(recording: Recording) -> Run:
         zip(recording.header, recording.columns, strict=True), start=1
     ):
         if values is None:
-            notes.append(f"column {number} '{name}' holds text and is left out")
+            notes.append(f"column {number} '{name}' contains text and is left out")
             continue
         channels[name] = _channel(name, unit, values, number)
         if column_dimension(name) is not None:
@@ -76,7 +76,7 @@ def assemble(recording: Recording) -> Run:
     time = channels.pop("time", None)
     if time is None:
         metadata.setdefault("time", "row number")
-        notes.append("there is no column 'time'; rows are counted instead")
+        notes.append("there is no column 'time'; the number of the row is used instead")
         time = Channel(np.arange(recording.rows, dtype=np.float64), "s")
     refuse([*faults, *_time_faults(recording, time.values)])
     path = recording.path
@@ -144,7 +144,7 @@ def _channel(name: str, unit: str, values: Array, number: int) -> Channel:
     unit = unit or "1"
     si, shift = factor(unit, dimension), convert(0.0, unit, dimension)
     if si != 1.0 or shift != 0.0:
-        with np.errstate(over="ignore"):  # what becomes infinite is a fault, told by its line
+        with np.errstate(over="ignore"):  # an infinite result is a fault, reported with its line
             values = values * si + shift
     return Channel(values, next(iter(UNITS[dimension])), number)
 

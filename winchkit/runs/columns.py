@@ -1,4 +1,4 @@
-"""What the columns of a run are called, which dimension each has, and how a header is read."""
+"""Names and dimensions of the columns of a run, and the reader of a header."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ def header_of(text: str) -> tuple[str, str] | None:
 
 
 def column_dimension(name: str) -> str | None:
-    """Dimension of a column, with or without a winch's prefix; None for one we do not know."""
+    """Dimension of a column, with or without a winch's prefix; None for an unknown one."""
     if name == "time":
         return "time"
     return POSE_DIMENSIONS.get(name) or CHANNEL_DIMENSIONS.get(name.rpartition(".")[2])
 
 
 def near_miss(name: str) -> str | None:
-    """A name that we know and that an unknown one all but spells."""
+    """A known name that is similar to an unknown one."""
     known = ["time", *CHANNEL_DIMENSIONS, *POSE_DIMENSIONS]
     return next(iter(get_close_matches(name.rpartition(".")[2], known, n=1, cutoff=0.75)), None)
 
 
 def unit_fault(name: str, unit: str, dimension: str) -> str | None:
-    """Why a unit does not fit a column; None where it does."""
+    """Message on a unit of the wrong dimension; None for a valid one."""
     units = UNITS[dimension]
     if unit in units or (dimension == "ratio" and not unit):
         return None

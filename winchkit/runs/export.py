@@ -1,4 +1,4 @@
-"""Writes what was read from one or several files in the format that the output's name says."""
+"""Export of a run, or of the parts of a log, in the format of the output's suffix."""
 
 from __future__ import annotations
 
@@ -17,10 +17,27 @@ FORMATS = (".csv", ".mcap", ".parquet", ".mf4")
 
 
 def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> Run:
-    """Write a run, or the parts of a log together, and return its rows.
+    """Write a run, or the parts of a log, to one file.
 
-    ``winch`` takes only that winch, its columns without its name. An MF4 file keeps every
-    source's own time stamps, the others hold rows. Raises RunError, FileError, UsageError.
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        The run, or the parts of a log.
+    output : str or Path
+        File; its suffix is the format. MF4 keeps the time stamps of every source, the other formats
+        have rows.
+    winch : str
+        Only this winch, with its columns without prefix.
+
+    Returns
+    -------
+    Run
+        The written rows.
+
+    Raises
+    ------
+    RunError, FileError, UsageError
+        For an invalid run, a file that cannot be written, an unknown suffix.
     """
     suffix = Path(output).suffix.lower()
     if suffix not in FORMATS:

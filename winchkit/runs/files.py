@@ -1,4 +1,4 @@
-"""Files that are whole, or keep what was whole when they can no longer be written."""
+"""Atomic writing of files, and truncation of a file to its complete part after an error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["abandoned", "write_whole"]
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file whole, or leave what was there; raises FileError, UsageError for a live log."""
+    """Write a file completely or not at all; raises FileError, UsageError for an open log."""
     refuse_written([path])
     beside = path.with_name(f".{path.name}.new")
     try:
@@ -27,9 +27,9 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def abandoned(stream: BinaryIO, path: Path, whole: int, error: OSError) -> FileError:
-    """Close a stream, cut its file back to ``whole`` bytes, and return the error to raise."""
+    """Close a stream, truncate its file to ``whole`` bytes, and return the error to raise."""
     if not stream.closed:
-        # Closing writes what still waits, which fails again; what it got out is cut off after it.
+        # Closing writes the buffer, which fails again; its partial output is truncated afterwards.
         with suppress(OSError):
             stream.close()
         with suppress(OSError):

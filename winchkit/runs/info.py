@@ -1,4 +1,4 @@
-"""What a log holds: sources, rates, gaps, what was counted, and whether it was closed."""
+"""Summary of a log: sources, rates, gaps, counters, and whether it was closed."""
 
 from __future__ import annotations
 
@@ -35,35 +35,35 @@ class SourceInfo:
     rate: float
     """Over the whole log, Hz; NaN with fewer than two samples."""
     gaps: int
-    """How often the time jumps by more than 1.5 usual intervals."""
+    """Number of intervals longer than 1.5 usual ones."""
     longest_gap: float
     """Longest interval, s."""
     missing: Mapping[str, int]
     """Samples without a value, by channel."""
     flagged: int
-    """Samples against which the instrument said something."""
+    """Samples that the instrument marked as invalid or old."""
 
 
 @dataclass(frozen=True)
 class LogInfo:
-    """A log as a whole."""
+    """A whole log."""
 
     path: str
     closed: bool | None
     """Whether it has its end; None for CSV, which has none."""
     begun: str | None
-    """UTC of the first sample, where the log knows the clock's offset."""
+    """UTC of the first sample, where the log has the clock's offset."""
     duration: float
     """From the first sample of any source to the last, s."""
     sources: tuple[SourceInfo, ...]
     counters: Mapping[str, Any]
-    """What was counted at last, by instrument."""
+    """Last values of the counters, by instrument."""
     events: tuple[str, ...]
-    """Trips that were latched, in order."""
+    """Latched trips, in order."""
     tares: tuple[str, ...]
-    """Every tare in force (``A.cell: …``) and when it changed, in order."""
+    """Tares (``A.cell: …``) and the times of their changes, in order."""
     commanders: tuple[str, ...]
-    """Who commanded each winch (``A: …``) and when that changed, in order."""
+    """Commanding client of each winch (``A: …``) and the times of its changes, in order."""
     metadata: Mapping[str, str]
     notes: tuple[str, ...]
 
@@ -102,12 +102,12 @@ def _commanders(event: Mapping[str, Any]) -> Mapping[str, str]:
 
 
 def _changes(
-    events: Sequence[Note], first: float, told: Callable[[Mapping[str, Any]], Mapping[str, str]]
+    events: Sequence[Note], first: float, of: Callable[[Mapping[str, Any]], Mapping[str, str]]
 ) -> Iterator[str]:
-    """What events tell by name: at first, and at every change (s from ``first``)."""
+    """Named values in events: the first, and every change (s from ``first``)."""
     known: dict[str, str] = {}
     for note in events:
-        for name, text in told(note.value).items():
+        for name, text in of(note.value).items():
             if known.get(name) != text:
                 since = f" from {note.time - first:.3f} s on" if name in known else ""
                 known[name] = text
@@ -117,7 +117,7 @@ def _changes(
 def _source_info(source: Source, samples: Samples) -> SourceInfo:
     steps = np.diff(samples.times)
     steps = steps[steps > 0]
-    # What was held back in an adapter comes in bursts, whose median interval says little.
+    # Samples that an adapter has buffered arrive in bursts: their median interval is not the rate.
     mean = float(steps.mean()) if len(steps) else float("nan")
     usual = max(float(np.median(steps)), mean) if len(steps) else mean
     names = [signal.column or signal.name for signal in source.signals]
@@ -137,7 +137,7 @@ def _source_info(source: Source, samples: Samples) -> SourceInfo:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """Size and holes of a run."""
+    """Size of a run, and its missing values."""
 
     rows: int
     duration: float
@@ -145,11 +145,11 @@ class RunSummary:
     rate: float
     """Samples a second from the median interval, Hz; NaN where rows are not samples in time."""
     gaps: int
-    """How often the time jumps by more than 1.5 intervals."""
+    """Number of intervals longer than 1.5 usual ones."""
     missing: Mapping[str, int]
     """Samples without a value, by channel."""
     constant: tuple[str, ...]
-    """Channels that have values, but only one."""
+    """Channels with a constant value."""
 
     @property
     def text(self) -> str:
@@ -168,7 +168,7 @@ class RunSummary:
 
 
 def summary_of(run: Run) -> RunSummary:
-    """Count what a run holds and what it lacks."""
+    """Summarise a run."""
     in_time = run.metadata.get("time") != "row number" and len(run) > 1
     constant = tuple(name for name in run if _is_constant(run, name))
     return RunSummary(

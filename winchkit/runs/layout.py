@@ -1,4 +1,4 @@
-"""What a log of a bench holds: sources, their signals, and where a row of the run stands."""
+"""Layout of a log of a bench: sources, their signals, and the times of rows."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _LARGEST = 1 << 62
 
 @dataclass(frozen=True)
 class Signal:
-    """One number that a source gives."""
+    """One number of a source."""
 
     name: str
     unit: str
     column: str = ""
-    """Of the run; empty for what a run does not hold, such as raw counts."""
+    """Column of the run; empty for a signal that a run does not contain, such as raw counts."""
 
 
 @dataclass(frozen=True)
@@ -35,20 +35,20 @@ class Source:
     """``/A/drive``, ``/A/cell``."""
     signals: tuple[Signal, ...]
     max_gap: float
-    """Samples further apart are not interpolated between, s."""
+    """Longest interval over which samples are interpolated, s."""
 
 
 @dataclass(frozen=True)
 class RowRule:
-    """Where the rows of the run stand: at the samples of one source."""
+    """Times of the rows of a run: those of the samples of one source."""
 
     topic: str
     opened: float
-    """On the bench's clock, s; samples from before do not count."""
+    """Start on the bench's clock, s; earlier samples are ignored."""
     period: float = 0.0
     """Least time between two rows, s."""
     start: float | None = None
-    """Moment of the first row, where an earlier part of the log has it, s."""
+    """Time of the first row, where it is in an earlier part of the log, s."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,12 @@ class Layout:
 
 @dataclass(frozen=True)
 class Samples:
-    """What came from one source, in order of arrival."""
+    """Samples of one source, in order of arrival."""
 
     times: Array
-    """Moments of sampling on the bench's clock, s, shape (n,)."""
+    """Times of sampling on the bench's clock, s, shape (n,)."""
     received: Array
-    """Moments of arrival, s, shape (n,)."""
+    """Times of arrival, s, shape (n,)."""
     values: Array
     """Shape (n, signals); NaN where there is no value."""
 
@@ -82,7 +82,7 @@ class Samples:
 
     @staticmethod
     def joined(pieces: Sequence[Samples], signals: int) -> Samples:
-        """Pieces one after another."""
+        """Concatenated pieces."""
         if not pieces:
             return Samples(np.empty(0), np.empty(0), np.empty((0, signals)))
         return Samples(
@@ -93,12 +93,12 @@ class Samples:
 
 
 def write_layout(layout: Layout) -> str:
-    """As JSON."""
+    """A layout as JSON."""
     return json.dumps(asdict(layout), separators=(",", ":"))
 
 
 def read_layout(text: str, path: str) -> Layout:
-    """From JSON; raises RunError."""
+    """A layout from JSON; raises RunError."""
     try:
         layout = _layout(json.loads(text))
     except (ValueError, TypeError, KeyError, ArithmeticError, RecursionError) as error:
@@ -107,9 +107,11 @@ def read_layout(text: str, path: str) -> Layout:
     if len(set(topics)) < len(topics):
         raise RunError(Fault("its layout names a source twice", path))
     if layout.rule.topic not in topics:
-        raise RunError(Fault(f"its rows stand at the unknown source '{layout.rule.topic}'", path))
+        raise RunError(
+            Fault(f"its rows are those of the unknown source '{layout.rule.topic}'", path)
+        )
     if not -_LARGEST < layout.clock_offset < _LARGEST:
-        raise RunError(Fault(f"its clock offset {layout.clock_offset} ns cannot be", path))
+        raise RunError(Fault(f"its clock offset {layout.clock_offset} ns is impossible", path))
     return layout
 
 

@@ -1,4 +1,4 @@
-"""A log of a bench as it was read: every source with its own time stamps."""
+"""A log of a bench: every source with its own time stamps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BRIDGED = 1.5
 
 @dataclass(frozen=True)
 class Note:
-    """An event, or what was counted until a moment."""
+    """An event, or the counters at a time."""
 
     time: float
     """On the bench's clock, s."""
@@ -40,14 +40,14 @@ class Log:
     events: tuple[Note, ...] = ()
     counters: tuple[Note, ...] = ()
     end: Mapping[str, str] = field(default_factory=dict)
-    """What the recorder said when it closed the log; empty of one that it did not close."""
+    """Counters at the end of the log; empty for a log that was not closed."""
     closed: bool | None = True
-    """Whether the file has its end, or was cut off; None where its format has none."""
+    """Whether the file is complete; None where its format has no mark of its end."""
     notes: tuple[str, ...] = ()
 
     @property
     def span(self) -> tuple[float, float]:
-        """First and last moment of any source, s; NaN without samples."""
+        """First and last time of any source, s; NaN without samples."""
         times = [item.times for item in self.samples.values() if len(item)]
         if not times:
             return float("nan"), float("nan")
@@ -88,11 +88,11 @@ def log_of_run(run: Run, closed: bool | None = True) -> Log:
 
 
 def joined(logs: Sequence[Log]) -> Log:
-    """The parts of one log put together; raises RunError where they are not of one log."""
+    """The parts of one log, joined; raises RunError for parts of different logs."""
     first = logs[0]
     for other in logs[1:]:
         if _identity(other) != _identity(first):
-            message = f"is no part of the same log as {first.path}"
+            message = f"is not a part of the same log as {first.path}"
             raise RunError(Fault(message, other.path))
     samples = {
         source.topic: Samples.joined(
@@ -112,6 +112,6 @@ def joined(logs: Sequence[Log]) -> Log:
 
 
 def _identity(log: Log) -> object:
-    """What parts of one log have in common."""
+    """Values that are equal in all parts of one log."""
     signals = [(source.topic, source.signals) for source in log.layout.sources]
     return replace(log.layout.rule, start=None), log.layout.clock_offset, signals

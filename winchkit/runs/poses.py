@@ -1,4 +1,4 @@
-"""What a robot's runs say of its poses: one row a pose, NaN where nothing was measured."""
+"""Measured poses of a robot's runs: one row per pose, NaN where nothing was measured."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
 
 @dataclass(frozen=True)
 class Measured:
-    """What was measured at p poses of a robot with n lines."""
+    """Measurements at p poses of a robot with n lines."""
 
     motor_angle: Array
     """(p, n), rad."""
@@ -36,15 +36,15 @@ class Measured:
     swivel: Array
     """(p, n), rad, each line with a zero of its own."""
     cable_length: Array
-    """By an instrument at the rope, (p, n), m, each with an offset of its own."""
+    """By an instrument at the cable, (p, n), m, each with an offset of its own."""
     tension: Array
     """(p, n), N."""
     temperature: Array
-    """Of the ropes, (p, n), degrees Celsius."""
+    """Of the cables, (p, n), degrees Celsius."""
     run: NDArray[np.intp]
-    """Which of the runs each pose is from, (p,)."""
+    """Index of the run of each pose, (p,)."""
     place: NDArray[np.str_]
-    """Which row of which run each pose is, in words, (p,)."""
+    """Text with the run and the row of each pose, (p,)."""
     length_zeroed: bool = False
     """Whether the length instruments have no offset."""
     notes: tuple[str, ...] = ()
@@ -63,10 +63,25 @@ _ARRAYS = tuple(
 
 
 def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
-    """Gather the poses of all runs; rows without a motor angle are left out and noted.
+    """Poses of all runs.
 
-    Raises RunError with the faults of all runs: lines that the robot does not have, lines without
-    motor angles, half a quaternion.
+    Parameters
+    ----------
+    runs : sequence of Run
+        Runs of the robot, a row per pose.
+    profile : RobotProfile
+        The robot.
+
+    Returns
+    -------
+    Measured
+        Rows without a motor angle are left out and noted.
+
+    Raises
+    ------
+    RunError
+        With the faults of all runs: unknown lines, lines without motor angles, incomplete
+        quaternions.
     """
     faults: list[Fault] = []
     parts: list[Measured] = []
@@ -81,7 +96,7 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
 
 
 def joined(parts: Sequence[Measured]) -> Measured:
-    """Poses of several parts, one after another."""
+    """Concatenated poses of several parts."""
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
     }
@@ -122,7 +137,7 @@ def _faults(run: Run, profile: RobotProfile) -> list[Fault]:
 
 
 def _present(run: Run, names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Which of these columns the run has, and which it lacks."""
+    """Those of the columns that the run has, and those that it lacks."""
     given = [name for name in names if name in run]
     return given, [name for name in names if name not in given]
 
@@ -146,13 +161,13 @@ def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
         length_zeroed=run.length_zeroed,
     )
     moved = np.any(np.isfinite(found.motor_angle), axis=1)
-    told = [*_partly(run), *_gaps(found, moved)]
-    notes = [f"{run.path or run.name}: {note}" for note in told]
+    messages = [*_partly(run), *_gaps(found, moved)]
+    notes = [f"{run.path or run.name}: {note}" for note in messages]
     return replace(found[moved], notes=tuple(notes))
 
 
 def _partly(run: Run) -> list[str]:
-    """Fair, but more often a misspelt column."""
+    """Notes on incomplete groups of columns, which are valid but often a misspelling."""
     given, lacking = _present(run, _POSITION)
     if not given or not lacking:
         return []
@@ -176,7 +191,7 @@ def _gaps(found: Measured, moved: NDArray[np.bool_]) -> list[str]:
 
 
 def _temperature(run: Run, names: Sequence[str]) -> Array:
-    """Line by line where it was measured so, else one for all."""
+    """Temperature per line where it was measured so, else one for all lines."""
     common = _column(run, "temperature")
     own = [_column(run, f"{name}.temperature") for name in names]
     return np.stack([np.where(np.isfinite(t), t, common) for t in own], axis=1)

@@ -1,4 +1,4 @@
-"""Reads a run or a log from whichever format its name says, in one file or in parts."""
+"""Reader of runs and logs in the format of their suffix, in one file or in parts."""
 
 from __future__ import annotations
 
@@ -17,9 +17,22 @@ SUFFIXES = (".csv", ".mcap")
 
 
 def read_run(path: str | Path) -> Run:
-    """Read a run from CSV or MCAP; raises RunError with every fault of the file.
+    """Read a run from CSV or MCAP.
 
-    Of a log in parts, ``lift.mcap`` is all of ``lift.001.mcap``, ``lift.002.mcap`` … together.
+    Parameters
+    ----------
+    path : str or Path
+        The file; ``lift.mcap`` also stands for the parts ``lift.001.mcap``, ``lift.002.mcap`` …
+
+    Returns
+    -------
+    Run
+        Channels in SI on one time base.
+
+    Raises
+    ------
+    RunError
+        With every fault of the file.
     """
     _format_of(path)
     files = _files(path)
@@ -27,9 +40,22 @@ def read_run(path: str | Path) -> Run:
 
 
 def read_log(paths: str | Path | Sequence[str | Path]) -> Log:
-    """Read a log with every source's own time stamps, of one file or of its parts together.
+    """Read a log with the time stamps of every source.
 
-    A run of rows is a log of one source. Raises RunError.
+    Parameters
+    ----------
+    paths : str, Path or sequence of these
+        One file, or the parts of one log.
+
+    Returns
+    -------
+    Log
+        A run of rows is a log of one source.
+
+    Raises
+    ------
+    RunError
+        For invalid files, and for parts of different logs.
     """
     given = [paths] if isinstance(paths, str | Path) else paths
     files = [file for path in given for file in _files(path)]
@@ -44,7 +70,7 @@ def _files(path: str | Path) -> list[Path]:
 
 
 def _has_begun(path: Path) -> bool:
-    """Whether a part holds anything: a recorder killed in between leaves its last one bare."""
+    """Whether a part has content: a killed recorder may leave its last part empty."""
     data = read_bytes(path, may_be_empty=True)
     if _format_of(path) == ".csv":
         return any(line.strip() and line[:1] != b"#" for line in data.split(b"\n")[:-1])

@@ -1,4 +1,4 @@
-"""Saves what is whole of a file that was cut off or damaged."""
+"""Recovery of the complete records of a file that was cut off or damaged."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ __all__ = ["Recovered", "recover", "recovered_path"]
 _COPIED = (Op.SCHEMA, Op.CHANNEL, Op.METADATA)
 _ZSTD = b"\x04\0\0\0zstd"
 _ZSTD_AT = 37
-"""Where a chunk record has the name of its compression: what the search for the next one finds."""
+"""Position of the name of the compression in a chunk record, by which chunks are searched."""
 
 
 @dataclass(frozen=True)
 class Recovered:
-    """What was saved, and what was not."""
+    """Result of a recovery."""
 
     output: str
     kept: int
     """Messages, or rows of a CSV file."""
     dropped_pieces: int
-    """Chunks or rows that were damaged and left out."""
+    """Number of damaged chunks or rows, which were left out."""
     dropped_bytes: int
     was_whole: bool
     """Whether there was nothing to recover."""
@@ -51,10 +51,26 @@ def recovered_path(path: Path) -> Path:
 
 
 def recover(path: str | Path, output: str | Path | None = None) -> Recovered:
-    """Write everything whole of a file to another, which reads like one that was closed.
+    """Write the complete records of a file to another, complete one.
 
-    Never fails on a file of ours that was cut off, wherever that was. Raises RunError for a file
-    that is neither MCAP nor CSV, FileError where the output cannot be written.
+    Parameters
+    ----------
+    path : str or Path
+        MCAP or CSV file of winchkit, cut off at any position or damaged.
+    output : str or Path, optional
+        By default ``lift.recovered.mcap`` for ``lift.mcap``.
+
+    Returns
+    -------
+    Recovered
+        Numbers of records saved and left out.
+
+    Raises
+    ------
+    RunError
+        For a file that is neither MCAP nor CSV.
+    FileError
+        Where the output cannot be written.
     """
     source = Path(path)
     target = Path(output) if output else recovered_path(source)
@@ -74,7 +90,8 @@ def recover(path: str | Path, output: str | Path | None = None) -> Recovered:
 
 def _mcap(data: bytes, source: Path, target: Path) -> tuple[bytes, Recovered]:
     if not data.startswith(MARK) and not MARK.startswith(data):
-        raise RunError(Fault("is no MCAP file: it does not begin with MCAP's mark", str(source)))
+        message = "is not an MCAP file: it does not start with its magic bytes"
+        raise RunError(Fault(message, str(source)))
     stream = io.BytesIO()
     file = McapFile(stream, PROFILE, "winchkit recover")
     kept = damaged = end = 0
@@ -107,7 +124,7 @@ def _mcap(data: bytes, source: Path, target: Path) -> tuple[bytes, Recovered]:
 
 
 def _whole(data: bytes) -> Iterator[Record | Messages]:
-    """Every whole record; after damage it goes on at the next chunk that is whole."""
+    """All complete records; after damage the search continues at the next complete chunk."""
     at = len(MARK)
     while at < len(data):
         try:
@@ -122,7 +139,7 @@ def _whole(data: bytes) -> Iterator[Record | Messages]:
 
 
 def _next_chunk(data: bytes, start: int) -> int:
-    """Where the next whole chunk begins; the end of the data without any."""
+    """Start of the next complete chunk, or the end of the data."""
     found = data.find(_ZSTD, start)
     while found >= 0:
         at = found - _ZSTD_AT
@@ -152,7 +169,7 @@ def _is_readable(item: Record) -> bool:
 
 
 def _chunk(item: Record) -> bytes | None:
-    """What is in a chunk; None where it is damaged."""
+    """Content of a chunk; None where it is damaged."""
     try:
         content = chunk_content(item.body)
         ends = [inner.end for inner in records(content)]
@@ -162,9 +179,9 @@ def _chunk(item: Record) -> bytes | None:
 
 
 def _csv(data: bytes, target: Path) -> tuple[bytes, Recovered]:
-    """Whole lines: remarks, the header, and rows of numbers with rising time."""
+    """Complete lines: comments, header, and rows of numbers with increasing time."""
     lines = data.split(b"\n")
-    # What follows the last line end was cut off: a number there may lack digits.
+    # Text after the last line feed was cut off: a number there may lack digits.
     cut = lines.pop()
     kept: list[bytes] = []
     rows = dropped = 0
@@ -194,7 +211,7 @@ def _csv(data: bytes, target: Path) -> tuple[bytes, Recovered]:
 
 
 def _numbers(line: bytes, width: int) -> list[float] | None:
-    """A row's numbers, NaN for an empty cell; None where it is no row."""
+    """A row's numbers, NaN for an empty cell; None for an invalid row."""
     cells = line.split(b",")
     if len(cells) != width:
         return None

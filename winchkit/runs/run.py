@@ -1,4 +1,4 @@
-"""A run: named channels over one time base, with units, metadata and what is missing counted."""
+"""A run: named channels over one time base, with units and metadata."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ CHANNEL_DIMENSIONS: dict[str, str] = {
     "temperature": "temperature",
     "swivel": "angle",
 }
-"""Dimension of every channel of a winch that the model knows."""
+"""Dimension of every channel of a winch that the model uses."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One signal: values in SI where the model knows its name, else as in the file."""
+    """One signal: values in SI where the model uses it, else in the unit of the file."""
 
     values: Array
     """Shape (n,); NaN where there is no value."""
@@ -42,7 +42,7 @@ class Channel:
 
     @property
     def missing(self) -> int:
-        """How many samples are NaN."""
+        """Number of NaN samples."""
         return int(np.count_nonzero(np.isnan(self.values)))
 
 
@@ -57,7 +57,7 @@ class Run:
     metadata: Mapping[str, str] = field(default_factory=dict)
     path: str = ""
     notes: tuple[str, ...] = ()
-    """What the reader noticed that is no fault, e.g. a column that it had to leave out."""
+    """Notes of the reader, e.g. on a column that was left out."""
 
     def __len__(self) -> int:
         return len(self.time)
@@ -69,7 +69,7 @@ class Run:
         return iter(self.channels)
 
     def __getitem__(self, name: str) -> Array:
-        """Values of a channel; RunError names the columns there are."""
+        """Values of a channel; raises RunError with the known columns."""
         try:
             return self.channels[name].values
         except KeyError:
@@ -79,7 +79,7 @@ class Run:
 
     @property
     def load_mass(self) -> float | None:
-        """The known weight on the rope, kg, from the metadata ``load_mass``."""
+        """The known mass on the cable, kg, from the metadata ``load_mass``."""
         text = self.metadata.get("load_mass")
         return None if text is None else parse(text, "mass")
 
@@ -95,11 +95,11 @@ class Run:
 
     @property
     def gaps(self) -> int:
-        """How often the time jumps by more than 1.5 sampling intervals."""
+        """Number of intervals longer than 1.5 sampling intervals."""
         return int(np.count_nonzero(np.diff(self.time) > 1.5 * self.interval))
 
     def winches(self) -> list[str]:
-        """Names of the winches in it: of ``A.motor_angle`` columns; ``[""]`` for a plain run."""
+        """Names of the winches, from columns ``A.motor_angle``; ``[""]`` without prefixes."""
         prefixes = [
             name.rpartition(".")[0]
             for name in self.channels

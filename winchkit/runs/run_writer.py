@@ -1,4 +1,4 @@
-"""What writers of runs have in common: rows in, flushed in time, one error for a full disk."""
+"""Base class of run writers: rows, flushed in time, and one error for a full disk."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Clock = Callable[[], float]
 
 
 class RunWriter(ABC):
-    """A run being written; a context manager that closes it."""
+    """Writer of a run, and context manager that closes it."""
 
     flush_interval: float
 
@@ -57,7 +57,7 @@ class RunWriter(ABC):
 
     @property
     def descriptor(self) -> int:
-        """Of the open file, for fsync."""
+        """Descriptor of the open file, for fsync."""
         return self._stream.fileno()
 
     @property
@@ -67,11 +67,11 @@ class RunWriter(ABC):
 
     @property
     def size(self) -> int:
-        """Bytes handed over so far."""
+        """Bytes written so far."""
         return self._stream.tell()
 
     def append(self, row: Mapping[str, float]) -> None:
-        """Add a row; a column that it lacks has no value there. UsageError for an unknown one."""
+        """Add a row; missing columns are NaN. Raises UsageError for an unknown one."""
         for name in row:
             if name not in self._names:
                 known = f"no column '{name}' in {self.path}; it has {', '.join(self._names)}"
@@ -79,7 +79,7 @@ class RunWriter(ABC):
         self.append_values([row.get(name, math.nan) for name in self._names])
 
     def append_values(self, values: Iterable[float]) -> None:
-        """Add a row in the order of the columns; what is not finite is written as no value."""
+        """Add a row in the order of the columns; numbers that are not finite are missing values."""
         if self._stream.closed:
             raise UsageError(f"{self.path} is closed; no row can follow")
         with self._writing():
@@ -89,11 +89,11 @@ class RunWriter(ABC):
             self.flush()
 
     def require_in_place(self) -> None:
-        """Raise FileError where the file was removed, replaced or cut since it was begun."""
+        """Raise FileError where the file was removed, replaced or truncated."""
         require_in_place(self.path, self._stream, self._whole)
 
     def flush(self) -> None:
-        """Hand what was appended to the operating system, so that it outlives this process."""
+        """Flush the rows to the operating system, so that they are kept if this process ends."""
         with self._writing():
             if not self._stream.closed:
                 self._hand_over()
@@ -102,7 +102,7 @@ class RunWriter(ABC):
         self._flushed = self._clock()
 
     def close(self) -> None:
-        """Finish the file; closing twice does no harm."""
+        """Finish the file; further calls have no effect."""
         if not self._stream.closed:
             with self._writing():
                 self._hand_over()
@@ -111,7 +111,7 @@ class RunWriter(ABC):
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Turn a full disk into FileError, after which the writer is closed."""
+        """Convert the error of a full disk to FileError, and close the writer."""
         try:
             yield
         except OSError as error:
@@ -135,14 +135,14 @@ class RunWriter(ABC):
     def _row(self, values: Sequence[float]) -> None: ...
 
     def _hand_over(self) -> None:
-        """Pass on what the format itself holds back; nothing, unless it says otherwise."""
+        """Flush buffers of the format; without effect in the base class."""
         return
 
     def _end(self) -> None:
-        """Write what follows the last row; nothing, unless the format says otherwise."""
+        """Write the end of the file; without effect in the base class."""
         return
 
 
 def _words(text: str) -> str:
-    """A text in one line: its words, whatever stood between them."""
+    """A text in one line, with single spaces."""
     return " ".join(text.split())

@@ -1,10 +1,10 @@
-"""Writes runs: row by row while they are recorded, or whole.
+"""Writers of runs: row by row while they are recorded, or at once.
 
     with open_writer("lift.mcap", [("time", "s"), ("tension", "N")], {"load_mass": "15 kg"}) as log:
         log.append({"time": 0.0, "tension": 147.1})
 
-While rows keep coming, none waits in this process for longer than 0.5 s (CSV) or 0.25 s (MCAP);
-call ``flush`` before a pause.
+Rows are flushed when the next row is added after 0.5 s (CSV) or 0.25 s (MCAP); call ``flush``
+before a pause.
 """
 
 from __future__ import annotations
@@ -34,30 +34,63 @@ def open_writer(
 ) -> RunWriter:
     """Start a run in a file, in the format of its suffix; the file is locked until it is closed.
 
-    ``columns`` are names and units in order; values are written as they come, in these units. An
-    earlier file is written over with ``replace`` only. Raises FileError where the file cannot be
-    written, UsageError for a suffix that is no format, for a file that holds something, and, with
-    ``replace`` as well, for one that is being written.
+    Parameters
+    ----------
+    path : str or Path
+        File, ``.csv`` or ``.mcap``.
+    columns : sequence of (str, str)
+        Names and units in order; values are written in these units.
+    metadata : mapping, optional
+        Keys and texts.
+    clock : callable
+        Time of flushing, s.
+    replace : bool
+        Overwrite an earlier file.
+
+    Returns
+    -------
+    RunWriter
+        Open writer.
+
+    Raises
+    ------
+    FileError
+        Where the file cannot be written.
+    UsageError
+        For an unknown suffix, an existing file without ``replace``, and a file that is being
+        written.
     """
     begin = partial(create, Path(path), replace=replace)
     return kind_for(path)(Path(path), columns, metadata or {}, clock, begin)
 
 
 def write_run(run: Run, path: str | Path) -> None:
-    """Write a run in the format of the file's suffix, channels in the units that they have.
+    """Write a run in the format of the file's suffix, with the units of its channels.
 
-    An earlier file is replaced, unless a log is being written to it (UsageError).
+    Parameters
+    ----------
+    run : Run
+        The run.
+    path : str or Path
+        File; an earlier one is replaced.
+
+    Raises
+    ------
+    FileError
+        Where the file cannot be written.
+    UsageError
+        For an unknown suffix, and for a file to which a log is being written.
     """
     _write(run, path, kind_for(path))
 
 
 def write_csv(run: Run, path: str | Path) -> None:
-    """Write a run as CSV, whatever the file is called."""
+    """Write a run as CSV, independent of the file's suffix."""
     _write(run, path, CsvWriter)
 
 
 def write_mcap(run: Run, path: str | Path) -> None:
-    """Write a run as MCAP, whatever the file is called."""
+    """Write a run as MCAP, independent of the file's suffix."""
     from winchkit.runs.formats.mcap_write import McapWriter
 
     _write(run, path, McapWriter)

@@ -1,1 +1,6 @@
-"""What files declare, as frozen dataclasses in SI; :mod:`winchkit.schema.read` reads them."""
+"""Contents of declaration files as frozen dataclasses in SI.
+
+``profiles`` has winches, robots and sizing specifications, ``devices`` drives and instruments,
+``eds`` electronic data sheets, ``reading`` the reader of TOML. The functions that read a file are
+in :mod:`winchkit.schema.read`.
+"""

@@ -1,4 +1,4 @@
-"""What a wiring file (bench.toml) declares: buses, and winches with their devices and limits."""
+"""Contents of a bench file (bench.toml): buses, and winches with their devices and limits."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ NEEDED_BY_BUS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class BusSpec(Table):
-    """One bus; which keys count depends on ``kind``."""
+    """One bus; ``kind`` determines which keys apply."""
 
     kind: Literal["can", "modbus-rtu", "modbus-tcp", "serial"]
     # can
@@ -50,7 +50,7 @@ class BusSpec(Table):
     """Node id of the host, for its heartbeat."""
     heartbeat: Annotated[
         float,
-        Quantity("time", 2e-3, 1.0, why="a drive stops 2.5 heartbeats after its host dies"),
+        Quantity("time", 2e-3, 1.0, why="a drive stops 2.5 heartbeats after the loss of its host"),
     ] = 0.05
     # serial, modbus-rtu and modbus-tcp
     port: str | int | None = None
@@ -64,7 +64,7 @@ class BusSpec(Table):
     host: str | None = None
     timeout: Annotated[
         float,
-        Quantity("time", 1e-3, 10.0, why="a later answer is of no use to control"),
+        Quantity("time", 1e-3, 10.0, why="a later answer is too old for control"),
     ] = 0.2
 
     def rules(self) -> Iterator[Rule]:
@@ -73,7 +73,7 @@ class BusSpec(Table):
             if getattr(self, key) is None:
                 yield key, f"missing; a {self.kind} bus needs it"
         if self.kind == "modbus-tcp" and isinstance(self.port, str):
-            yield "port", f"'{self.port}' is no TCP port; write a number such as 502"
+            yield "port", f"'{self.port}' is not a TCP port; write a number such as 502"
 
 
 @dataclass(frozen=True)
@@ -87,16 +87,16 @@ class DeviceRef(Table):
     calibration: str | None = None
     """A file of kind ``calibration`` beside the bench, applied by the host."""
     rate: Frequency | None = None
-    """At most so many readings a second, Hz; else as many as it converts and its line allows."""
+    """Limit of the reading rate, Hz; by default the device's conversion rate or the line's."""
 
 
 _EMERGENCY = re.compile(r"[0-9A-Fa-f]{2}([0-9A-Fa-f]{2}|xx)")
-"""An emergency code of CiA 301, or the family of those with the same first byte."""
+"""An emergency code of CiA 301, or the class of codes with the same first byte."""
 
 
 @dataclass(frozen=True)
 class LimitSpec(Table):
-    """What the supervisor enforces on one winch, SI."""
+    """Limits that the supervisor enforces on one winch, SI."""
 
     speed: PositiveSpeed
     acceleration: PositiveAcceleration = 1.0
@@ -105,23 +105,23 @@ class LimitSpec(Table):
     tension_slack: Force | None = None
     tension_rate: Annotated[float, Quantity("force per time", 0.0, above=True)] | None = None
     in_drive: Flag = False
-    """Whether the drive is to keep ``length`` as well (607Dh), a little further out."""
+    """Whether the drive also enforces ``length`` (607Dh), with a margin."""
     following_error: PositiveLength | None = None
-    """Of rope, at which the drive itself gives up (6065h)."""
+    """Following error of the cable length at which the drive reports a fault (6065h), m."""
     torque: Annotated[float, Quantity("torque", 0.0, above=True)] | None = None
-    """Greatest of the motor, kept by the drive (6072h)."""
+    """Maximum motor torque, enforced by the drive (6072h), N m."""
     response_time: PositiveDuration = 0.06
-    """By which the measured speed lags behind the commanded one at most, s: twice the time
-    constant of the drive's velocity loop, or more."""
+    """Maximum lag of the measured speed behind the commanded one, s: at least twice the time
+    constant of the drive's velocity loop."""
     emergency_trips: tuple[str, ...] = ()
     """Emergency codes that trip although the drive reports no fault: ``4210``, ``42xx``."""
 
     def rules(self) -> Iterator[Rule]:
         """Lower limits lie below upper ones."""
         if self.in_drive and self.length is None:
-            yield "in_drive", "there is no `length` for the drive to keep"
+            yield "in_drive", "needs `length`, the limits that the drive is to enforce"
         if self.length is not None and self.length[0] < 0:
-            yield "length", f"{self.length[0]:g} m: a cable length is not below 0"
+            yield "length", f"{self.length[0]:g} m: a cable length is at least 0"
         if self.length is not None and self.length[0] >= self.length[1]:
             low, high = self.length
             yield "length", f"the lower limit {low:g} m is not below the upper limit {high:g} m"
@@ -130,7 +130,7 @@ class LimitSpec(Table):
             yield "tension_slack", f"{slack:g} N is not below tension_high, {high_tension:g} N"
         for code in self.emergency_trips:
             if not _EMERGENCY.fullmatch(code):
-                yield "emergency_trips", f"'{code}' is no code such as '4210' or '42xx'"
+                yield "emergency_trips", f"'{code}' is not a code such as '4210' or '42xx'"
 
 
 @dataclass(frozen=True)
@@ -147,20 +147,20 @@ class WinchWiring(Table):
     temperature: DeviceRef | None = None
     brake: Flag = False
     options: OptionSpec = field(default_factory=OptionSpec)
-    """Option codes of the drive, before those of its device file; written and read back."""
+    """Option codes of the drive, which override those of its device file; written and read back."""
     host_loss: Literal["hardware"] | None = None
-    """``hardware`` where no object of the drive, but hardware beside it, stops the winch when the
-    host has gone; left out, what the device file declares."""
+    """``hardware`` where external hardware, and no object of the drive, stops the winch at a loss
+    of the host; by default the mechanism that the device file declares."""
     host_loss_description: str = ""
-    """Which hardware that is, and how it stops the winch; told at every start and in every log."""
+    """Description of that hardware; reported at every start and in every log."""
 
     def rules(self) -> Iterator[Rule]:
         """The tension at the platform end is either measured or known."""
         if (self.host_loss is None) != (not self.host_loss_description.strip()):
             yield (
                 "host_loss",
-                '`host_loss = "hardware"` and `host_loss_description`, which says what stops the '
-                "winch when the host has gone, are given together",
+                '`host_loss = "hardware"` and `host_loss_description`, the description of the '
+                "hardware that stops the winch at a loss of the host, must be given together",
             )
         if self.load is not None and self.load_mass is not None:
             yield "load_mass", "given beside a load cell 'load'; keep one of them"
@@ -168,24 +168,24 @@ class WinchWiring(Table):
 
 @dataclass(frozen=True)
 class BenchSpec(Table):
-    """A bench as wired."""
+    """A bench: buses and winches."""
 
     name: str
     winch: Mapping[str, WinchWiring]
     bus: Mapping[str, BusSpec]
     cycle: Annotated[
         float,
-        Quantity("time", 1e-4, 0.1, why="limits are tested and targets sent once in a cycle"),
+        Quantity("time", 1e-4, 0.1, why="limits are tested and targets sent once per cycle"),
     ] = 0.004
     stop_together: Flag = True
-    """Whether a stop of one winch stops all. Trips stop all in any case."""
+    """Whether a stop of one winch stops all winches. A trip always stops all."""
     effects: tuple[str, ...] = ()
-    """Python files with effects of the user's own, which profiles of its winches may have."""
+    """Python files with user effects that profiles of its winches may contain."""
     description: str = ""
     path: str = field(default="", compare=False)
-    """The file it was read from; profiles and effects by path are found beside it."""
+    """The file it was read from; relative paths of profiles and effects start there."""
     latch_file: str = field(default="", compare=False)
-    """Where its trips are kept for later processes; empty for a simulation in this process."""
+    """File in which latched trips are saved; empty for a simulation in this process."""
 
     @property
     def record_file(self) -> str:
@@ -194,14 +194,14 @@ class BenchSpec(Table):
 
     @property
     def effect_files(self) -> tuple[Path, ...]:
-        """The files of ``effects``, those with a relative path beside the bench's own."""
+        """The files of ``effects``; relative paths start at the folder of the bench file."""
         return tuple(Path(self.path).parent / file for file in self.effects)
 
     def with_effects(self, files: Iterable[str | Path]) -> BenchSpec:
-        """The bench with more files of effects, their paths as seen from here."""
+        """The bench with further files of effects; relative paths start at the working folder."""
         return replace(self, effects=(*self.effects, *(str(Path(f).absolute()) for f in files)))
 
 
 def latch_path(bench_path: str) -> str:
-    """Where the trips of a bench are kept: beside its bench file."""
+    """File of a bench's latched trips, beside its bench file."""
     return f"{Path(bench_path).resolve().with_suffix('')}.trip.json"

@@ -1,4 +1,4 @@
-"""What files beside a bench declare of its load cells: a calibration, and the host's tares."""
+"""Contents of the files of load cells beside a bench: calibration, and tares of the host."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ LoadDirection = Literal["tension", "compression"]
 
 @dataclass(frozen=True)
 class CalibrationPoint(Table):
-    """One load as it was hung, and what the device showed."""
+    """One applied load and the device's reading."""
 
     load: Force
     indicated: Force
     """Mean of the device's gross value."""
     std: Force = 0.0
-    """Of that mean."""
+    """Standard deviation of that mean."""
     going: Literal["up", "down"] = "up"
-    """Whether the load before it was smaller or larger."""
+    """Direction of loading: ``up`` after a smaller load, ``down`` after a larger one."""
     series: WholeNumber = 1
 
 
@@ -51,14 +51,14 @@ class CellCalibration(Table):
     direction: LoadDirection = "tension"
     low: Force = 0.0
     high: PositiveForce = float("inf")
-    """Loads between which it was made."""
+    """Lowest and highest load of the calibration."""
     residual_std: Force = 0.0
     nonlinearity: Count = 0.0
-    """Largest departure of the mean curve from its straight line, as a share of the span."""
+    """Nonlinearity: largest deviation of the mean curve from its line, as a share of the span."""
     hysteresis: Count = 0.0
-    """Largest difference between going down and going up, as a share of the span."""
+    """Hysteresis: largest difference between unloading and loading, as a share of the span."""
     repeatability: Count = 0.0
-    """Standard deviation between series at the same load, as a share of the span."""
+    """Repeatability: standard deviation between series at a load, as a share of the span."""
     point: tuple[CalibrationPoint, ...] = ()
     path: str = field(default="", compare=False)
 
@@ -72,12 +72,12 @@ class CellCalibration(Table):
 
 @dataclass(frozen=True)
 class HostTare(Table):
-    """A tare of the host: subtracted from the calibrated value, unknown to the device."""
+    """A tare of the host: subtracted from the calibrated value and not stored in the device."""
 
     value: Force | Length
-    """Of a length instrument a length."""
+    """The subtracted value, N; m for a length instrument."""
     std: Force | Length = 0.0
-    """Of the mean that it was taken from."""
+    """Standard deviation of the mean from which it was taken."""
     taken: datetime | None = None
 
 
@@ -91,6 +91,6 @@ class TareBook(Table):
 
 
 def tare_book_path(bench_path: str) -> str:
-    """Where the tares of a bench stand: beside its wiring file."""
+    """File of a bench's tares, beside its bench file."""
     stem = bench_path.removesuffix(".toml")
     return f"{stem}.tares.toml"

@@ -1,4 +1,4 @@
-"""What files declare of how a drive notices that its host has gone."""
+"""Mechanisms by which a drive detects the loss of its host, as files declare them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ __all__ = [
 ]
 
 MECHANISMS = ("heartbeat", "guarding", "rpdo-timeout", "sync-loss")
-"""Those of CiA 301, best first."""
+"""Mechanisms of CiA 301, best first."""
 VENDOR = "vendor:"
-"""Before the name of a table ``[servo.vendor_watchdog.NAME]``."""
+"""Prefix of the name of a table ``[servo.vendor_watchdog.NAME]``."""
 HARDWARE = "hardware"
-"""In a bench file only: no object of the drive, but hardware beside it, stops the winch."""
+"""In a bench file only: external hardware, and no object of the drive, stops the winch."""
 
 _Stored = Whole(-(2**31), 2**32 - 1)
 
@@ -35,11 +35,11 @@ class VendorObject(Table):
     object: str
     """As ``0x2F21`` or ``0x2F21:1``."""
     value: Annotated[int, _Stored] | None = None
-    """What is written as it is."""
+    """Value to write."""
     time_unit: PositiveDuration | None = None
     """In place of ``value``: the limit is written in this unit, s."""
     off: Annotated[int, _Stored] | None = None
-    """What is written when the bench is closed at rest; left out, the object keeps its value."""
+    """Value to write when the bench is closed at rest; left out, the object keeps its value."""
 
     def rules(self) -> Iterator[Rule]:
         """An object gets either a value or the limit."""
@@ -52,7 +52,7 @@ class VendorWatchdog(Table):
     """A maker's own watchdog of the communication."""
 
     silence: Literal["heartbeat", "rpdo", "sync", "all"]
-    """The host's frames whose absence it notices; ``all``: any frame of the host."""
+    """Frames of the host whose absence it detects; ``all``: any frame of the host."""
     object: tuple[VendorObject, ...]
     """The objects that set it up, in the order in which they are written."""
     emergency: Annotated[int, Whole(1, 0xFFFF)] | None = None
@@ -60,7 +60,7 @@ class VendorWatchdog(Table):
 
 
 def unknown_mechanism(declared: str, vendor: tuple[str, ...]) -> str:
-    """What is wrong with a declared ``host_loss``; empty where it is known."""
+    """Fault of a declared ``host_loss``; empty where it is known."""
     if declared in MECHANISMS:
         return ""
     if declared == HARDWARE:

@@ -1,8 +1,7 @@
-"""Bounds beyond which a number in a file or on a command line is taken for a mistake, with reasons.
+"""Plausibility bounds of numbers in files and on the command line, with reasons.
 
-A value beyond them is refused where it is read: ``winchkit check`` says so, and nothing opens.
-They are wide; what is possible but rarely meant is a warning
-(:mod:`winchkit.schema.bench_warnings`).
+A value beyond its bound is refused when it is read, also by ``winchkit check``. The bounds are
+wide; valid but unusual values are warnings (:mod:`winchkit.schema.bench_warnings`).
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ LARGEST: Mapping[str, Bound] = {
     "length": Bound(1e5, "the longest cables of winches, in the deep sea, have some 10 km"),
     "speed": Bound(50.0, "mine hoists and cable cameras run at 20 m/s"),
     "acceleration": Bound(1000.0, "the fastest cable robots reach 430 m/s^2"),
-    "angle": Bound(1e8, "a motor turns less in its life on a drum"),
+    "angle": Bound(1e8, "a winch motor turns less in its service life"),
     "time": Bound(1e7, "it is 115 days"),
     "frequency": Bound(1e7, "no converter of a load cell is faster"),
     "force": Bound(1e15, "no cable and no frame has a force or a stiffness near it"),
-    "torque": Bound(1e9, "no motor or drum of a winch has it"),
+    "torque": Bound(1e9, "no motor or drum of a winch reaches it"),
     "mass": Bound(1e6, "no single cable holds 1000 t"),
     "force per time": Bound(1e12, "no cable breaks so fast"),
-    "temperature": Bound(1e4, "no cable stands it"),
+    "temperature": Bound(1e4, "no cable withstands it"),
 }
 """By dimension; others, and ratios, have none in general."""
 

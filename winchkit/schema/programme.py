@@ -1,4 +1,4 @@
-"""What a motion programme declares: moves, holds and questions to the operator, in order."""
+"""Contents of a motion programme: moves, holds and operator requests, in order."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 _RUN_UP = 0.1
-"""Over which a programme's first place is approached, m."""
+"""Distance over which the first position of a programme is approached, m."""
 STEP_ACTIONS = ("to", "by", "hold", "ask")
 
 
@@ -37,7 +37,7 @@ class Step(Table):
     """One step: exactly one of ``to``, ``by``, ``hold`` and ``ask`` is given."""
 
     winch: str = "all"
-    to: Annotated[float, Quantity("length", 0.0, why="a cable length is not below 0")] | None = None
+    to: Annotated[float, Quantity("length", 0.0, why="a cable length is at least 0")] | None = None
     """Cable length to go to, m."""
     by: Length | None = None
     """Change of cable length, m."""
@@ -45,14 +45,14 @@ class Step(Table):
     acceleration: PositiveAcceleration | None = None
     hold: PositiveDuration | None = None
     ask: str | None = None
-    """What the operator is asked to do; waits for the answer."""
+    """Request to the operator; the programme waits for the answer."""
     load_mass: PositiveMass | None = None
-    """The known weight that hangs on the rope from this step on, kg."""
+    """The known weight that hangs on the cable from this step on, kg."""
     temperature: Temperature | None = None
-    """Of rope and machine from this step on, degC."""
+    """Temperature of cable and machine from this step on, degC."""
 
     def rules(self) -> Iterator[Rule]:
-        """A step does one thing, and has the keys of that thing."""
+        """A step has one action, and only keys of this action."""
         given = [key for key in STEP_ACTIONS if getattr(self, key) is not None]
         if len(given) != 1:
             had = f"; it has {' and '.join(given)}" if given else ""
@@ -70,7 +70,7 @@ class Step(Table):
                 yield key, f"belongs to a step with 'ask', not to '{given[0]}'"
 
     def asks_beyond(self, hanging: float | None, warm: float | None) -> bool:
-        """Whether its question is about more than the load and the temperature that there are."""
+        """Whether it requests a load or a temperature other than the present ones."""
         if self.ask is None:
             return False
         told = self.load_mass is not None or self.temperature is not None
@@ -91,10 +91,18 @@ class Programme(Table):
     description: str = ""
 
     def approach(self, winch: str) -> tuple[float, ...]:
-        """Cable lengths (m) to come from and to begin at, so that all repeats are one motion.
+        """Cable lengths from which and to which a winch moves before the first repeat.
 
-        It begins where a repeat ends, and comes there from the same side. Empty where the
-        programme does not say where it ends.
+        Parameters
+        ----------
+        winch : str
+            Name of the winch.
+
+        Returns
+        -------
+        tuple of float
+            m; the second is the length at which a repeat ends, approached from the same side, so
+            that all repeats have the same motion. Empty where the final length is unknown.
         """
         here: float | None = None
         before: float | None = None
@@ -113,7 +121,7 @@ class Programme(Table):
         return here + max(-_RUN_UP, min(_RUN_UP, before - here)), here
 
     def rules(self) -> Iterator[Rule]:
-        """A programme without a step does nothing."""
+        """A programme has at least one step."""
         if not self.step:
             yield "step", "a programme needs at least one [[step]]"
 

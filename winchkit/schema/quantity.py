@@ -1,8 +1,8 @@
 """The types of file fields: a quantity with its unit in the file, an SI float in the dataclass.
 
-``winding_radius: Length`` reads ``"60 mm"`` and holds ``0.06``. The marker carries what a reader
-needs (dimension and range); pydantic is imported only when a file is read, and nothing is
-checked when code builds a dataclass from SI numbers.
+``winding_radius: Length`` reads ``"60 mm"`` and has the value ``0.06``. The marker has the
+dimension and the range. pydantic is imported only when a file is read; a dataclass that is built in
+code from SI numbers is not checked.
 """
 
 from __future__ import annotations
@@ -51,21 +51,21 @@ __all__ = [
 
 
 class Marker(ABC):
-    """Says within ``Annotated`` how a field is read from a file, and in words what is expected."""
+    """Reader of a field within ``Annotated``, with a description of the expected value."""
 
     @property
     @abstractmethod
     def wanted(self) -> str:
-        """What is expected in the file, in words."""
+        """Description of the expected value."""
 
     @abstractmethod
     def read(self, raw: object) -> object:
-        """Turn a value of a file into the field's; raises UsageError with the reason."""
+        """Convert a value of a file; raises UsageError with the reason."""
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: Callable[[Any], CoreSchema]
     ) -> CoreSchema:
-        """Let pydantic read the field through :meth:`read`."""
+        """Make pydantic read the field by :meth:`read`."""
         from pydantic_core import core_schema
 
         return core_schema.no_info_plain_validator_function(self.read)
@@ -75,8 +75,8 @@ class Marker(ABC):
 class Quantity(Marker):
     """Marks a float field as a quantity of ``dimension`` within ``[low, high]`` (SI).
 
-    With ``above`` the low end itself is excluded; ``why`` tells the reason of the range. No
-    quantity may be beyond its dimension's bound (``plausible``).
+    With ``above`` the low end itself is excluded; ``why`` is the reason of the range. The bound of
+    the dimension (``plausible``) applies too.
     """
 
     dimension: str
@@ -86,7 +86,7 @@ class Quantity(Marker):
     why: str = ""
 
     def read(self, raw: object) -> float:
-        """Turn a value of a file into SI; raises UsageError with the reason."""
+        """Convert a value of a file to SI; raises UsageError with the reason."""
         value = parse(raw, self.dimension)
         unit = next(iter(UNITS[self.dimension])) if self.dimension != "ratio" else ""
         reason = f": {self.why}" if self.why else ""
@@ -99,7 +99,7 @@ class Quantity(Marker):
 
     @property
     def wanted(self) -> str:
-        """What is expected in the file, in words."""
+        """Description of the expected value."""
         if self.dimension == "ratio":
             return "a number"
         unit = next(iter(UNITS[self.dimension]))
@@ -115,7 +115,7 @@ class Whole(Marker):
 
     @property
     def wanted(self) -> str:
-        """What is expected in the file, in words."""
+        """Description of the expected value."""
         if self.high is None:
             return f"a whole number of at least {self.low}"
         return f"a whole number from {self.low} to {self.high}"
@@ -135,7 +135,7 @@ class Truth(Marker):
 
     @property
     def wanted(self) -> str:
-        """What is expected in the file, in words."""
+        """Description of the expected value."""
         return "true or false"
 
     def read(self, raw: object) -> bool:

@@ -1,4 +1,4 @@
-"""Reads what users declare in TOML into frozen dataclasses in SI.
+"""Readers of declarations in TOML into frozen dataclasses in SI.
 
     winch = read_winch("profiles/bench-spiral.toml")
 
@@ -60,7 +60,7 @@ PathLike = str | Path
 
 @dataclass(frozen=True)
 class Declaration:
-    """A file of any kind as read, with what is doubtful in it but no fault."""
+    """A file of any kind as read, with its warnings."""
 
     kind: str
     """As the file's key ``kind`` has it, e.g. ``winch`` or ``bench``."""
@@ -74,12 +74,12 @@ def read_winch(path: PathLike) -> WinchProfile:
 
 
 def read_robot(path: PathLike) -> RobotProfile:
-    """Read a robot's profile; lines that name a winch hold its profile, read as well."""
+    """Read a robot's profile, with the winch profiles that its lines name."""
     return _read(path, "robot", RobotProfile)
 
 
 def read_bench(path: PathLike) -> BenchSpec:
-    """Read a wiring file; its profiles and devices must exist and fit."""
+    """Read a bench file; its profiles and devices must exist and fit."""
     return _read(path, "bench", BenchSpec)
 
 
@@ -99,7 +99,7 @@ def read_device(path: PathLike) -> DeviceSpec:
 
 
 def read_size(path: PathLike) -> SizeSpec:
-    """Read what a winch is to be sized for."""
+    """Read a sizing specification."""
     return _read(path, "size", SizeSpec)
 
 
@@ -114,12 +114,12 @@ def read_tares(path: PathLike) -> TareBook:
 
 
 def read_any(path: PathLike) -> Declared:
-    """Read a declaration of whichever kind it says it is."""
+    """Read a declaration of the kind that it declares."""
     return load(path).value
 
 
 def load(path: PathLike, kind: str | None = None) -> Declaration:
-    """Read a declaration with its warnings; of ``kind``, if one is asked for."""
+    """Read a declaration with its warnings; ``kind``, if given, is required."""
     reading = Reading(open_source(path))
     found = reading.source.kind
     if kind is not None and found != kind:
@@ -166,7 +166,7 @@ def _line(reading: Reading, raw: object, at: Key) -> object:
     else:
         profile = None
         reading.fault(place, f"expected the name of a winch or its tables, not {winch!r}")
-    # A winch with faults, noted above, is not to be reported a second time.
+    # The faults of a winch are noted above and not reported a second time.
     return {**raw, "winch": profile or str(winch)}
 
 

@@ -1,4 +1,4 @@
-"""What a simulated bench declares: what is wired, what is true, what goes wrong."""
+"""Contents of a simulated bench: bench, true values, hidden effects, noise and faults."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ __all__ = ["FaultSpec", "HiddenSpec", "NoiseSpec", "SimBench", "WinchTruth"]
 
 @dataclass(frozen=True)
 class HiddenSpec(Table):
-    """A piece of the simulator's own physics; ``answers`` is for scoring only."""
+    """An effect of the simulator's own physics; ``answers`` is for scoring only."""
 
     physics: str
-    """Name in the simulator's own table of physics, which is not the catalogue of effects."""
+    """Name in the simulator's table of physics, which is separate from the catalogue of effects."""
     numbers: Mapping[str, Any]
     answers: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class WinchTruth(Table):
-    """What is true of one winch and its profile does not say."""
+    """True values of one winch that differ from its profile."""
 
     overrides: Mapping[str, Any] = field(default_factory=dict)
     """Dotted profile keys with their true values, e.g. ``{"drum.winding_radius": "60.4 mm"}``."""
     hidden: tuple[HiddenSpec, ...] = ()
     load_mass: PositiveMass = 20.0
-    """The weight that hangs there until a programme asks for another, kg."""
+    """Mass on the cable until a programme requests another, kg."""
     temperature: Temperature = 20.0
     temperature_drift: Annotated[float, Quantity("temperature drift")] = 0.0
     """K per hour."""
@@ -53,7 +53,7 @@ class NoiseSpec(Table):
 
 @dataclass(frozen=True)
 class FaultSpec(Table):
-    """Something that goes wrong at a time."""
+    """A fault at a time."""
 
     time: Duration
     kind: str
@@ -63,7 +63,7 @@ class FaultSpec(Table):
 
 @dataclass(frozen=True)
 class SimBench(Table):
-    """A simulated bench: a bench and its truth, winch by winch."""
+    """A simulated bench: a bench, and the true values of each winch."""
 
     name: str
     bench: BenchSpec

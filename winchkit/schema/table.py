@@ -1,6 +1,6 @@
-"""The base of every declared table: unknown keys are refused, and rules tie its keys together.
+"""Base class of every declared table: unknown keys are refused, and rules relate its keys.
 
-The rules are checked when a file is read, never when code builds a dataclass from SI numbers.
+The rules are checked when a file is read, not when code builds a dataclass from SI numbers.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 __all__ = ["BrokenRules", "Rule", "Table"]
 
 Rule = tuple[str, str]
-"""A key of the table (dotted, positions in arrays from 0; empty for the table itself) and what is
-wrong with it."""
+"""A key of the table (dotted, positions in arrays from 0; empty for the table itself) and its
+fault."""
 
 
 class BrokenRules(ValueError):
-    """The rules that one table breaks; carries them from pydantic to the reader."""
+    """The rules that one table violates; passed from pydantic to the reader."""
 
     def __init__(self, rules: tuple[Rule, ...]) -> None:
         super().__init__(*rules)
@@ -27,19 +27,19 @@ class BrokenRules(ValueError):
 
 
 class Table:
-    """A table of a file; a dataclass that derives from it yields its broken :meth:`rules`."""
+    """A table of a file; a dataclass that derives from it yields its violated :meth:`rules`."""
 
-    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - pydantic reads this very name
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - pydantic reads this name
 
     def rules(self) -> Iterator[Rule]:
-        """Yield what is wrong between keys that are each right."""
+        """Yield contradictions between keys that are each valid."""
         yield from ()
 
     @classmethod
     def __get_pydantic_core_schema__(
         cls, source: object, handler: Callable[[Any], CoreSchema]
     ) -> CoreSchema:
-        """Let pydantic check the rules once the fields have been read."""
+        """Make pydantic check the rules after reading the fields."""
         from pydantic_core import core_schema
 
         return core_schema.no_info_after_validator_function(_obey, handler(source))

@@ -1,7 +1,7 @@
-"""The little language in which a device file writes a line of text: ``ST,{kind:2},{value:8}kg``.
+"""Templates of lines of text in a device file: ``ST,{kind:2},{value:8}kg``.
 
 ``{name:8}`` is a field of eight characters, ``{name}`` one that ends where the next literal
-character begins or with the line. ``{skip}`` is text of no interest. ``{{`` is a brace.
+character begins or with the line. ``{skip}`` is ignored text. ``{{`` is a brace.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ class Part:
 
 
 def parts_of(template: str) -> tuple[Part, ...]:
-    """Pieces of a template in order; raises UsageError with what is wrong in it."""
+    """Pieces of a template in order; raises UsageError with its fault."""
     try:
         pieces = list(Formatter().parse(template))
     except ValueError as error:
-        raise UsageError(f"'{template}' is no template: {error}") from error
+        raise UsageError(f"'{template}' is not a template: {error}") from error
     found: list[Part] = []
     for literal, field, width, conversion in pieces:
         if literal:
@@ -87,6 +87,6 @@ def _refuse_doubtful(template: str, parts: list[Part]) -> None:
     for part, after in pairwise(parts):
         if part.field and part.width is None and after.field:
             raise UsageError(
-                f"'{template}': nothing tells where {{{part.field}}} ends and {{{after.field}}} "
-                "begins; give it a width"
+                f"'{template}': the end of {{{part.field}}} and the start of {{{after.field}}} are "
+                "ambiguous; give the first a width"
             )

@@ -1,4 +1,4 @@
-"""Simulated benches as a whole: their profiles, and what is hidden in them."""
+"""Simulated benches: their profiles and hidden effects."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
 def programme_path(name: str) -> Path:
     """Path of a motion programme: a file, or one shipped beside the simulated benches.
 
-    Raises FileError naming those that are shipped.
+    Raises FileError with the shipped ones.
     """
     for path in (Path(name), folder("sim") / f"{name}.toml"):
         if path.is_file():
@@ -58,10 +58,25 @@ def programme_path(name: str) -> Path:
 
 
 def hiding(bench: SimBench, physics: Sequence[str]) -> SimBench:
-    """Hide the named physics on every winch instead of what is hidden there.
+    """Replace the hidden effects of every winch.
 
-    ``"elastic rope"`` has its typical size, ``"elastic rope, axial_stiffness=80 kN"`` its own
-    numbers, ``none`` hides nothing. Raises FileError naming what is known.
+    Parameters
+    ----------
+    bench : SimBench
+        The simulated bench.
+    physics : sequence of str
+        Names, such as ``"elastic rope"`` at its typical size, or with values,
+        ``"elastic rope, axial_stiffness=80 kN"``; ``none`` hides nothing.
+
+    Returns
+    -------
+    SimBench
+        A copy.
+
+    Raises
+    ------
+    FileError
+        For an unknown name, with the known ones.
     """
     specs = tuple(_spec(text) for text in physics if text != "none")
     build(specs)
@@ -76,12 +91,12 @@ def _spec(text: str) -> HiddenSpec:
 
 
 def demo_names() -> list[str]:
-    """Names of the simulated benches among which a demonstration chooses."""
+    """Names of the simulated benches of the demonstration."""
     return [name for name in names("sim") if name.startswith(_DEMO)]
 
 
 def listed_benches() -> list[dict[str, object]]:
-    """Every shipped simulated bench: name, description, and what it hides."""
+    """Every shipped simulated bench: name, description, and hidden effects."""
     from winchkit.schema.read import load
 
     rows: list[dict[str, object]] = []
@@ -97,10 +112,9 @@ def listed_benches() -> list[dict[str, object]]:
 
 
 def choose_bench(seed: int) -> SimBench:
-    """The demonstration's bench for a seed: which effect it hides, and how large it is.
+    """The demonstration's bench for a seed, which determines the hidden effect and its size.
 
-    The same seed gives the same bench, seeds in a row go through all of them; sizes vary
-    between 0.8 and 1.3 of the declared ones.
+    Consecutive seeds give all benches in turn; sizes are 0.8 to 1.3 times the declared ones.
     """
     from winchkit.schema.read import read_simbench
 
@@ -119,5 +133,5 @@ def choose_bench(seed: int) -> SimBench:
 
 
 def choose_hidden(seed: int) -> dict[str, tuple[HiddenSpec, ...]]:
-    """What :func:`choose_bench` hides for a seed, by winch; an empty tuple is nothing."""
+    """Hidden effects of :func:`choose_bench` for a seed, by winch; an empty tuple for none."""
     return {name: truth.hidden for name, truth in choose_bench(seed).truth.items()}

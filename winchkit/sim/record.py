@@ -1,4 +1,4 @@
-"""Runs a programme on simulated winches without buses, faster than real time."""
+"""Execution of a programme on simulated winches without buses, faster than real time."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _UNITS = {
     "temperature": "degC",
 }
 _SWITCH_ON = 0.02
-"""Time that the drive holds before the first sample, s."""
+"""Hold of the drive before the first sample, s."""
 
 
 def record(
@@ -46,12 +46,33 @@ def record(
     seed: int = 0,
     rate: float = 50.0,
 ) -> Iterator[Run]:
-    """Yield one run per repeat and load, sampled at ``rate`` Hz.
+    """Simulate a programme.
 
-    ``profiles`` are the declared ones by winch. Each run starts at rest with fresh noise and
-    with every memory at its null, as if the load had just been hung; only temperature goes on
-    from run to run. The same arguments give the same runs. Raises UsageError for a rate that
-    the plant cannot give, FileError for a programme that does not fit the bench.
+    Parameters
+    ----------
+    bench : SimBench
+        The simulated bench.
+    profiles : mapping
+        Declared profiles by winch.
+    programme : Programme
+        The motion programme.
+    seed : int
+        Seed of the noise; the same arguments give the same runs.
+    rate : float
+        Sampling rate, Hz.
+
+    Yields
+    ------
+    Run
+        One per repeat and load. Each starts at rest with new noise and with all effects with memory
+        at their null; only the temperature continues from run to run.
+
+    Raises
+    ------
+    UsageError
+        For an impossible rate.
+    FileError
+        For a programme that does not match the bench.
     """
     if not 0 < rate <= 1 / MAX_STEP:
         raise UsageError(f"rate {rate:g} Hz must be above 0 and at most {1 / MAX_STEP:g} Hz")
@@ -73,7 +94,7 @@ def record(
 
 
 class _Recording:
-    """One run being made: a plant per winch, stepped together."""
+    """One run in progress: a plant per winch, integrated together."""
 
     def __init__(
         self,
@@ -98,7 +119,7 @@ class _Recording:
         }
 
     def rows(self) -> list[Row]:
-        """Time and readings of every winch, row by row."""
+        """Time and readings of every winch, by row."""
         length = dict(self._plan.start)
         for name, plant in self._plants.items():
             plant.advance(_SWITCH_ON, self._command(name, length[name], 0.0))
@@ -122,7 +143,7 @@ class _Recording:
         return rows
 
     def _command(self, name: str, length: float, speed: float) -> DriveCommand:
-        """What the drive is told so that the declared winch would be at ``length``."""
+        """Command at which the declared winch has the cable length ``length``."""
         chain = self._chains[name]
         angle = chain.motor_angle(length)
         return DriveCommand(angle=angle, speed=-speed / chain.arm(angle))
@@ -141,7 +162,7 @@ def _truth_of_run(truth: WinchTruth, run_plan: RunPlan, winch: str) -> WinchTrut
 def _as_run(
     name: str, rows: Sequence[Row], bench: SimBench, programme: Programme, run_plan: RunPlan
 ) -> Run:
-    """Columns of the instruments that the bench has, with what the run's reader must know."""
+    """Columns of the bench's instruments, with the metadata of the run."""
     import numpy as np
 
     from winchkit.runs.run import Channel, Run
@@ -171,7 +192,7 @@ def _signals(wired: WinchWiring) -> list[str]:
 
 
 def _metadata(bench: SimBench, programme: Programme, run_plan: RunPlan) -> dict[str, str]:
-    """What a recorder on the real bench would note; nothing of the truth."""
+    """Metadata of a recorder on the real bench, without the true values."""
     wiring = bench.bench.winch
     metadata = {"bench": bench.name, "programme": programme.name}
     if len(wiring) == 1:

@@ -1,4 +1,4 @@
-"""A motion programme laid out in time: which run holds which moves under which load."""
+"""Schedule of a motion programme: runs with their moves and loads over time."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from winchkit.units import suggest
 __all__ = ["Leg", "RunPlan", "schedule"]
 
 _JERK_TIME = 0.4
-"""Over which an acceleration builds up where nothing else limits the jerk, s."""
+"""Rise time of an acceleration without another limit of jerk, s."""
 _NOTHING = (
-    "nothing moves and nothing is held: a repeat starts where it ends, so that repeats are equal; "
-    "add a step to another length, or a hold"
+    "the programme has neither a move nor a hold: a repeat starts at the length where it ends; add "
+    "a step to another length, or a hold"
 )
 ASK_PAUSE = 20.0
-"""How long an operator takes to hang a load, s."""
+"""Time of an operator to attach a load, s."""
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One step: moves of cable length that begin together, or a hold without any."""
+    """One step: moves of cable length with a common start, or a hold."""
 
     duration: float
     moves: Mapping[str, SCurve] = field(default_factory=dict)
@@ -33,19 +33,19 @@ class Leg:
 
 @dataclass(frozen=True)
 class RunPlan:
-    """One run: where it starts, what hangs there, what moves."""
+    """One run: initial lengths, loads and moves."""
 
     start: Mapping[str, float]
     """Cable length of every winch, m."""
     load_mass: Mapping[str, float]
-    """Known weight on every winch, kg."""
+    """Known mass on every winch, kg."""
     legs: tuple[Leg, ...]
     elapsed: float
-    """Since the programme began, pauses included, s."""
+    """Start since that of the programme, pauses included, s."""
     temperature: Mapping[str, float] = field(default_factory=dict)
-    """What winches were brought to, degC, where somebody was asked to."""
+    """Temperatures that were requested, by winch, degC."""
     warmed: float = 0.0
-    """When that was, s since the programme began."""
+    """Time of that request since the start of the programme, s."""
 
     @property
     def duration(self) -> float:
@@ -54,7 +54,7 @@ class RunPlan:
 
 
 class _Layout:
-    """Walks through the steps and notes where everything stands."""
+    """Evaluates the steps with the resulting lengths, loads and times."""
 
     def __init__(
         self, limits: Mapping[str, LimitSpec], length: dict[str, float], load: dict[str, float]
@@ -88,7 +88,7 @@ class _Layout:
         self._begin()
 
     def take(self, step: Step, winches: Sequence[str]) -> None:
-        """Lay out one step for the winches that it names."""
+        """Schedule one step for the winches that it names."""
         if step.load_mass is not None and any(
             self.load[name] != step.load_mass for name in winches
         ):
@@ -127,11 +127,28 @@ def schedule(
     length: Mapping[str, float],
     load_mass: Mapping[str, float],
 ) -> list[RunPlan]:
-    """Lay a programme out: every repeat, a new run at every change of load.
+    """Schedule all repeats of a programme, with a new run at every change of load.
 
-    ``length`` and ``load_mass`` hold at its start by winch. The first run starts where a
-    repeat ends, so that all repeats are the same motion. Raises FileError for a step of an
-    unknown winch, one that leaves a winch's length limits, or where nothing is left to record.
+    Parameters
+    ----------
+    programme : Programme
+        The motion programme.
+    limits : mapping
+        Limits by winch.
+    length, load_mass : mapping
+        Initial cable length, m, and mass, kg, by winch.
+
+    Returns
+    -------
+    list of RunPlan
+        The first run starts at the length where a repeat ends, so that all repeats have the same
+        motion.
+
+    Raises
+    ------
+    FileError
+        For a step of an unknown winch or beyond a winch's length limits, and for a programme
+        without motion and hold.
     """
     _check_names(programme, list(limits))
     layout = _Layout(limits, dict(length), dict(load_mass))

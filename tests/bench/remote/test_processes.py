@@ -25,7 +25,7 @@ from winchkit.bench.ownership import owner_process
 from winchkit.errors import NotPermitted
 from winchkit.runs import read_run
 from winchkit.schema.read import read_bench
-from winchkit.sim.live.client import tell
+from winchkit.sim.live.client import send
 
 pytestmark = [
     pytest.mark.realtime,
@@ -86,7 +86,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 def state(served: Path) -> tuple[float, str]:
     """True cable length, m, and the drive's state, as the simulation tells."""
-    found = re.match(r"A: ([\d.]+) m, .* kg, ([a-z ]+)", tell(served, "status"))
+    found = re.match(r"A: ([\d.]+) m, .* kg, ([a-z ]+)", send(served, "status"))
     assert found is not None
     return float(found[1]), found[2]
 

@@ -57,6 +57,21 @@ def collected(instrument: Instrument) -> list[Reading]:
     return readings
 
 
+def test_after_a_damaged_answer_no_time_out_is_waited_for() -> None:
+    """The connection is opened anew at once: with a time-out of a minute readings go on."""
+    instrument = cell()
+    damaged = {5, 12, 13}
+    cut = lambda _u, number, body: (0.0, body[:-2] if number in damaged else body)  # noqa: E731
+    with Peer(behave=cut) as peer:
+        weigh(peer, 19_613)
+        readings = collected(instrument)
+        with polled(peer, instrument, timeout=60.0):
+            until(lambda: len(readings) > 20, within=10.0)
+    usable = [reading.value for reading in readings if reading.quality.usable]
+    assert usable == pytest.approx([196.13] * len(usable))
+    assert peer.connections >= 1 + len(damaged)
+
+
 def test_readings_come_with_their_times() -> None:
     instrument = cell()
     with Peer() as peer:

@@ -192,6 +192,25 @@ def test_a_cut_reply_and_another_reply_never_join(cut: int, other: int, pieces: 
     assert gate.broken
 
 
+@given(
+    st.lists(st.sampled_from([0, 0x2B]) | st.integers(0, 255), min_size=14, max_size=14),
+    st.integers(0, 13),
+)
+def test_no_answer_is_refused_for_bytes_that_it_held_before(data: list[int], at: int) -> None:
+    """A register that stays meets every transaction number once in 65,000 requests."""
+    body = (1, 3, 14, *data)
+    gate, number = TcpAnswerGate(), max(int.from_bytes(bytes(body[2 + at : 4 + at])) - 5, 0)
+    for k in range(30):
+        while gate.resembles(number):
+            number += 1
+        gate.sent(tcp(number, 1, 3, 0, 6, 0, 7))
+        answered = gate.received(tcp(number, *body)) != b""
+        assert answered or k == 0
+        if not answered:
+            return  # nothing was known before the first answer
+        number += 1
+
+
 def test_what_was_not_answered_in_time_ends_the_connection() -> None:
     gate = asked_tcp()
     assert not gate.expire()

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.report.figures.reduction import bin_means, filled_edges, thin, thin_points
+from winchkit.report.figures.reduction import bin_means, decimated, decimated_points, filled_edges
 
 
 @given(st.integers(1, 5000), st.integers(10, 400), st.integers(0, 2**32 - 1))
 def test_every_extreme_stays_and_the_length_is_kept(count: int, points: int, seed: int) -> None:
     values = np.random.default_rng(seed).normal(size=count)
     x = np.arange(count, dtype=float)
-    short_x, (short,) = thin(x, [values], points)
+    short_x, (short,) = decimated(x, [values], points)
     assert len(short_x) == len(short) <= max(points, 1)
     assert (short.min(), short.max()) == (values.min(), values.max())
     assert np.all(np.diff(short_x) >= 0)
@@ -24,14 +24,14 @@ def test_every_extreme_stays_and_the_length_is_kept(count: int, points: int, see
 def test_a_gap_stays_a_gap() -> None:
     values = np.ones(1000)
     values[400:600] = np.nan
-    _, (short,) = thin(np.arange(1000.0), [values], 100)
+    _, (short,) = decimated(np.arange(1000.0), [values], 100)
     assert np.count_nonzero(np.isnan(short)) == pytest.approx(20, abs=2)
 
 
 def test_a_single_spike_is_drawn() -> None:
     values = np.zeros(100_000)
     values[54_321] = 7.0
-    at, (short,) = thin(np.arange(100_000.0), [values], 2000)
+    at, (short,) = decimated(np.arange(100_000.0), [values], 2000)
     assert at[np.argmax(short)] == pytest.approx(54_321, abs=100)
     assert short.max() == 7.0
 
@@ -39,7 +39,7 @@ def test_a_single_spike_is_drawn() -> None:
 @given(st.integers(1, 3000), st.integers(1, 300))
 def test_dots_are_few_and_sorted(count: int, points: int) -> None:
     x = np.random.default_rng(count).normal(size=count)
-    chosen = thin_points(x, points)
+    chosen = decimated_points(x, points)
     assert 1 <= len(chosen) <= points
     assert np.all(np.diff(x[chosen]) >= 0)
 

@@ -9,7 +9,7 @@ import pytest
 from report_answers import CALM, FIVE_CORNERS, FRICTION, NOISY, RUBBING, STRETCH, told
 from winchkit.diagnosis.results import Estimate, Step, Where
 from winchkit.effects.catalogue import load_catalogue
-from winchkit.report.words.sentence import sentence, telling, where_text
+from winchkit.report.words.sentence import main_patterns, sentence, where_text
 from winchkit.report.words.vocabulary import clause, estimate_text, kind, listed
 
 
@@ -157,7 +157,7 @@ def test_places_are_named_as_the_field_names_them(where: Where, text: str) -> No
 
 
 def test_a_clear_order_tells_more_than_a_larger_trend() -> None:
-    first = telling(FIVE_CORNERS)
+    first = main_patterns(FIVE_CORNERS)
     assert [(place.output, place.order) for place in first] == [
         ("tension", 5),
         ("motor_torque", None),

@@ -20,7 +20,7 @@ from winchkit.schema.programme import Step
 from winchkit.schema.read import read_bench, read_simbench
 from winchkit.schema.simbench import FaultSpec, NoiseSpec, SimBench
 from winchkit.sim.live.bench import LiveBench
-from winchkit.sim.live.client import address_file, answer, is_simulated, tell
+from winchkit.sim.live.client import address_file, answer, is_simulated, send
 from winchkit.sim.live.control import ControlServer, obey
 
 COUNT = 2 * 3.141592653589793 / 65536
@@ -229,13 +229,13 @@ def test_another_process_finds_the_simulation_beside_its_wiring_file(
         assert live.winches["A"].plant.load_mass == 25
         assert not answer(path, Step(ask="look at it"))
         with pytest.raises(DeviceRefused, match="unknown line 'dance'"):
-            tell(path, "dance")
-        assert tell(path, "quit") == "ending"
+            send(path, "dance")
+        assert send(path, "quit") == "ending"
         assert ended
     assert not answer(path, Step(ask="hang it", load_mass=25.0))
     address_file(path).write_text("127.0.0.1:1\n", encoding="utf-8")
     with pytest.raises(ConnectionLost, match="sim serve"):
-        tell(path, "status")
+        send(path, "status")
 
 
 def test_a_machine_without_a_multicast_route_is_told_how_to_get_one(

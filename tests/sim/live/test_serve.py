@@ -15,7 +15,7 @@ import can
 import pytest
 
 from winchkit.schema.read import read_bench
-from winchkit.sim.live.client import address_file, tell
+from winchkit.sim.live.client import address_file, send
 
 COMMAND = [sys.executable, "-c", "from winchkit.cli import main; main()", "sim", "serve"]
 
@@ -64,8 +64,8 @@ def test_it_serves_until_it_is_interrupted(tmp_path: Path, number: int) -> None:
         wait_for_file(process, address_file(path))
         bus = read_bench(path).bus["can"]
         assert isinstance(bus.port, int)
-        tell(path, "load A 14 kg")
-        assert "14 kg" in tell(path, "status")
+        send(path, "load A 14 kg")
+        assert "14 kg" in send(path, "status")
         with can.Bus(interface="udp_multicast", channel=bus.channel, port=bus.port) as master:
             # Upload 1018:4, the serial number, of node 1.
             request = can.Message(

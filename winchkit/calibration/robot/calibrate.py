@@ -205,7 +205,7 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
     payload = [e for e in options.effects if e.startswith("payload")]
     if payload and len(robot.names) < 6:
         raise UsageError(
-            f"{payload[0]} needs cables that hold all six freedoms; the robot has "
+            f"{payload[0]} needs cables that hold all six degrees of freedom; the robot has "
             f"{len(robot.names)} lines"
         )
     if payload and not tension and parameters.law is None:

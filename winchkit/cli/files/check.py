@@ -160,10 +160,10 @@ def _declaration(file: str, effects: Sequence[str]) -> Verdict:
 
 def _doubts(file: str, bench: BenchSpec | None) -> list[Fault]:
     """Limits of a bench that are possible and rarely meant."""
-    from winchkit.schema.bench_warnings import doubts
+    from winchkit.schema.bench_warnings import bench_warnings
     from winchkit.schema.reading.source import open_source
 
-    if bench is None or not (found := list(doubts(bench))):
+    if bench is None or not (found := list(bench_warnings(bench))):
         return []
     source = open_source(file)
     return [source.fault(key, message) for key, message in found]

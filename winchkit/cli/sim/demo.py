@@ -1,4 +1,4 @@
-"""``winchkit demo``: the whole loop on a simulated bench, the truth revealed last."""
+"""``winchkit demo``: the whole loop on a simulated bench, with the hidden effect shown last."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ import click
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
-    from winchkit.cli.sim.demo_loop import Findings, Told
+    from winchkit.cli.sim.demo_loop import Findings, ProgressCallback
     from winchkit.diagnosis.results import Comparison
 
 __all__ = ["command"]
 
 _RECORDING_SECONDS = 62.0
-_FEEDS_SHOWN = 2
+_SHARES_SHOWN = 2
 _OPENING = (
     "A simulated bench with seed {seed}: a winch, a CiA 402 drive on CAN, a load cell, a length "
-    "and a temperature instrument on Modbus. Its truth hides something, or nothing."
+    "and a temperature instrument on Modbus. It has at most one effect that its profile lacks."
 )
 
 
 @click.command()
-@click.option("--seed", default=1, show_default=True, help="Which effect is hidden, and the noise.")
+@click.option("--seed", default=1, show_default=True, help="Seed of hidden effect and noise.")
 @click.option(
     "--out",
     default="winchkit-demo",
@@ -35,14 +35,14 @@ _OPENING = (
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for runs, profiles and report.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON, the story aside.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.pass_context
 def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
-    """Find a hidden effect on a simulated bench, from the first CAN frame to the better profile.
+    """Find a hidden effect on a simulated bench, from the first CAN frame to the extended profile.
 
-    A drive on a CAN bus and instruments on Modbus are simulated, their protocols are real; a
-    minute of simulated time passes as fast as this computer can. Exits with 0 when the hidden
-    effect was found and the held-out error has come down to the noise, else with 1.
+    A drive on a CAN bus and instruments on Modbus are simulated, with real protocols; a minute of
+    simulated time passes as fast as this computer allows. Exits with 0 when the hidden effect was
+    found and the held-out error is at the noise floor, else with 1.
     """
     from winchkit.catalog import find
     from winchkit.cli.sim import demo_loop
@@ -51,70 +51,70 @@ def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
     from winchkit.schema.read import read_winch
     from winchkit.sim import choose_bench
 
-    begun = time.monotonic()
+    started = time.monotonic()
     story = _Story(quiet=as_json)
     bench = choose_bench(seed)
     profile_name = next(iter(bench.bench.winch.values())).profile
-    story.tell(_OPENING.format(seed=seed))
-    with _progress(_RECORDING_SECONDS) as told:
-        paths = demo_loop.record(bench, seed, out / "runs", told)
-        told("thinking", _RECORDING_SECONDS)
+    story.add(_OPENING.format(seed=seed))
+    with _progress(_RECORDING_SECONDS) as progress:
+        paths = demo_loop.record(bench, seed, out / "runs", progress)
+        progress("diagnosing", _RECORDING_SECONDS)
         runs = [read_run(path) for path in paths]
         comparison = compare(runs, read_winch(find("profiles", profile_name)))
         findings = demo_loop.learn(runs, profile_name, out)
-    story.tell(
+    story.add(
         f"{len(runs)} runs were recorded, each motion twice under two loads: "
         f"{sum(len(run) for run in runs)} rows in {out / 'runs'}."
     )
-    _tell_findings(story, comparison, findings)
+    _add_findings(story, comparison, findings)
     truth = demo_loop.truth_of(bench)
     right = findings.right(truth)
     hidden = ", ".join(truth) or "nothing"
-    story.tell(f"The truth: {hidden} was hidden. {'Found.' if right else 'Not found.'}")
+    story.add(f"Hidden effect: {hidden}. {'Found.' if right else 'Not found.'}")
     report = _write_report(out, story, findings, profile_name, hidden)
-    seconds = time.monotonic() - begun
-    story.say(f"Report: {report}   ({seconds:.0f} s)")
+    seconds = time.monotonic() - started
+    story.print(f"Report: {report}   ({seconds:.0f} s)")
     if as_json:
         echo_json(_outcome(seed, findings, truth, seconds, out))
     ctx.exit(0 if right else 1)
 
 
 class _Story:
-    """What is told, sentence by sentence, and kept for the report."""
+    """Sentences that are printed and kept for the report."""
 
     def __init__(self, quiet: bool) -> None:
         self.sentences: list[str] = []
         self._quiet = quiet
 
-    def tell(self, sentence: str) -> None:
-        """Tell a sentence and keep it."""
+    def add(self, sentence: str) -> None:
+        """Print a sentence and keep it."""
         self.sentences.append(sentence)
-        self.say(sentence)
+        self.print(sentence)
 
-    def say(self, text: str) -> None:
-        """Tell only: to stdout, or to stderr where JSON goes to stdout."""
+    def print(self, text: str) -> None:
+        """Print a text to stdout, or to stderr where JSON goes to stdout."""
         import textwrap
 
         click.echo(textwrap.fill(text, 80, subsequent_indent="  "), err=self._quiet)
 
 
-def _tell_findings(story: _Story, comparison: Comparison, findings: Findings) -> None:
+def _add_findings(story: _Story, comparison: Comparison, findings: Findings) -> None:
     from winchkit.report.words.numbers import percent, quantity
     from winchkit.report.words.sentence import sentence
     from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
     for name, error in comparison.outputs.items():
-        told = f"Nominal model, {OUTPUT_NAMES[name]}: off by {quantity(error.rms, error.unit)} rms"
+        text = f"Nominal model, {OUTPUT_NAMES[name]}: error {quantity(error.rms, error.unit)} rms"
         if error.noise_rms is not None:
-            told += f" where repeats differ by {quantity(error.noise_rms, error.unit)}"
-        follows = [f"{VARIABLE_NAMES.get(v, v)} {percent(s)}" for v, s in error.follows]
-        if follows:
-            told += f"; it follows {', '.join(follows[:_FEEDS_SHOWN])}"
-        story.tell(told + ".")
-    story.tell(sentence(findings.answer.diagnosis))
+            text += f", noise {quantity(error.noise_rms, error.unit)}"
+        shares = [f"{VARIABLE_NAMES.get(v, v)} {percent(s)}" for v, s in error.follows]
+        if shares:
+            text += f"; variance explained by {', '.join(shares[:_SHARES_SHOWN])}"
+        story.add(text + ".")
+    story.add(sentence(findings.answer.diagnosis))
     if findings.addition is not None:
         added = findings.addition.added[0].effect.id
-        story.tell(f"Added {added} to a copy of the profile: improved.toml beside nominal.toml.")
+        story.add(f"Added {added} to a copy of the profile: improved.toml beside nominal.toml.")
 
 
 def _write_report(
@@ -154,7 +154,7 @@ def _outcome(
 
 
 @contextmanager
-def _progress(total: float) -> Iterator[Told]:
+def _progress(total: float) -> Iterator[ProgressCallback]:
     """A progress bar on stderr, by the recorded time."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -169,7 +169,7 @@ def _progress(total: float) -> Iterator[Told]:
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting", total=total)
 
-        def told(what: str, recorded: float) -> None:
+        def progress(what: str, recorded: float) -> None:
             bar.update(task, description=what, completed=min(recorded, 0.98 * total))
 
-        yield told
+        yield progress

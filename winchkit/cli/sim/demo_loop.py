@@ -1,4 +1,4 @@
-"""The stations of the demonstration: record on a simulated bench, diagnose, add, compare."""
+"""Steps of the demonstration: record on a simulated bench, diagnose, add, compare."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from winchkit.schema.programme import Programme, Step
     from winchkit.schema.simbench import SimBench
 
-__all__ = ["Findings", "Told", "learn", "programmes", "record", "truth_of"]
+__all__ = ["Findings", "ProgressCallback", "learn", "programmes", "record", "truth_of"]
 
-Told = Callable[[str, float], None]
-"""Told what is being done, and the recorded time so far, s."""
+ProgressCallback = Callable[[str, float], None]
+"""Called with the present step and the recorded time, s."""
 
 PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
 _AT_NOISE = 1.3
@@ -30,15 +30,15 @@ _APPROACH = 0.5
 
 @dataclass(frozen=True)
 class Findings:
-    """What the loop found, the truth still unknown to it."""
+    """Result of the loop, without knowledge of the hidden effect."""
 
     answer: WinchAnswer
     addition: Addition | None
-    """The effect named first, added to the profile."""
+    """Addition of the first named effect to the profile."""
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Effects of the first step, as the data leave them; empty where nothing is missing."""
+        """Effects of the first step; empty where none is missing."""
         steps = self.answer.diagnosis.steps
         return steps[0].effects if steps else ()
 
@@ -52,7 +52,7 @@ class Findings:
         )
 
     def right(self, truth: tuple[str, ...]) -> bool:
-        """Whether the hidden effect, and nothing else, was found, and the error is noise now."""
+        """Whether only the hidden effect was found and the error is at the noise floor."""
         steps = self.answer.diagnosis.steps
         if not truth:
             return not steps and self.answer.diagnosis.verdict == "adequate"
@@ -67,11 +67,11 @@ def programmes() -> list[Programme]:
 
 
 def truth_of(bench: SimBench) -> tuple[str, ...]:
-    """Catalogue ids of what is hidden; looked at when everything else is done."""
+    """Catalogue ids of the hidden effects; used only after the diagnosis."""
     return tuple(a for t in bench.truth.values() for spec in t.hidden for a in spec.answers)
 
 
-def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
+def record(bench: SimBench, seed: int, folder: Path, report: ProgressCallback) -> list[Path]:
     """Run the programmes on a simulated bench, with CAN frames and Modbus transactions.
 
     Time is simulated: it advances as fast as this computer can. Raises MotionError where the
@@ -88,10 +88,10 @@ def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
     start = clock.now()
 
     def progress(repeat: int, _number: int, step: Step) -> None:
-        told(f"repeat {repeat}: {_words(step)}", clock.now() - start)
+        report(f"repeat {repeat}: {_words(step)}", clock.now() - start)
 
     with LiveBench(bench, seed=seed, simulated_time=clock) as live:
-        told("commissioning the drive", 0.0)
+        report("commissioning the drive", 0.0)
         with open_bench(live.bench_spec, clock) as opened:
             for programme in programmes():
                 _go_to_start(opened, programme)
@@ -101,14 +101,14 @@ def record(bench: SimBench, seed: int, folder: Path, told: Told) -> list[Path]:
             late = opened.loop.overruns
     if late:
         raise MotionError(
-            f"this computer could not keep the cycle: {late} late, result not valid; "
-            "run the demo again while less else is running"
+            f"this computer could not keep the cycle: {late} late cycles, result not valid; "
+            "run the demo again with fewer other programs"
         )
     return written
 
 
 def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
-    """Diagnose recorded runs, add what was found to a copy of the profile, and fit it."""
+    """Diagnose recorded runs, add the named effect to a copy of the profile, and fit it."""
     from winchkit.cli.model.add import write_addition
     from winchkit.diagnosis.add import add
     from winchkit.diagnosis.diagnose import diagnose
@@ -127,7 +127,7 @@ def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
 
 
 def _go_to_start(opened: Bench, programme: Programme) -> None:
-    """Begin where the programme ends, so that its repeats are equal from the first one on."""
+    """Move to the final length of the programme, so that all its repeats have the same motion."""
     last = next(step for step in reversed(programme.step) if step.to is not None)
     for winch in opened.winch.values():
         if last.to is not None:

@@ -22,7 +22,7 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.effects.term import modifiers_of
-from winchkit.model.derivatives import is_calmer
+from winchkit.model.derivatives import is_smoother
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 
@@ -121,7 +121,9 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     if recording.thinned:
         return None
     velocity = signals.motor_velocity
-    if velocity is not None and is_calmer(velocity, np.gradient(signals.motor_angle, signals.time)):
+    if velocity is not None and is_smoother(
+        velocity, np.gradient(signals.motor_angle, signals.time)
+    ):
         return None
     count = len(signals.time)
     here = np.arange(count, dtype=float)

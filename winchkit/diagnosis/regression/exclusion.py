@@ -45,7 +45,7 @@ def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
     )
     if all(a is b for a, b in zip(recordings, dataset.recordings, strict=True)):
         return None
-    names = ", ".join(t.label for t in found.terms if t.effect.shakes is not None)
+    names = ", ".join(t.label for t in found.terms if t.effect.impacts is not None)
     share = 1 - _compared(recordings) / max(1, _compared(dataset.recordings))
     if share > _MOST:
         return None  # The remaining samples would not determine the effects.
@@ -67,8 +67,8 @@ def _without_impacts(recording: Recording, terms: Sequence[Term]) -> Recording:
     at = recording.raw.at
     shaken = np.zeros(len(at.time), dtype=bool)
     for term in terms:
-        if term.effect.shakes is not None:
-            shaken |= term.effect.shakes(at, term.values)
+        if term.effect.impacts is not None:
+            shaken |= term.effect.impacts(at, term.values)
     known_weight = recording.raw.load_mass is not None
     left = set(_FORCES if known_weight else _FORCES[1:]) & recording.valid.keys()
     if not shaken.any() or not left:

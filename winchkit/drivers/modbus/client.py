@@ -2,11 +2,13 @@
 
 pymodbus takes whatever decodes as an answer. Its trace hook sees every byte first; the gate that
 stands there passes the one frame that answers the request and counts all else. A TCP connection
-on which anything else came, or on which an answer did not come in time, is replaced by a new one.
+on which anything else came, or on which an answer did not come in time, is replaced by a new one,
+at once where no answer can be recognised any more.
 """
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import sys
 from collections import defaultdict, deque
@@ -64,6 +66,8 @@ class ModbusClient:
         self._client: AsyncModbusTcpClient | AsyncModbusSerialClient | None = None
         self._gate: AnswerGate | TcpAnswerGate = AnswerGate()
         self._known = 0
+        self._lost: asyncio.Future[None] | None = None
+        """Of the exchange under way: done once no answer to it can be taken."""
         self._random = Random()
         self.replaced = False
         """Whether the connection was closed here because something else than the answer came."""
@@ -121,6 +125,7 @@ class ModbusClient:
     async def read(self, unit: int, block: ReadBlock, count: int) -> list[int]:
         """Exactly ``count`` registers; raises NoReply, DeviceRefused, ConnectionLost."""
         client = self._open()
+        self._number(client)
         ask = client.read_holding_registers if block.function == 3 else client.read_input_registers
         reply = await self._exchange(unit, ask(block.start, count=count, device_id=unit))
         return list(reply.registers)
@@ -128,6 +133,7 @@ class ModbusClient:
     async def write(self, unit: int, register: int, words: Sequence[int], *, many: bool) -> None:
         """Write registers, with function 16 where ``many``; raises as :meth:`read`."""
         client = self._open()
+        self._number(client)
         if many:
             await self._exchange(
                 unit, client.write_registers(register, list(words), device_id=unit)
@@ -135,12 +141,27 @@ class ModbusClient:
         else:
             await self._exchange(unit, client.write_register(register, words[0], device_id=unit))
 
+    def _number(self, client: AsyncModbusTcpClient | AsyncModbusSerialClient) -> None:
+        """Leave transaction numbers out that the last answers resemble."""
+        gate, context = self._gate, client.ctx
+        if isinstance(gate, TcpAnswerGate):
+            while gate.resembles(context.next_tid % _LAST_TRANSACTION + 1):
+                context.next_tid = context.next_tid % _LAST_TRANSACTION + 1
+
     async def _exchange(self, unit: int, request: Awaitable[Any]) -> Any:
+        waiting = asyncio.ensure_future(request)
+        self._lost = lost = asyncio.get_running_loop().create_future()
         try:
-            reply = await request
+            await asyncio.wait((waiting, lost), return_when=asyncio.FIRST_COMPLETED)
+            if not waiting.done():
+                raise ModbusException("the answer is damaged")
+            reply = waiting.result()
         except _PORT_ERRORS as error:
             came = self._gate.expire()
             raise self._failed(unit, error, came) from error
+        finally:
+            waiting.cancel()
+            await asyncio.wait((waiting,))
         if isinstance(reply, ExceptionResponse):
             self.refusal = code = reply.exception_code
             raise DeviceRefused(
@@ -165,6 +186,9 @@ class ModbusClient:
             return data
         fresh = data[self._known :] if len(data) >= self._known else data
         answer = gate.received(fresh)
+        lost = self._lost
+        if isinstance(gate, TcpAnswerGate) and gate.lost and lost is not None and not lost.done():
+            lost.set_result(None)
         self._known = len(data) - len(answer)
         return answer
 

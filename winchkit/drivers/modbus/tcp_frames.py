@@ -37,7 +37,9 @@ class TcpAnswerGate:
         self.broken = False
         """Whether something came that was not the answer; the connection is not used again."""
         self.transactions = deque(transactions, maxlen=_REMEMBERED)
-        self._lost = False
+        self.lost = False
+        """Whether it is unknown where the next frame begins: no answer can be taken any more."""
+        self._answers_before: dict[int, bytes] = {}
         self._request: Request | None = None
         self._unit = 0
         self._buffer = b""
@@ -52,16 +54,25 @@ class TcpAnswerGate:
         self._unit = self._request.unit
         self.transactions.append(packet[:2])
 
+    def resembles(self, transaction: int) -> bool:
+        """Whether the last answers hold the bytes of a transaction behind their head.
+
+        The next answers are likely to hold them again and would be taken for joined frames.
+        """
+        number = transaction.to_bytes(2, "big")
+        return any(number in frame[_HEAD + 2 :] for frame in self._answers_before.values())
+
     def received(self, data: bytes) -> bytes:
         """The whole answer once it is there, else nothing."""
         if self._buffer:
             self._joints.append(len(self._buffer))
         self._buffer += data
-        while not self._lost and (size := self._size()):
+        while not self.lost and (size := self._size()):
             frame, self._buffer = self._buffer[:size], self._buffer[size:]
             joints, self._joints = self._joints, []
             if self._answers(frame, joints):
                 self._request = None
+                self._answers_before[self._unit] = frame
                 return frame
         if self._request is None and self._buffer:
             self._lose()
@@ -71,7 +82,7 @@ class TcpAnswerGate:
         """The time for an answer is over; returns whether anything at all had come."""
         waiting, self._request = self._request, None
         came = bool(self._buffer) or self.broken
-        if self._buffer and not self._lost:
+        if self._buffer and not self.lost:
             self._lose()
         # An answer that was not heard may still come: never on this connection.
         self.broken |= waiting is not None
@@ -125,6 +136,6 @@ class TcpAnswerGate:
 
     def _lose(self) -> None:
         """Where the next frame begins is not known any more."""
-        self.broken = self._lost = True
+        self.broken = self.lost = True
         self._buffer, self._joints = b"", []
         self._events.append(Event(self._unit, "malformed"))

@@ -1,1 +1,1 @@
-"""Effects on the way from motor angle to cable length, one a file."""
+"""Effects on the cable length, one per file."""

@@ -1,4 +1,4 @@
-"""cable-creep: the rope goes on stretching after a step of the load."""
+"""cable-creep: the strain of the cable keeps changing after a step of the load."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ def apply(length: Array, at: At, values: Values) -> Array:
 
 
 def carried(after: Array, before: Array, at: At, values: Values) -> float:
-    """Strain over T/EA_c at the last sample; zero tension keeps what there was."""
+    """Strain over T/EA_c at the last sample; unchanged at zero tension."""
     settled = at.stressed_length[-1] * at.tension[-1] / values["creep_stiffness"]
     return float((after[-1] - before[-1]) / settled) if settled else values["start"]
 
@@ -51,7 +51,7 @@ EFFECT = Effect(
     outputs=("cable_length",),
     what="Fibres and strands settle: strain follows the tension with a time constant.",
     formula="ε' = (T/EA_c − ε)/τ; start: ε over T/EA_c at the run's start",
-    source="Kelvin-Voigt element; polymer ropes creep up to 15 % (s00542-019-04554-5)",
+    source="Kelvin-Voigt element; polymer cables creep up to 15 % (s00542-019-04554-5)",
     looks_like="The length drifts after a step of the load and levels off.",
     confused_with=("cable-thermal", "cable-hysteresis", "encoder-slip"),
     told_apart="Hold after a load step, then unload; temperature up and down at constant load.",

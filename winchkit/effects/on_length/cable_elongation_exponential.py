@@ -1,4 +1,4 @@
-"""cable-elongation-exponential: a rope that is soft when slack and stiff when tight."""
+"""cable-elongation-exponential: the stiffness of the cable grows with its tension."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
-    """Length with the strain k ln(1 + T/F0); a slack rope has none."""
+    """Length with the strain k ln(1 + T/F0); a slack cable has none."""
     tight = np.log1p(np.maximum(at.tension, 0.0) / values["force_scale"])
     return length + at.stressed_length * values["strain_scale"] * tight
 
@@ -31,17 +31,17 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
-    what="The rope's stiffness grows in proportion to its tension.",
+    what="The cable's stiffness grows in proportion to its tension.",
     formula="ℓ + ℓ_s k ln(1 + T/F0), hence T = F0 (exp(ε/k) − 1)",
     source="IPAnema 3 paper, Eq. 6, re-based to zero strain at zero tension",
-    looks_like="Much stretch at low tension, little more at high tension.",
+    looks_like="Large strain at low tension, little more at high tension.",
     confused_with=(
         "cable-elongation-linear",
         "cable-elongation-quartic",
         "cell-nonlinearity",
     ),
     told_apart="At least four loads, the lowest near slack.",
-    family="rope law",
+    family="cable law",
     contains=("cable-elongation-linear",),
     needs=("rope_force",),
     on_robot=frozenset({"all"}),

@@ -1,4 +1,4 @@
-"""cable-elongation-linear: the rope stretches under its tension."""
+"""cable-elongation-linear: elastic elongation in proportion to the tension."""
 
 import numpy as np
 
@@ -22,13 +22,13 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
-    what="The rope is elastic: it is longer by its strain times its stressed length.",
+    what="The cable is elastic: it is longer by its strain times its stressed length.",
     formula="ℓ + ℓ_s T / EA, ℓ_s = ℓ + dead length",
     source="Hooke; IPAnema 3 paper, Eq. 4; steel EA = 50–105 GPa × fill × area",
     looks_like="A length error in proportion to tension times length.",
     confused_with=("frame-compliance", "cable-elongation-quartic", "cable-elongation-exponential"),
     told_apart="The same load at several lengths; several loads over the full stroke.",
-    family="rope law",
+    family="cable law",
     needs=("rope_force",),
     on_robot=frozenset({"one", "all"}),
 )

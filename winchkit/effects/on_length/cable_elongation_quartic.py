@@ -1,4 +1,4 @@
-"""cable-elongation-quartic: a rope whose stiffness changes with its strain."""
+"""cable-elongation-quartic: the stiffness of the cable changes with its strain."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ _LAST_STEP = 1e-5
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
-    """Length with the strain of the quartic law; a slack rope has none."""
+    """Length with the strain of the quartic law; a slack cable has none."""
     force = np.maximum(at.tension, 0.0) / values["k1"]
     bend = (values["b2"], values["b3"], values["b4"])
     strain = _solve(force, Polynomial([0.0, 1.0, *bend])) if any(bend) else force
@@ -40,21 +40,21 @@ def _solve(force: Array, law: Polynomial) -> Array:
         value, rate = reach(strain)
         step = (value - force) / rate
         strain = strain - step
-        # Steps shrink by their square: after one this small the rest is a 10⁻¹⁰.
+        # Convergence is quadratic: after a step this small the error is below 1e-10.
         if np.max(np.abs(step), initial=0.0) < _LAST_STEP * table[-1]:
             break
     return strain
 
 
 def _soft_end(slope: Polynomial) -> float:
-    """Strain from which the law goes on straight, so that every force has one strain."""
+    """Strain from which the law continues as a straight line, so that its inverse is unique."""
     roots = (slope - _SOFTEST).roots()
     real = roots.real[(np.abs(roots.imag) < 1e-12) & (roots.real > 0)]
     return float(np.min(real, initial=1.0))
 
 
 def _largest(reach: Callable[[Array], tuple[Array, Array]], force: float) -> float:
-    """A strain above that of the largest force, by doubling from where it would be if linear."""
+    """An upper bound of the strain at the largest force, by doubling the linear value."""
     strain = force
     while strain < force / _SOFTEST and float(reach(np.array(strain))[0]) < force:
         strain *= 2
@@ -72,7 +72,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
-    what="The rope is stiffer (or softer) the more it is stretched: strands bed in.",
+    what="The stiffness of the cable depends on its strain: strands bed in.",
     formula="ℓ + ℓ_s ε with T/k1 = ε + b2 ε² + b3 ε³ + b4 ε⁴, straight where softer than k1/10",
     source="IPAnema 3 paper, Eq. 5, re-based to zero strain at zero tension",
     looks_like="A length error over the tension that is curved, in proportion to the length.",
@@ -82,7 +82,7 @@ EFFECT = Effect(
         "cell-nonlinearity",
     ),
     told_apart="At least four loads over the whole range; the torque shows a curved cell.",
-    family="rope law",
+    family="cable law",
     contains=("cable-elongation-linear",),
     needs=("rope_force",),
     probes=({"k1": 2e5}, {"k1": 2e5, "b2": 100.0}, {"k1": 2e5, "b3": 3e4}),

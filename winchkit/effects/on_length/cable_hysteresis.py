@@ -1,4 +1,4 @@
-"""cable-hysteresis: strands rub, so that the strain depends on where the tension came from."""
+"""cable-hysteresis: friction between strands, so that the strain depends on the tension's path."""
 
 import numpy as np
 
@@ -12,10 +12,10 @@ _STUCK = 0.5
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
-    """Length less the strain that the rope's inner friction holds back.
+    """Length less the strain that the cable's internal friction withholds.
 
-    The friction takes half of a change of tension from rest and all of it right after a full
-    reversal, where the rope of that stiffness is stuck.
+    The friction takes half of a change of tension from rest, and all of it right after a full
+    reversal, where the strands stick.
     """
     if values["fraction"] == 0.0:
         return length
@@ -41,10 +41,10 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
-    what="Friction between strands holds back strain: loading and unloading differ.",
+    what="Friction between strands withholds strain: loading and unloading differ.",
     formula="ℓ − ℓ_s F/EA, dF/dT = ½ (1 − s F/F_c), F_c = fraction·T; start: F/F_c at the start",
-    source="Dahl friction (Cable-winding device, Eq. 25) over the tension, the loop alone",
-    looks_like="A loop of the length error over the tension, whatever the rate.",
+    source="Dahl friction (Cable-winding device, Eq. 25) over the tension, without its mean",
+    looks_like="A hysteresis loop of the length error over the tension, at any rate.",
     confused_with=("cable-creep", "drum-winding-tension", "gear-backlash"),
     told_apart="The same tension cycle at two rates: creep changes its loop, hysteresis not.",
     needs=("rope_force",),

@@ -1,4 +1,4 @@
-"""cable-sag: the rope hangs through, so that its chord is shorter than the rope."""
+"""cable-sag: the cable sags under its weight, so that its chord is shorter than the cable."""
 
 from math import cos
 
@@ -13,8 +13,8 @@ from winchkit.model.stages import At, Stage
 def apply(length: Array, at: At, values: Values) -> Array:
     """Length less w² ℓ³ cos²(inclination) / 24 T².
 
-    The parabola holds while the tension exceeds the rope's weight across the chord; below, that
-    weight stands for the tension. Without any tension nothing is known of the sag: it is zero.
+    The parabola is valid while the tension exceeds the cable's weight across the chord; below, that
+    weight replaces the tension. Without any tension the sag is unknown and set to zero.
     """
     weight = values["mass_per_length"] * GRAVITY * np.abs(at.free_length)
     across = weight * abs(cos(at.profile.path.inclination))
@@ -29,12 +29,12 @@ EFFECT = Effect(
     parameters=(Parameter("mass_per_length", "kg/m", null=0.0, typical=0.14, low=0.0, high=50.0),),
     apply=apply,
     outputs=("cable_length",),
-    what="The rope's own weight bends it; the straight distance is shorter than the rope.",
+    what="The cable's own weight bends it; the straight distance is shorter than the cable.",
     formula="ℓ − w² ℓ³ cos²(inclination) / 24 T², w = mass_per_length·g",
     source="parabola for a shallow catenary (Irvine, Cable Structures)",
-    looks_like="A length error only near slack and on long ropes, in proportion to ℓ³/T².",
+    looks_like="A length error only near slack and on long cables, in proportion to ℓ³/T².",
     confused_with=("cable-elongation-linear", "cable-elongation-exponential"),
-    told_apart="Low tension over the full stroke; a hanging rope does not sag.",
+    told_apart="Low tension over the full stroke; a hanging cable does not sag.",
     needs=("rope_force",),
     order=4,
     probes=({"mass_per_length": 0.14},),

@@ -1,4 +1,4 @@
-"""cable-thermal: the rope grows with its temperature."""
+"""cable-thermal: thermal expansion of the cable."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -19,7 +19,7 @@ EFFECT = Effect(
     parameters=(Parameter("expansion", "1/K", null=0.0, typical=1.1e-5, low=-1e-4, high=1e-4),),
     apply=apply,
     outputs=("cable_length",),
-    what="The rope expands (steel) or shrinks (HMPE) as it warms.",
+    what="The cable expands (steel) or shrinks (HMPE) as it warms.",
     formula="ℓ + ℓ_s α (temperature − 20 °C)",
     source="linear thermal expansion; steel 1.1e-5 1/K, HMPE −1.2e-5 1/K",
     looks_like="A length error in proportion to temperature times length.",

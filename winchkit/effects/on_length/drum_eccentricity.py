@@ -1,4 +1,4 @@
-"""drum-eccentricity: the drum runs out once per turn."""
+"""drum-eccentricity: runout of the drum, one period per turn."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from winchkit.model.stages import At, Path, Stage
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Wound length with e (sin(φ − φ0) + sin φ0) on it, and its derivative."""
+    """Wound length plus e (sin(φ − φ0) + sin φ0), and its derivative."""
     size, phase = values["eccentricity"], values["phase"]
     turned = at.drum_angle - phase
     return Path(

@@ -1,4 +1,4 @@
-"""drum-radius: the rope winds on another radius than the profile says."""
+"""drum-radius: the winding radius differs from the profile."""
 
 from dataclasses import replace
 
@@ -20,10 +20,10 @@ EFFECT = Effect(
     parameters=(Parameter("radius_error", "m", null=0.0, typical=5e-4, low=-0.02, high=0.02),),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
-    what="The winding radius differs from the profile: machining, rope compression, a wrong r.",
+    what="The winding radius differs from the profile: machining, cable compression, a wrong r.",
     formula="W(Φ; r + δr)",
     source="CABTIVE paper, Eq. 2 with r_w as a parameter (Table 7: 59 to 60.5 for 60 mm)",
-    looks_like="A length error that grows in proportion to the drum angle, whatever the tension.",
+    looks_like="A length error in proportion to the drum angle, at any tension.",
     confused_with=("gear-ratio", "layer-thickness"),
     told_apart="An encoder on the drum; on a layered drum a stroke over several layers.",
     on_robot=frozenset({"one", "all"}),

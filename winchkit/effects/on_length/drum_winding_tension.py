@@ -1,4 +1,4 @@
-"""drum-winding-tension: rope on the drum keeps the strain at which it was wound in."""
+"""drum-winding-tension: cable on the drum keeps the strain at which it was wound in."""
 
 from itertools import pairwise
 
@@ -12,10 +12,10 @@ _UNIT_TENSION = 500.0
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
-    """Length with what the rope on the drum is longer than its unstrained length.
+    """Length plus the difference of strained and unstrained length of the cable on the drum.
 
-    Each piece wound in during the run keeps the strain fraction·T/500 N of that moment; what
-    was on the drum before has that of the run's mean tension, since nothing is known of it.
+    Each piece wound in during the run keeps the strain fraction·T/500 N of that moment. The cable
+    on the drum before has the strain of the run's mean tension, since its own is unknown.
     """
     if values["fraction"] == 0.0:
         return length
@@ -24,10 +24,10 @@ def apply(length: Array, at: At, values: Values) -> Array:
 
 
 def stored(wound: Array, strain: Array) -> Array:
-    """Integral of the strain of the rope on the drum over its wound length; m, shape (n,).
+    """Integral of the strain of the cable on the drum over its wound length; m, shape (n,).
 
-    ``wound`` in m since the reference, ``strain`` now at the drum. The drum is a stack: rope
-    wound in last is paid out first, so each monotone stretch either grows or reads the stack.
+    ``wound`` in m since the reference, ``strain`` now at the drum. The drum is a stack: cable
+    wound in last is paid out first, so each monotone section either pushes to or pops from it.
     """
     before = float(np.mean(strain))
     lowest, n = float(np.min(wound)) - 1.0, len(wound)
@@ -53,7 +53,7 @@ def stored(wound: Array, strain: Array) -> Array:
 
 
 def _stretches(wound: Array) -> list[tuple[int, int]]:
-    """Index ranges over which the rope runs in one direction; standstill counts as paying out."""
+    """Index ranges over which the cable runs in one direction; standstill counts as paying out."""
     winds_in = np.diff(wound) > 0
     turns = np.flatnonzero(np.diff(winds_in)) + 2
     ends = [1, *turns.tolist(), len(wound)]
@@ -66,7 +66,7 @@ EFFECT = Effect(
     parameters=(Parameter("fraction", "1", null=0.0, typical=5e-3, low=-0.05, high=0.05),),
     apply=apply,
     outputs=("cable_length",),
-    what="Rope wound in under tension lies stretched and flattened on the drum until paid out.",
+    what="Cable wound in under tension stays strained and flattened on the drum until paid out.",
     formula="ℓ + ∫ ε_w dW, ε_w = fraction·T/500 N when that piece was wound in",
     source="Schmidt, Mall, Pott 2015: ovalisation changes winding by 0.3 to 1.2 %",
     looks_like="A length error over the drum angle that depends on the tension at winding.",
@@ -74,5 +74,5 @@ EFFECT = Effect(
     told_apart="Wind in under one load, pay out under another.",
     needs=("rope_force",),
     order=5,
-    left_out="the tension at which the rope on the drum was wound in is not known",
+    left_out="the tension at which the cable on the drum was wound in is not known",
 )

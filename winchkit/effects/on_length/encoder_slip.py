@@ -1,4 +1,4 @@
-"""encoder-slip: the coupling of the encoder slips once, and the drum angle is off for good."""
+"""encoder-slip: a single slip of the encoder's coupling, a lasting error of the drum angle."""
 
 import numpy as np
 
@@ -32,12 +32,12 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
-    what="A coupling or a belt slipped: from then on drum and encoder disagree.",
+    what="A coupling or a belt slipped: from then on the encoder has an error.",
     formula="φ + Δφ x²(3 − 2x), x = (t − t0) / 0.4 s from 0 to 1, t from the run's start",
-    source="field experience; a step without a jerk, so that a fit can find its time",
+    source="field experience; a smooth step, so that a fit can find its time",
     looks_like="A step of the length at one moment that does not return.",
     confused_with=("cable-creep", "gear-backlash"),
     told_apart="Return to the same place at the end of the run: creep recovers, a slip stays.",
     order=3,
-    left_out="it happened once, in the run that showed it; set the zero anew (winchkit home)",
+    left_out="it occurred once, in the run that showed it; repeat the homing (winchkit home)",
 )

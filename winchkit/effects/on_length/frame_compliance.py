@@ -1,4 +1,4 @@
-"""frame-compliance: the frame gives under the rope's force."""
+"""frame-compliance: elastic deflection of the frame under the cable force."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
-    """Length with T/k on it."""
+    """Length plus T/k."""
     return length + at.tension / values["stiffness"]
 
 
@@ -22,7 +22,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
-    what="Mast, pulley brackets and exit point move towards the load.",
+    what="Mast, pulley brackets and exit point deflect towards the load.",
     formula="ℓ + T/k",
     source="Hooke",
     looks_like="A length error in proportion to the tension, the same at every length.",

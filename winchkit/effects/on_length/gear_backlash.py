@@ -1,8 +1,8 @@
-"""gear-backlash: the drum does not follow until the play of the gear is taken up.
+"""gear-backlash: after a reversal the drum stands still until the backlash is closed.
 
-While the drum stands in the play the motor turns freely, unless the load keeps the teeth on one
-flank: which of the two a gear does depends on its drag, so the share of the torque that is held
-there is fitted.
+Within the backlash the motor turns freely, unless the load keeps the teeth on one flank. The
+friction of the gear determines which of both applies, so that the share of the torque that acts
+within the backlash is a parameter.
 """
 
 import numpy as np
@@ -14,13 +14,13 @@ from winchkit.model.recurrence import play
 from winchkit.model.stages import At, Path, Stage
 
 _ON_THE_FLANK = 0.98
-"""Of the way to a flank: what is nearer bears, though the encoder's noise may say otherwise."""
+"""Share of the gap: teeth closer to a flank than this count as in contact (encoder noise)."""
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Drum angle through a play; within the gap the drum stands and a share of the torque is held.
+    """Drum angle behind a backlash, within which the drum stands and a share of the torque acts.
 
-    One state at rest says nothing of the gap: it is taken as meshing.
+    For a single state at rest the position within the gap is unknown; it is assumed in contact.
     """
     gap = values["gap"]
     if gap == 0.0 or len(path.value) < 2:
@@ -31,12 +31,12 @@ def apply(path: Path, at: At, values: Values) -> Path:
 
 
 def _meshes(turned: Array, drum_angle: Array, gap: float) -> NDArray[np.bool_]:
-    """Where the teeth bear, and not somewhere in the gap."""
+    """Samples at which the teeth are in contact."""
     return np.asarray(np.abs(drum_angle - turned) >= gap / 2 * _ON_THE_FLANK)
 
 
-def shaken(at: At, values: Values) -> NDArray[np.bool_]:
-    """Where teeth part and meet: between two samples, at a speed that jumps."""
+def impacts(at: At, values: Values) -> NDArray[np.bool_]:
+    """Samples near separation and impact of the teeth, between which the speed jumps."""
     gap, turned = values["gap"], at.drum_angle
     if gap == 0.0 or len(turned) < 2:
         return np.zeros(len(turned), dtype=bool)
@@ -45,7 +45,7 @@ def shaken(at: At, values: Values) -> NDArray[np.bool_]:
 
 
 def carried(after: Path, before: Path, _at: At, values: Values) -> float:
-    """Place in the gap at the last sample."""
+    """Position in the gap at the last sample."""
     gap = values["gap"]
     return float((after.value[-1] - before.value[-1]) / gap) if gap else values["start"]
 
@@ -60,19 +60,20 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
-    what="Teeth have play: after a reversal the drum stands until the other flank bears.",
-    formula="play operator of gap b on φ; held: share of the rope's torque within the play, "
-    "but for the last fiftieth of the way to a flank; start: place in the gap at the run's "
+    what="Clearance between teeth: after a reversal the drum stands until the other flank is in "
+    "contact.",
+    formula="play operator of gap b on φ; held: share of the cable's torque within the gap, "
+    "except in the last fiftieth before a flank; start: position in the gap at the run's "
     "start, −½ to ½",
     source="play operator (Krasnosel'skii and Pokrovskii, Systems with Hysteresis)",
-    looks_like="A step of the length after a reversal, whatever the speed.",
+    looks_like="A step of the length after a reversal, at any speed.",
     confused_with=("length-time-offset", "cable-hysteresis"),
     told_apart="A ladder of speeds: the step stays, a time offset grows with the speed.",
     needs=("gearing",),
     order=2,
     memory=True,
     carry=carried,
-    shakes=shaken,
+    impacts=impacts,
     probes=(
         {"gap": 1e-3},
         {"gap": 4e-3},

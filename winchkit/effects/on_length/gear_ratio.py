@@ -1,4 +1,4 @@
-"""gear-ratio: the gearbox turns the drum a little more or less than the profile says."""
+"""gear-ratio: the gear ratio differs from the profile."""
 
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Path, Stage
@@ -16,10 +16,10 @@ EFFECT = Effect(
     parameters=(Parameter("ratio_error", "1", null=0.0, typical=5e-3, low=-0.5, high=1.0),),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
-    what="The gearbox or belt has another ratio than the profile: a rounded or wrong number.",
+    what="The ratio of the gearbox or belt differs from the profile: a rounded or wrong number.",
     formula="φ = θ / (i (1 + e))",
     source="kinematics of a gearbox",
-    looks_like="A length error in proportion to the motor angle, whatever the tension.",
+    looks_like="A length error in proportion to the motor angle, at any tension.",
     confused_with=("drum-radius", "layer-thickness"),
     told_apart="An encoder on the drum; on a layered drum a stroke over several layers.",
     needs=("gearing",),

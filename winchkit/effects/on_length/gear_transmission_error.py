@@ -1,4 +1,4 @@
-"""gear-transmission-error: the gear does not turn evenly, in a whole order of the motor turn."""
+"""gear-transmission-error: periodic error of the gear, a whole order of the motor turn."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from winchkit.model.stages import At, Path, Stage
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Drum angle with a sin(kθ + p) on it, and its derivative by the motor angle."""
+    """Drum angle plus a sin(kθ + p), and its derivative by the motor angle."""
     size, order = values["amplitude"], values["order"]
     turned = order * at.motor_angle + values["phase"]
     return Path(path.value + size * np.sin(turned), path.slope + size * order * np.cos(turned))
@@ -23,7 +23,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
-    what="Teeth and shafts run out: the drum leads and lags within each motor turn.",
+    what="Runout of teeth and shafts: the drum leads and lags within each motor turn.",
     formula="φ + a sin(k θ + p), k whole per motor turn",
     source="static transmission error of gears, one harmonic",
     looks_like="A ripple over the motor angle: in length, and in torque in proportion to the load.",

@@ -1,4 +1,4 @@
-"""guide-offset: the rope guide stands beside the place where the rope winds."""
+"""guide-offset: axial offset of the cable guide from the point where the cable winds."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ _TURN = 2 * np.pi
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Wound length with the guide's detour √(h² + x²) − h on it, x = x0 + m Φ/2π."""
+    """Wound length plus the detour by the guide √(h² + x²) − h, x = x0 + m Φ/2π."""
     guide = at.profile.guide
     if guide is None:
         return path
@@ -28,7 +28,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
-    what="The guide is mounted off, or its screw moves it by more or less than the groove.",
+    what="The guide is mounted with an offset, or its lead differs from the groove pitch.",
     formula="ℓ − (√(h² + (x0 + m Φ/2π)²) − h), h = guide.distance, m per turn",
     source="Pythagoras; cable-winding device, section on the guide",
     looks_like="A parabola of the length error over the travel of the guide.",

@@ -1,4 +1,4 @@
-"""layer-thickness: each layer adds more or less radius than the profile says."""
+"""layer-thickness: the growth of the radius per layer differs from the profile."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(drum: Drum, at: At, values: Values) -> Drum:
-    """A layered drum with growth g + δ; other drums have no layers and stay as they are."""
+    """A layered drum with growth g + δ; other drums have no layers and are unchanged."""
     if isinstance(drum, Spiral | Archimedean):
         return replace(drum, growth=drum.growth + values["thickness_error"])
     return drum
@@ -20,7 +20,7 @@ EFFECT = Effect(
     parameters=(Parameter("thickness_error", "m", null=0.0, typical=1e-4, low=-0.005, high=0.005),),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
-    what="Layers grow by another amount than the profile: the rope flattens or nests.",
+    what="The layer growth differs from the profile: the cable flattens or nests.",
     formula="W(Φ; g + δ)",
     source="CABTIVE paper, Eq. 2 with d_c as a parameter (Table 4: 0.42 to 0.54 mm)",
     looks_like="A parabola of the length error over the drum angle; torque follows the radius.",

@@ -1,4 +1,4 @@
-"""length-time-offset: the length instrument's samples are late."""
+"""length-time-offset: delay of the length instrument."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -7,7 +7,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
-    """Length as it was a delay ago."""
+    """Length one delay earlier."""
     return shifted(length, at.time, -values["delay"])
 
 
@@ -17,10 +17,10 @@ EFFECT = Effect(
     parameters=(Parameter("delay", "s", null=0.0, typical=0.02, low=-2.0, high=2.0),),
     apply=apply,
     outputs=("cable_length",),
-    what="The length instrument filters or is stamped late against the drive.",
+    what="The length instrument filters, or its time stamps are later than the drive's.",
     formula="ℓ(t − δt)",
     source="definition of a delay",
-    looks_like="A length error in proportion to the speed, so of both signs.",
+    looks_like="A length error in proportion to the speed, of both signs.",
     confused_with=("gear-backlash",),
     told_apart="A ladder of speeds in both directions: backlash stays the same.",
 )

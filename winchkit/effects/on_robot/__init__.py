@@ -1,1 +1,1 @@
-"""Effects that only a robot can have: its geometry, its home and its payload."""
+"""Effects of robots: geometry, home lengths and payload."""

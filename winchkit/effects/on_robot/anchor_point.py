@@ -1,4 +1,4 @@
-"""anchor-point: the rope meets the platform elsewhere."""
+"""anchor-point: the anchor point of a cable differs from the profile."""
 
 from dataclasses import replace
 
@@ -22,10 +22,10 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
-    what="The rope meets the platform at another point than the profile says.",
+    what="The anchor point of the cable on the platform differs from the profile.",
     formula="b + δb, δb in the platform frame",
     source="CABTIVE paper, Tables 3 and 6 (up to 10 mm apart, nominal to calibrated)",
-    looks_like="One line's length error along the rope's direction, turning with the platform.",
+    looks_like="One line's length error by the cable direction in the platform frame.",
     confused_with=("exit-point", "home-length"),
     told_apart="Poses that turn the platform: without rotation it is an exit point the other way.",
     needs=("robot",),

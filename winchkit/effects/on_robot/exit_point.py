@@ -1,4 +1,4 @@
-"""exit-point: the rope leaves the frame elsewhere."""
+"""exit-point: the exit point of a cable differs from the profile."""
 
 from dataclasses import replace
 
@@ -22,10 +22,10 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
-    what="The rope leaves the frame at another point than the profile says: a pulley mounted off.",
+    what="The exit point of the cable differs from the profile: a pulley mounted with an offset.",
     formula="p + δp",
     source="CABTIVE paper, Tables 2 and 5 (up to 10 mm apart, nominal to calibrated)",
-    looks_like="One line's length error that turns with its rope's direction, whatever pulls it.",
+    looks_like="One line's length error by the cable direction in the base frame, at any tension.",
     confused_with=("anchor-point", "home-length", "swivel-radius"),
     told_apart="Poses that turn the platform: they move anchor points and no exit point.",
     needs=("robot",),

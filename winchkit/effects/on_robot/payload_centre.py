@@ -1,4 +1,4 @@
-"""payload-centre: the platform's centre of mass lies elsewhere."""
+"""payload-centre: the platform's centre of mass differs from the profile."""
 
 from dataclasses import replace
 
@@ -22,10 +22,10 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension",),
-    what="The platform's centre of mass lies elsewhere than the profile says.",
+    what="The platform's centre of mass differs from the profile.",
     formula="Δt = A⁺ᵀ Δw, Δw = −(0, R δc × m g)",
     source="Static balance A t + w = 0; IPAnema 3 paper, Eq. 7 and 8 with the sign corrected",
-    looks_like="Lines on one side pull more, on the other less, by a constant moment.",
+    looks_like="Higher tensions on one side and lower ones on the other, by a constant moment.",
     confused_with=("payload-mass", "cell-gain"),
     told_apart="Poses that turn the platform: its height matters only where the platform tilts.",
     needs=("robot", "rope_force"),

@@ -1,4 +1,4 @@
-"""payload-mass: the platform is heavier or lighter."""
+"""payload-mass: the platform's mass differs from the profile."""
 
 from dataclasses import replace
 
@@ -18,10 +18,10 @@ EFFECT = Effect(
     parameters=(Parameter("mass_error", "kg", null=0.0, typical=0.3, low=-1e4, high=1e4),),
     apply=apply,
     outputs=("tension",),
-    what="The platform weighs more or less than the profile says: a tool, a payload, a hose.",
+    what="The mass of the platform differs from the profile: a tool, a payload, a hose.",
     formula="Δt = A⁺ᵀ Δw, Δw = −(δm g, c × δm g)",
     source="Static balance A t + w = 0; IPAnema 3 paper, Eq. 7 and 8 with the sign corrected",
-    looks_like="Upper lines pull more than the weight asks for, lower ones less, at every pose.",
+    looks_like="Tensions above those that balance the weight in upper lines, below in lower lines.",
     confused_with=("payload-centre", "cell-gain"),
     told_apart="A weight known well on the platform: it changes the mass, and no cell.",
     needs=("robot", "rope_force"),

@@ -1,1 +1,1 @@
-"""Effects on the way from the load to the cell's reading, one a file."""
+"""Effects on the tension, from the load to the cell's reading, one per file."""

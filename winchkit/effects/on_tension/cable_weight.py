@@ -1,4 +1,4 @@
-"""cable-weight: the rope hangs on itself."""
+"""cable-weight: weight of the free cable."""
 
 from math import sin
 
@@ -9,7 +9,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:
-    """Tension with the weight of the free rope along its direction on it."""
+    """Tension plus the weight of the free cable along its direction."""
     along = GRAVITY * sin(at.profile.path.inclination)
     return tension + values["mass_per_length"] * along * at.free_length
 
@@ -20,10 +20,10 @@ EFFECT = Effect(
     parameters=(Parameter("mass_per_length", "kg/m", null=0.0, typical=0.14, low=0.0, high=50.0),),
     apply=apply,
     outputs=("tension", "motor_torque"),
-    what="The free rope's own weight adds to the tension on the way up to the winch.",
+    what="The weight of the free cable adds to the tension towards the winch.",
     formula="T + m g ℓ sin(inclination)",
-    source="statics; 6 mm steel rope 0.14 kg/m",
-    looks_like="A tension error in proportion to the free length, whatever the load.",
+    source="statics; 6 mm steel cable 0.14 kg/m",
+    looks_like="A tension error in proportion to the free length, at any load.",
     confused_with=("cell-offset", "cell-drift"),
     told_apart="The full stroke, up and down.",
     needs=("load",),

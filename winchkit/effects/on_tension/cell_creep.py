@@ -1,4 +1,4 @@
-"""cell-creep: the reading goes on changing after a step of the load."""
+"""cell-creep: the reading keeps changing after a step of the load."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -7,14 +7,14 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:
-    """Reading with a creeping share of it on top; creep starts at zero."""
+    """Reading plus a creeping share of it; creep starts at zero."""
     begun = values["start"] * float(tension[0])
     crept = first_order_lag(tension, at.time, values["time_constant"], begun)
     return tension + values["fraction"] * crept
 
 
 def carried(after: Array, before: Array, _at: At, values: Values) -> float:
-    """c/T at the last sample; without a tension or a creep what there was."""
+    """c/T at the last sample; unchanged without a tension or a creep."""
     settled = values["fraction"] * before[-1]
     return float((after[-1] - before[-1]) / settled) if settled else values["start"]
 

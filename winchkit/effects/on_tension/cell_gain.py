@@ -1,4 +1,4 @@
-"""cell-gain: the load cell's span is off."""
+"""cell-gain: the load cell's span is wrong."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -16,12 +16,12 @@ EFFECT = Effect(
     parameters=(Parameter("gain_error", "1", null=0.0, typical=0.01, low=-0.9, high=10.0),),
     apply=apply,
     outputs=("tension",),
-    what="The cell's span is wrong: calibration, mounting angle, a side path for the force.",
+    what="The cell's span is wrong: calibration, mounting angle, a parallel load path.",
     formula="(1 + g) T",
     source="load-cell practice",
     looks_like="A tension error in proportion to the tension, alike in both directions.",
     confused_with=("pulley-coulomb", "pulley-capstan", "cell-nonlinearity", "torque-constant"),
-    told_apart="Several loads in both directions; the torque tells it from a wrong load.",
+    told_apart="Several loads in both directions; the torque distinguishes it from a wrong load.",
     family="cell static",
     needs=("load",),
     order=0,

@@ -1,4 +1,4 @@
-"""cell-hysteresis: the load cell reads less while loaded up than while unloaded."""
+"""cell-hysteresis: lower readings of the load cell while loading than while unloading."""
 
 import numpy as np
 
@@ -36,10 +36,10 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension",),
-    what="Micro-slip in the cell and its mounting: loading and unloading read differently.",
+    what="Micro-slip in the cell and its mounting: readings at loading and unloading differ.",
     formula="T − F, dF/dT = 10 f (1 − s F/F_c), F_c = f T; start: F/F_c at the run's start",
     source="Dahl loop over the tension; combined error of data sheets",
-    looks_like="A loop of the tension error over the tension, whatever the motion.",
+    looks_like="A hysteresis loop of the tension error over the tension, at any motion.",
     confused_with=("pulley-dahl", "pulley-coulomb"),
     told_apart="Static weights up and down, without motion.",
     needs=("load",),

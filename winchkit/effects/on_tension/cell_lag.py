@@ -1,4 +1,4 @@
-"""cell-lag: the amplifier of the load cell filters."""
+"""cell-lag: low-pass filter of the load cell's amplifier."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -17,13 +17,13 @@ EFFECT = Effect(
     parameters=(Parameter("time_constant", "s", null=0.0, typical=0.05, low=0.0, high=10.0),),
     apply=apply,
     outputs=("tension",),
-    what="The cell's amplifier filters its reading: it comes late and rounded.",
+    what="The cell's amplifier low-passes its reading, which delays and smooths it.",
     formula="τ T_m' + T_m = T",
     source="first-order filter, exact for a signal linear between samples",
-    looks_like="A tension error in proportion to how fast the tension changes.",
+    looks_like="A tension error in proportion to the rate of the tension.",
     confused_with=("pulley-inertia", "pulley-dahl"),
     told_apart="Fast moves under two loads, and a step of the load.",
     needs=("load",),
     order=7,
-    left_out="undoing a filter would amplify the noise; at rest it vanishes",
+    left_out="inverting a filter would amplify the noise; at rest it vanishes",
 )

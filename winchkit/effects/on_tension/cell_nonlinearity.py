@@ -1,4 +1,4 @@
-"""cell-nonlinearity: the load cell's characteristic is bent."""
+"""cell-nonlinearity: curvature of the load cell's characteristic."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values

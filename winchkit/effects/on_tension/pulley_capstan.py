@@ -1,4 +1,4 @@
-"""pulley-capstan: the rope slides around a pulley that does not turn."""
+"""pulley-capstan: the cable slides around a pulley that does not turn."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values

@@ -1,4 +1,4 @@
-"""pulley-coulomb: dry friction of each pulley's bearing."""
+"""pulley-coulomb: Coulomb friction of each pulley's bearing."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -7,7 +7,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:
-    """Tension after a pulley with friction μ N against the rope's motion."""
+    """Tension after a pulley with friction μ N against the cable's motion."""
     return tension * coulomb_ratio(at.direction * values["friction"], at.wrap)
 
 
@@ -17,7 +17,7 @@ EFFECT = Effect(
     parameters=(Parameter("friction", "1", null=0.0, typical=0.02, low=0.0, high=0.5),),
     apply=apply,
     outputs=("tension", "motor_torque"),
-    what="Bearings rub in proportion to the force on them, on every pulley alike.",
+    what="Bearing friction in proportion to the force on the bearing, equal on all pulleys.",
     formula="T1 = T0 + s μ N, N = √(T0² − 2 T0 T1 cos α + T1²)",
     source="Cable-winding device, Eq. 20–23, solved in closed form; about 0.02 per sheave",
     looks_like="A step of the tension error with the direction, in proportion to the tension.",

@@ -1,4 +1,4 @@
-"""pulley-inertia: the rope must turn every pulley faster or slower."""
+"""pulley-inertia: inertia of the pulleys."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:
-    """Tension with m_eq dv/dt on it."""
+    """Tension plus m_eq dv/dt."""
     return tension + values["equivalent_mass"] * np.gradient(at.speed, at.time)
 
 
@@ -18,13 +18,13 @@ EFFECT = Effect(
     parameters=(Parameter("equivalent_mass", "kg", null=0.0, typical=0.5, low=0.0, high=1e4),),
     apply=apply,
     outputs=("tension", "motor_torque"),
-    what="Pulleys, all alike, have inertia that the rope must accelerate.",
+    what="The cable accelerates the inertia of the pulleys, which are equal.",
     formula="T1 = T0 + m_eq dv/dt, m_eq = J/r²",
     source="Newton",
-    looks_like="A tension error in proportion to the rope's acceleration.",
+    looks_like="A tension error in proportion to the cable's acceleration.",
     confused_with=("cell-lag", "rotor-inertia"),
     told_apart="Fast moves under two loads: a lag's error grows with the load's change.",
     needs=("pulley", "load"),
     order=2,
-    left_out="the rope's acceleration is not measured; at rest it vanishes",
+    left_out="the cable's acceleration is not measured; at rest it vanishes",
 )

@@ -1,4 +1,4 @@
-"""pulley-stribeck: a pulley holds harder at creep speed than when it runs."""
+"""pulley-stribeck: higher friction of a pulley at low speed."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -13,12 +13,12 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 
 
 def _sticks(values: Values) -> bool:
-    """Friction falls as a film of grease builds up: it is no less at creep speed."""
+    """Whether friction at standstill is at least that in motion, as with a film of grease."""
     return values["static"] >= values["coulomb"]
 
 
 def _passed(at: At, values: Values) -> bool:
-    """Whether the extra that is there at creep speed ever falls."""
+    """Whether the speeds are high enough for the excess at low speed to fall."""
     return has_fallen(at.speed, values["stribeck_speed"])
 
 
@@ -41,10 +41,10 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
-    what="Bearings rub more at creep speed, before a film of grease carries.",
+    what="Bearing friction is higher at low speed, before a film of grease builds up.",
     formula="T1 = T0 + s N (μc + (μs − μc) exp(−(v/vs)²))",
     source="Stribeck curve (Armstrong-Hélouvry et al. 1994) with Eq. 22 for N",
-    looks_like="Friction with an extra at creep speed, in proportion to the tension.",
+    looks_like="Friction with an excess at low speed, in proportion to the tension.",
     confused_with=("pulley-dahl", "pulley-coulomb"),
     told_apart="Very slow ramps, at several speeds from 1 to 100 mm/s.",
     family="pulley friction",

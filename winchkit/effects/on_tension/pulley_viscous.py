@@ -1,4 +1,4 @@
-"""pulley-viscous: grease drags in proportion to the speed."""
+"""pulley-viscous: friction of the pulleys in proportion to the speed."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -6,7 +6,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:
-    """Tension with c v on it."""
+    """Tension plus c v."""
     return tension + values["viscosity"] * at.speed
 
 
@@ -16,10 +16,10 @@ EFFECT = Effect(
     parameters=(Parameter("viscosity", "N s/m", null=0.0, typical=10.0, low=0.0, high=1e6),),
     apply=apply,
     outputs=("tension", "motor_torque"),
-    what="Grease and seals of every pulley drag in proportion to the rope's speed.",
+    what="Grease and seals of every pulley have friction in proportion to the cable speed.",
     formula="T1 = T0 + c v",
     source="viscous friction",
-    looks_like="A tension error that is odd and linear in the speed, whatever the load.",
+    looks_like="A tension error that is odd and linear in the speed, at any load.",
     confused_with=("pulley-coulomb", "pulley-stribeck"),
     told_apart="A ladder of speeds in both directions.",
     needs=("pulley", "load"),

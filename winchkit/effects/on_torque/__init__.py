@@ -1,1 +1,1 @@
-"""Effects on the way from rope force to motor torque, one a file."""
+"""Effects on the motor torque, one per file."""

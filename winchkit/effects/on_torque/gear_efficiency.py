@@ -16,7 +16,7 @@ EFFECT = Effect(
     parameters=(Parameter("efficiency", "1", null=1.0, typical=0.9, low=0.05, high=1.0),),
     apply=apply,
     outputs=("motor_torque",),
-    what="Tooth friction in proportion to the load: the motor gives more and gets less back.",
+    what="Tooth friction in proportion to the load: more motor torque winding in, less paying out.",
     formula="τ/η winding in, τ η paying out, smooth between",
     source="Cable-winding device, Eq. 10: 0.68 over six bearings and a belt",
     looks_like="A step of the torque error with the direction, in proportion to the load.",

@@ -1,4 +1,4 @@
-"""motor-cogging: the magnets pull the rotor to the teeth, in a whole order of the motor turn."""
+"""motor-cogging: cogging torque of the motor, a whole order of the motor turn."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque with a sin(kθ + p) on it."""
+    """Torque plus a sin(kθ + p)."""
     return torque + values["amplitude"] * np.sin(values["order"] * at.motor_angle + values["phase"])
 
 
@@ -22,7 +22,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
-    what="Slots and poles give a torque that depends on the angle alone.",
+    what="Slots and poles cause a torque that depends only on the motor angle.",
     formula="τ + a sin(k θ + p), k from poles, slots and their multiples",
     source="cogging torque of permanent-magnet motors",
     looks_like="A ripple of the torque over the motor angle, the same at every load.",

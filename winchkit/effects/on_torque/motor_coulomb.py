@@ -1,4 +1,4 @@
-"""motor-coulomb: dry friction of the motor."""
+"""motor-coulomb: Coulomb friction of the motor side."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -6,7 +6,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque with s c on it."""
+    """Torque plus s c."""
     return torque + values["torque"] * at.motor_direction
 
 
@@ -16,7 +16,7 @@ EFFECT = Effect(
     parameters=(Parameter("torque", "N m", null=0.0, typical=0.02, low=0.0, high=1e6),),
     apply=apply,
     outputs=("motor_torque",),
-    what="Bearings, seals and gears rub, whatever the load.",
+    what="Coulomb friction of bearings, seals and gears, independent of the load.",
     formula="τ + s c",
     source="Coulomb friction",
     looks_like="A step of the torque error with the direction, the same at every load.",

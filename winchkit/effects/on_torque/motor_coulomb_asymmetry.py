@@ -6,7 +6,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque with an offset on it."""
+    """Torque plus an offset."""
     return torque + values["offset"]
 
 
@@ -16,9 +16,9 @@ EFFECT = Effect(
     parameters=(Parameter("offset", "N m", null=0.0, typical=0.01, low=-1e6, high=1e6),),
     apply=apply,
     outputs=("motor_torque",),
-    what="Friction is larger one way than the other, or the torque signal has an offset.",
+    what="Coulomb friction depends on the direction, or the torque signal has an offset.",
     formula="τ + o, o = (c₊ − c₋)/2",
-    source="Coulomb friction, one value a direction",
+    source="Coulomb friction, one value per direction",
     looks_like="A constant torque error.",
     confused_with=("torque-constant", "motor-coulomb"),
     told_apart="Two loads: a wrong torque constant grows with them.",

@@ -1,4 +1,4 @@
-"""motor-stribeck: the motor holds harder at creep speed."""
+"""motor-stribeck: higher friction of the motor side at low speed."""
 
 import numpy as np
 
@@ -9,14 +9,14 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque with s b exp(−(θ'/ω_s)²) on it."""
+    """Torque plus s b exp(−(θ'/ω_s)²)."""
     return torque + values["torque"] * at.motor_direction * np.exp(
         -((at.motor_rate / values["stribeck_speed"]) ** 2)
     )
 
 
 def _passed(at: At, values: Values) -> bool:
-    """Whether the extra that is there at creep speed ever falls."""
+    """Whether the speeds are high enough for the excess at low speed to fall."""
     return has_fallen(at.motor_rate, values["stribeck_speed"])
 
 
@@ -38,10 +38,10 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
-    what="Bearings and seals rub more at creep speed, before a film carries.",
+    what="Friction of bearings and seals is higher at low speed, before a film builds up.",
     formula="τ + s b exp(−(θ'/ω_s)²)",
     source="Stribeck curve (Armstrong-Hélouvry et al. 1994)",
-    looks_like="Extra torque against the motion at creep speed only.",
+    looks_like="Additional torque against the motion at low speed only.",
     confused_with=("motor-coulomb", "pulley-stribeck"),
     told_apart="Very slow ramps at several speeds.",
     family="motor friction",

@@ -1,4 +1,4 @@
-"""motor-viscous: friction of the motor that grows with its speed."""
+"""motor-viscous: friction of the motor side in proportion to its speed."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -6,7 +6,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque with b θ' on it."""
+    """Torque plus b θ'."""
     return torque + values["viscosity"] * at.motor_rate
 
 
@@ -16,7 +16,7 @@ EFFECT = Effect(
     parameters=(Parameter("viscosity", "N m s", null=0.0, typical=1e-3, low=0.0, high=1e6),),
     apply=apply,
     outputs=("motor_torque",),
-    what="Grease, eddy currents and windage drag in proportion to the speed.",
+    what="Losses by grease, eddy currents and windage in proportion to the speed.",
     formula="τ + b θ'",
     source="viscous friction",
     looks_like="A torque error that is odd and linear in the motor's speed.",

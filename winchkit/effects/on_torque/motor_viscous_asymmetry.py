@@ -1,4 +1,4 @@
-"""motor-viscous-asymmetry: friction grows faster with speed one way than the other."""
+"""motor-viscous-asymmetry: viscous friction depends on the direction."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque with d |θ'| on it."""
+    """Torque plus d |θ'|."""
     return torque + values["viscosity_difference"] * np.abs(at.motor_rate)
 
 
@@ -20,11 +20,9 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
-    what="Preloaded screws, worms and lip seals drag more one way than the other, in proportion "
-    "to the speed.",
+    what="Viscous friction of preloaded screws, worms and lip seals depends on the direction.",
     formula="τ + d |θ'|, d = (b₊ − b₋)/2",
-    source="viscous friction, one value a direction; seen on EMPS (Janot et al. 2019), whose two "
-    "directions differ",
+    source="viscous friction, one value per direction; observed on EMPS (Janot et al. 2019)",
     looks_like="A torque error that is even in the motor's speed and linear in it.",
     confused_with=("motor-coulomb-asymmetry", "motor-viscous"),
     told_apart="A ladder of speeds in both directions: an offset is the same at every speed.",

@@ -1,4 +1,4 @@
-"""rotor-inertia: the motor must accelerate its own rotor."""
+"""rotor-inertia: inertia of the rotor."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -6,7 +6,7 @@ from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque with J θ'' on it."""
+    """Torque plus J θ''."""
     return torque + values["inertia"] * at.motor_acceleration
 
 
@@ -16,10 +16,10 @@ EFFECT = Effect(
     parameters=(Parameter("inertia", "kg m^2", null=0.0, typical=1e-4, low=0.0),),
     apply=apply,
     outputs=("motor_torque",),
-    what="Rotor, brake, coupling and gearbox input must be accelerated.",
+    what="Inertia of rotor, brake, coupling and gearbox input.",
     formula="τ + J θ''",
     source="Newton",
-    looks_like="Torque in proportion to the motor's acceleration, whatever the load.",
+    looks_like="Torque in proportion to the motor's acceleration, at any load.",
     confused_with=("torque-lag", "pulley-inertia"),
     told_apart="Fast and slow moves without load.",
 )

@@ -1,4 +1,4 @@
-"""torque-constant: the drive's torque scale is off."""
+"""torque-constant: the drive's torque scale is wrong."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -21,6 +21,6 @@ EFFECT = Effect(
     source="motor data sheets give ±10 %",
     looks_like="A torque error in proportion to the load, alike in both directions.",
     confused_with=("gear-efficiency", "cell-gain", "drum-radius"),
-    told_apart="Several loads in both directions; the length tells it from the drum's radius.",
+    told_apart="Several loads in both directions; the length excludes a wrong drum radius.",
     needs=("rope_force",),
 )

@@ -1,4 +1,4 @@
-"""torque-lag: the drive filters the torque that it reports."""
+"""torque-lag: low-pass filter of the drive's reported torque."""
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
@@ -17,10 +17,10 @@ EFFECT = Effect(
     parameters=(Parameter("time_constant", "s", null=0.0, typical=0.02, low=0.0, high=10.0),),
     apply=apply,
     outputs=("motor_torque",),
-    what="The drive filters its torque signal: it comes late and rounded.",
+    what="The drive low-passes its torque signal, which delays and smooths it.",
     formula="τ_f m' + m = τ",
     source="first-order filter, exact for a signal linear between samples",
-    looks_like="A torque error in proportion to how fast the torque changes.",
+    looks_like="A torque error in proportion to the rate of the torque.",
     confused_with=("rotor-inertia", "motor-coulomb"),
     told_apart="Fast moves under two loads.",
 )

@@ -1,7 +1,7 @@
-"""Laws of a cable's elongation, force from strain and inverse (IPAnema paper, Eq. 4, 5 and 6).
+"""Laws of a cable's elongation: force from strain and inverse (IPAnema paper, Eq. 4, 5 and 6).
 
 The paper writes F = k1 δl + k0 and so on with coefficients of its own test; here the laws are in
-strain and in newtons, and their offset k0 cancels wherever elongation is taken between two states.
+strain and in newtons. Their offset k0 cancels in the elongation between two states.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class Quartic:
-    """F = k4 ε⁴ + k3 ε³ + k2 ε² + k1 ε + k0 (Eq. 5), from zero strain as far as it rises."""
+    """F = k4 ε⁴ + k3 ε³ + k2 ε² + k1 ε + k0 (Eq. 5), on its rising branch from zero strain."""
 
     k1: float
     k2: float = 0.0
@@ -86,14 +86,14 @@ class Exponential:
         _positive("k1", self.k1)
 
     def force(self, strain: float) -> float:
-        """N; infinite beyond what a float holds."""
+        """N; infinite where it exceeds the range of a float."""
         from math import exp
 
         exponent = self.k1 * strain
         return exp(exponent) + self.k0 if exponent < 700.0 else inf
 
     def strain(self, force: float) -> float:
-        """Inverse; NaN at and below k0, which no strain reaches."""
+        """Inverse; NaN at and below k0, the force's lower bound."""
         above = force - self.k0
         return log(above) / self.k1 if above > 0.0 else nan
 

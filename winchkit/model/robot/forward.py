@@ -93,8 +93,8 @@ def forward(
     hanging = count < 6
     if hanging and (platform is None or platform.mass <= 0):
         raise UsageError(
-            f"{count} lines leave the platform {6 - count} freedoms, which only its weight settles;"
-            " give [platform] mass"
+            f"{count} lines leave the platform {6 - count} degrees of freedom, whose rest position "
+            "depends on its weight; give [platform] mass"
         )
     search = _Search(geometry, given, platform if hanging else None)
     return search.run(start, steps)
@@ -132,7 +132,7 @@ class _Search:
             rotation[going] = rotation_by(step[:, 3:]) @ rotation[going]
             size = np.linalg.norm(step, axis=1)
             still = size < _TOLERANCE
-            # Lengths that cannot all be taut have no fixed point: look at the set in between too.
+            # Lengths that cannot all be taut have no fixed point: test the set in between too.
             asked = still | (taken % _PATIENCE == 0)
             which = going[asked]
             there = Pose(position[which], rotation[which])
@@ -157,7 +157,7 @@ class _Search:
         excess = lengths(self.geometry, at.position, at.rotation) - self.given[which]
         push = np.where(taut, -forces / (self.platform.mass * GRAVITY), -np.inf)
         short = np.where(taut, -np.inf, excess)
-        # The cable tightened last is slackened last, or the set would alternate for ever.
+        # The cable tightened last is slackened last, or the set would alternate without end.
         other = np.where(np.arange(push.shape[1]) == cables.tightened[which, None], -np.inf, push)
         push = np.where(np.max(other, axis=1, keepdims=True) > _PUSH, other, push)
         worst, missing = np.argmax(push, axis=1), np.argmax(short, axis=1)

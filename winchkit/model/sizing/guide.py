@@ -1,4 +1,4 @@
-"""The rope guide of a sizing: lead screw and toothed belt (Eq. 15–18)."""
+"""The cable guide of a sizing: lead screw and toothed belt (Eq. 15–18)."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _screw_rows(
 
 
 def _reach_rows(spec: SizeSpec, screw: ScrewChoice, speed: float) -> Iterator[Row]:
-    """A screw long enough for the drum and short enough for its speed."""
+    """Requirements of a screw's length: at least the drum's width, and limited by its speed."""
     safe = parts.critical_speed(screw.diameter, screw.length, screw.ends)
     thick = parts.screw_diameter(speed, screw.length, screw.ends)
     short = screw.length * (safe / speed) ** 0.5

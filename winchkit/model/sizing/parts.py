@@ -1,4 +1,4 @@
-"""The winding-device paper's design equations (Eq. 10–18), corrected as docs/papers.md tells.
+"""Design equations of the winding-device paper (Eq. 10–18), with the corrections in docs/papers.md.
 
 SI throughout; rad/s for speeds of rotation.
 """
@@ -30,13 +30,13 @@ BUCKLES = {
     "fixed-fixed": 4.730041,
     "fixed-free": 1.875104,
 }
-"""First root of the bending vibration of a shaft by how its ends are held."""
+"""First root of the bending vibration of a shaft, by the bearings at its ends."""
 STANDARD_MODULES = (0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.007, 0.01)
 """Of toothed belts, m."""
 _STEEL_SOUND = sqrt(2.06e11 / 7850.0)
 """Speed of sound along a steel bar, m/s."""
 _RESERVE = 0.8
-"""Share of the critical speed that a screw is driven at; part of makers' f = 21.9."""
+"""Highest share of the critical speed for a screw; part of makers' f = 21.9."""
 _MODULE_FACTOR = 35e-3 * (60 / (2 * pi) * 1e3) ** (-1 / 3)
 """Eq. 17's 35 for m, W and rad/s in place of mm, kW and rpm."""
 
@@ -98,7 +98,7 @@ def belt_length(distance: float, first: float, second: float) -> float:
 
 
 def centre_distance(length: float, first: float, second: float) -> float:
-    """Shaft distance for a belt length (Eq. 18 with the squares where they belong), m.
+    """Shaft distance for a belt length (Eq. 18 with the squares of the radii corrected), m.
 
     A = ¼[L − π(R1 + R2) + √((L − π(R1 + R2))² − 8(R2 − R1)²)], an approximation of
     :func:`belt_length` to second order in (R2 − R1)/A. Raises UsageError for a belt too short.

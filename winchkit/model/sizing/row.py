@@ -1,4 +1,4 @@
-"""One line of a sizing: a requirement, its value, its limit, and what would do where it fails."""
+"""One line of a sizing: a requirement, its value, its limit, and alternatives where it fails."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ _EXACT = 1e-6
 
 
 def up(value: float, digits: int = 4) -> str:
-    """A lower limit in words: rounded up, so that what is written does."""
+    """A lower limit as text, rounded up, so that the printed value is sufficient."""
     return _rounded(value, digits, ROUND_CEILING)
 
 
 def down(value: float, digits: int = 4) -> str:
-    """An upper limit in words: rounded down, so that what is written does."""
+    """An upper limit as text, rounded down, so that the printed value is sufficient."""
     return _rounded(value, digits, ROUND_FLOOR)
 
 
@@ -29,7 +29,7 @@ def _rounded(value: float, digits: int, way: str) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A requirement; values in ``unit``, which is SI. Without a limit it is only told."""
+    """A requirement; values in ``unit``, which is SI. Without a limit it is only reported."""
 
     name: str
     equation: str
@@ -39,7 +39,7 @@ class Row:
     limit: float | None = None
     ok: bool | None = None
     alternatives: tuple[str, ...] = ()
-    """What would do instead, each by itself; empty where the requirement is met."""
+    """Alternatives, each sufficient by itself; empty where the requirement is met."""
     note: str = ""
 
     @staticmethod
@@ -62,6 +62,6 @@ class Row:
     def equal(
         name: str, equation: str, value: float, limit: float, unit: str, *options: str
     ) -> Row:
-        """A value that must be met to a millionth."""
+        """A value that must be met within a relative error of 1e-6."""
         ok = abs(value - limit) <= _EXACT * abs(limit)
         return Row(name, equation, value, unit, "=", limit, ok, () if ok else options)

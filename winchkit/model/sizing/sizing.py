@@ -1,4 +1,4 @@
-"""Sizes a winch after the winding-device paper: every requirement with its value and its limit.
+"""Sizing of a winch by the winding-device paper: every requirement with its value and its limit.
 
 for row in sized(read_size("winding-device.toml")):
     print(row.name, row.value, row.relation, row.limit, row.ok)
@@ -21,13 +21,13 @@ __all__ = ["Row", "sized"]
 
 @dataclass(frozen=True)
 class _Drive:
-    """What the chain from rope to motor comes to."""
+    """Requirements at the motor from those at the cable."""
 
     efficiency: float
     power: float
     """At the motor, W."""
     torque: float
-    """At the motor with all rope on the drum, N m."""
+    """At the motor with all cable on the drum, N m."""
     speed: float
     """Of the motor with the drum empty, rad/s."""
     radius: float
@@ -70,26 +70,26 @@ def _motor_rows(spec: SizeSpec, drive: _Drive) -> Iterator[Row]:
 
 
 def _ratio_limits(spec: SizeSpec) -> tuple[float, float]:
-    """Gear ratios from which the torque suffices and up to which the speed does."""
+    """Lowest gear ratio by the torque and highest by the speed."""
     drive, ratio = _drive(spec), spec.gearbox.ratio
     lowest = ratio * drive.torque * spec.motor.margin / spec.motor.rated_torque
     return lowest, ratio * spec.motor.speed / drive.speed
 
 
 def _less_torque(spec: SizeSpec, drive: _Drive) -> tuple[str, ...]:
-    """One change at a time that brings the torque below its limit."""
+    """Single changes that bring the torque below its limit."""
     share = spec.motor.rated_torque / (drive.torque * spec.motor.margin)
     return (
         *_other_ratio(spec),
         f"a motor of {up(drive.torque * spec.motor.margin)} N m at this ratio",
-        f"a rope force of at most {down(spec.requirement.force * share)} N",
+        f"a cable force of at most {down(spec.requirement.force * share)} N",
         f"a winding radius of at most {down(drive.radius * share * 1e3)} mm",
     )
 
 
 def _slower(spec: SizeSpec) -> tuple[str, ...]:
     speed = spec.motor.speed * spec.drum.winding_radius / spec.gearbox.ratio
-    return (*_other_ratio(spec), f"a rope speed of at most {down(speed)} m/s")
+    return (*_other_ratio(spec), f"a cable speed of at most {down(speed)} m/s")
 
 
 def _other_ratio(spec: SizeSpec) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ def _other_ratio(spec: SizeSpec) -> tuple[str, ...]:
     fit = [ratio for ratio in spec.gearbox.offered if lowest <= ratio <= highest]
     offered = f"; offered: {', '.join(f'{ratio:g}' for ratio in fit)}" if fit else ""
     ratios = f"a gear ratio from {up(lowest, 3)} to {down(highest, 3)}"
-    # Of a worm the efficiency falls as the ratio grows.
+    # The efficiency of a worm falls as its ratio grows.
     return (f"{ratios} of the same efficiency{offered}",)
 
 
@@ -135,7 +135,7 @@ def _drum_rows(spec: SizeSpec) -> Iterator[Row]:
     if room > 0:
         options += (
             f"a winding radius of at least {up(drum.winding_radius / room * 1e3)} mm",
-            f"at most {down(need.cable_length * room)} m of rope",
+            f"at most {down(need.cable_length * room)} m of cable",
         )
     yield Row("turns on the drum", "Eq. 12", turns, "1", note=f"{drum.dead_wraps:g} dead wraps")
     yield Row.at_most("drum width", "Eq. 12", width, drum.width, "m", *options)

@@ -1,4 +1,4 @@
-"""A residual map in words."""
+"""Residual maps as figures and as text."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def map_text(drawn: ResidualMap, scale: Scale) -> str:
 
 
 def map_reading(variable: str) -> Reading:
-    """How a map's variable is written: an angle within its turn."""
+    """Axis text of a map's variable; an angle is taken within its turn."""
     return reading(variable, within_turn=variable in ANGLES)
 
 
@@ -57,11 +57,11 @@ def signed(value: float, scale: Scale) -> str:
 _FAINTEST = 0.04
 _MOST = 2
 _ABOVE_NOISE = 2.0
-"""Full colour is at least so many times the noise: what is near it stays pale."""
+"""Least value of full colour as a multiple of the noise, so that values near it are pale."""
 
 
 def maps_drawn(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, list[Markup]]:
-    """Figures per output: the two most telling maps, or the first before and after a change."""
+    """Maps per output: the two with the largest shares, or the first before and after a change."""
     out: dict[str, list[Markup]] = {}
     for output, scale in scales.items():
         found = [

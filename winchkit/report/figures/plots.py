@@ -1,4 +1,4 @@
-"""The curves of a report: residuals before and after, over time and over what they follow."""
+"""The curves of a report: residuals before and after, over time and over their main variable."""
 
 from __future__ import annotations
 
@@ -14,7 +14,13 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Followed, variables_of
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.plain_json import significant
-from winchkit.report.figures.reduction import bin_edges, bin_means, strongest, thin, thin_points
+from winchkit.report.figures.reduction import (
+    bin_edges,
+    bin_means,
+    decimated,
+    decimated_points,
+    strongest,
+)
 from winchkit.report.html.chart import reading
 from winchkit.report.words.numbers import Scale, percent, scale_for
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
@@ -22,7 +28,7 @@ from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 __all__ = ["AT_NOISE", "OutputPlots", "Plot", "Residuals", "plots_of"]
 
 AT_NOISE = 1.15
-"""Up to how many times its noise an error counts as noise."""
+"""Largest ratio of an error to its noise at which it counts as noise."""
 _POINTS = 2000
 _DOTS = 600
 _DIGITS = 4
@@ -34,7 +40,7 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Residuals:
-    """What to draw: residuals of a problem, (rows,), and the noise beside them."""
+    """Residuals to draw, (rows,), and their noise."""
 
     regression: TimeSeriesRegression
     before: Array
@@ -46,7 +52,7 @@ class Residuals:
 
 @dataclass(frozen=True)
 class Plot:
-    """One drawing: what the page's script needs, and words for who cannot see it."""
+    """One drawing: data of the page's script, and a text alternative."""
 
     id: str
     caption: str
@@ -63,12 +69,12 @@ class OutputPlots:
     over_time: Plot
     over_variable: Plot | None
     followed: Followed | None
-    """What the residual is drawn over; None where it follows nothing that was measured."""
+    """Residual over its main variable; None where no measured variable explains it."""
 
 
 @dataclass(frozen=True)
 class _Curves:
-    """Residuals of one output, all its runs one after another, in the unit shown."""
+    """Residuals of one output, its runs concatenated, in the unit of the figure."""
 
     output: str
     scale: Scale
@@ -77,7 +83,7 @@ class _Curves:
     after: tuple[Array, ...] | None
     noise: float | None
     tone: str
-    """How to colour a residual that nothing changes: ``residual`` at the noise, else ``before``."""
+    """Colour of an unchanged residual: ``residual`` at the noise, else ``before``."""
 
 
 def plots_of(residuals: Residuals) -> tuple[OutputPlots, ...]:
@@ -135,7 +141,7 @@ def _rms(parts: Sequence[Array]) -> float:
 
 
 def _over_time(regression: TimeSeriesRegression, curves: _Curves) -> Plot:
-    """All runs one after another, at most ``_POINTS`` samples."""
+    """All runs concatenated, at most ``_POINTS`` samples."""
     recordings = regression.dataset.recordings
     share = max(2, _POINTS // len(curves.runs))
     parts: list[tuple[Array, list[Array]]] = []
@@ -146,7 +152,7 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves) -> Plot:
         lines = [curves.before[position]]
         if curves.after is not None:
             lines.append(curves.after[position])
-        parts.append(thin(initial_model + time, lines, share))
+        parts.append(decimated(initial_model + time, lines, share))
         initial_model += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
     x = np.concatenate([part[0] for part in parts])
     lines = [np.concatenate([part[1][i] for part in parts]) for i in range(len(parts[0][1]))]
@@ -154,11 +160,11 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves) -> Plot:
     band = "" if curves.noise is None else "; the grey band is the noise, ± its rms"
     return Plot(
         f"time-{curves.output}",
-        f"Measured less predicted {name} over time, all runs one after another{band}.",
+        f"Measured less predicted {name} over time, all runs concatenated{band}.",
         {
             "kind": "time",
             "x": _numbers(x, 6),
-            "xLabel": "time, runs one after another [s]",
+            "xLabel": "time, runs concatenated [s]",
             "yLabel": _labelled("residual", curves.scale.label),
             "unit": curves.scale.label,
             "series": _series(lines, curves.tone),
@@ -175,7 +181,7 @@ def _over_variable(regression: TimeSeriesRegression, curves: _Curves, followed: 
     lines = [before] if curves.after is None else [before, np.concatenate(curves.after)]
     good = np.isfinite(before) & np.isfinite(variable)
     x, lines = variable[good], [line[good] for line in lines]
-    dots = thin_points(x, _DOTS)
+    dots = decimated_points(x, _DOTS)
     centres, means = bin_means(x, lines, bin_edges(x, followed, _DEGREES))
     placed = _spread(x[dots]) if followed.variable == "direction" else x[dots]
     whole = np.concatenate([placed, centres])
@@ -185,11 +191,11 @@ def _over_variable(regression: TimeSeriesRegression, curves: _Curves, followed: 
     binned = [np.concatenate([nothing_there, mean])[order] for mean in means]
     output = OUTPUT_NAMES.get(curves.output, curves.output)
     name = VARIABLE_NAMES.get(followed.variable, followed.variable)
-    often = "" if followed.order is None else f", {followed.order} per turn"
+    often = "" if followed.order is None else f", {followed.order} periods per turn"
     return Plot(
         f"over-{curves.output}",
-        f"Residual of the {output} over the {name}{often}, which takes "
-        f"{percent(followed.share)} of it. Dots are samples, lines their means.",
+        f"Residual of the {output} over {name}{often}, which explains {percent(followed.share)} "
+        "of its variance. Dots are samples, lines their means.",
         {
             "kind": "over",
             "x": _numbers(whole[order], 5),
@@ -205,7 +211,7 @@ def _over_variable(regression: TimeSeriesRegression, curves: _Curves, followed: 
 
 
 def _spread(values: Array) -> Array:
-    """Dots of a variable with few values side by side, so that they do not hide each other."""
+    """Dots of a variable with few values, spread so that they do not overlap."""
     out = values.copy()
     for value in np.unique(values):
         alike = values == value
@@ -216,7 +222,7 @@ def _spread(values: Array) -> Array:
 def _axis(
     regression: TimeSeriesRegression, curves: _Curves, followed: Followed
 ) -> tuple[Array, str, bool]:
-    """Values of a variable along the runs as people read them, its label, and if it is a power."""
+    """Values of a variable in the unit of its axis, its label, and whether it is a logarithm."""
     recordings = regression.dataset.recordings
     values = np.concatenate(
         [variables_of(recordings[run])[followed.variable] for run in curves.runs]

@@ -1,4 +1,4 @@
-"""What the errors of poses are drawn over: the variable that each output follows most."""
+"""Errors of poses over the variable that explains the largest share of each output."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from winchkit.report.figures.reduction import bin_means, filled_edges
 __all__ = ["NUMBER", "Trace", "trace_over", "traces", "unit_of"]
 
 NUMBER = "number"
-"""Poses one after another, for an error that follows nothing."""
+"""Number of the pose, for an error that no variable explains."""
 _BINS = 12
 _DIGITS = 5
 _POOLED = ("winch", "pose", NUMBER)
-"""What is drawn of all lines; else of the one that tells most."""
+"""Variables for which all lines are drawn; else the line with the largest share."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Trace:
     """Measured less predicted, (k,)."""
     after: Array | None = None
     line: str | None = None
-    """The line, or axis, that is drawn; None where all are."""
+    """The drawn line or axis; None for all."""
 
     def means(self, values: Array) -> tuple[Array, Array]:
         """Mean of the variable and of an error in every bin."""
@@ -53,7 +53,7 @@ class Trace:
         return centres, mean
 
     def to_json(self, values: Array) -> dict[str, Any]:
-        """As the commands print the mean of an error."""
+        """Mean of an error as the commands print it."""
         x, mean = self.means(values)
         return {
             "output": self.over.output,
@@ -74,7 +74,7 @@ def unit_of(variable: str) -> str:
 
 
 def traces(regression: PoseRegression, before: Errors, after: Errors | None = None) -> list[Trace]:
-    """Per output its errors over what they follow most, before anything was added."""
+    """Per output its errors over the variable with the largest share before the change."""
     found: dict[str, Followed] = {}
     for followed in follows_of(regression, before):
         if followed.variable != "pose":
@@ -89,7 +89,7 @@ def traces(regression: PoseRegression, before: Errors, after: Errors | None = No
 def trace_over(
     regression: PoseRegression, over: Followed, before: Errors, after: Errors | None = None
 ) -> Trace:
-    """Errors of one output over one variable, of the line that shows it most."""
+    """Errors of one output over one variable, of the line with the largest share."""
     name = over.output
     error = on_cables(regression, {name: before[name]})[name]
     then = None if after is None else on_cables(regression, {name: after[name]})[name]

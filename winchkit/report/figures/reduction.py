@@ -1,4 +1,4 @@
-"""Long signals made short for drawing: the lowest and the highest of every stretch are kept."""
+"""Decimation of long signals for drawing: the extremes of every interval are kept."""
 
 from __future__ import annotations
 
@@ -21,20 +21,33 @@ __all__ = [
     "bin_edges",
     "bin_means",
     "curve_of",
+    "decimated",
+    "decimated_points",
     "filled_edges",
     "strongest",
-    "thin",
-    "thin_points",
 ]
 
 _FEW = 5
 
 
-def thin(x: Array, series: Sequence[Array], points: int) -> tuple[Array, list[Array]]:
-    """At most ``points`` samples of some signals over one x, every extreme kept.
+def decimated(x: Array, series: Sequence[Array], points: int) -> tuple[Array, list[Array]]:
+    """Decimate signals over one variable, with the extremes of every interval.
 
-    ``x`` and each signal are (n,); a stretch in which a signal is NaN throughout stays NaN. Within
-    a stretch the extremes stand in their order, at the stretch's first and last x.
+    Parameters
+    ----------
+    x : (n,) array
+        Variable.
+    series : sequence of (n,) array
+        Signals; NaN where missing.
+    points : int
+        Maximum number of samples.
+
+    Returns
+    -------
+    x : (m,) array
+        First and last x of every interval.
+    series : list of (m,) array
+        Extremes of every interval in their order; NaN where all its samples are NaN.
     """
     if len(x) <= points:
         return x, [np.asarray(values, dtype=float) for values in series]
@@ -53,15 +66,15 @@ def _extremes(values: Array, edges: NDArray[np.intp]) -> Array:
     return out.ravel()
 
 
-def thin_points(x: Array, points: int) -> NDArray[np.intp]:
-    """Indices of at most ``points`` samples, evenly through the recording, sorted by x."""
+def decimated_points(x: Array, points: int) -> NDArray[np.intp]:
+    """Indices of at most ``points`` samples, evenly distributed over the recording, sorted by x."""
     step = max(1, -(-len(x) // points))
     chosen = np.arange(0, len(x), step)
     return np.asarray(chosen[np.argsort(x[chosen], kind="stable")])
 
 
 def filled_edges(x: Array, bins: int) -> Array:
-    """Inner edges of at most ``bins`` equally filled bins; between the values where they are few.
+    """Inner edges of at most ``bins`` equally filled bins; between values where these are few.
 
     x is (n,) and finite.
     """
@@ -100,7 +113,7 @@ class Curve:
     """Measured less predicted, (bins,)."""
 
     def to_json(self) -> dict[str, Any]:
-        """As the commands print it."""
+        """The curve as the commands print it."""
         return {
             "output": self.over.output,
             "variable": self.over.variable,
@@ -113,7 +126,7 @@ class Curve:
 
 
 def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, Followed]:
-    """Per output what to draw its residual over: a clear order, else the largest share."""
+    """Main variable of each output's residual: a clear order, else the largest share."""
     orders = [f for f in harmonics(regression, residual) if f.share > CLEAR_ORDER]
     trends = [f for f in follows(regression, residual) if f.share > _WORTH_DRAWING]
     out: dict[str, Followed] = {}
@@ -125,7 +138,7 @@ def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, Fo
 
 
 def curve_of(regression: TimeSeriesRegression, residual: Array, over: Followed) -> Curve:
-    """The curve of a residual, (rows,), along what it follows."""
+    """The curve of a residual, (rows,), over a variable."""
     x, error = [], []
     for segment, time in zip(regression.segments, regression.in_time(residual), strict=True):
         if segment.output == over.output:
@@ -142,7 +155,7 @@ def curve_of(regression: TimeSeriesRegression, residual: Array, over: Followed) 
 
 
 def bin_edges(values: Array, over: Followed, turn: float) -> Array:
-    """Inner edges of bins: even within a turn, fine enough for the order; else equally filled."""
+    """Inner edges of bins: equal within a turn, fine enough for the order; else equally filled."""
     if over.order is None:
         return filled_edges(values, _BINS)
     return np.linspace(0, turn, max(_BINS, _PER_PERIOD * over.order) + 1)[1:-1]

@@ -1,4 +1,4 @@
-"""What every step buys out of sample: in the order of growth, added first, and dropped last."""
+"""Contributions of effects to the held-out error: in sequence, added first, and removed last."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from winchkit.diagnosis.selection.stepwise import SelectionResult
 
 __all__ = ["GEOMETRY_NAME", "Waterfall", "waterfall_of"]
 
-GEOMETRY_NAME = "the geometry, all of it"
-"""What a robot's model lacks where its whole geometry had to be let go."""
+GEOMETRY_NAME = "the whole geometry"
+"""Name of the change of a robot's model in which all of its geometry is fitted."""
 
 
 @dataclass(frozen=True)
 class Waterfall:
-    """Held-out rms per output, SI, at every rung."""
+    """Held-out rms per output, SI, at every step."""
 
     rungs: tuple[tuple[str, Mapping[str, float]], ...]
-    """The profile as it is, then with each addition in the order of growth."""
+    """The unchanged profile, then with each effect in the order of selection."""
     first: Mapping[str, Mapping[str, float]]
-    """By effect: with it alone beside the profile."""
+    """By effect: the profile with it alone."""
     last: Mapping[str, Mapping[str, float]]
-    """By effect: with everything else that was found, but without it."""
+    """By effect: the profile with all other named effects."""
 
 
 def waterfall_of(answer: Answer) -> Waterfall | None:
-    """The ladder of a diagnosis; None where it names nothing."""
+    """Contributions of the effects of a diagnosis; None where it names none."""
     diagnosis, engine, file_engine = answer.diagnosis, answer.engine, answer.file_engine
     if not diagnosis.steps:
         return None
@@ -39,7 +39,7 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
     before = {o: fit.heldout_rms_before for o, fit in diagnosis.outputs.items()}
     after = {o: fit.heldout_rms_after for o, fit in diagnosis.outputs.items()}
     ladder = _Ladder(engine, answer.result, {added: after})
-    rungs: list[tuple[str, Mapping[str, float]]] = [("profile as it is", before)]
+    rungs: list[tuple[str, Mapping[str, float]]] = [("unchanged profile", before)]
     first: dict[str, Mapping[str, float]] = {}
     last: dict[str, Mapping[str, float]] = {}
     if file_engine is engine:
@@ -58,14 +58,14 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
 
 @dataclass(frozen=True)
 class _Ladder:
-    """Held-out errors of one inquiry's model with some of the terms found."""
+    """Held-out errors of a model with some of its named effects."""
 
     engine: SelectionEngine
     result: SelectionResult
     known: dict[tuple[int, ...], Mapping[str, float]]
 
     def error(self, *terms: int) -> Mapping[str, float]:
-        """With what the profile has and these additions, refitted."""
+        """Held-out error of the profile with these effects, refitted."""
         if terms not in self.known:
             engine, noise = self.engine, self.result.noise
             kept = _only(self.result.final.hypothesis, (*range(engine.n_initial_terms), *terms))
@@ -76,7 +76,7 @@ class _Ladder:
 
 
 def _only(whole: Hypothesis, kept: tuple[int, ...]) -> Hypothesis:
-    """Some terms of a hypothesis; nuisances are linear and start anew."""
+    """Some terms of a hypothesis; its nuisance parameters are linear and restart at zero."""
     return Hypothesis(
         tuple(whole.terms[index] for index in kept),
         (),

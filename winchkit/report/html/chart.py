@@ -1,7 +1,7 @@
-"""Charts as SVG inside a page: drawn without script, so that they print and need no browser's help.
+"""Charts as SVG inside a page, drawn without script, so that they can be printed.
 
-Colours are the page's own (``before``, ``after``, ``residual``, ``quiet``), so that a chart follows
-light and dark; lengths are of the view box, 480 wide, so that its words stay readable on a phone.
+Colours are classes of the page (``before``, ``after``, ``residual``, ``quiet``), for light and dark
+styles; lengths are those of the view box, 480 wide, so that texts remain legible on a small screen.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _HALF = 1e-6
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: what it shows with its unit, and from where to where."""
+    """One axis: label with unit, and range."""
 
     label: str
     low: float
@@ -46,21 +46,21 @@ class Axis:
     logarithmic: bool = False
 
     def share(self, value: float) -> float:
-        """How far along the axis a value lies, 0 to 1."""
+        """Position of a value along the axis, 0 to 1."""
         if self.logarithmic:
             return (log10(value) - log10(self.low)) / (log10(self.high) - log10(self.low))
         return (value - self.low) / (self.high - self.low)
 
     @property
     def ticks(self) -> list[float]:
-        """Round values along it."""
+        """Round values within the range."""
         return _powers(self.low, self.high) if self.logarithmic else _even(self.low, self.high)
 
 
 def axis_over(
     label: str, values: Iterable[float], *, logarithmic: bool = False, zero: bool = False
 ) -> Axis:
-    """An axis that holds finite values with a little room, and zero where asked."""
+    """An axis for finite values with a margin, and with zero if requested."""
     held = [*values, *([0.0] if zero else [])] or [0.0]
     low, high = min(held), max(held)
     if logarithmic:
@@ -76,11 +76,11 @@ class Chart:
     x: Axis
     y: Axis
     words: str
-    """What it shows, for who cannot see it."""
+    """Text alternative."""
     height: float = _HEIGHT
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Where a point lies in the view box."""
+        """Position of a point in the view box."""
         across = _LEFT + self.x.share(x) * (_WIDTH - _LEFT - _RIGHT)
         return across, _TOP + (1 - self.y.share(y)) * (self.height - _TOP - _BELOW)
 
@@ -90,7 +90,7 @@ class Chart:
         return element("polyline", points=path, class_="line", style=f"color:var(--{tone})")
 
     def dot(self, x: float, y: float, tone: str, said: str = "") -> Markup:
-        """A dot, with what is said where one points at it."""
+        """A dot with a tooltip."""
         across, down = self.at(x, y)
         inside = [element("title", said)] if said else []
         place = {"cx": f"{across:.1f}", "cy": f"{down:.1f}", "r": "3"}
@@ -99,7 +99,7 @@ class Chart:
     def cell(
         self, x: tuple[float, float], y: tuple[float, float], tone: str, strength: float, said: str
     ) -> Markup:
-        """A filled cell from corner to corner; its strength is from 0 to 1."""
+        """A filled cell between two corners; ``strength`` is its opacity, 0 to 1."""
         left, low = self.at(x[0], y[0])
         right, high = self.at(x[1], y[1])
         return element(
@@ -149,7 +149,7 @@ class Chart:
 
 
 def legend(entries: Sequence[tuple[str, str]]) -> Markup:
-    """Colours of the page with what they stand for, below a chart."""
+    """Legend of the page's colours, below a chart."""
     items = [
         element("li", element("span", class_="swatch", style=f"background:var(--{tone})"), text)
         for tone, text in entries
@@ -182,7 +182,7 @@ def _even(low: float, high: float) -> list[float]:
 
 
 def _powers(low: float, high: float) -> list[float]:
-    """1, 2 and 5 of every power of ten, or the powers alone where they are many."""
+    """1, 2 and 5 of every power of ten, or the powers alone over many decades."""
     powers = range(floor(log10(low)), ceil(log10(high)) + 1)
     digits = (1, 2, 5) if len(powers) < 4 else (1,)
     ticks = [digit * 10.0**power for power in powers for digit in digits]
@@ -199,18 +199,18 @@ _OF_PLATFORM = {f"platform_{axis}": ("m", 1.0) for axis in "xyz"} | {
 
 @dataclass(frozen=True)
 class Reading:
-    """How a variable is written on an axis."""
+    """Unit and label of a variable on an axis."""
 
     label: str
     """Its name with the unit."""
     unit: str
     worth: float = 1.0
-    """SI value of one of it."""
+    """SI value of the unit."""
     logarithmic: bool = False
-    """The variable is a logarithm (base 10) of what is shown."""
+    """Whether the variable is the logarithm (base 10) of the shown value."""
 
     def shown(self, values: _Value) -> _Value:
-        """SI values as they are shown."""
+        """SI values in the unit of the axis."""
         return 10.0**values if self.logarithmic else values / self.worth
 
 
@@ -221,7 +221,7 @@ _WITH_A_SIGN = {
 
 
 def reading(variable: str, *, within_turn: bool = False) -> Reading:
-    """How to write a variable; an angle within its turn in degrees, else in turns."""
+    """Unit and label of a variable; an angle within its turn in degrees, else in turns."""
     name = VARIABLE_NAMES.get(variable, variable.replace("_", " "))
     if variable in ANGLES and within_turn:
         return Reading(f"{name} within its turn [°]", "°", _TURN / _DEGREES)

@@ -1,4 +1,4 @@
-"""HTML from data: everything is escaped unless it is already markup."""
+"""HTML from data: every text is escaped unless it is markup already."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = [
 
 
 class Markup(str):
-    """Text that is HTML already; any other text is escaped where it enters a page."""
+    """Text that is HTML; any other text is escaped when it is inserted into a page."""
 
     __slots__ = ()
 
@@ -37,12 +37,12 @@ def element(name: str, *children: str, **attributes: str) -> Markup:
 
 
 def join(children: Iterable[str]) -> Markup:
-    """Children one after another."""
+    """Children concatenated."""
     return Markup("".join(c if isinstance(c, Markup) else escape(c) for c in children))
 
 
 def section(id_: str, heading: str, *children: str) -> Markup:
-    """A section with its heading, for both eye and ear; nothing where it has no content."""
+    """A section with its heading as accessible name; empty without content."""
     if not any(children):
         return Markup("")
     title = element("h2", heading, id=f"{id_}-heading")
@@ -50,14 +50,14 @@ def section(id_: str, heading: str, *children: str) -> Markup:
 
 
 def details(summary: str, *children: str) -> Markup:
-    """Something to open."""
+    """A block to be opened."""
     return element("details", element("summary", summary), *children)
 
 
 def table(
     caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1
 ) -> Markup:
-    """A table whose first ``words`` columns are text and whose others are figures."""
+    """A table whose first ``words`` columns are text and whose others are numbers."""
 
     def row(cells: Sequence[str]) -> Markup:
         first = element("th", cells[0], scope="row")
@@ -83,7 +83,7 @@ def table(
 
 
 def compact(value: Any, indent: int | None = None) -> str:
-    """JSON with null where there is no finite number."""
+    """JSON with null in place of numbers that are not finite."""
     separators = (",", ":") if indent is None else (",", ": ")
     plain = without_nan(value)
     return json.dumps(
@@ -92,6 +92,6 @@ def compact(value: Any, indent: int | None = None) -> str:
 
 
 def inline(value: Any) -> str:
-    """JSON that no text in it can end the script element of."""
+    """JSON for a script element, escaped so that no text in it can end the element."""
     text = compact(value)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -1,4 +1,4 @@
-"""The shell of every page: one file with its styles, scripts and licences, and no network."""
+"""Frame of every page: one file with its styles, scripts and licences, without network access."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inl
 
 
 def page(title: str, plots: Sequence[OutputPlots], *content: Markup) -> str:
-    """A whole page: its title, then the content, whose figures draw the plots."""
+    """A whole page: title, content, and the data of its plots."""
     head = element(
         "header", element("h1", title), element("p", f"winchkit, {date.today()}", class_="quiet")
     )
     drawing = _drawing(plots) if plots else []
-    noscript = element("noscript", element("p", "The plots need JavaScript; all else is here."))
+    noscript = element("noscript", element("p", "The plots need JavaScript; the rest does not."))
     within = [head, noscript, *content] if plots else [head, *content]
     body = element("body", element("main", *within), *drawing)
     return f'<!DOCTYPE html>\n<html lang="en">{_head(title, drawn=bool(plots))}{body}</html>\n'
 
 
 def _drawing(plots: Sequence[OutputPlots]) -> list[Markup]:
-    """What draws plots; a page without any goes without script."""
+    """Script elements of the plots; none for a page without plots."""
     return [
         Markup(f'<script type="application/json" id="plots">{inline(_data(plots))}</script>'),
         _script("uPlot.iife.min.js"),

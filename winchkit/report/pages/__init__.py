@@ -1,1 +1,1 @@
-"""Whole pages: one file for each subject, put together from figures, tables and sentences."""
+"""Whole pages, one module for each subject, composed of figures, tables and sentences."""

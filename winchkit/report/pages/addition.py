@@ -1,4 +1,4 @@
-"""The sections of an addition's page."""
+"""Sections of the page of an added effect."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def addition_sections(
     return join(
         [
             _lead(addition, better),
-            section("residuals", "What it changes", *figures),
+            section("residuals", "Residuals before and after", *figures),
             section("parameters", "All effects of the new profile", _parameters(addition)),
             section("notes", "Notes", bullets(addition.notes)),
             repeat(command, commands, "addition", addition.to_json()),
@@ -47,14 +47,14 @@ def addition_sections(
 
 
 def addition_sentence(addition: Addition) -> str:
-    """What was added with its values, and what it bought."""
+    """The added effect with its values, and the change of the held-out errors."""
     term, values = addition.added
-    told = ", ".join(part for part in (meaning(term.effect.id), _values(values)) if part)
-    named = f"Added {term.label} to the profile{f': {told}' if told else ''}."
+    text = ", ".join(part for part in (meaning(term.effect.id), _values(values)) if part)
+    named = f"Added {term.label} to the profile{f': {text}' if text else ''}."
     outputs = addition.outputs
     gain = gain_text(outputs, "With it")
     worse = worse_text(outputs)
-    nothing = "" if gain or worse else "It leaves the held-out errors as they are."
+    nothing = "" if gain or worse else "It does not change the held-out errors."
     return " ".join(part for part in (named, gain, nothing, worse, still_text(outputs)) if part)
 
 
@@ -72,16 +72,16 @@ def _lead(addition: Addition, better: str) -> Markup:
 
 
 def _chip(outputs: Mapping[str, OutputFit]) -> tuple[str, str]:
-    """The addition in a word, and its tone."""
+    """The result in a word, and its colour."""
     if worse_text(outputs):
-        return "Added, and worse", "unknown"
+        return "Added, with larger errors", "unknown"
     if not moved_outputs(outputs):
         return "Added without gain", "partly"
     return "Added", "explained"
 
 
 def _errors(outputs: Mapping[str, OutputFit]) -> Markup:
-    """Errors before and after per output, fitted and held out, beside the noise."""
+    """Errors before and after per output, fitted and held out, and the noise."""
     rows = []
     for name, output in outputs.items():
         scale = scale_for(output.heldout_rms_before, output.unit)
@@ -103,8 +103,8 @@ def _errors(outputs: Mapping[str, OutputFit]) -> Markup:
         )
     head = ["output", "measured, rms", "fitted, before", "after", "held out, before", "after"]
     caption = (
-        "Error, rms, of the runs fitted, and held out: each group of runs predicted with values "
-        "fitted without it. The last column is the held-out error after, in units of the noise."
+        "Error, rms, of the fitted runs, and held out: each group of runs is predicted with values "
+        "fitted without it. The last column is the held-out error after, over the noise."
     )
     return table(caption, [*head, "noise", "error / noise"], rows)
 
@@ -120,7 +120,7 @@ def _parameters(addition: Addition) -> Markup:
         ]
         for at, (term, values) in enumerate(addition.terms)
     ]
-    head = ["effect", "status", "what it means", "values"]
+    head = ["effect", "status", "meaning", "values"]
     caption = "All values are fitted together, ± one standard deviation."
     return table(caption, head, rows, words=4)
 

@@ -1,4 +1,4 @@
-"""The report of a cell's calibration as one page without network."""
+"""Report of a load cell's calibration as text and as a self-contained page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 NAMES = ("c0 [N]", "c1 [1]", "c2 [1/N]")
-"""Of the coefficients."""
+"""Names of the coefficients."""
 _WIDTH = 56
 _ROWS = 11
 _MARKS = {"up": "^", "down": "v"}
@@ -42,7 +42,7 @@ def report_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
 
 
 def figures(fit: CellFit) -> list[tuple[str, str]]:
-    """Figures of merit and what they are."""
+    """Names and values of the figures of merit."""
     return [
         ("residual std", f"{fit.residual_std:.3g} N ({fit.residual_std / fit.span:.3%} of span)"),
         ("non-linearity", _share(fit.nonlinearity)),
@@ -77,12 +77,12 @@ def _residual_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[st
 
 
 _FORMULA = "True force = c0 + c1 x + c2 x², x the indicated force in N; a line has no c2."
-_SPAN = "How well it fits; the span is from the least to the largest load."
+_SPAN = "Figures of merit; the span is from the smallest to the largest load."
 _TONES = {"up": "above", "down": "below"}
 
 
 def report_page(calibration: CellCalibration, fit: CellFit) -> str:
-    """What was calibrated, the fit, the residuals, the points."""
+    """Page with the load cell, the fit, the residuals and the points."""
     coefficients = [
         (name, f"{value:.6g}", f"{std:.2g}")
         for name, value, std in zip(NAMES, fit.coefficients, fit.std, strict=False)
@@ -90,13 +90,13 @@ def report_page(calibration: CellCalibration, fit: CellFit) -> str:
     return page(
         f"Calibration of {calibration.name}",
         (),
-        section("about", "What was calibrated", _about(calibration)),
+        section("about", "Load cell", _about(calibration)),
         section(
             "fit",
             "Fit",
             table(_FORMULA, ("coefficient", "value", "one standard deviation"), coefficients),
             table(
-                "How well it fits; span is from the least to the largest load.",
+                "Figures of merit; the span is from the smallest to the largest load.",
                 ("figure", "value"),
                 figures(fit),
             ),
@@ -110,11 +110,11 @@ def report_page(calibration: CellCalibration, fit: CellFit) -> str:
 def _about(calibration: CellCalibration) -> Markup:
     warm = calibration.temperature
     rows = [
-        ("device", calibration.device or "not told"),
-        ("serial number", calibration.serial_number or "not told"),
+        ("device", calibration.device or "not given"),
+        ("serial number", calibration.serial_number or "not given"),
         ("date", calibration.date.isoformat()),
         ("direction", calibration.direction),
-        ("temperature", "not told" if warm is None else f"{warm:g} °C"),
+        ("temperature", "not given" if warm is None else f"{warm:g} °C"),
     ]
     pairs = [part for name, said in rows for part in (element("dt", name), element("dd", said))]
     return element("dl", *pairs, class_="facts")
@@ -133,12 +133,13 @@ def _points(points: Sequence[CalibrationPoint], fit: CellFit) -> Markup:
         for point, residual in zip(points, fit.residuals, strict=True)
     ]
     head = ("series", "going", "load [N]", "indicated [N]", "std [N]", "residual [N]")
-    return table("Loads in the order in which they were hung; std is the reading's.", head, rows, 2)
+    caption = "Loads in the order of application; std is that of the reading."
+    return table(caption, head, rows, 2)
 
 
 def _drawing(fit: CellFit, points: Sequence[CalibrationPoint]) -> Markup:
     """Residuals over the load."""
-    caption = "True less fitted force over the load; a loop between up and down is hysteresis."
+    caption = "True less fitted force over the load; a difference of up and down is hysteresis."
     chart = Chart(
         axis_over("load [N]", [point.load for point in points]),
         axis_over("residual [N]", fit.residuals, zero=True),

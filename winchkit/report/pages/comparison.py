@@ -1,4 +1,4 @@
-"""The sections of a comparison's page."""
+"""Sections of the page of a comparison."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 __all__ = ["comparison_sections", "distance_text"]
 
 _NEXT = (
-    "A comparison tells how far off the model is, not why: winchkit diagnose, as written below, "
-    "names the effect that is missing, or says that none is."
+    "A comparison quantifies the error of the model, not its cause: winchkit diagnose, with the "
+    "command below, names the missing effect or states that there is none."
 )
 
 
@@ -29,12 +29,12 @@ def comparison_sections(
     figures: Sequence[Markup],
     command: Command,
 ) -> Markup:
-    """Everything below the title; ``over`` is what each output's error follows most."""
+    """Content below the title; ``over`` is the main variable of each output's error."""
     profile = command.profile
     return join(
         [
             _lead(comparison, over),
-            section("residuals", "Where the model fails", *figures),
+            section("residuals", "Residuals", *figures),
             section("notes", "Notes", bullets(comparison.notes)),
             repeat(
                 command,
@@ -47,43 +47,43 @@ def comparison_sections(
 
 
 def distance_text(name: str, error: OutputError, over: Followed | None) -> str:
-    """How far one output is off, beside its noise, and what the error follows."""
-    off = f"The {OUTPUT_NAMES.get(name, name)} is off by {quantity(error.rms, error.unit)} rms"
+    """Error of one output, its ratio to the noise, and its attribution."""
+    size = f"{quantity(error.rms, error.unit)} rms"
+    off = f"The error of the {OUTPUT_NAMES.get(name, name)} is {size}"
     if error.noise_rms is None:
-        return f"{off}, its noise unknown without a repeated run; {_following(over)}."
+        return f"{off}; its noise is unknown without repeats; {_attributed(over)}."
     noise = f"its noise of {quantity(error.noise_rms, error.unit)}"
     if _at_noise(error):
         return f"{off}, about {noise}."
     ratio = error.rms / error.noise_rms if error.noise_rms else None
-    beside = "beside" if ratio is None else f"{significant(ratio, 2)} times"
-    return f"{off}, {beside} {noise}; {_following(over)}."
+    beside = "with" if ratio is None else f"{significant(ratio, 2)} times"
+    return f"{off}, {beside} {noise}; {_attributed(over)}."
 
 
-def _following(over: Followed | None) -> str:
+def _attributed(over: Followed | None) -> str:
     if over is None:
-        return "it hardly follows anything that was measured"
-    share = f"({percent(over.share)} of the error)"
+        return "no measured variable explains it"
+    share = f"({percent(over.share)} of its variance)"
     if over.order is not None:
-        return f"it repeats {often_per_turn(over.variable, over.order)} {share}"
-    return f"it follows the {VARIABLE_NAMES.get(over.variable, over.variable)} {share}"
+        return f"it has {often_per_turn(over.variable, over.order)} {share}"
+    return f"it depends on {VARIABLE_NAMES.get(over.variable, over.variable)} {share}"
 
 
 def _lead(comparison: Comparison, over: Mapping[str, Followed]) -> Markup:
     outputs = comparison.outputs
-    told = [distance_text(name, error, over.get(name)) for name, error in outputs.items()]
+    texts = [distance_text(name, error, over.get(name)) for name, error in outputs.items()]
     rows = [
-        [name, _trends(error), *sizes, _ratio(error)]
+        [name, unbroken(followed(error)), *sizes, _ratio(error)]
         for (name, *sizes), error in zip(size_rows(comparison), outputs.values(), strict=True)
     ]
-    caption = "Measured less predicted, the profile's values as they are in the file."
-    inside = [table(caption, ["output", "follows", *HEAD[1:], "rms / noise"], rows, words=2)]
+    caption = (
+        "Measured less predicted, with the values of the profile's file. Shares are those of the "
+        "error's variance."
+    )
+    inside = [table(caption, ["output", "explained by", *HEAD[1:], "rms / noise"], rows, words=2)]
     if comparison.offset is not None:
         inside.append(element("p", f"{capital(offset_text(comparison.offset))}."))
-    return lead(*_chip(list(outputs.values())), told, *inside, element("p", _NEXT, class_="quiet"))
-
-
-def _trends(error: OutputError) -> str:
-    return unbroken(followed(error).removeprefix("follows "))
+    return lead(*_chip(list(outputs.values())), texts, *inside, element("p", _NEXT, class_="quiet"))
 
 
 def _ratio(error: OutputError) -> str:
@@ -91,7 +91,7 @@ def _ratio(error: OutputError) -> str:
 
 
 def _chip(errors: Sequence[OutputError]) -> tuple[str, str]:
-    """The comparison in a word, and its tone."""
+    """The comparison in a word, and its colour."""
     if any(error.noise_rms is not None and not _at_noise(error) for error in errors):
         return "Above the noise", "partly"
     if any(error.noise_rms is None for error in errors):

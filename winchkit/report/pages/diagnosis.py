@@ -1,4 +1,4 @@
-"""The sections of a diagnosis' page, in the order in which a bench engineer reads."""
+"""Sections of the page of a diagnosis, in order of use."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from winchkit.diagnosis.results import Diagnosis
 from winchkit.report import tables
 from winchkit.report.as_json import report_json
 from winchkit.report.detectability import effects_of, smallest_shown
-from winchkit.report.figures.rest import rest_figures
+from winchkit.report.figures.unexplained import unexplained_figures
 from winchkit.report.figures.waterfall import waterfall_of
 from winchkit.report.html.markup import Markup, element, join, section, table
 from winchkit.report.pages.parts import bullets, lead
@@ -31,34 +31,34 @@ def sections(
     truth: Mapping[str, object] | None,
     command: Command,
 ) -> Markup:
-    """Everything below the title."""
+    """Content below the title."""
     diagnosis = answer.diagnosis
     effects = effects_of(answer)
     return join(
         [
             _verdict(answer),
-            section("story", "What was done", _story(story)),
-            section("residuals", "Where the model fails", *figures),
+            section("story", "Procedure", _story(story)),
+            section("residuals", "Residuals", *figures),
             section(
                 "waterfall",
-                "What each step buys",
+                "Contribution of each effect",
                 tables.waterfall(waterfall_of(answer), diagnosis),
             ),
-            section("candidates", "What else was considered", tables.candidates(answer)),
+            section("candidates", "Candidate effects", tables.candidates(answer)),
             section(
                 "confusion",
-                f"What these {diagnosis.data} cannot tell apart",
+                f"Effects that cannot be distinguished with these {diagnosis.data}",
                 tables.confusion(diagnosis, effects),
             ),
             section(
                 "detectable",
-                f"What these {diagnosis.data} could show",
+                f"Effects that are detectable with these {diagnosis.data}",
                 tables.detectable(answer),
             ),
-            section("unexplained", "What is left unexplained", _unexplained(answer)),
-            section("next", "What to run next", _next(diagnosis)),
+            section("unexplained", "Unexplained residual", _unexplained(answer)),
+            section("next", "Next runs", _next(diagnosis)),
             section("notes", "Notes", bullets(diagnosis.notes)),
-            section("truth", "What was hidden", _truth(truth)),
+            section("truth", "Simulated effect", _truth(truth)),
             repeat(command, _commands(diagnosis, command), "diagnosis", report_json(answer)),
         ]
     )
@@ -68,7 +68,7 @@ def _verdict(answer: Answer) -> Markup:
     diagnosis = answer.diagnosis
     seen = smallest_shown(answer) if diagnosis.verdict == "adequate" else []
     shown = element(
-        "p", f"These {diagnosis.data} would have shown, among others, ", listed(seen), "."
+        "p", f"Detectable with these {diagnosis.data}, among others: ", listed(seen), "."
     )
     return lead(
         VERDICT_NAMES[diagnosis.verdict],
@@ -100,28 +100,31 @@ def _unexplained(answer: Answer) -> Markup:
     diagnosis = answer.diagnosis
     if diagnosis.verdict == "explained" and diagnosis.unexplained_share >= _TRACE:
         left = percent(diagnosis.unexplained_share)
-        trace = f"A trace of {left} of what stood above the noise is left, below the noise itself."
-        return element("p", trace)
+        return element(
+            "p",
+            f"{left} of the residual variance above the noise floor remains; it is below the noise "
+            "floor itself.",
+        )
     if diagnosis.verdict not in {"partly", "unknown"}:
         return Markup("")
-    left = f"{percent(diagnosis.unexplained_share)} of what stood above the noise is left."
+    share = percent(diagnosis.unexplained_share)
+    left = element("p", f"{share} of the residual variance above the noise floor remains.")
     places = bullets([where_text(where) for where in diagnosis.where])
-    lead = "Where it shows; variables that move together show the same error more than once:"
-    lives = element("p", lead) if places else Markup("")
-    return join([element("p", left), lives, places, *rest_figures(answer), _offer(diagnosis)])
+    caption = "Its patterns; correlated variables explain the same part of the residual:"
+    head = element("p", caption) if places else Markup("")
+    return join([left, head, places, *unexplained_figures(answer), _offer(diagnosis)])
 
 
 def _offer(diagnosis: Diagnosis) -> Markup:
-    """How to take up a rest that is not understood."""
+    """Commands that continue with an unexplained residual."""
     if not diagnosis.empirical:
         return Markup("")
     return element(
         "p",
-        "Until it is understood, ",
         element("code", f"winchkit add {diagnosis.empirical[0]}"),
-        " adds it as a curve that is marked as not understood, and ",
+        " adds it as an empirical curve, and ",
         element("code", "winchkit effects new"),
-        " begins an effect of your own from it; both stand below in full.",
+        " creates an effect of your own from it; the full commands are below.",
     )
 
 
@@ -133,10 +136,10 @@ def _next(diagnosis: Diagnosis) -> Markup:
         for r in diagnosis.next_runs
     ]
     caption = (
-        "What would tell effects apart, and the chance that it does; – where no motion does, "
-        "only the change that is named."
+        "Runs that distinguish effects, and the power of the test; – where a change of the machine "
+        "is needed in place of a motion."
     )
-    return table(caption, ["effects", "what to run", "power"], rows, words=2)
+    return table(caption, ["effects", "run", "power"], rows, words=2)
 
 
 def _truth(truth: Mapping[str, object] | None) -> Markup:
@@ -147,7 +150,7 @@ def _truth(truth: Mapping[str, object] | None) -> Markup:
 
 
 def _commands(diagnosis: Diagnosis, command: Command) -> list[str]:
-    """What to type to get this again, and to go on from it."""
+    """Commands that reproduce the result and continue from it."""
     profile = command.profile
     commands = [command.compare(profile), command.diagnose(profile)]
     for number, step in enumerate(diagnosis.steps, start=1):

@@ -1,4 +1,4 @@
-"""Effects as a page: each with its words, its numbers, and its signature drawn from its code."""
+"""Effects as a page: each with its description, parameters, and signature computed by its code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from winchkit.arrays import Array
 from winchkit.effects.card import Signature, in_control, parameter_kind, signature
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS
-from winchkit.report.figures.reduction import thin
+from winchkit.report.figures.reduction import decimated
 from winchkit.report.html.chart import Chart, axis_over
 from winchkit.report.html.markup import Markup, element, section, table
 from winchkit.report.html.page import page
@@ -24,8 +24,8 @@ __all__ = ["effects_html"]
 _POINTS = 240
 _HEIGHT = 190.0
 _MOTION = (
-    "Along the standard motion: a fast and a slow stroke under 15 kg, then under 45 kg, while it "
-    "grows warmer. Each curve is what the effect adds to the output, from its own code."
+    "Along the standard motion: a fast and a slow stroke under 15 kg, then under 45 kg, at rising "
+    "temperature. Each curve is the change of the output by the effect, computed by its code."
 )
 
 
@@ -44,7 +44,7 @@ def _contents(effects: Sequence[Effect]) -> Markup:
             for e in effects
             if ("" if e.of_robots else e.outputs[0]) == output
         ]
-        place = f"On the way to {OUTPUT_NAMES[output]}" if output else "On a robot"
+        place = f"Effects on {OUTPUT_NAMES[output]}" if output else "Effects on a robot"
         if items:
             lists += [element("h3", place), element("ul", *items)]
     return section("contents", f"{len(effects)} effects", *lists)
@@ -52,20 +52,20 @@ def _contents(effects: Sequence[Effect]) -> Markup:
 
 def _card(effect: Effect) -> Markup:
     needs = [need.replace("_", " ") for need in effect.needs]
-    told = [
+    pairs = [
         ("formula", element("span", effect.formula, class_="formula")),
         ("source", effect.source),
         ("changes", listed([OUTPUT_NAMES.get(name, name) for name in effect.outputs])),
-        ("needs", listed(needs) or "nothing beside the motor angle"),
+        ("needs", listed(needs) or "only the motor angle"),
         ("family", effect.family),
         ("contains", listed(list(effect.contains))),
         ("looks like", effect.looks_like),
         ("confused with", listed(list(effect.confused_with), "or")),
-        ("told apart by", effect.told_apart),
+        ("distinguished by", effect.told_apart),
         ("in control", in_control(effect)),
     ]
     facts = [
-        part for name, said in told if said for part in (element("dt", name), element("dd", said))
+        part for name, text in pairs if text for part in (element("dt", name), element("dd", text))
     ]
     return section(
         effect.id,
@@ -82,8 +82,8 @@ def _parameters(effect: Effect) -> Markup:
     rows = [
         [parameter_name(p.name), parameter_kind(effect, p), *_figures(p)] for p in effect.parameters
     ]
-    head = ["parameter", "kind", "vanishes at", "usual size", "from", "to"]
-    caption = "Where it vanishes a shape has its default; searches begin with the usual size."
+    head = ["parameter", "kind", "null value", "typical size", "from", "to"]
+    caption = "The null value of a shape parameter is its default; searches start at typical size."
     return table(caption, head, rows, words=2)
 
 
@@ -97,7 +97,7 @@ def _figures(parameter: Parameter) -> list[str]:
 
 
 def _size(value: float, unit: str) -> str:
-    """A size that somebody chose: as few digits as it has."""
+    """A chosen size, with as few digits as it has."""
     scale = scale_for(value, unit)
     return scale.labelled(plain(value / scale.worth))
 
@@ -120,7 +120,7 @@ def _drawing(effect: Effect) -> list[Markup]:
 
 
 def _moves(drawn: Signature, over: str) -> Markup:
-    said = "Free length of the bare line, for orientation."
+    said = "Free length of the nominal line, for orientation."
     return _figure((drawn.time, over), drawn.cable_length, ("free length", "m"), "residual", said)
 
 
@@ -136,7 +136,7 @@ def _figure(
     """One curve, its extremes kept."""
     (time, over), (name, unit) = along, shown
     scale = scale_for(float(np.nanmax(np.abs(values))), unit)
-    x, (y,) = thin(time, [values / scale.worth], _POINTS)
+    x, (y,) = decimated(time, [values / scale.worth], _POINTS)
     points = [(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True) if isfinite(b)]
     chart = Chart(
         axis_over(over, x.tolist()),

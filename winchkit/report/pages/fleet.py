@@ -1,4 +1,4 @@
-"""All winches of a recording as one page: a line for each, what they share, their own pages."""
+"""All winches of a recording as one page: a row for each, common effects, links to their pages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from winchkit.report.html.page import page
 from winchkit.report.pages.parts import bullets
 from winchkit.report.words.columns import aligned, hanging, paragraph
 from winchkit.report.words.numbers import Scale, percent, quantity, scale_for, significant, unbroken
-from winchkit.report.words.sentence import telling, where_text
+from winchkit.report.words.sentence import main_patterns, where_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VARIABLE_NAMES,
@@ -35,53 +35,53 @@ __all__ = [
 
 _FOLLOWED = 3
 _BY_CHANCE = 0.01
-"""From here on an alarm of one of many winches may be chance."""
+"""Least probability at which a false alarm of one of many winches is reported."""
 _ALL = 0.9
-"""Part of a share that makes it alike in all winches, and the rest not worth a word."""
+"""Least common part of a share at which it counts as common to all winches."""
 
 
 def shared_effects_text(
     found: Mapping[str, Diagnosis], shared: Sequence[SharedEffect], chances: Mapping[str, float]
 ) -> str:
-    """A diagnosis of every winch in a line each, and which effects they share.
+    """Diagnoses of all winches, a line each, and their common effects.
 
     ``chances`` are those of :func:`winchkit.diagnosis.fleet.meta_analysis.alarms`.
     """
     lines = [f"all {len(found)} winches", *hanging(winch_rows(found, chances), words=2)]
     if shared:
-        lines += ["", "what they have in common, and what not"]
+        lines += ["", "effects in common and in single winches"]
         lines += [line for one in shared for line in paragraph(effect_text(one), "  ", "    ")]
     return "\n".join(lines)
 
 
 def shared_errors_text(found: Mapping[str, Comparison], shared: Mapping[str, SharedError]) -> str:
-    """A comparison of every winch in a line each, and what their errors follow alike or not."""
+    """Comparisons of all winches, a line each, and the common attribution of their errors."""
     lines = [f"all {len(found)} winches", *aligned(error_rows(found))]
-    lines += ["", "what the errors of all follow"]
-    lines += [line for told in error_texts(shared) for line in paragraph(told, "  ", "    ")]
+    lines += ["", "share of the errors' variance explained by"]
+    lines += [line for text in error_texts(shared) for line in paragraph(text, "  ", "    ")]
     return "\n".join(lines)
 
 
 def winch_rows(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> list[list[str]]:
-    """Per winch its name, its verdict, and what was found."""
+    """Per winch its name, its verdict, and its effects."""
     rows = []
     for name, one in found.items():
-        told, chance = _found(one), chances.get(name, 0.0)
+        text, chance = _found(one), chances.get(name, 0.0)
         if chance > _BY_CHANCE:
-            told += f"; by chance in one of {len(found)} winches: {percent(chance)} of recordings"
-        rows.append([name, VERDICT_NAMES[one.verdict], told])
+            text += f"; false alarm of one in {len(found)} winches: {percent(chance)} of recordings"
+        rows.append([name, VERDICT_NAMES[one.verdict], text])
     return rows
 
 
 def effect_text(shared: SharedEffect) -> str:
-    """``your motor side rubs (motor-coulomb): in H alone: torque = …; A to G would show it``."""
+    """``the drum has runout (drum-eccentricity): only in H: amplitude = …; excluded in A``."""
     first, *others = shared.effects
     ids = f"{first}, or {listed(others, 'or')}" if others else first
     parts = [f"{clause(first)} ({ids}): {_where(shared)}"]
     if shared.without:
-        parts.append(f"{listed(list(shared.without))} would have shown it and did not")
+        parts.append(f"excluded in {listed(list(shared.without))}")
     if shared.unsure:
-        parts.append(f"of {listed(list(shared.unsure))} these runs cannot tell")
+        parts.append(f"not decidable in {listed(list(shared.unsure))} with these runs")
     return "; ".join(parts)
 
 
@@ -110,35 +110,36 @@ def _beside_noise(error: OutputError, scale: Scale) -> str:
 
 
 def error_texts(shared: Mapping[str, SharedError]) -> list[str]:
-    """Per output what its errors follow: ``motor torque: direction 87 %, most of it in H``."""
+    """Per output the attribution of its errors: ``motor torque (…): direction 87 %, …``."""
     out = []
     for output, error in shared.items():
-        told = "; ".join(_followed(one) for one in error.follows[:_FOLLOWED])
+        text = "; ".join(_followed(one) for one in error.follows[:_FOLLOWED])
         most = [
-            f", {percent(s)} of the squares in {w}" for w, s in error.winches.items() if s > 0.5
+            f", {percent(s)} of the variance in {w}" for w, s in error.winches.items() if s > 0.5
         ]
         off = f"{quantity(error.rms, error.unit)} rms{''.join(most)}"
         name = OUTPUT_NAMES.get(output, output)
-        out.append(f"{name} ({off}): {told or 'nothing that was measured'}")
+        out.append(f"{name} ({off}): {text or 'no measured variable'}")
     return out
 
 
 def _followed(one: SharedFollowed) -> str:
-    name = "winch, a level of its own" if one.variable == "winch" else VARIABLE_NAMES[one.variable]
-    told = f"{name} {percent(one.share)}"
+    name = "constant of each winch" if one.variable == "winch" else VARIABLE_NAMES[one.variable]
+    text = f"{name} {percent(one.share)}"
     if one.variable != "winch":
         if one.common >= _ALL * one.share:
-            return f"{told}, alike in all"
-        told += f", {percent(one.common)} alike in all"
-    return f"{told}, most of the difference in {listed(list(one.apart))}" if one.apart else told
+            return f"{text}, common to all"
+        text += f", {percent(one.common)} common to all"
+    return f"{text}, outlying: {listed(list(one.apart))}" if one.apart else text
 
 
 def _found(one: Diagnosis) -> str:
     if one.steps:
         return "; ".join(_step(step) for step in one.steps)
     if one.verdict == "adequate":
-        return "nothing above the noise"
-    return "; ".join(where_text(where) for where in telling(one.where)[:1]) or "no known effect"
+        return "residual at the noise floor"
+    patterns = [where_text(where) for where in main_patterns(one.where)[:1]]
+    return "; ".join(patterns) or "no known effect"
 
 
 def _step(step: Step) -> str:
@@ -150,28 +151,28 @@ def _step(step: Step) -> str:
 
 def _where(shared: SharedEffect) -> str:
     values = ", ".join(_value(name, p) for name, p in shared.parameters.items())
-    told = f": {values}" if values else ""
+    text = f": {values}" if values else ""
     if len(shared.winches) == 1:
-        alone = "alone" if not shared.unsure else "at least"
-        return f"in {shared.winches[0]} {alone}{told}"
+        only = "only" if not shared.unsure else "at least"
+        return f"{only} in {shared.winches[0]}{text}"
     every = not shared.without and not shared.unsure
     who = f"all {len(shared.winches)}" if every else listed(list(shared.winches))
-    return f"in {who}, {_likeness(shared)}{told}"
+    return f"in {who}, {_likeness(shared)}{text}"
 
 
 def _likeness(shared: SharedEffect) -> str:
-    """Whether the winches have it alike, all parameters together."""
-    apart = dict.fromkeys(name for p in shared.parameters.values() for name in p.apart)
+    """Homogeneity of the winches over all parameters of the effect."""
+    outlying = dict.fromkeys(name for p in shared.parameters.values() for name in p.apart)
     if all(p.alike for p in shared.parameters.values()):
-        return "alike"
-    return f"alike but for {listed(list(apart))}" if apart else "of different sizes"
+        return "equal in size"
+    return f"equal in size except {listed(list(outlying))}" if outlying else "of different sizes"
 
 
 def _value(name: str, one: Pooled) -> str:
-    told = estimate_text(name, Estimate(one.value, one.std, one.unit))
+    text = estimate_text(name, Estimate(one.value, one.std, one.unit))
     if one.alike or one.apart:
-        return told
-    return f"{told} in the mean, {quantity(one.spread, one.unit, 2)} from winch to winch"
+        return text
+    return f"{text} in the mean, standard deviation {quantity(one.spread, one.unit, 2)} of winches"
 
 
 def shared_effects_html(
@@ -181,15 +182,15 @@ def shared_effects_html(
     title: str,
     pages: Mapping[str, str],
 ) -> str:
-    """The page over the diagnoses of all winches; ``pages`` are the names of each one's own."""
-    told_of = winch_rows(found, chances)
-    rows = [[_link(name, pages), verdict, unbroken(text)] for name, verdict, text in told_of]
-    told = [unbroken(effect_text(one)) for one in shared]
+    """The page over the diagnoses of all winches; ``pages`` are the files of the single ones."""
+    plain = winch_rows(found, chances)
+    rows = [[_link(name, pages), verdict, unbroken(text)] for name, verdict, text in plain]
+    texts = [unbroken(effect_text(one)) for one in shared]
     return page(
         title,
         (),
-        section("winches", "Every winch", _table(["winch", "verdict", "what was found"], rows, 3)),
-        section("shared", "What they have in common, and what not", bullets(told)),
+        section("winches", "Every winch", _table(["winch", "verdict", "effects"], rows, 3)),
+        section("shared", "Effects in common and in single winches", bullets(texts)),
         _as_json({"effects": [one.to_json() for one in shared], "alarms": dict(chances)}),
     )
 
@@ -203,18 +204,18 @@ def shared_errors_html(
     """The page over the comparisons of all winches, as :func:`shared_effects_html`."""
     head, *rows = error_rows(found)
     linked = [[_link(name, pages), *cells] for name, *cells in rows]
-    told = [unbroken(text) for text in error_texts(shared)]
+    texts = [unbroken(text) for text in error_texts(shared)]
     return page(
         title,
         (),
         section("winches", "Every winch", _table(head, linked, 1)),
-        section("shared", "What the errors of all follow", bullets(told)),
+        section("shared", "Share of the errors' variance explained by", bullets(texts)),
         _as_json({"outputs": {name: error.to_json() for name, error in shared.items()}}),
     )
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], words: int) -> Markup:
-    return table("Each by itself, against the same profile.", head, rows, words=words)
+    return table("Each winch separately, with the same profile.", head, rows, words=words)
 
 
 def _link(name: str, pages: Mapping[str, str]) -> Markup:
@@ -222,4 +223,4 @@ def _link(name: str, pages: Mapping[str, str]) -> Markup:
 
 
 def _as_json(shared: Mapping[str, object]) -> Markup:
-    return details("What is shared as JSON", element("pre", compact(shared, indent=1)))
+    return details("Common effects as JSON", element("pre", compact(shared, indent=1)))

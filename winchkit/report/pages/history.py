@@ -1,4 +1,4 @@
-"""A profile's ledger as a page: what every step left of the held-out error."""
+"""A profile's ledger as a page: the held-out error after every step."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _ROOM = 1.05
 
 
 def ladder_html(name: str, rungs: Sequence[Rung]) -> str:
-    """The page; a step on other runs than the one before begins anew."""
-    title = f"{name}: how it grew"
+    """The page; a step on other runs than the one before starts a new series."""
+    title = f"{name}: history of its effects"
     if not rungs:
-        return page(title, (), element("p", "Nothing was added to it or removed from it."))
+        return page(title, (), element("p", "No effect was added or removed."))
     caption = (
-        "Held-out error, rms, after each step, each group of runs predicted with values fitted "
-        "without it. The upright mark is the noise at that step; bars compare within a column."
+        "Held-out error, rms, after each step: each group of runs is predicted with values fitted "
+        "without it. The vertical mark is the noise at that step; bars of a column have one scale."
     )
     shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]
-    head = ["step", "what it means", *(OUTPUT_NAMES[o] for o in shown)]
+    head = ["step", "meaning", *(OUTPUT_NAMES[o] for o in shown)]
     steps = table(caption, head, _rows(rungs, shown), words=2)
     return page(title, (), section("waterfall", "Held-out error per step", steps))
 
@@ -58,7 +58,7 @@ def _bars(
     shown: Sequence[str],
     longest: Mapping[str, float],
 ) -> list[Markup]:
-    """A bar per output; a dash where a step was not judged."""
+    """A bar per output; a dash where a step has no held-out error."""
     return [
         bar(errors[o], longest[o], noise.get(o), scale_for(errors[o], LADDER_UNITS[o]))
         if o in errors
@@ -73,9 +73,9 @@ def _longest(rungs: Sequence[Rung], output: str) -> float:
 
 
 def ladder_text(name: str, rungs: Sequence[Rung]) -> str:
-    """Held-out error per step; a step on other runs than the one before begins anew."""
+    """Held-out error per step; a step on other runs than the one before starts a new series."""
     if not rungs:
-        return f"{name}: nothing was added to it or removed from it"
+        return f"{name}: no effect was added or removed"
     shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]
     rows = [["held-out error, rms", "", *(OUTPUT_NAMES[o] for o in shown)]]
     runs: tuple[str, ...] = ()
@@ -90,7 +90,7 @@ def ladder_text(name: str, rungs: Sequence[Rung]) -> str:
 
 
 def _cells(values: Mapping[str, float], shown: Sequence[str]) -> list[str]:
-    """Values of the shown outputs, a dash where a step was not judged."""
+    """Values of the shown outputs, a dash where a step has no held-out error."""
     return [
         scale_for(values[o], LADDER_UNITS[o]).text(values[o]) if o in values else "—" for o in shown
     ]

@@ -32,9 +32,25 @@ def report_html(
 ) -> str:
     """The page of a diagnosis.
 
-    ``story`` tells in sentences what was done; ``truth`` is what a simulated bench hid, revealed
-    last; ``profile`` is the profile as the user named it and ``options`` what else the command
-    was given, for the commands that repeat all this.
+    Parameters
+    ----------
+    answer : WinchAnswer
+        The diagnosis.
+    title : str
+        Title of the page.
+    story : sequence of str, optional
+        Sentences on the procedure.
+    truth : mapping, optional
+        The hidden effect of a simulated bench, shown at the end.
+    profile : str, optional
+        The profile as the user named it, for the printed commands.
+    options : sequence of str, optional
+        Further options of the command.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
     """
     residuals, diagnosis = residuals_of(answer), answer.diagnosis
     plots = plots_of(residuals)
@@ -45,7 +61,7 @@ def report_html(
 
 
 def residuals_of(answer: WinchAnswer) -> Residuals:
-    """What the page of a diagnosis draws; an ``after`` only where something was named."""
+    """Residuals on the page of a diagnosis; ``after`` only where an effect was named."""
     diagnosis, found = answer.diagnosis, answer.result
     return Residuals(
         answer.engine.regression,
@@ -71,7 +87,7 @@ def comparison_html(
 def addition_html(
     grown: Grown, title: str, profile: str = "", better: str = "", *, options: Sequence[str] = ()
 ) -> str:
-    """The page of an addition; ``better`` is the profile that was written, the rest as above."""
+    """The page of an added effect; ``better`` is the written profile, the others as above."""
     noise = {name: output.noise_rms for name, output in grown.addition.outputs.items()}
     residuals = Residuals(
         grown.regression, grown.initial_model.residual, grown.final.residual, noise

@@ -1,4 +1,4 @@
-"""Parts that the pages of a diagnosis, a comparison and an addition share."""
+"""Common parts of the pages of a diagnosis, a comparison and an added effect."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ __all__ = ["bullets", "drawings", "lead"]
 
 
 def lead(chip: str, tone: str, sentences: Sequence[str], *inside: Markup) -> Markup:
-    """What a page comes to: a word, plain sentences, and the figures behind them.
+    """Result of a page: a word, sentences, and tables.
 
-    ``tone`` colours it as the verdicts are: adequate, explained, partly, unknown.
+    ``tone`` is a verdict whose colour is taken: adequate, explained, partly, unknown.
     """
-    told = [element("p", unbroken(text), class_="sentence") for text in sentences]
+    texts = [element("p", unbroken(text), class_="sentence") for text in sentences]
     return element(
         "section",
         element("h2", chip, id="verdict-heading", class_="chip"),
-        *told,
+        *texts,
         *inside,
         id="verdict",
         class_=f"verdict {tone}",
@@ -31,7 +31,7 @@ def lead(chip: str, tone: str, sentences: Sequence[str], *inside: Markup) -> Mar
 
 
 def bullets(lines: Sequence[str]) -> Markup:
-    """A list of sentences; nothing where there is none."""
+    """A list of sentences; empty without any."""
     items = [element("li", capital(line)) for line in lines]
     return element("ul", *items) if items else Markup("")
 
@@ -52,7 +52,7 @@ def _output(own: OutputPlots, maps: Sequence[Markup]) -> Markup:
     title = element("h3", capital(OUTPUT_NAMES.get(own.output, own.output)))
     pair = element("div", *maps, class_="pair maps") if maps else Markup("")
     if own.over_variable is None:
-        words = element("p", "It hardly follows anything that was measured.", class_="quiet")
+        words = element("p", "No measured variable explains the residual.", class_="quiet")
         return element("div", title, _figure(own.over_time), words, pair, class_="output")
     both = element("div", _figure(own.over_time), _figure(own.over_variable), class_="pair")
     return element("div", title, both, pair, class_="output")

@@ -1,4 +1,4 @@
-"""What a robot's poses came to as one self-contained page, without script."""
+"""Pages of a robot's diagnosis, comparison and added effect, self-contained and without script."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def pose_figures(
     noise: Mapping[str, float | None],
     first: Sequence[str] = (),
 ) -> list[Markup]:
-    """A block per output: its errors over what they follow, and line by line or axis by axis.
+    """A block per output: its errors over their main variable, and by line or axis.
 
     ``after`` is None where nothing was changed; outputs in ``first`` come first.
     """
@@ -79,7 +79,7 @@ def _figure(trace: Trace, noise: float | None) -> Markup:
     how, unit = reading(trace.over.variable), UNITS[trace.over.output]
     scale = scale_for(float(np.abs(trace.before).max(initial=0.0)), unit)
     if noise is not None and trace.over.output == "platform_position":
-        noise /= sqrt(len(AXES))  # That of one axis; a position's is of its distance.
+        noise /= sqrt(len(AXES))  # Noise of one axis from that of the distance.
     states = [("before", trace.before)]
     if trace.after is not None and _differ(trace):
         states.append(("after", trace.after))
@@ -100,14 +100,14 @@ def _figure(trace: Trace, noise: float | None) -> Markup:
         points = zip(how.shown(at).tolist(), (mean / scale.worth).tolist(), strict=True)
         if trace.over.variable != "winch":
             marks.append(chart.line(points, tone))
-    said = ["before", "after"] if len(states) > 1 else ["as it is"]
+    said = ["before", "after"] if len(states) > 1 else ["unchanged"]
     words = [(tone, text) for (tone, _), text in zip(states, said, strict=True)]
     drawn = chart.draw(*marks)
     return element("figure", drawn, legend(words), element("figcaption", unbroken(caption)))
 
 
 def _differ(trace: Trace) -> bool:
-    """Whether what was added changed this output at all."""
+    """Whether the added effects changed this output."""
     assert trace.after is not None
     sizes = [float(np.sqrt(np.mean(values**2))) for values in (trace.before, trace.after)]
     return max(sizes) > _CHANGED * min(sizes)
@@ -116,14 +116,15 @@ def _differ(trace: Trace) -> bool:
 def _caption(trace: Trace, noise: float | None) -> str:
     over = trace.over
     if over.variable == NUMBER:
-        told = f"{OUTPUT_NAMES.get(over.output, over.output)}; it follows nothing that was measured"
+        name = OUTPUT_NAMES.get(over.output, over.output)
+        text = f"{name}; no measured variable explains its error"
     else:
-        told = where_text(Where(over.output, over.variable, over.share, line=over.line))
+        text = where_text(Where(over.output, over.variable, over.share, line=over.line))
     if trace.line is not None and over.line is None:
         where = "along" if over.output == "platform_position" else "of line"
-        told += f", drawn {where} {trace.line}, which shows it most"
+        text += f", drawn {where} {trace.line}, with the largest share"
     band = "" if noise is None else " The grey band is the noise, ± its rms."
-    return f"{capital(told)}. Dots are poses, lines their means.{band}"
+    return f"{capital(text)}. Dots are poses, lines their means.{band}"
 
 
 def _axis(trace: Trace, label: str, shown: Array) -> Axis:
@@ -133,7 +134,7 @@ def _axis(trace: Trace, label: str, shown: Array) -> Axis:
 
 
 def _beside(trace: Trace, x: Array, states: int) -> list[Array]:
-    """Places of the dots of each state; those of one line stand side by side."""
+    """Positions of the dots of each state; those of one line are side by side."""
     if trace.over.variable != "winch":
         return [x] * states
     out = x.copy()
@@ -165,7 +166,9 @@ def _each_line(name: str, lines: Sequence[str], before: Array, after: Array | No
     ]
     kind = "axis" if name == "platform_position" else "line"
     head = [kind, *(tone if after is not None else "error" for tone in sizes)]
-    least = " as the least forces that would balance the weight" if name == "tension" else ""
+    least = (
+        " as the least cable forces that balance the residual wrench" if name == "tension" else ""
+    )
     return table(f"Error, rms, by {kind}{least}.", head, rows)
 
 

@@ -1,4 +1,4 @@
-"""A robot's calibration as one page: errors before and after, pose by pose, and every number."""
+"""Page of a robot's calibration: errors before and after, per pose, and all parameters."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _MM = 1e3
 
 
 def calibration_html(found: Calibrated, following: Sequence[NextPose], title: str) -> str:
-    """The page; it needs neither network nor script for its figures."""
+    """The page, self-contained and without script."""
     head, tone = _verdict(found)
     return page(
         title,
         (),
         lead(head, tone, list(_sentences(found))),
-        section("errors", "Position errors, pose by pose", *_figures(found)),
+        section("errors", "Position errors of the poses", *_figures(found)),
         section("blind", "Not identifiable from these poses", bullets(found.observed.unobservable)),
         section("missing", "Candidate effects", bullets(candidate_lines(found))),
         section("notes", "Notes", bullets(found.warnings)),
@@ -39,11 +39,11 @@ def calibration_html(found: Calibrated, following: Sequence[NextPose], title: st
 
 
 def _verdict(found: Calibrated) -> tuple[str, str]:
-    """A word for what came out, and its colour."""
+    """The result in a word, and its colour."""
     if not found.solution.converged:
-        return "not settled", "partly"
+        return "not converged", "partly"
     if found.candidates:
-        return "calibrated, but something is missing", "partly"
+        return "calibrated, with a missing effect", "partly"
     if found.observed.unobservable:
         return "calibrated in part", "partly"
     return "calibrated", "explained"
@@ -65,17 +65,17 @@ def _sentences(found: Calibrated) -> Iterator[str]:
             )
         )
     else:
-        yield "No position was held out: how well the model now predicts one is not known."
+        yield "No position was held out: the prediction error of the model is unknown."
     yield (
         f"{found.observed.free} parameters were fitted to {len(found.equations.measured)} poses; "
-        f"the data see {found.observed.rank} directions of them. Left over, one standard "
-        f"deviation each: {noise_words(found)}."
+        f"the rank of the data is {found.observed.rank}. Standard deviations of the residuals: "
+        f"{noise_words(found)}."
     )
     if found.candidates:
         first = found.candidates[0]
         yield (
-            f"That is not noise alone: the effect {first.effect} would explain "
-            f"{first.share * 100:.0f} % of it."
+            f"They exceed the noise: the effect {first.effect} would explain "
+            f"{first.share * 100:.0f} % of their variance."
         )
 
 
@@ -103,7 +103,7 @@ def _figures(found: Calibrated) -> Iterator[Markup]:
 
 
 def _figure(name: str, up: Axis, before: PoseErrors, after: PoseErrors) -> Markup:
-    """Dots over the poses, the same scale for every figure; each tells its pose when pointed at."""
+    """Dots over the poses, with one scale for all figures and the pose as tooltip."""
     places = after.place.tolist()
     caption = f"{name}: distance of the predicted from the measured position, before and after."
     chart = Chart(axis_over("number of the pose", [1.0, float(len(places))]), up, caption)
@@ -131,7 +131,7 @@ def _next(following: Sequence[NextPose]) -> Markup:
     ]
     head = ["", "x [mm]", "y [mm]", "z [mm]", "roll [°]", "pitch [°]", "yaw [°]", "gain [bit]"]
     return table(
-        "In this order. Ropes hold the platform in each; look that nothing else is in the way.",
+        "In this order. The cables hold the platform in each; check for collisions.",
         head,
         rows,
     )

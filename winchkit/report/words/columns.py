@@ -28,7 +28,7 @@ def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
 
 
 def hanging(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
-    """Rows as by :func:`aligned`, the last cell of each as words that go on below themselves."""
+    """Rows as by :func:`aligned`, with the last cell of each wrapped in its column."""
     heads = aligned([row[:-1] for row in rows], words)
     width = max((len(head) for head in heads), default=0) + 2
     return [

@@ -1,6 +1,6 @@
-"""Numbers as people read them: a prefix by size, digits by the standard deviation.
+"""Numbers as text: unit prefix by magnitude, digits by the standard deviation.
 
-SI comes in; ``"247.4 ± 6.1 kN"`` goes out. Nothing is rounded before it gets here.
+Inputs are SI and unrounded; the result is, for example, ``"247.4 ± 6.1 kN"``.
 """
 
 from __future__ import annotations
@@ -44,18 +44,18 @@ _LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
     "%": ((float("inf"), "%", 1e-2),),
     "1": ((float("inf"), "", 1.0),),
 }
-"""Per SI unit: below which size which label, and the label's worth in SI."""
+"""Per SI unit: upper limit of the magnitude, label, and SI value of the label's unit."""
 _WITHIN_A_FIGURE = pattern(r"(?<=[\d±=]) | (?=[±=])|(?<=N) (?=m\b)|(?<=m) (?=s\b)")
 _SIGNS = str.maketrans("-", "−")
 
 
 @dataclass(frozen=True)
 class Scale:
-    """A unit to show values in."""
+    """A unit in which values are printed."""
 
     label: str
     worth: float
-    """SI value of one of it."""
+    """SI value of the unit."""
 
     def text(self, value: float, digits: int = 3) -> str:
         """A value with its unit; ``unknown`` where it is NaN."""
@@ -64,13 +64,13 @@ class Scale:
         return self.labelled(significant(value / self.worth, digits))
 
     def labelled(self, number: str) -> str:
-        """A number already written, with the unit behind it."""
+        """A formatted number followed by the unit."""
         tight = self.label in {"", "°", "/K"} or self.label.startswith("·")
         return f"{number}{self.label}" if tight else f"{number} {self.label}"
 
 
 def scale_for(sizes: float | Sequence[float], unit: str) -> Scale:
-    """The scale in which the largest of some SI sizes reads well; an unknown unit stays itself."""
+    """The scale for the largest of some SI values; an unknown unit is kept."""
     values = [sizes] if isinstance(sizes, int | float) else sizes
     size = max((abs(v) for v in values if isfinite(v)), default=0.0)
     ladder = _LADDERS.get(unit, ((float("inf"), unit, 1.0),))
@@ -113,7 +113,7 @@ def percent(share: float) -> str:
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """A number to some significant digits, never in powers of ten between 1e-6 and 1e9."""
+    """A number to some significant digits, without an exponent between 1e-6 and 1e9."""
     if isnan(value):
         return "unknown"
     if not isfinite(value):
@@ -127,7 +127,7 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def between(low: float, high: float, unit: str) -> str:
-    """Two SI ends with two digits of their distance: ``236 to 259 kN``."""
+    """An SI interval with two digits of its width: ``236 to 259 kN``."""
     scale = scale_for((low, high), unit)
     ends, apart = (low / scale.worth, high / scale.worth), abs(high - low) / scale.worth
     decimals = 1 - floor(log10(apart)) if apart > 0 else 2
@@ -135,22 +135,22 @@ def between(low: float, high: float, unit: str) -> str:
 
 
 def plain(value: float, digits: int = 4) -> str:
-    """A number to the digits that it has, four at most: ``0.02``, not ``0.0200``."""
+    """A number to four digits at most, without trailing zeros: ``0.02``, not ``0.0200``."""
     shown = f"{value:.{digits - 1}e}".partition("e")[0].lstrip("-").rstrip("0").replace(".", "")
     return significant(value, max(1, len(shown))) if isfinite(value) else significant(value)
 
 
 def grouped(value: float) -> str:
-    """A whole number with its thousands apart: ``22 503 365``."""
+    """A whole number with its thousands separated: ``22 503 365``."""
     return f"{value:,.0f}".replace(",", " ").translate(_SIGNS)
 
 
 def unbroken(text: str) -> str:
-    """Text whose figures keep together with their units where lines are broken."""
+    """Text with no-break spaces between numbers and units."""
     return _WITHIN_A_FIGURE.sub("\u00a0", text)
 
 
 def _fixed(value: float, decimals: int) -> str:
-    """A number with a fixed count of decimals; negative ones round before the point."""
+    """A number with a fixed count of decimals; a negative count rounds before the point."""
     rounded = round(value, decimals) + 0.0
     return f"{rounded:.{max(decimals, 0)}f}".translate(_SIGNS)

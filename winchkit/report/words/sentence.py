@@ -1,4 +1,4 @@
-"""The verdict in plain words, the same in the report, at the terminal and in the demo."""
+"""The verdict in sentences, the same on the page, at the terminal and in the demo."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ __all__ = [
     "capital",
     "changes_text",
     "gain_text",
+    "main_patterns",
     "moved_outputs",
     "often_per_turn",
     "sentence",
     "still_text",
-    "telling",
     "where_text",
     "worse_text",
 ]
 
 _MOVED = 1.05
 CLEAR_ORDER = 0.2
-"""From which share on an order within a turn says more than a trend."""
+"""Least share of the residual variance from which an order within a turn precedes a trend."""
 _ABOVE = 1.5
 _WHOLE = (
-    "your robot's geometry is off as a whole: no few effects explain these poses as all of its "
-    "points and radii together do"
+    "the geometry of the robot differs as a whole: no small set of effects explains these poses as "
+    "well as all points and radii together"
 )
-_NO_GAIN = "Adding it leaves the held-out errors as they are."
+_NO_GAIN = "Adding it does not change the held-out errors."
 _CHANGES = {
     "runs": {
-        "more": "runs with other loads, strokes, speeds or temperatures",
+        "more": "runs at other loads, strokes, speeds or temperatures",
         "one": "a run",
-        "other": "a run with another load, stroke or speed",
+        "other": "a run at another load, stroke or speed",
     },
     "poses": {
-        "more": "poses farther out, turned more, with other tensions, payloads or temperatures,",
+        "more": "poses farther out or at other rotations, tensions, payloads or temperatures",
         "one": "a set of poses",
-        "other": "poses elsewhere, or under other tensions,",
+        "other": "poses at other positions or tensions",
     },
 }
-"""Other data, by what a diagnosis was made from."""
+"""Further data that could change a verdict, by the kind of data of the diagnosis."""
 _CONSTANT = ("winch", "pose")
 _COUNTS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
 
@@ -61,69 +61,72 @@ def sentence(diagnosis: Diagnosis) -> str:
         return _adequate(diagnosis)
     if diagnosis.steps:
         steps, outputs = diagnosis.steps, diagnosis.outputs
-        gain = gain_text(outputs, f"{_do(steps)} and") or _NO_GAIN
+        gain = gain_text(outputs, _opening(steps)) or _NO_GAIN
         parts = [_named(steps, diagnosis.data), gain, still_text(outputs)]
         if diagnosis.verdict == "partly":
-            parts.append(_rest(diagnosis, "Something else is still missing"))
+            parts.append(_unexplained(diagnosis, "Partly unexplained"))
         return " ".join(part for part in parts if part)
     if diagnosis.verdict == "partly":
-        return _rest(diagnosis, "Something is missing, and known effects explain only part of it")
-    return _rest(diagnosis, "Something is missing that no known effect explains")
+        return _unexplained(diagnosis, "Partly explained by known effects, none of which is named")
+    return _unexplained(diagnosis, "Unexplained by any known effect")
 
 
 def changes_text(diagnosis: Diagnosis) -> str:
-    """What would change the verdict, in a sentence."""
+    """Further data that would change the verdict, in a sentence."""
     words = _CHANGES[diagnosis.data]
     if diagnosis.verdict == "adequate":
-        return f"What would change this: {words['more']} in which the error rises above the noise."
+        return (
+            f"This result would be refuted by {words['more']} with a residual above the noise "
+            "floor."
+        )
     if not diagnosis.steps:
         return (
-            "No name is given, because with so much left it would be a guess. What would change "
-            "this: an effect of your own that explains the rest where it lives, or "
-            f"{words['one']} that isolates it."
+            "No effect is named, since a name would be a guess with so large a residual. This "
+            "result would change with an effect of your own that explains the residual, or with "
+            f"{words['one']} that isolates its cause."
         )
     if any(len(step.effects) > 1 and not step.whole for step in diagnosis.steps):
         return (
-            f"What would change this: {words['one']} in which the effects differ that these "
-            f"{diagnosis.data} cannot tell apart."
+            f"This result would change with {words['one']} in which the effects differ that these "
+            f"{diagnosis.data} cannot distinguish."
         )
     return (
-        f"What would change this: {words['other']} that the fitted values do not predict down "
-        "to the noise."
+        f"This result would be refuted by {words['other']} that the fitted model does not predict "
+        "to within the noise floor."
     )
 
 
 def where_text(where: Where) -> str:
-    """Where a rest lives: ``cable length, 5 times per drum turn (46 % of its error)``."""
+    """Residual attribution: ``tension, 5 periods per drum turn (46 % of its variance)``."""
     output = OUTPUT_NAMES.get(where.output, where.output)
     if where.line is not None:
         on = "along" if where.output == "platform_position" else "of line"
         output = f"{output} {on} {where.line}"
     if where.variable == "winch":
-        what = "the same at every pose" if where.line else "by a constant of each line"
-        return f"{output}, {what} ({percent(where.share)} of all lines' error)"
+        what = "constant over the poses" if where.line else "by a constant of each line"
+        return f"{output}, {what} ({percent(where.share)} of the residual variance of all lines)"
+    share = f"({percent(where.share)} of its residual variance)"
     if where.variable == "pose":
-        return f"{output}, alike on all lines of a pose ({percent(where.share)} of its error)"
+        return f"{output}, equal on all lines of a pose {share}"
     variable = VARIABLE_NAMES.get(where.variable, where.variable)
     if where.order is not None:
-        often = often_per_turn(where.variable, where.order)
-        return f"{output}, {often} ({percent(where.share)} of its error)"
+        return f"{output}, {often_per_turn(where.variable, where.order)} {share}"
     if where.frequency is not None:
         hertz = significant(where.frequency, 2)
-        return f"{output}, around {hertz} Hz ({percent(where.share)} of all above the noise)"
-    return f"{output}, following the {variable} ({percent(where.share)} of its error)"
+        return f"{output}, around {hertz} Hz ({percent(where.share)} of the power above the noise)"
+    return f"{output}, as a function of {variable} {share}"
 
 
 def often_per_turn(angle: str, order: int) -> str:
-    """``5 times per drum turn``."""
+    """``5 periods per drum turn``."""
     turn = VARIABLE_NAMES.get(angle, angle).removesuffix(" angle")
-    return f"{'once' if order == 1 else f'{order} times'} per {turn} turn"
+    return f"{order} period{'' if order == 1 else 's'} per {turn} turn"
 
 
-def telling(places: Sequence[Where]) -> list[Where]:
-    """Places with the most telling first, one per output.
+def main_patterns(places: Sequence[Where]) -> list[Where]:
+    """The most specific attribution of each output, the most specific output first.
 
-    A clear order says more than a trend, and a trend more than a constant of a robot's line.
+    A clear order within a turn precedes a trend, and a trend a constant of a robot's line.
     """
     ranked = sorted(
         places,
@@ -140,7 +143,7 @@ def telling(places: Sequence[Where]) -> list[Where]:
 
 
 def moved_outputs(outputs: Mapping[str, OutputFit]) -> list[str]:
-    """Outputs whose held-out error fell noticeably, the largest fall first."""
+    """Outputs whose held-out error fell by more than 5 %, the largest fall first."""
     falls = {
         name: output.heldout_rms_before / output.heldout_rms_after
         for name, output in outputs.items()
@@ -150,16 +153,16 @@ def moved_outputs(outputs: Mapping[str, OutputFit]) -> list[str]:
 
 
 def gain_text(outputs: Mapping[str, OutputFit], opening: str) -> str:
-    """``Add it and the held-out error of … falls from … to …``; empty where none falls."""
+    """``With it, the held-out error of … falls from … to …``; empty where none falls."""
     moved = moved_outputs(outputs)
     if not moved:
         return ""
     if len(moved) == 1:
         output = outputs[moved[0]]
         error = f"the held-out error of the {OUTPUT_NAMES.get(moved[0], moved[0])}"
-        return f"{opening} {error} {_fall(output)}{_beside(output)}."
+        return f"{opening}, {error} {_fall(output)}{_beside(output)}."
     falls = [_in_one(name, outputs[name]) for name in moved]
-    return f"{opening} the held-out error {listed(falls)}."
+    return f"{opening}, the held-out error {listed(falls)}."
 
 
 def worse_text(outputs: Mapping[str, OutputFit]) -> str:
@@ -175,18 +178,18 @@ def worse_text(outputs: Mapping[str, OutputFit]) -> str:
 
 
 def still_text(outputs: Mapping[str, OutputFit]) -> str:
-    """Outputs that stay well above their noise, which an explained error need not fall to."""
+    """Outputs whose error remains well above their noise floor."""
     above = {
         name: output.heldout_rms_after / output.noise_rms
         for name, output in outputs.items()
         if output.noise_rms
     }
-    told = [
-        f"the {OUTPUT_NAMES.get(name, name)} at {significant(ratio, 2)} times its noise"
+    texts = [
+        f"{OUTPUT_NAMES.get(name, name)} by a factor of {significant(ratio, 2)}"
         for name, ratio in above.items()
         if ratio > _ABOVE
     ]
-    return f"That leaves {listed(told)}." if told else ""
+    return f"Still above the noise floor: {listed(texts)}." if texts else ""
 
 
 def _adequate(diagnosis: Diagnosis) -> str:
@@ -194,13 +197,13 @@ def _adequate(diagnosis: Diagnosis) -> str:
     for name, output in diagnosis.outputs.items():
         figure = f"{OUTPUT_NAMES.get(name, name)} {quantity(output.heldout_rms_after, output.unit)}"
         if output.noise_rms is not None:
-            figure += f" against {quantity(output.noise_rms, output.unit)}"
+            figure += f" (noise {quantity(output.noise_rms, output.unit)})"
         figures.append(figure)
-    errors = f"Held-out error against noise: {'; '.join(figures)}." if figures else ""
+    errors = f"Held-out error: {'; '.join(figures)}." if figures else ""
     if _from_repeats(diagnosis):
-        return f"Nothing is missing above the noise. {errors}".strip()
+        return f"No effect is missing: the residual is at the noise floor. {errors}".strip()
     return (
-        "No known effect is missing; without a repeated run an unknown one cannot be excluded. "
+        "No known effect is missing; an unknown effect cannot be excluded without repeats. "
         f"{errors}"
     ).strip()
 
@@ -213,17 +216,17 @@ def _named(steps: tuple[Step, ...], data: str) -> str:
     return f"{count} effects are missing: {'; '.join(numbered)}."
 
 
-def _do(steps: Sequence[Step]) -> str:
-    """What to do about what is missing."""
+def _opening(steps: Sequence[Step]) -> str:
+    """Opening of the sentence on the errors with the missing effects added."""
     if steps[0].whole:
-        return "Calibrate" if len(steps) == 1 else "Calibrate, add the rest"
+        return "After calibration" if len(steps) == 1 else "After calibration, with the others"
     if len(steps) > 1:
-        return "Add them"
-    return "Add one of them" if len(_kinds(steps[0])) > 1 else "Add it"
+        return "With them"
+    return "With one of them" if len(_kinds(steps[0])) > 1 else "With it"
 
 
 def _kinds(step: Step) -> list[list[str]]:
-    """Effects of a set by kind, parsimonious ones first: a rope stretches by several laws."""
+    """Effects of a set by kind, parsimonious ones first: there are several laws of elongation."""
     kinds: dict[str, list[str]] = {}
     for effect in step.effects:
         kinds.setdefault(kind(effect), []).append(effect)
@@ -236,20 +239,20 @@ def _step(step: Step, data: str, form: str = ": {}") -> str:
     kinds = _kinds(step)
     if len(kinds) == 1:
         ((first, *others),) = kinds
-        beside = f"these {data} cannot tell it from {listed(others)}" if others else ""
+        beside = f"these {data} cannot distinguish it from {listed(others)}" if others else ""
         return _with_values(step, first, form, beside, "; ")
     either = [
         _with_values(step, first, " ({})", f"or as {listed(others, 'or')}" if others else "", ", ")
         for first, *others in kinds
     ]
-    return f"{listed(either, 'or')} – these {data} cannot tell which"
+    return f"{listed(either, 'or')} – these {data} cannot distinguish them"
 
 
 def _with_values(step: Step, effect: str, form: str, beside: str, link: str) -> str:
-    """An effect in words with its values, and what is to be said beside them."""
+    """An effect in words with its values and a remark."""
     values = step.parameters.get(effect, {})
-    told = ", ".join(estimate_text(name, value) for name, value in values.items())
-    inside = link.join(part for part in (told, beside) if part)
+    fitted = ", ".join(estimate_text(name, value) for name, value in values.items())
+    inside = link.join(part for part in (fitted, beside) if part)
     return clause(effect) + (form.format(inside) if inside else "")
 
 
@@ -262,8 +265,8 @@ def _beside(output: OutputFit) -> str:
     if output.noise_rms is None:
         return ""
     known = output.noise_source == "repeats"
-    what = "the instruments' noise" if known else "what no known effect explains"
-    return f"; {what} is {quantity(output.noise_rms, output.unit)}"
+    what = "noise floor" if known else "residual that no known effect explains"
+    return f"; the {what} is {quantity(output.noise_rms, output.unit)}"
 
 
 def _in_one(name: str, output: OutputFit) -> str:
@@ -273,11 +276,12 @@ def _in_one(name: str, output: OutputFit) -> str:
     return f"{text} (noise {quantity(output.noise_rms, output.unit)})"
 
 
-def _rest(diagnosis: Diagnosis, opening: str) -> str:
-    left = f"{percent(diagnosis.unexplained_share)} of what stood above the noise is left"
-    places = [where_text(where) for where in telling(diagnosis.where)[:2]]
-    lives = f" It lives in the {', and in the '.join(places)}." if places else ""
-    return f"{opening}: {left}.{lives}"
+def _unexplained(diagnosis: Diagnosis, opening: str) -> str:
+    share = percent(diagnosis.unexplained_share)
+    places = [where_text(where) for where in main_patterns(diagnosis.where)[:2]]
+    plural = "s" if len(places) > 1 else ""
+    pattern = f" Main pattern{plural}: {'; '.join(places)}." if places else ""
+    return f"{opening}: {share} of the residual variance above the noise floor remains.{pattern}"
 
 
 def _from_repeats(diagnosis: Diagnosis) -> bool:
@@ -285,5 +289,5 @@ def _from_repeats(diagnosis: Diagnosis) -> bool:
 
 
 def capital(text: str) -> str:
-    """With its first letter large."""
+    """Text with a capital first letter."""
     return text[:1].upper() + text[1:]

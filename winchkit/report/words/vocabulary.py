@@ -1,4 +1,4 @@
-"""The words of a report: what an effect means to its owner, and what channels are called."""
+"""Names of outputs and variables, and a clause for every effect, as reports print them."""
 
 from __future__ import annotations
 
@@ -48,99 +48,99 @@ VARIABLE_NAMES = {
     "winch": "line",
     "pose": "pose",
     "number": "number of the pose",
-    "platform_x": "platform's x",
-    "platform_y": "platform's y",
-    "platform_z": "platform's z",
-    "platform_roll": "platform's roll",
-    "platform_pitch": "platform's pitch",
-    "platform_yaw": "platform's yaw",
+    "platform_x": "platform x",
+    "platform_y": "platform y",
+    "platform_z": "platform z",
+    "platform_roll": "platform roll",
+    "platform_pitch": "platform pitch",
+    "platform_yaw": "platform yaw",
 }
 _CLAUSES = {
-    "anchor-point": "your rope meets the platform elsewhere",
-    "cable-creep": "your rope creeps under load",
-    "cable-elongation-exponential": "your rope stretches, and stiffens with its tension",
-    "cable-elongation-linear": "your rope stretches",
-    "cable-elongation-quartic": "your rope stretches along a curve",
-    "cable-hysteresis": "your rope stretches differently when loaded and unloaded",
-    "cable-sag": "your rope sags under its own weight",
-    "cable-thermal": "your rope expands with its temperature",
-    "cable-weight": "your rope's own weight counts",
-    "cell-creep": "your load cell creeps",
-    "cell-drift": "your load cell's zero drifts with time",
-    "cell-gain": "your load cell's span is wrong",
-    "cell-hysteresis": "your load cell reads differently when loaded and unloaded",
-    "cell-lag": "your load cell's reading comes late",
-    "cell-nonlinearity": "your load cell's sensitivity changes with the load",
-    "cell-offset": "your load cell's zero is off",
-    "cell-thermal": "your load cell's zero follows the temperature",
-    "drum-eccentricity": "your drum runs out of true",
-    "drum-radius": "your drum's winding radius is off",
-    "exit-point": "your rope leaves the frame elsewhere",
-    "home-length": "your rope had another length at home",
-    "payload-centre": "your platform's centre of mass lies elsewhere",
-    "payload-mass": "your platform's mass is off",
-    "swivel-radius": "your swivel pulley's radius is off",
-    "drum-winding-tension": "your rope lies on the drum with the strain of its winding",
-    "encoder-slip": "your drum slipped against its encoder",
-    "frame-compliance": "your frame gives way to the load",
-    "gear-backlash": "your gearbox has play",
-    "gear-efficiency": "your gearbox loses torque to friction",
-    "gear-ratio": "your gear ratio is off",
-    "gear-transmission-error": "your gearbox leads and lags within each turn",
-    "guide-offset": "your guide is mounted off",
-    "layer-thickness": "your rope's layers grow by another amount",
-    "length-time-offset": "your length instrument is late",
-    "motor-cogging": "your motor cogs",
-    "motor-coulomb": "your motor side rubs",
-    "motor-coulomb-asymmetry": "your torque signal has an offset",
-    "motor-stribeck": "your motor side rubs more at creep speed",
-    "motor-viscous": "your motor side drags with speed",
-    "motor-viscous-asymmetry": "your motor side drags more one way than the other",
-    "pulley-capstan": "your rope drags around a stuck pulley",
-    "pulley-coulomb": "your pulleys rub",
-    "pulley-dahl": "your pulleys give before they slide",
-    "pulley-inertia": "your pulleys' inertia counts",
-    "pulley-stribeck": "your pulleys rub more at creep speed",
-    "pulley-viscous": "your pulleys drag with speed",
-    "rotor-inertia": "your rotor's inertia counts",
-    "torque-constant": "your drive's torque constant is off",
-    "torque-lag": "your drive's torque signal comes late",
-    "torque-lead": "your torque signal is what the drive was told",
+    "anchor-point": "the anchor point of the cable differs from the profile",
+    "cable-creep": "the cable creeps under load",
+    "cable-elongation-exponential": "the cable is elastic and stiffens with its tension",
+    "cable-elongation-linear": "the cable is elastic",
+    "cable-elongation-quartic": "the cable is elastic with a nonlinear law",
+    "cable-hysteresis": "the cable is elastic with hysteresis",
+    "cable-sag": "the cable sags under its own weight",
+    "cable-thermal": "the cable expands with its temperature",
+    "cable-weight": "the weight of the cable is not negligible",
+    "cell-creep": "the load cell creeps",
+    "cell-drift": "the zero of the load cell drifts with time",
+    "cell-gain": "the span of the load cell is wrong",
+    "cell-hysteresis": "the load cell has hysteresis",
+    "cell-lag": "the reading of the load cell is delayed",
+    "cell-nonlinearity": "the sensitivity of the load cell depends on the load",
+    "cell-offset": "the zero of the load cell is wrong",
+    "cell-thermal": "the zero of the load cell depends on the temperature",
+    "drum-eccentricity": "the drum has runout",
+    "drum-radius": "the winding radius of the drum is wrong",
+    "exit-point": "the exit point of the cable differs from the profile",
+    "home-length": "the cable length at home differs from the profile",
+    "payload-centre": "the centre of mass of the platform is wrong",
+    "payload-mass": "the mass of the platform is wrong",
+    "swivel-radius": "the radius of the swivel pulley is wrong",
+    "drum-winding-tension": "the cable on the drum keeps the strain of its winding",
+    "encoder-slip": "the drum slipped against its encoder",
+    "frame-compliance": "the frame is compliant",
+    "gear-backlash": "the gearbox has backlash",
+    "gear-efficiency": "the gearbox loses torque by friction",
+    "gear-ratio": "the gear ratio is wrong",
+    "gear-transmission-error": "the gearbox has a periodic transmission error",
+    "guide-offset": "the guide is mounted with an offset",
+    "layer-thickness": "the growth of the cable layers is wrong",
+    "length-time-offset": "the length instrument is delayed",
+    "motor-cogging": "the motor has cogging torque",
+    "motor-coulomb": "the motor side has Coulomb friction",
+    "motor-coulomb-asymmetry": "the torque signal has an offset",
+    "motor-stribeck": "the motor side has Coulomb friction with a Stribeck curve",
+    "motor-viscous": "the motor side has viscous friction",
+    "motor-viscous-asymmetry": "the viscous friction of the motor side depends on the direction",
+    "pulley-capstan": "the cable slides around a blocked pulley (capstan friction)",
+    "pulley-coulomb": "the pulleys have Coulomb friction",
+    "pulley-dahl": "the pulleys have presliding friction (Dahl)",
+    "pulley-inertia": "the inertia of the pulleys is not negligible",
+    "pulley-stribeck": "the pulleys have Coulomb friction with a Stribeck curve",
+    "pulley-viscous": "the pulleys have viscous friction",
+    "rotor-inertia": "the inertia of the rotor is not negligible",
+    "torque-constant": "the torque constant of the drive is wrong",
+    "torque-lag": "the torque signal of the drive is delayed",
+    "torque-lead": "the torque signal is the command, ahead of the torque",
 }
 _SYMBOLS = {"axial_stiffness": "EA"}
 _SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")
 
 
 def clause(effect: str) -> str:
-    """What an effect means, in lower case; an effect that is not winchkit's keeps its id."""
+    """Clause on a missing effect, in lower case; a user effect is named by its id."""
     return meaning(effect) or f"the effect {effect} is missing"
 
 
 def meaning(effect: str) -> str:
-    """What an effect of winchkit's own means, and on which line; empty for any other."""
+    """Clause on an effect of the catalogue, with its line; empty for a user effect."""
     own, _, line = effect.partition("/")
     words = _CLAUSES.get(own, "")
     return f"{words} (line {line})" if words and line else words
 
 
 def kind(effect: str) -> str:
-    """What an effect shares with its variants: that a rope stretches, by whichever law."""
+    """The clause that an effect shares with its variants, such as the laws of elongation."""
     words = clause(effect)
     return min((c for c in (*_CLAUSES.values(), words) if words.startswith(c)), key=len)
 
 
 def parameter_name(parameter: str) -> str:
-    """A parameter's name to read: its symbol, else its words."""
+    """Name of a parameter in texts: its symbol, else its words."""
     return _SYMBOLS.get(parameter, parameter.replace("_", " "))
 
 
 def parameter_unit(parameter: str, unit: str) -> str:
-    """The unit to read a parameter in: shares in per cent, everything else in its own."""
+    """Unit of a parameter in texts: per cent for shares, else its own."""
     return "%" if unit == "1" and parameter in _SHARES else unit
 
 
 def estimate_text(parameter: str, estimate: Estimate) -> str:
-    """A parameter with its value: ``EA = 247.4 ± 6.1 kN``; a whole number stays one."""
+    """A parameter with its value: ``EA = 247.4 ± 6.1 kN``; an order is a whole number."""
     unit = parameter_unit(parameter, estimate.unit)
     if parameter == "order":
         return f"order {estimate.value:.0f}"
@@ -148,7 +148,7 @@ def estimate_text(parameter: str, estimate: Estimate) -> str:
 
 
 def interval_text(parameter: str, estimate: Estimate) -> str:
-    """``95 %: 236 to 259 kN``; empty where it was not worked out."""
+    """``95 %: 236 to 259 kN``; empty where it was not computed."""
     if estimate.interval is None or not all(isfinite(end) for end in estimate.interval):
         return ""
     unit = parameter_unit(parameter, estimate.unit)

@@ -1,4 +1,4 @@
-"""Reads a run from CSV: metadata lines ``# key: value``, one header line, numbers."""
+"""Reader of runs in CSV: metadata lines ``# key: value``, one header line, numbers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _PIECE = 1 << 20
 
 
 def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
-    """Content of a file; raises RunError where there is none to read."""
+    """Content of a file; raises RunError where it cannot be read."""
     try:
         with open(path, "rb", opener=regular) as file:
             data = file.read()
@@ -42,27 +42,27 @@ def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
     except OSError as error:
         raise RunError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
     except ValueError as error:
-        raise RunError(Fault(f"is no usable file name: {error}", repr(str(path)))) from None
+        raise RunError(Fault(f"is not a usable file name: {error}", repr(str(path)))) from None
     if not data and not may_be_empty:
         raise RunError(Fault("the file is empty", str(path)))
     return data
 
 
 def cut_off(path: str, whole: str) -> str:
-    """What is said of a log without its end, of which something whole was read."""
+    """Note on a log without its end, of which the complete part was read."""
     if is_written(Path(path)):
         return f"the log is still being written; its {whole} so far are read"
     return (
-        f"the file is cut off; its {whole} are read, what follows is left out "
-        f"(`winchkit log recover {path}` writes a whole file)"
+        f"the file is cut off; its {whole} are read, the remainder is left out "
+        f"(`winchkit log recover {path}` writes a complete file)"
     )
 
 
 def read_lines(path: Path) -> Iterator[str]:
-    """Lines of a text file in UTF-8, UTF-16 with its mark, or Windows-1252, one after another.
+    """Lines of a text file in UTF-8, UTF-16 with byte order mark, or Windows-1252.
 
-    Each has its line feed, but for a last line that the file ends without one.
-    The file is gone through twice and never held whole: an hour of eight winches is gigabytes.
+    Each has its line feed, except a last line without one. The file is read twice and never kept in
+    memory: an hour of eight winches is gigabytes.
     """
     encoding = _encoding(path)
     with open(path, encoding=encoding, opener=regular) as file:
@@ -70,7 +70,7 @@ def read_lines(path: Path) -> Iterator[str]:
 
 
 def _encoding(path: Path) -> str:
-    """The first encoding in which all of a file reads; raises RunError where it is no text."""
+    """The first encoding in which a file is valid; raises RunError for a binary file."""
     marked = _beginning(path).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
         try:
@@ -89,7 +89,7 @@ def _holds_no_zero(path: Path, encoding: str) -> bool:
 
 
 def _beginning(path: Path) -> bytes:
-    """First bytes of a file; raises RunError where there is none to read."""
+    """First bytes of a file; raises RunError where it cannot be read."""
     try:
         with open(path, "rb", opener=regular) as file:
             data = file.read(4)
@@ -100,15 +100,33 @@ def _beginning(path: Path) -> bytes:
 
 Rows = list[list[str]]
 _BLOCK = 4096
-"""Rows whose text is held at a time."""
+"""Rows whose text is in memory at a time."""
 
 
 def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
-    """Read a run; raises RunError with every fault of the file, each with its line.
+    """Read a run.
 
-    A last line without a line feed is no row where winchkit wrote the file, whose rows all have
-    one; in a file of another program it is, when it has every column. A part of a log may be
-    without rows.
+    Parameters
+    ----------
+    path : str or Path
+        CSV file.
+    is_part : bool
+        Whether it is a part of a log, which may have no rows.
+
+    Returns
+    -------
+    Run
+        Channels in SI.
+
+    Raises
+    ------
+    RunError
+        With every fault of the file, each with its line.
+
+    Notes
+    -----
+    A last line without a line feed is ignored in files of winchkit, whose rows all have one. In a
+    file of another program it is a row if it has all columns.
     """
     name, lines = str(path), read_lines(Path(path))
     above: list[str] = []
@@ -135,7 +153,7 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
             metadata,
             metadata_lines,
             number,
-            notes.told,
+            notes.notes,
             faults + table.faults,
             is_part,
         )
@@ -143,26 +161,26 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
 
 
 class _Notes:
-    """Judges the last line of a file that ends without a line feed."""
+    """Treatment of a last line without a line feed."""
 
     def __init__(self, path: str, *, is_own: bool) -> None:
-        self.told: list[str] = []
+        self.notes: list[str] = []
         self._path, self._is_own = path, is_own
 
     def whole(self, lines: Iterator[str], width: int) -> Iterator[str]:
-        """The lines that are whole; what is said of a last one that is not, is in ``told``."""
+        """The complete lines; the note on an incomplete last one is in ``notes``."""
         for line in lines:
             if not _is_ended(line) and line.strip():
                 if self._is_own:
-                    self.told.append(cut_off(self._path, "rows before its last line"))
+                    self.notes.append(cut_off(self._path, "rows before its last line"))
                     return
                 if (cells := _width(line)) < width:
-                    self.told.append(
+                    self.notes.append(
                         f"the last line has {cells} cells of {width} and no line end; it is left "
                         "out: is the file cut off?"
                     )
                     return
-                self.told.append(
+                self.notes.append(
                     "the last row has no line end; if the file was cut off there, its last number "
                     "may lack digits"
                 )
@@ -218,12 +236,12 @@ class _Table:
             return
         pieces.append(values)
         self.faults += [
-            Fault(f"column '{name}' holds {cells[row]!r}, not a number", self._path, numbers[row])
+            Fault(f"column '{name}' has {cells[row]!r}, not a number", self._path, numbers[row])
             for row in wrong
         ]
 
     def ragged(self) -> list[Fault]:
-        """A fault for every row that has another width than the header."""
+        """A fault for every row whose width differs from that of the header."""
         width = len(self._names)
         faults = [
             Fault(f"{cells} cells in this row, {width} columns in the header", self._path, line)
@@ -235,7 +253,7 @@ class _Table:
         return faults
 
     def columns(self) -> list[Array | None]:
-        """All values so far; None for an unknown column that holds text."""
+        """All values so far; None for an unknown column with text."""
         out: list[Array | None] = []
         for index, pieces in enumerate(self._pieces):
             out.append(None if pieces is None else np.concatenate([np.empty(0), *pieces]))
@@ -243,13 +261,13 @@ class _Table:
         return out
 
     def line_of(self, row: int) -> int:
-        """Line at which a row stands."""
+        """Line of a row."""
         block = -1 if row < 0 else row // _BLOCK
         return int(self._numbers[block][row if row < 0 else row % _BLOCK])
 
 
 def _is_comment_kept(line: str, above: list[str]) -> bool:
-    """Whether a line stands above the header; it is kept then."""
+    """Whether a line is above the header; such lines are kept."""
     if not _is_comment(line):
         return False
     above.append(line)
@@ -263,7 +281,7 @@ def _is_comment(line: str) -> bool:
 def _metadata(
     path: str, lines: Sequence[str]
 ) -> tuple[dict[str, str], dict[str, int], list[Fault]]:
-    """Metadata and the line of each key; a comment without a colon is only a comment."""
+    """Metadata and the line of each key; a comment without a colon is ignored."""
     values: dict[str, str] = {}
     places: dict[str, int] = {}
     faults: list[Fault] = []
@@ -294,7 +312,7 @@ def _header(path: str, line: str, number: int) -> list[tuple[str, str]]:
         raise RunError(Fault(f"the header cannot be read: {error}", path, number)) from None
     if not any(_numbers([cell])[1] for cell in cells):
         message = (
-            "the first line holds numbers; a header such as 'time [s],motor_angle [rad]' is due"
+            "the first line has numbers; expected a header such as 'time [s],motor_angle [rad]'"
         )
         raise RunError(Fault(message, path, number))
     header = [(cell, header_of(cell)) for cell in cells]
@@ -309,7 +327,7 @@ def _header(path: str, line: str, number: int) -> list[tuple[str, str]]:
 
 
 def _blocks(path: str, lines: Iterator[str], start: int) -> Iterator[tuple[Rows, list[int]]]:
-    """Cells of every row that is not blank, and its line, so many rows at a time."""
+    """Cells and lines of all rows that are not blank, in blocks."""
     rows: Rows = []
     numbers: list[int] = []
     reader = csv.reader(lines)
@@ -328,7 +346,7 @@ def _blocks(path: str, lines: Iterator[str], start: int) -> Iterator[tuple[Rows,
 
 
 def _numbers(cells: Sequence[str]) -> tuple[Array, list[int]]:
-    """Values of a column, NaN where a cell is empty, and the rows that hold no number."""
+    """Values of a column, NaN for an empty cell, and the rows without a number."""
     try:
         values = np.array(list(map(float, cells)), dtype=np.float64)
     except ValueError:
@@ -343,7 +361,7 @@ def _numbers(cells: Sequence[str]) -> tuple[Array, list[int]]:
 
 
 def _number(cell: str) -> float | None:
-    """A cell's value; Python would also read ``1_000``, which no instrument writes."""
+    """A cell's value; ``1_000``, which Python accepts, is not a number."""
     text = cell.strip()
     if not text:
         return math.nan

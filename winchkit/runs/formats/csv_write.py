@@ -1,4 +1,4 @@
-"""Writes a run as CSV: metadata lines, one header line, numbers that read back exactly."""
+"""Writer of runs in CSV: metadata lines, one header line, numbers without loss of digits."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ __all__ = ["CSV_MARK", "CsvWriter"]
 CSV_MARK = "# written by winchkit"
 """First line of a CSV file of winchkit, each of whose lines ends with a line feed.
 
-A run that is written whole and has no metadata begins with its header instead.
+A run without metadata that is written at once starts with its header instead.
 """
 
 
 class CsvWriter(RunWriter):
-    """A CSV file in UTF-8; no value is an empty cell."""
+    """A CSV file in UTF-8; a missing value is an empty cell."""
 
     flush_interval = 0.5
 
@@ -33,11 +33,11 @@ class CsvWriter(RunWriter):
         self._stream.write("".join([*lines, header.getvalue()]).encode())
 
     def _row(self, values: Sequence[float]) -> None:
-        # NaN is the one number that differs from itself.
+        # NaN is the only number that differs from itself.
         cells = [repr(value) if value == value else "" for value in values]  # noqa: PLR0124
         self._waiting.append(",".join(cells) + "\n")
 
     def _hand_over(self) -> None:
-        # Whole rows in one write: a file that ends within a number would be read as another one.
+        # Complete rows in one write: a number that is cut off would be read as another one.
         self._stream.write("".join(self._waiting).encode())
         self._waiting.clear()

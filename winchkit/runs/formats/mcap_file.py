@@ -1,4 +1,4 @@
-"""An MCAP file being written, record by record, with the index that readers look for at its end."""
+"""Writer of an MCAP file, record by record, with the index at its end."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ COLUMNS = "winchkit.columns"
 LOG = "winchkit.log"
 """Metadata record of a log: its ``layout`` as JSON, and the number of its ``part``."""
 END = "winchkit.end"
-"""Metadata record of a log that was closed: what was counted until then."""
+"""Metadata record of a closed log: its counters."""
 EVENTS = "/events"
 COUNTERS = "/counters"
 CDR = b"\x00\x01\x00\x00"
-"""Head of a CDR message: little-endian; what follows is aligned to eight bytes from here on."""
+"""Header of a CDR message: little-endian; the data after it are aligned to eight bytes."""
 
 _WORD = re.compile(r"[A-Za-z]+")
 
@@ -66,7 +66,7 @@ def message_name(source: Source) -> str:
 
 
 def message_definition(signals: Sequence[Signal]) -> bytes:
-    """The ROS 2 definition of a message; each field carries its unit as a remark."""
+    """The ROS 2 definition of a message; each field has its unit as a comment."""
     return "".join(f"float64 {item.name} # {item.unit}\n" for item in signals).encode()
 
 
@@ -93,7 +93,7 @@ class McapFile:
         return self._at
 
     def put(self, op: int, body: bytes) -> None:
-        """Write a record, and note what the index will say of it."""
+        """Write a record, and note its entry of the index."""
         at = self._at
         self._write(_record(op, body))
         self._kinds[op] += 1
@@ -155,7 +155,7 @@ class McapFile:
         self._counts[batch.channel] += len(batch.log_times)
 
     def put_messages(self, batch: Messages, data: bytes) -> None:
-        """Write messages that lie in no chunk as they are."""
+        """Write messages outside any chunk."""
         self._write(data)
         self.count(batch)
 
@@ -202,7 +202,7 @@ _GROUPS = (Op.SCHEMA, Op.CHANNEL, Op.STATISTICS, Op.CHUNK_INDEX, Op.METADATA_IND
 
 
 def texts(values: Mapping[str, str]) -> bytes:
-    """A map of texts as MCAP has it."""
+    """A map of texts in the encoding of MCAP."""
     packed = b"".join(_text(key) + _text(value) for key, value in values.items())
     return struct.pack("<I", len(packed)) + packed
 

@@ -1,4 +1,4 @@
-"""Reads a run or a log from MCAP; of a file that was cut off, every whole record."""
+"""Reader of runs and logs in MCAP; of a file that was cut off, all complete records."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ __all__ = [
 
 @dataclass
 class McapContent:
-    """Everything of a file that counts here."""
+    """Content of a file."""
 
     topics: dict[int, str] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -60,15 +60,15 @@ class McapContent:
     """By topic, in the order of the file."""
     complete: bool = False
     damage: str = ""
-    """Why the reading ended before the file did, where it was not merely cut off."""
+    """Reason why reading ended before the end of the file, other than a cut-off file."""
 
     def count(self, topic: str) -> int:
-        """Messages of a topic."""
+        """Number of messages of a topic."""
         return sum(len(batch.log_times) for batch in self.messages.get(topic, ()))
 
 
 def read_content(data: bytes) -> McapContent:
-    """Read an MCAP file that begins with its mark. Raises nothing: damage is told in the result."""
+    """Read an MCAP file that starts with its magic bytes; damage is noted in the result."""
     content = McapContent()
     try:
         for item in records(data, len(MARK)):
@@ -108,7 +108,7 @@ def _take(content: McapContent, item: Record | Messages) -> None:
 
 
 def samples_of(content: McapContent, source: Source, layout: Layout) -> Samples:
-    """Samples of a source; raises Damage where its messages are not what the layout says."""
+    """Samples of a source; raises Damage where its messages do not match the layout."""
     size = len(CDR) + 8 * len(source.signals)
     pieces = []
     for batch in content.messages.get(source.topic, ()):
@@ -121,12 +121,12 @@ def samples_of(content: McapContent, source: Source, layout: Layout) -> Samples:
 
 
 def _seconds(stamps: NDArray[np.uint64], layout: Layout) -> NDArray[np.float64]:
-    """On the bench's clock."""
+    """Time stamps on the bench's clock, s."""
     return (stamps.astype(np.int64) - layout.clock_offset) / 1e9
 
 
 def read_mcap(path: str | Path) -> Run:
-    """Read a run; raises RunError where the file is none. A file cut off gives what is whole."""
+    """Read a run; raises RunError for any other file. Of a cut-off file the complete rows."""
     name, content = str(path), _content(path)
     return aligned(_log(name, content)) if LOG in content.metadata else _run(name, content)
 
@@ -142,14 +142,14 @@ def read_mcap_log(path: str | Path) -> Log:
 def _content(path: str | Path) -> McapContent:
     name, data = str(path), read_bytes(Path(path))
     if not data.startswith(MARK):
-        raise RunError(Fault("is no MCAP file: it does not begin with MCAP's mark", name))
+        raise RunError(Fault("is not an MCAP file: it does not start with its magic bytes", name))
     content = read_content(data)
     if content.damage:
         rows = content.count(TOPIC)
         message = f"is damaged after {rows} rows: {content.damage}"
         if LOG in content.metadata:
             message = f"is damaged: {content.damage}"
-        advice = "; `winchkit log recover` saves what is whole"
+        advice = "; `winchkit log recover` saves the complete part"
         raise RunError(Fault(message + advice, name))
     return content
 
@@ -159,7 +159,7 @@ def _run(name: str, content: McapContent) -> Run:
     columns = content.metadata.get(COLUMNS, {})
     if not columns:
         topics = ", ".join(sorted(set(content.topics.values()))) or "none"
-        message = f"holds no run: there is no metadata record '{COLUMNS}'; its topics are {topics}"
+        message = f"has no run: there is no metadata record '{COLUMNS}'; its topics are {topics}"
         raise RunError(Fault(message, name))
     rows = [bytes(row) for batch in content.messages.get(TOPIC, ()) for row in batch.data]
     notes = []
@@ -233,7 +233,7 @@ def _log(name: str, content: McapContent) -> Log:
 def _notes(
     content: McapContent, topic: str, offset: int, known: Callable[[dict[str, Any]], dict[str, Any]]
 ) -> tuple[Note, ...]:
-    """JSON messages, of each what is ``known`` to have the right form."""
+    """JSON messages, of each the entries that ``known`` accepts."""
     found: list[Note] = []
     for batch in content.messages.get(topic, ()):
         for stamp, data in zip(batch.log_times.tolist(), batch.data, strict=True):

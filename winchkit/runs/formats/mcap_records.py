@@ -1,7 +1,7 @@
-"""Takes the bytes of an MCAP file apart: whole records, and messages of one kind at a time.
+"""Parser of MCAP files: complete records, and batches of messages of one kind.
 
-Messages of the same channel and size that follow one another are one batch of arrays: a log of
-eight winches at 1 kHz has five million messages in ten minutes.
+Consecutive messages of one channel and size are one batch of arrays: a log of eight winches at 1
+kHz has five million messages in ten minutes.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ class Op:
 
 
 class Damage(ValueError):
-    """Bytes that are no records; the readers of files turn it into an error with a place."""
+    """Invalid bytes; the readers of files convert it to an error with its place."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """One record as it lies in the file."""
+    """One record of the file."""
 
     op: int
     offset: int
@@ -55,18 +55,18 @@ class Record:
 
     @property
     def end(self) -> int:
-        """Where the next one begins."""
+        """Start of the next record."""
         return self.offset + _HEAD.size + len(self.body)
 
 
 @dataclass(frozen=True)
 class Messages:
-    """Messages of one channel and size, one after another."""
+    """Consecutive messages of one channel and size."""
 
     channel: int
     offset: int
     size: int
-    """Of each record with its head, bytes."""
+    """Size of each record with its header, bytes."""
     log_times: NDArray[np.uint64]
     publish_times: NDArray[np.uint64]
     data: NDArray[np.uint8]
@@ -74,12 +74,12 @@ class Messages:
 
     @property
     def end(self) -> int:
-        """Where the next record begins."""
+        """Start of the next record."""
         return self.offset + self.size * len(self.log_times)
 
 
 def records(data: bytes, start: int = 0) -> Iterator[Record | Messages]:
-    """Records from ``start`` on, until the data end or a record is not whole; raises Damage."""
+    """Records from ``start`` to the end or to an incomplete record; raises Damage."""
     view = memoryview(data)
     while start + _HEAD.size <= len(data):
         op, length = _HEAD.unpack_from(data, start)
@@ -113,7 +113,7 @@ def _message_type(length: int) -> np.dtype[np.void]:
 
 
 def _messages(data: bytes, start: int, length: int) -> Messages:
-    """The message at ``start`` and those like it that follow."""
+    """The message at ``start`` and the following ones of the same kind."""
     if length < _MESSAGE_HEAD:
         raise Damage(f"the message at byte {start} is shorter than its head")
     kind = _message_type(length)
@@ -146,7 +146,7 @@ def pack_messages(
     publish_times: NDArray[np.int64],
     data: NDArray[np.uint8],
 ) -> bytes:
-    """Message records, one per row of ``data`` (n, bytes), counted from ``sequence`` on."""
+    """Message records, one per row of ``data`` (n, bytes), numbered from ``sequence``."""
     count, width = data.shape
     block = np.zeros(count, _message_type(_MESSAGE_HEAD + width))
     block["op"], block["length"], block["channel"] = Op.MESSAGE, _MESSAGE_HEAD + width, channel
@@ -156,13 +156,13 @@ def pack_messages(
 
 
 class Body:
-    """Reads the fields of a record in order; raises Damage where they do not fit."""
+    """Reads the fields of a record in order; raises Damage for invalid ones."""
 
     def __init__(self, body: memoryview | bytes) -> None:
         self._view, self._at = memoryview(body), 0
 
     def take(self, length: int) -> memoryview:
-        """So many bytes."""
+        """The next ``length`` bytes."""
         end = self._at + length
         if end > len(self._view):
             raise Damage("a field is longer than its record")
@@ -170,7 +170,7 @@ class Body:
         return taken
 
     def number(self, size: int) -> int:
-        """An unsigned number of so many bytes."""
+        """An unsigned number of ``size`` bytes."""
         return int.from_bytes(self.take(size), "little")
 
     def text(self) -> str:
@@ -178,7 +178,7 @@ class Body:
         try:
             return str(self.take(self.number(4)), "utf-8")
         except UnicodeDecodeError:
-            raise Damage("a text is no UTF-8") from None
+            raise Damage("a text is not UTF-8") from None
 
     def texts(self) -> dict[str, str]:
         """A map of texts."""
@@ -195,25 +195,25 @@ class Body:
 
 
 def chunk_content(body: memoryview) -> bytes:
-    """The records in a chunk; raises Damage, also where its checksum says that it is not whole."""
+    """The records in a chunk; raises Damage, also for a wrong checksum."""
     fields = Body(body)
     fields.take(16)
     size, crc, compression = fields.number(8), fields.number(4), fields.text()
     packed = bytes(fields.take(fields.number(8)))
     if size > _LARGEST:
-        raise Damage(f"a chunk of {size} bytes cannot be")
+        raise Damage(f"a chunk has an impossible size of {size} bytes")
     content = _unpacked(packed, compression, size)
     if len(content) != size:
-        raise Damage(f"a chunk holds {len(content)} bytes and not {size}")
+        raise Damage(f"a chunk has {len(content)} bytes in place of {size}")
     if crc and zlib.crc32(content) != crc:
         raise Damage("a chunk's checksum is wrong")
     return content
 
 
 def is_intact(end: Record, data: bytes) -> bool:
-    """Whether the checksum in the record at the end of the data is that of all before it."""
-    told = int.from_bytes(end.body, "little")
-    return not told or told == zlib.crc32(memoryview(data)[: end.offset])
+    """Whether the checksum in the record at the end of the data matches the data before it."""
+    checksum = int.from_bytes(end.body, "little")
+    return not checksum or checksum == zlib.crc32(memoryview(data)[: end.offset])
 
 
 def _unpacked(packed: bytes, compression: str, size: int) -> bytes:
@@ -224,7 +224,7 @@ def _unpacked(packed: bytes, compression: str, size: int) -> bytes:
 
         try:
             if zstandard.frame_content_size(packed) not in (-1, size):
-                raise Damage("a chunk's size is not the one that it tells")
+                raise Damage("a chunk's size differs from its declared one")
             return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
         except zstandard.ZstdError as error:
             raise Damage(f"a chunk cannot be unpacked: {error}") from None

@@ -1,4 +1,4 @@
-"""Writes a run as MCAP, one record per row, so that a file cut off keeps every whole row."""
+"""Writer of runs in MCAP, one record per row, so that a cut-off file keeps all complete rows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["McapWriter"]
 
 
 class McapWriter(RunWriter):
-    """An MCAP file without chunks: a chunk would hold rows back until it is full."""
+    """An MCAP file without chunks, since a chunk would delay rows until it is full."""
 
     flush_interval = 0.25
 
@@ -29,7 +29,7 @@ class McapWriter(RunWriter):
         self._writer.add_metadata(COLUMNS, dict(self.columns))
 
     def _row(self, values: Sequence[float]) -> None:
-        # NaN is the one number that differs from itself.
+        # NaN is the only number that differs from itself.
         cells = [value if value == value else None for value in values]  # noqa: PLR0124
         row = dict(zip(self._names, cells, strict=True))
         stamp = max(round((cells[self._time] or 0.0) * 1e9), 0)

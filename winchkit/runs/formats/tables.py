@@ -1,4 +1,4 @@
-"""Writes a log as ASAM MDF 4, a group per source with its own time; needs the extra ``mf4``."""
+"""Writers of logs in ASAM MDF 4 (extra ``mf4``) and of runs in Parquet (extra ``parquet``)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = [
 
 
 def write_mf4(log: Log, path: str | Path) -> None:
-    """Channels keep their own time stamps, counted from the first sample of any.
+    """Write a log as MDF 4, a group per source with its time stamps, from the first sample of any.
 
     Raises UsageError without asammdf, FileError where the file cannot be written.
     """
@@ -48,7 +48,7 @@ def write_mf4(log: Log, path: str | Path) -> None:
 
 
 def write_parquet(run: Run, path: str | Path) -> None:
-    """One column per channel, null for a missing value, the unit in the column's metadata.
+    """Write a run as Parquet: a column per channel, null for NaN, units in the columns' metadata.
 
     Raises UsageError without pyarrow, FileError where the file cannot be written.
     """
@@ -65,7 +65,7 @@ def write_parquet(run: Run, path: str | Path) -> None:
         [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in units.items()],
         metadata=dict(run.metadata),
     )
-    # From pandas, where NaN is how a missing value is written.
+    # As from pandas, where NaN is a missing value.
     columns = [pa.array(item, from_pandas=True) for item in values.values()]
     try:
         with Path(path).open("wb") as stream:

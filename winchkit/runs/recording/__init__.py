@@ -1,1 +1,1 @@
-"""Logs of a bench while they are recorded."""
+"""Writers of logs of a bench: by channels (MCAP) or by rows (CSV), in parts, with file locks."""

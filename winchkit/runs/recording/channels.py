@@ -1,4 +1,4 @@
-"""A log by channels: MCAP in which every source keeps its own time stamps."""
+"""A log by channels: MCAP with the time stamps of every source."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = ["ChannelLog"]
 
 
 class ChannelLog(LogWriter):
-    """One topic per source, beside events and counters."""
+    """One topic per source, and topics of events and counters."""
 
     _file: McapFile
 
@@ -86,7 +86,7 @@ class ChannelLog(LogWriter):
         content = [self._message_block(topic, samples) for topic, samples in pieces.items()]
         self._put_chunk([*content, *self._waiting])
         if self._aligner.start is None:
-            # Later parts have to know when the first row was, to count time from there.
+            # Later parts need the time of the first row, from which time is counted.
             for topic, samples in pieces.items():
                 self._aligner.add(topic, samples.times, samples.values)
             self._aligner.rows(now)
@@ -149,7 +149,7 @@ class ChannelLog(LogWriter):
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Flush at the end; of a full disk make FileError, and keep what was whole before."""
+        """Flush at the end; raise FileError for a full disk, and keep the complete part."""
         try:
             yield
             self._stream.flush()
@@ -159,5 +159,5 @@ class ChannelLog(LogWriter):
 
 
 def _json(value: object) -> bytes:
-    """JSON with null for what is no finite number."""
+    """JSON with null for numbers that are not finite."""
     return json.dumps(without_nan(value), separators=(",", ":"), allow_nan=False).encode()

@@ -1,8 +1,8 @@
-"""Creates the files of logs: exclusively, and locked for as long as they are written.
+"""Exclusive creation of the files of logs, which are locked while they are written.
 
-The lock (flock; on Windows msvcrt) belongs to the open file, so it holds against every other name
+The lock (flock; on Windows msvcrt) belongs to the open file. It is effective for every other name
 of the file (symbolic links, hard links, other spellings), in this process and in others, and ends
-with the process. Who would write to a locked file is refused.
+with the process. Another writer of a locked file is refused.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ __all__ = ["begin_log", "create", "is_written", "refuse_written", "require_in_pl
 
 _BUFFER = 1 << 20
 _PATIENCE = 2.0
-"""Longest wait for another process that begins a log in the same folder, s."""
+"""Longest wait for another process that starts a log in the same folder, s."""
 _FAR = 1 << 62
-"""Where Windows locks a byte: readers must not meet it."""
+"""Position of the byte that Windows locks, beyond those of readers."""
 _PART = re.compile(r"(.+)\.\d{3,}")
 
 
 class Lock(Enum):
-    """What became of the attempt to lock a file."""
+    """Result of locking a file."""
 
     HELD = auto()
     BUSY = auto()
@@ -41,9 +41,9 @@ class Lock(Enum):
 
 
 def create(path: Path, *, replace: bool) -> BinaryIO:
-    """Create a file and lock it; with ``replace`` empty an earlier one, else only where it is bare.
+    """Create and lock a file; an earlier one must be empty or is truncated with ``replace``.
 
-    Raises UsageError where it holds something or is being written, FileError where it cannot be
+    Raises UsageError for a file that is not empty or is being written, FileError where it cannot be
     written.
     """
     place = Path(os.path.realpath(path))
@@ -56,9 +56,9 @@ def create(path: Path, *, replace: bool) -> BinaryIO:
 def begin_log(path: Path, first: Path, *, replace: bool) -> BinaryIO:
     """Create the first file of the log ``path``: ``path`` itself, or part 1 of a log in parts.
 
-    Earlier files of that log are removed with ``replace``: they would be read as parts of the new
-    one. Raises UsageError, with nothing changed, where one is being written, or holds something
-    and ``replace`` is not given; FileError where a file cannot be removed or written.
+    Earlier files of that log are removed with ``replace``, since they would be read as parts of the
+    new one. Raises UsageError, without any change, where one is being written, or where one is not
+    empty and ``replace`` is not given; FileError where a file cannot be removed or written.
     """
     with _folder_locked(path.parent), ExitStack() as held:
         earlier = [item for item in (path, *parts_beside(path)) if os.path.lexists(item)]
@@ -83,7 +83,7 @@ def refuse_written(paths: Sequence[Path]) -> None:
 
 
 def is_written(path: Path) -> bool:
-    """Whether a log is being written to a file; False where that cannot be told."""
+    """Whether a log is being written to a file; False where that is unknown."""
     try:
         descriptor = regular(path)
     except OSError:
@@ -95,7 +95,7 @@ def is_written(path: Path) -> bool:
 
 
 def require_in_place(path: Path, stream: BinaryIO, size: int) -> None:
-    """Raise FileError where a file that is being written was removed, replaced or cut meanwhile."""
+    """Raise FileError where a file that is being written was removed, replaced or truncated."""
     own = os.fstat(stream.fileno())
     try:
         found = path.stat()
@@ -127,7 +127,7 @@ def _created(place: Path, path: Path, *, replace: bool) -> BinaryIO:
 
 
 def _hold(item: Path, held: ExitStack, *, replace: bool) -> None:
-    """Lock an earlier file of a log until ``held`` is closed; raises what forbids its loss."""
+    """Lock an earlier file of a log until ``held`` is closed; raises where it must not be lost."""
     try:
         descriptor = regular(item)
     except FileNotFoundError:
@@ -145,13 +145,13 @@ def _require_free(descriptor: int, path: Path, *, replace: bool, is_new: bool = 
         raise _being_written(path)
     if os.fstat(descriptor).st_size and not replace:
         raise UsageError(
-            f"{path} holds a log already; name another file, or replace it "
+            f"{path} contains a log already; name another file, or replace it "
             "(--replace, in Python replace=True)"
         )
     if lock is Lock.UNSUPPORTED and not is_new:
         raise UsageError(
-            f"{path}: its file system has no locks, so whether a log is being written to it "
-            "cannot be told; name another file"
+            f"{path}: its file system has no locks, so that another writer cannot be detected; "
+            "name another file"
         )
 
 
@@ -173,7 +173,7 @@ def _remove(item: Path) -> None:
 
 
 def _lock(descriptor: int) -> Lock:
-    """Lock a file exclusively if it is free; the system lets it go with the last descriptor."""
+    """Lock a file exclusively if it is free; the system releases it with the last descriptor."""
     try:
         if sys.platform == "win32":
             import msvcrt
@@ -194,9 +194,9 @@ def _lock(descriptor: int) -> Lock:
 
 @contextmanager
 def _folder_locked(folder: Path) -> Iterator[None]:
-    """One process at a time begins a log in a folder, where the system can lock folders.
+    """Lock a folder, where the system can, so that one process at a time starts a log in it.
 
-    Without it a log in one file and a log in parts of the same name could begin at one moment.
+    Otherwise a log in one file and a log in parts of the same name could start at the same time.
     """
     try:
         descriptor = os.open(folder, os.O_RDONLY)

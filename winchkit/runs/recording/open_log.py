@@ -1,4 +1,4 @@
-"""Opens a log for writing, in the format of its file name."""
+"""Opening of a log for writing, in the format of its suffix."""
 
 from __future__ import annotations
 
@@ -21,11 +21,35 @@ def open_log(
     *,
     replace: bool = False,
 ) -> LogWriter:
-    """Start a log in the format of the file's name; its files are locked while they are written.
+    """Start a log in the format of the file's suffix; its files are locked while they are written.
 
-    An earlier log of that name, its parts included, is removed with ``replace`` only. Raises
-    FileError where it cannot be written, UsageError for a suffix that is no format, for a file that
-    holds something, and, with ``replace`` as well, for one that is being written.
+    Parameters
+    ----------
+    path : Path
+        File, ``.mcap`` or ``.csv``.
+    layout : Layout
+        Sources and rule of rows.
+    metadata : mapping
+        Metadata of the run.
+    rotation : Rotation, optional
+        Size or duration of parts.
+    watch : callable
+        Called with the descriptor of every file.
+    replace : bool
+        Remove an earlier log of that name, its parts included.
+
+    Returns
+    -------
+    LogWriter
+        Open writer.
+
+    Raises
+    ------
+    FileError
+        Where the file cannot be written.
+    UsageError
+        For an unknown suffix, an existing log without ``replace``, and a file that is being
+        written.
     """
     if path.suffix.lower() == ".mcap":
         from winchkit.runs.recording.channels import ChannelLog

@@ -1,4 +1,4 @@
-"""When a log goes on in a new file, and what its parts are called."""
+"""Rotation of logs: size or duration of parts, and their names."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SMALLEST, _SHORTEST = 10e3, 1.0
 
 @dataclass(frozen=True)
 class Rotation:
-    """A part ends when it has so many bytes, or has lasted so long (s)."""
+    """Size (bytes) or duration (s) at which a part ends."""
 
     size: float = float("inf")
     duration: float = float("inf")
@@ -32,14 +32,14 @@ class Rotation:
         if unit in _BYTES:
             size = parse(f"{number} m", "length") * _BYTES[unit]
             if size < _SMALLEST:
-                raise UsageError(f"parts of '{text}' are too small; 10 kB is the least")
+                raise UsageError(f"parts of '{text}' are too small; the minimum is 10 kB")
             return cls(size=size)
         if unit in UNITS["time"]:
             duration = parse(f"{number} {unit}", "time")
             if duration < _SHORTEST:
-                raise UsageError(f"parts of '{text}' are too short; 1 s is the least")
+                raise UsageError(f"parts of '{text}' are too short; the minimum is 1 s")
             return cls(duration=duration)
-        raise UsageError(f"'{text}' is no size of a part; write e.g. 100MB or 10min")
+        raise UsageError(f"'{text}' is not a size of a part; write e.g. 100MB or 10min")
 
     def due(self, size: float, duration: float) -> bool:
         """Whether a part of this size and duration has to end."""

@@ -1,4 +1,4 @@
-"""A log as rows: CSV as it grows, aligned while it is recorded."""
+"""A log as rows: CSV, aligned while it is recorded."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["RowLog"]
 
 
 class RowLog(LogWriter):
-    """Rows at the moments of the slowest instrument."""
+    """Rows at the samples of the slowest instrument."""
 
     _writer: RunWriter
 
@@ -47,9 +47,9 @@ class RowLog(LogWriter):
         self.rows += len(rows)
 
     def close(self, end: Mapping[str, str]) -> None:
-        """Write the rows that waited for a source, and finish the file.
+        """Write the rows that wait for a source, and finish the file.
 
-        Where the next part could not be begun there is no open file, and nothing is written.
+        Where the next part could not be started there is no open file, and nothing is written.
         """
         try:
             if self._writer.is_open:

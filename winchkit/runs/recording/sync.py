@@ -1,4 +1,4 @@
-"""Brings files to the disk from a thread of its own: neither the writer nor a loop waits for it."""
+"""fsync of files on a separate thread, for which neither the writer nor a control loop waits."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import threading
 __all__ = ["SYNC_PERIOD", "Syncer"]
 
 SYNC_PERIOD = 0.8
-"""Between two fsyncs, s: what was written reaches the disk within a second of it."""
+"""Period of fsync, s: written data reach the disk within a second."""
 _CANNOT = (errno.EINVAL, errno.ENOTSUP, errno.EROFS)
 """A pipe or a device has nothing to sync."""
 
 
 class Syncer:
-    """Calls fsync for the file that is watched until closed."""
+    """Calls fsync periodically for the current file."""
 
     def __init__(self) -> None:
         self.error: OSError | None = None
-        """What the disk refused; from then on nothing is synced."""
+        """First error of fsync, after which no file is synced."""
         self._lock = threading.Lock()
         self._watched: int | None = None
         self._finished: list[int] = []
@@ -28,7 +28,7 @@ class Syncer:
         self._thread.start()
 
     def watch(self, descriptor: int) -> None:
-        """Sync this file from now on; the one before once more."""
+        """Sync this file from now on, and the previous one once more."""
         with self._lock:
             self._release()
             self._watched = os.dup(descriptor)

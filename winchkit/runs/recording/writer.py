@@ -1,4 +1,4 @@
-"""What logs of a bench have in common: samples in, one file or several parts."""
+"""Base class of log writers: samples in, one file or several parts out."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from winchkit.runs.recording.rotation import Rotation, part_path
 __all__ = ["LogWriter", "Watch"]
 
 Watch = Callable[[int], None]
-"""Is told the descriptor of every file that is written."""
+"""Called with the descriptor of every file that is written."""
 
 
 class LogWriter(ABC):
-    """Takes what came from every source since the last time. Raises FileError where it cannot."""
+    """Writes the new samples of every source. Raises FileError where it cannot."""
 
     def __init__(
         self,
@@ -32,19 +32,19 @@ class LogWriter(ABC):
         replace: bool,
     ) -> None:
         self.rows = 0
-        """Of the run so far."""
+        """Rows of the run so far."""
         self.parts: list[Path] = []
         """Files so far, the last one being written."""
         self._path, self._layout = path, layout
         self.metadata = metadata
-        """Of the parts that are still to come."""
+        """Metadata of further parts."""
         self._rotation, self._watch = rotation, watch
         self._began = layout.rule.opened
         first = part_path(path, 1) if rotation else path
         self._put_part(1, first, begin_log(path, first, replace=replace))
 
     def write(self, pieces: Mapping[str, Samples], now: float) -> None:
-        """Write samples by topic, and hand them to the operating system."""
+        """Write samples by topic, and flush them to the operating system."""
         if self._rotation and self._rotation.due(self._size(), now - self._began):
             self._close_part({})
             self._began = now
@@ -60,11 +60,11 @@ class LogWriter(ABC):
         return
 
     def close(self, end: Mapping[str, str]) -> None:
-        """Finish the file; ``end`` is what was counted."""
+        """Finish the file; ``end`` has the counters."""
         self._close_part(end)
 
     def _next_part(self) -> None:
-        """Go on in a new file; the number of one that holds something already is left out."""
+        """Continue in a new file; numbers of existing non-empty files are skipped."""
         while True:
             self._number += 1
             path = part_path(self._path, self._number)
@@ -82,7 +82,7 @@ class LogWriter(ABC):
 
     @abstractmethod
     def require_in_place(self) -> None:
-        """Raise FileError where another program has removed, replaced or cut the file."""
+        """Raise FileError where another program has removed, replaced or truncated the file."""
 
     @abstractmethod
     def _open_part(self, path: Path, stream: BinaryIO, about: Mapping[str, str]) -> None: ...

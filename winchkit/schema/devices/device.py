@@ -1,4 +1,4 @@
-"""What a device file declares: a device of one kind, with source and trust of its numbers."""
+"""Contents of a device file: a device of one kind, with source and confirmation of its values."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ class DeviceSpec(Table):
     maker: str
     model: str
     source: str
-    """Where its numbers come from: a manual's name and page."""
+    """Source of its values: a manual's name and page."""
     trust: Literal["manual", "interoperability", "hardware", "generic", "eds"]
-    """Who has confirmed it: the manual, another program, the device itself, nobody (a generic
-    file), or nobody beyond the maker's EDS (``eds``)."""
+    """Confirmation of its values: by the manual, another program, the device itself, only the
+    maker's EDS (``eds``), or none (a generic file)."""
     servo: ServoSpec | None = None
     modbus: ModbusSpec | None = None
     stream: StreamSpec | None = None
     process: ProcessSpec | None = None
     unconfirmed: tuple[str, ...] = ()
-    """What stands in the file without a source: to be compared with the manual."""
+    """Values without a source, to be compared with the manual."""
     description: str = ""
     path: str = dataclasses.field(default="", compare=False)
 

@@ -1,4 +1,4 @@
-"""What a device file declares of an instrument that is read over Modbus."""
+"""Contents of a device file of an instrument that is read over Modbus."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ __all__ = [
 StatusMeaning = Literal[
     "fault", "overload", "underload", "stable", "unstable", "net", "zero", "valid", "busy"
 ]
-"""``valid``: without it there is no value. ``busy``: with it the value is an old one. ``zero``: the
-gross value is within a quarter of a count of zero."""
+"""``valid``: the value is valid only while it is set. ``busy``: the value is an old one while it is
+set. ``zero``: the gross value is within a quarter of a count of zero."""
 ValueType = Literal["u16", "i16", "u32", "i32", "f32"]
 Order = Literal["ABCD", "CDAB", "BADC", "DCBA"]
-"""Bytes as they come over the wire; A is the most significant. 16-bit types: AB or BA."""
+"""Order of the bytes on the line; A is the most significant. 16-bit types: AB or BA."""
 
 REGISTERS: dict[str, int] = {"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2}
 """Registers that a value of each type takes."""
@@ -55,7 +55,7 @@ _RANGES: dict[str, tuple[float, float]] = {
 
 @dataclass(frozen=True)
 class DecimalsSpec(Table):
-    """Where the device says how many decimals its counts have: bits of a register."""
+    """Bits of a register with the number of decimals of the counts."""
 
     register: int
     """Wire address (from 0), within a block that is read."""
@@ -79,22 +79,22 @@ class FieldSpec(Table):
     sign_bit: int | None = None
     """Bit of the status word that makes this magnitude negative."""
     limit: Number | None = None
-    """The device never shows more counts than this without a flag; what is beyond contradicts
-    its status, and is no number."""
+    """Largest count that the device shows without a flag; a larger one contradicts its status and
+    is invalid."""
     decimals: DecimalsSpec | None = None
-    """Counts are divided by ten to this power, which the device tells itself."""
+    """Counts are divided by ten to this power, which is read from the device."""
 
 
 @dataclass(frozen=True)
 class ReadBlock(Table):
-    """Registers that are read in one query, so that they belong together."""
+    """Registers that are read in one query, so that they are consistent."""
 
     start: int
     """Wire address (from 0)."""
     count: Annotated[int, Whole(1, 125)]
     function: Literal[3, 4] = 3
     fixed: Flag = False
-    """The device answers this length only, so queries cannot alternate with ``count + 1``."""
+    """The device answers only this length, so that queries cannot alternate with ``count + 1``."""
 
     @property
     def end(self) -> int:
@@ -104,7 +104,7 @@ class ReadBlock(Table):
 
 @dataclass(frozen=True)
 class UnlockStep(Table):
-    """A register that must be written before a command is taken."""
+    """A register that must be written before a command."""
 
     register: int
     value: Annotated[int, Whole(0, 0xFFFF)]
@@ -123,23 +123,23 @@ class CommandSpec(Table):
     unlock: tuple[UnlockStep, ...] = ()
     """Written before it, with the same function."""
     comes: StatusMeaning | None = None
-    """This status must come, or the command was not obeyed."""
+    """Status that is set when the command has been executed."""
     goes: StatusMeaning | None = None
-    """This status must go, or the command was not obeyed."""
+    """Status that is cleared when the command has been executed."""
     within: PositiveDuration = 1.0
-    """So long the status may take, s."""
+    """Longest time to that status, s."""
     permanent: Flag = False
     """It writes the device's EEPROM: only ``winchkit cell store`` sends it."""
 
     @property
     def writes_many(self) -> bool:
-        """Whether it goes out as function 16."""
+        """Whether it is written by function 16."""
         return self.function == 16 or REGISTERS[self.type] > 1
 
     def rules(self) -> Iterator[Rule]:
-        """A number that the type holds: a whole one, unless it is a float."""
+        """The value is within the range of its type, and a whole number unless it is a float."""
         if self.type != "f32" and self.value != int(self.value):
-            yield "value", f"{self.value:g} is no whole number, as {self.type} is"
+            yield "value", f"{self.value:g} is not a whole number, as {self.type} requires"
         low, high = _RANGES[self.type]
         if not low <= self.value <= high:
             yield "value", f"{self.value:g} is beyond what {self.type} holds, {low:g} to {high:g}"
@@ -147,7 +147,7 @@ class CommandSpec(Table):
 
 @dataclass(frozen=True)
 class BusLink(Table):
-    """A line as the device is set in the factory."""
+    """Factory settings of the line."""
 
     baudrate: WholeNumber = 9600
     parity: Literal["N", "E", "O"] = "N"
@@ -163,31 +163,31 @@ class ModbusSpec(Table):
     value: str
     """Name of the field that is the measurement; a field ``gross`` is it before any tare."""
     status_read: ReadBlock | None = None
-    """A second block with status and decimals, for a device where one query cannot hold all. It
-    is read after the value; the status before and the one after both count for the value."""
+    """A second block with status and decimals, for a device where one query cannot read all. It
+    is read after the value; the status before and the one after both apply to the value."""
     status_register: int | None = None
     status_type: ValueType = "u16"
     status_order: Order = "ABCD"
     status: Mapping[StatusMeaning, tuple[int, ...]] = dataclasses.field(default_factory=dict)
-    """Status bits by meaning; any of the bits will do."""
+    """Status bits by meaning; any of the bits is sufficient."""
     command: Mapping[str, CommandSpec] = dataclasses.field(default_factory=dict)
     identity: tuple[FieldSpec, ...] = ()
-    """What `winchkit cell info` asks once: serial number, firmware."""
+    """Fields of `winchkit cell info`: serial number, firmware."""
     link: BusLink | None = None
-    """The device's factory setting of its line."""
+    """Factory settings of the line."""
     max_registers: Annotated[int, Whole(1, 125)] = 125
-    """It answers at most so many in one query."""
+    """Largest number of registers in one query."""
     gap: Duration = 0.0
-    """Silence that it needs between an answer and the next query, s."""
+    """Least pause between an answer and the next query, s."""
     rate: PositiveNumber = 100.0
     """Conversions per second."""
     filter_delay: Duration = 0.0
-    """By this much a value is older than the moment at which it was read, s."""
+    """Age of a value when it is read, s."""
     longest_reply: PositiveDuration = 0.1
-    """After this long a reply cannot come any more, s."""
+    """Longest time to a reply, s."""
 
     def rules(self) -> Iterator[Rule]:
-        """What is measured is among the fields, everything within what is read."""
+        """The measured value is a field, and all fields are within the blocks that are read."""
         names = [field.name for field in self.field]
         if self.value not in names:
             yield "value", f"'{self.value}' is none of the fields {', '.join(names) or '(none)'}"
@@ -224,7 +224,7 @@ class ModbusSpec(Table):
     def _status_rules(self) -> Iterator[Rule]:
         if self.status_register is None:
             if self.status:
-                yield "status_register", "missing; the status bits stand there"
+                yield "status_register", "missing; it is the register of the status bits"
         elif not self.holds(self.status_register, REGISTERS[self.status_type]):
             yield "status_register", f"{self.status_register} is in no block that is read"
         for name, command in self.command.items():

@@ -1,4 +1,4 @@
-"""What a device file declares of a CANopen instrument: a process value, as CiA 404 has it."""
+"""Contents of a device file of a CANopen instrument: a process value after CiA 404."""
 
 from __future__ import annotations
 
@@ -30,47 +30,47 @@ class ProcessCommand(Table):
     """As ``0x2104`` or ``0x2104:1``."""
     value: Annotated[int, Whole(0, 0xFFFFFFFF)]
     comes: StatusMeaning | None = None
-    """This status must come, or the command was not obeyed."""
+    """Status that is set when the command has been executed."""
     goes: StatusMeaning | None = None
-    """This status must go, or the command was not obeyed."""
+    """Status that is cleared when the command has been executed."""
     within: PositiveDuration = 1.0
-    """So long the status may take, s."""
+    """Longest time to that status, s."""
     permanent: Flag = False
     """It writes the device's EEPROM: only ``winchkit cell store`` sends it."""
 
 
 @dataclass(frozen=True)
 class ProcessSpec(Table):
-    """A CANopen instrument. With ``tpdo`` it sends its values itself, else they are asked for."""
+    """A CANopen instrument. With ``tpdo`` it sends its values, else they are read by SDO."""
 
     eds: str
     """Name of the EDS file beside the device file; it has the objects' types."""
     value: str = "0x6130:1"
-    """Object of the process value; CiA 404 has it in 6130h as REAL32."""
+    """Object of the process value; 6130h (REAL32) in CiA 404."""
     type: Literal["f32", "integer"] = "f32"
-    """An integer has the size and sign that the EDS gives it."""
+    """Type; an integer has the size and sign of its declaration in the EDS."""
     unit: str = "N"
     scale: Number = 1.0
     """Physical value in ``unit`` of one count."""
     limit: Number | None = None
-    """The device never shows more counts than this without a flag."""
+    """Largest count that the device shows without a flag."""
     status: str | None = None
-    """Object with the status bits; CiA 404 has it in 6150h."""
+    """Object with the status bits; 6150h in CiA 404."""
     bits: Mapping[StatusMeaning, tuple[int, ...]] = field(default_factory=dict)
-    """Status bits by meaning; any of the bits will do."""
+    """Status bits by meaning; any of the bits is sufficient."""
     tpdo: tuple[PdoSpec, ...] = ()
     command: Mapping[str, ProcessCommand] = field(default_factory=dict)
     rate: PositiveNumber = 50.0
     """Conversions per second."""
     filter_delay: Duration = 0.0
-    """By this much a value is older than the moment at which it was sent, s."""
+    """Age of a value when it is sent, s."""
 
     def rules(self) -> Iterator[Rule]:
-        """The value is in one PDO with its status, so that they belong together."""
+        """The value and its status are in one PDO, so that they are consistent."""
         if dimension_of(self.unit) is None:
             yield "unit", f"unknown unit '{self.unit}'"
         if self.bits and self.status is None:
-            yield "status", "missing; the status bits stand there"
+            yield "status", "missing; it is the object of the status bits"
         wanted = {self.value} | ({self.status} if self.status else set())
         if self.tpdo and not any(wanted <= set(pdo.objects) for pdo in self.tpdo):
             yield "tpdo", f"none of them carries {' and '.join(sorted(wanted))}"

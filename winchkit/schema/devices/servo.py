@@ -1,4 +1,4 @@
-"""What a device file declares of a CiA 402 servo drive."""
+"""Contents of a device file of a CiA 402 servo drive."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class QuirkSpec(Table):
-    """How a drive differs from the standard; what the simulated one then does too."""
+    """Deviations of a drive from the standard, which the simulated drive reproduces."""
 
     quick_stop_codes: tuple[int, ...] = ()
     """Values that 605Ah takes; empty for 0 to 8. -1 is a quick stop that is ignored."""
@@ -32,7 +32,7 @@ class QuirkSpec(Table):
     needs_mode: Flag = False
     """Operation is not enabled while no mode is chosen (6061h is 0)."""
     needs_both_heartbeats: Flag = False
-    """1016h watches only while 1017h is set too."""
+    """1016h is effective only while 1017h is set too."""
     stops_outside_operational: Flag = False
     """Leaving the NMT state Operational shuts the drive down."""
     ramps_are_times: Flag = False
@@ -42,7 +42,7 @@ class QuirkSpec(Table):
     brake_release: Duration = 0.0
     """From enabling until the brake is open and set-points count, s."""
     brake_apply: Duration = 0.0
-    """For which the motor holds the load while the brake closes, s."""
+    """Time for which the motor holds the load while the brake closes, s."""
 
 
 Mode = Literal["PP", "PV", "PT", "HM", "IP", "CSP", "CSV", "CST"]
@@ -68,9 +68,9 @@ class PdoSpec(Table):
     """CANopen transmission type: 1 every SYNC, n every n-th, 0 with a SYNC after a change, 254
     and 255 by events of the drive."""
     event_timer: Duration = 0.0
-    """Of types 254 and 255: sent at the latest after this long, s; 0 only after a change."""
+    """Of types 254 and 255: event timer, s; 0: sent only after a change."""
     inhibit_time: Duration = 0.0
-    """Of types 254 and 255: never sent sooner again than after this, s."""
+    """Of types 254 and 255: inhibit time, s."""
 
     @property
     def every_sync(self) -> bool:
@@ -79,11 +79,11 @@ class PdoSpec(Table):
 
     @property
     def by_event(self) -> bool:
-        """Whether the drive sends it of its own accord."""
+        """Whether the drive sends it by its own events."""
         return self.transmission in _EVENT
 
     def rules(self) -> Iterator[Rule]:
-        """Types that the standard reserves, and timers that nothing reads, are mistakes."""
+        """Reserved transmission types, and timers without effect, are errors."""
         kind = self.transmission
         if kind in _RESERVED or kind in _ON_REQUEST:
             why = "is reserved" if kind in _RESERVED else "answers remote requests only"
@@ -95,7 +95,7 @@ class PdoSpec(Table):
 
 @dataclass(frozen=True)
 class OptionSpec(Table):
-    """What the drive shall do when it stops; a key that is left out leaves the drive's own."""
+    """Option codes for stops; a key that is left out keeps the drive's own value."""
 
     quick_stop: Annotated[int, _I16] | None = None
     """605Ah: 1 to 4 ramp, then switched off; 5 to 8 ramp and stay in quick stop; 0 coast."""
@@ -108,7 +108,7 @@ class OptionSpec(Table):
     fault: Annotated[int, _I16] | None = None
     """605Eh: 1 to 4 ramp, 0 coast."""
     connection_lost: Annotated[int, _I16] | None = None
-    """6007h: 1 fault, 2 disable voltage, 3 quick stop, 0 go on as if nothing had happened."""
+    """6007h: 1 fault, 2 disable voltage, 3 quick stop, 0 no action."""
 
 
 @dataclass(frozen=True)
@@ -120,40 +120,40 @@ class ServoSpec(Table):
     modes: tuple[Mode, ...]
     """Modes of operation that it has: PP, PV, PT, HM, IP, CSP, CSV, CST."""
     motion_mode: MotionMode = "CSV"
-    """The mode in which the bench moves it."""
+    """Mode of operation in which the bench moves it."""
     increments_per_turn: WholeNumber = 65_536
     """Position units of one motor turn unless the drive's objects say otherwise."""
     home_offset: str = "0x607C"
-    """Object that gives the home its position, as ``index`` or ``index:sub``; a maker's own where
-    the drive lacks 607Ch."""
+    """Object of the home position, as ``index`` or ``index:sub``; a maker-specific one where the
+    drive lacks 607Ch."""
     position_wraps: tuple[Count, Count] | None = None
-    """Lowest and highest count that 6064h shows before it goes on at the other end, where that is
-    not the range of its own 32 bits."""
+    """Lowest and highest count of 6064h before it wraps around, where that is not the range of 32
+    bits."""
     speed_unit: Literal["increments/s", "rpm", "0.1 rpm"] = "increments/s"
     """Of 606Ch, 60FFh, 6081h and, per second, of 6083h to 6085h, where 60A9h does not say."""
     units: Literal["drive", "file"] = "drive"
-    """Whose word counts on units: the drive's 608Fh, 6091h, 6092h, 60A8h and 60A9h, or this
-    file's, for drives whose objects stand at values that they do not use."""
+    """Source of units: the drive's 608Fh, 6091h, 6092h, 60A8h and 60A9h, or this file, for drives
+    that do not use the values of these objects."""
     rated_torque: Annotated[float, Quantity("torque", 0.0, above=True)] = 1.0
     """N m, unless object 6076h says otherwise."""
     tpdo: tuple[PdoSpec, ...] = ()
-    """What the drive sends: at least 6041h, 6064h and 606Ch, the first two with every SYNC."""
+    """TPDOs of the drive: at least 6041h, 6064h and 606Ch, the first two with every SYNC."""
     rpdo: tuple[PdoSpec, ...] = ()
-    """What the drive is sent: 6040h and the target of ``motion_mode``."""
+    """RPDOs of the drive: 6040h and the target of ``motion_mode``."""
     options: OptionSpec = field(default_factory=OptionSpec)
     """Written at commissioning and read back."""
     boot_time: Duration = 1.0
     """From power-on or NMT reset to the boot-up message at the latest, s."""
     quirks: QuirkSpec = field(default_factory=QuirkSpec)
-    """Ways in which it departs from CiA 402."""
+    """Deviations from CiA 402."""
     host_loss: str = "heartbeat"
-    """How it notices that the host has gone: ``heartbeat`` (1016h), ``guarding`` (100Ch, 100Dh),
-    ``rpdo-timeout`` (14xxh:05), ``sync-loss`` (1006h) or ``vendor:NAME``."""
+    """Mechanism by which it detects the loss of the host: ``heartbeat`` (1016h), ``guarding``
+    (100Ch, 100Dh), ``rpdo-timeout`` (14xxh:05), ``sync-loss`` (1006h) or ``vendor:NAME``."""
     vendor_watchdog: Mapping[str, VendorWatchdog] = field(default_factory=dict)
-    """Watchdogs of the maker's own, by name."""
+    """Maker-specific watchdogs, by name."""
 
     def rules(self) -> Iterator[Rule]:
-        """The way in which it notices a dead host is one that is known."""
+        """The mechanism of detecting a host loss is a known one; counts wrap upwards."""
         if self.position_wraps is not None and self.position_wraps[0] >= self.position_wraps[1]:
             yield "position_wraps", "the lowest count is not below the highest"
         if wrong := unknown_mechanism(self.host_loss, tuple(self.vendor_watchdog)):

@@ -1,4 +1,4 @@
-"""What a device file declares of an instrument on a serial line, polled or sending by itself.
+"""Contents of a device file of an instrument on a serial line, polled or continuously sending.
 
 Bytes are written as text, one character a byte (Latin-1); ``\\u001b`` is ESC.
 """
@@ -48,7 +48,7 @@ Says = Literal[
     "busy",
     "refused",
 ]
-"""What a status letter, a status bit, a word or a reply says."""
+"""Meanings of a status letter, a status bit, a word or a reply."""
 NUMBERS = ("value", "gross")
 """Fields that hold a number in the device's unit."""
 _OWN = (*NUMBERS, "unit", "address", "checksum", "bits", "skip")
@@ -56,16 +56,16 @@ _OWN = (*NUMBERS, "unit", "address", "checksum", "bits", "skip")
 
 @dataclass(frozen=True)
 class AskSpec(Table):
-    """What is sent, and the lines that may answer; ``{address:3}`` is the device's address."""
+    """A request and its possible replies; ``{address:3}`` is the device's address."""
 
     send: str
     answer: tuple[str, ...] = ()
-    """A ``*`` in it stands for anything; without answers the device says nothing."""
+    """A ``*`` in it stands for any text; without answers the device does not reply."""
 
 
 @dataclass(frozen=True)
 class FreshSpec(Table):
-    """How to ask whether there is a new value: bits that may say ``stale``."""
+    """Request for the presence of a new value: bits with the meaning ``stale``."""
 
     send: str
     frame: str = "{bits}"
@@ -77,14 +77,14 @@ class ChecksumSpec(Table):
 
     kind: Literal["xor", "sum", "sum-complement"]
     after: str = ""
-    """First character of the line that does not count; empty: the line counts from its start."""
+    """Character before the first summed one; empty: the sum starts at the start of the line."""
     before: str = ""
-    """Last character that does not count; empty: the line counts up to the check sum."""
+    """Character behind the last summed one; empty: the sum ends at the check sum."""
 
 
 @dataclass(frozen=True)
 class BinarySpec(Table):
-    """A frame of ``length`` bytes, which may hold any byte; the terminator comes behind it."""
+    """A frame of ``length`` bytes of any value, followed by the terminator."""
 
     length: WholeNumber
     value: tuple[Annotated[int, Whole(0)], WholeNumber]
@@ -104,7 +104,7 @@ class BinarySpec(Table):
 
 @dataclass(frozen=True)
 class UnitSpec(Table):
-    """What one of a unit that stands in a frame is: ``kg = { scale = 9.80665, unit = "N" }``."""
+    """Scale of a unit that a frame names: ``kg = { scale = 9.80665, unit = "N" }``."""
 
     scale: Number
     unit: str
@@ -112,7 +112,7 @@ class UnitSpec(Table):
 
 @dataclass(frozen=True)
 class LinkSpec(Table):
-    """The maker's settings of the line, said when nothing answers."""
+    """The maker's settings of the line, printed when the device does not answer."""
 
     baudrate: WholeNumber
     parity: Literal["N", "E", "O"] = "N"
@@ -129,7 +129,7 @@ class StreamSpec(Table):
 
     mode: Literal["polled", "continuous"]
     example: str
-    """A frame as the source prints it, without terminator; the simulated device looks like it."""
+    """A frame as printed in the source, without terminator; the simulated device sends its form."""
     frame: tuple[str, ...] = ()
     """Templates of a line with the field ``value``, the usual one first."""
     binary: BinarySpec | None = None
@@ -139,57 +139,57 @@ class StreamSpec(Table):
     checksum: ChecksumSpec | None = None
     unit: str = "1"
     scale: Number = 1.0
-    """Of one of what the field ``value`` counts, in ``unit``."""
+    """Value of one count of the field ``value``, in ``unit``."""
     units: Mapping[str, UnitSpec] = field(default_factory=dict)
-    """Units that stand in the frame, by their text there; then ``unit`` and ``scale`` are none."""
+    """Units that the frame names, by their text there, in place of ``unit`` and ``scale``."""
     capacity: PositiveNumber | None = None
-    """A number in the frame beyond this, either way, is an overload."""
+    """A number in the frame whose magnitude exceeds this is an overload."""
     words: Mapping[str, Says] = field(default_factory=dict)
     """Text in place of the digits."""
     replies: Mapping[str, Says] = field(default_factory=dict)
     """Lines in place of a frame; a ``*`` in it stands for anything."""
     letter: Mapping[str, Mapping[str, Says]] = field(default_factory=dict)
-    """Text of a status field by the field's name; what is not listed spoils the frame."""
+    """Texts of a status field by the field's name; a frame with any other text is invalid."""
     bits: Mapping[Says, tuple[Annotated[int, Whole(0, 31)], ...]] = field(default_factory=dict)
     """Bits of the number in the field ``bits``, from 0."""
     start: tuple[AskSpec, ...] = ()
-    """Sent when the device is first spoken to, and again when it was silent."""
+    """Sent at the first contact with the device, and again after a timeout."""
     stop: str = ""
-    """Ends the sending, before a command and at the end."""
+    """Stops continuous sending, before a command and at the end."""
     poll: str = ""
     fresh: FreshSpec | None = None
     select: AskSpec | None = None
-    """Sent before another device of the same line is spoken to."""
+    """Sent before the first request to another device of the line."""
     command: Mapping[str, AskSpec] = field(default_factory=dict)
     link: LinkSpec | None = None
     rate: PositiveNumber = 100.0
     """Conversions per second."""
     filter_delay: Duration = 0.0
-    """By this much a value is older than the moment at which it was sent, s."""
+    """Age of a value when it is sent, s."""
     longest_reply: PositiveDuration = 0.1
-    """After this long an answer cannot come any more, s."""
+    """Longest time to an answer, s."""
 
     def rules(self) -> Iterator[Rule]:
-        """A device speaks in one way, and what its frames hold is declared."""
+        """A device has one form of frame, and all fields of it are declared."""
         if (self.binary is None) == (not self.frame):
             yield "", "give either 'frame', templates of lines, or the table 'binary'"
         if self.binary is not None and self.mode == "continuous":
-            yield "mode", "nothing tells where a binary frame begins; it can only be polled"
+            yield "mode", "the start of a binary frame is not marked; it can only be polled"
         if (self.mode == "polled") != bool(self.poll):
-            yield "poll", "a polled device has what to send here, one that is continuous has not"
+            yield "poll", "a polled device needs its request here, a continuous one has none"
         if not self.terminator:
             yield "terminator", "empty; give the characters that end a frame"
         if self.binary is not None and (self.units or self.words):
-            yield "binary", "a binary frame holds neither units nor words"
+            yield "binary", "a binary frame has neither units nor words"
         if self.capacity is not None and self.units:
-            yield "capacity", "has no meaning where the unit stands in the frame"
+            yield "capacity", "has no meaning where the frame names the unit"
         yield from self._broken_units()
         yield from self._broken_templates()
         yield from self._broken_requests()
         yield from self._broken_example()
 
     def dimension(self) -> str | None:
-        """Of the value; None where a unit is unknown or there are several."""
+        """Dimension of the value; None where a unit is unknown or there are several."""
         units = [one.unit for one in self.units.values()] or [self.unit]
         found = {dimension_of(unit) for unit in units}
         return found.pop() if len(found) == 1 else None
@@ -219,7 +219,7 @@ class StreamSpec(Table):
                 yield key, f"'{text}' has no field {{value}}"
 
     def _broken_requests(self) -> Iterator[Rule]:
-        """Only the address can be put into what is sent, and all of it must be bytes."""
+        """Requests contain no field but the address, and only characters that are bytes."""
         asked = [("start", ask) for ask in self.start]
         asked += [(f"command.{name}", ask) for name, ask in self.command.items()]
         asked += [("select", self.select)] if self.select else []
@@ -234,9 +234,9 @@ class StreamSpec(Table):
             for name in sorted(strange):
                 yield key, f"'{text}': {{{name}}} is unknown; use {{address}} or {{address:3}}"
             if not _is_bytes(text):
-                yield key, f"'{text}' has characters that are no bytes"
+                yield key, f"'{text}' has characters that are not bytes"
         if not _is_bytes(self.terminator):
-            yield "terminator", f"'{self.terminator}' has characters that are no bytes"
+            yield "terminator", f"'{self.terminator}' has characters that are not bytes"
 
     def _broken_example(self) -> Iterator[Rule]:
         """The example is a frame."""
@@ -248,7 +248,7 @@ class StreamSpec(Table):
         try:
             templates = self.templates()
         except UsageError:
-            return  # said already, at its own place
+            return  # reported already, at its own key
         if templates and fields_of(templates[0], self.example) is None:
             yield "example", f"'{self.example}' does not fit '{self.frame[0]}'"
 

@@ -1,8 +1,8 @@
-"""Reads the text of an EDS or DCF file: mends what can be mended, and tells what and where.
+"""Reader of EDS and DCF files, which repairs faults and reports each with its line.
 
-Makers' files are often not quite what CiA 306 asks for. The text that comes out is in order for
-any reader of the format; everything that was not is a warning with its line. What cannot be
-mended without guessing is refused, with all its faults at once.
+Makers' files often deviate from CiA 306. The result is valid text of the format; every repair is a
+warning with its line. A file with faults that have no unique repair is refused, with all its faults
+in one error.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _MAKERS_OWN = range(0x2000, 0x6000)
 
 @dataclass(frozen=True)
 class EdsText:
-    """An EDS in order, and what had to be mended."""
+    """A valid EDS, and the repairs."""
 
     path: str
     text: str
@@ -37,7 +37,23 @@ class EdsText:
 
 
 def read_eds_text(path: str | Path) -> EdsText:
-    """Read an EDS or DCF; raises FileError naming every line that cannot be mended."""
+    """Read an EDS or DCF file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    EdsText
+        Valid text, and a warning per repair.
+
+    Raises
+    ------
+    FileError
+        With every line that cannot be repaired.
+    """
     findings = Findings(str(path))
     sections = _sections(_text(Path(path), findings), findings)
     if findings.faults:
@@ -60,7 +76,7 @@ def _text(path: Path, findings: Findings) -> str:
     except OSError as error:
         raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
     if len(data) > _LARGEST:
-        reason = f"larger than {_LARGEST / 1e6:g} MB, so it is no EDS"
+        reason = f"larger than {_LARGEST / 1e6:g} MB, so it is not an EDS"
         raise FileError(Fault(reason, str(path)))
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
@@ -74,7 +90,7 @@ def _text(path: Path, findings: Findings) -> str:
 
 
 def _sections(text: str, findings: Findings) -> list[Section]:
-    """Split into sections; the first of two that say the same stays."""
+    """Split into sections; the first of two equal ones is kept."""
     found: dict[str, Section] = {}
     sections: list[Section] = []
     for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
@@ -85,17 +101,17 @@ def _sections(text: str, findings: Findings) -> list[Section]:
         if head:
             sections.append(Section(canonical(head[1]), number))
         elif line.startswith("["):
-            findings.fault(number, f"{line!r} is no section; it should read [name]")
+            findings.fault(number, f"{line!r} is not a section; it should read [name]")
             sections.append(Section(line, number))
         elif not sections:
             findings.fault(
-                number, f"is no EDS: expected a section such as [FileInfo], not {line!r}"
+                number, f"is not an EDS: expected a section such as [FileInfo], not {line!r}"
             )
             return []
         else:
             _take_key(sections[-1], number, line, findings)
     if not sections:
-        findings.fault(1, "is no EDS: it has no sections")
+        findings.fault(1, "is not an EDS: it has no sections")
     for section in sections:
         _keep_first(found, section, findings)
     return [section for section in found.values() if not section.contradicts]
@@ -141,7 +157,7 @@ def _append(section: Section, value: str, line: int) -> None:
 
 
 def _keep_first(found: dict[str, Section], section: Section, findings: Findings) -> None:
-    """Of two sections with one name the first counts; what would be a guess is a fault."""
+    """Keep the first of two sections of one name; an ambiguous difference is a fault."""
     first = found.setdefault(section.name.casefold(), section)
     if first is section:
         return

@@ -1,4 +1,4 @@
-"""Mends the sections of an EDS where its meaning is plain; whatever is mended is a warning."""
+"""Repair of the sections of an EDS where their meaning is unique, with a warning per repair."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Section:
     values: dict[str, str] = field(default_factory=dict)
     lines: dict[str, int] = field(default_factory=dict)
     contradicts: bool = False
-    """Whether the file says two things of it, so that it cannot be used."""
+    """Whether the file contradicts itself about it, so that it cannot be used."""
 
     def uses(self, key: str) -> bool:
         """Whether winchkit reads a key of this section."""
@@ -92,11 +92,11 @@ class Findings:
     warnings: list[Fault] = field(default_factory=list)
 
     def fault(self, line: int, message: str) -> None:
-        """Something that makes the file useless."""
+        """Note a fault that makes the file unusable."""
         self.faults.append(Fault(message, self.path, line))
 
     def warn(self, line: int, message: str) -> None:
-        """Something that was mended."""
+        """Note a repair."""
         self.warnings.append(Fault(message, self.path, line))
 
 
@@ -148,7 +148,7 @@ _ACCESS = ("ro", "rw", "wo", "const", "rwr", "rww")
 
 
 def mend(sections: list[Section], findings: Findings) -> list[Section]:
-    """Sections in an order and a state that any reader of EDS files takes."""
+    """Sections in an order and a state that any reader of EDS files accepts."""
     by_name = {section.name: section for section in sections}
     _mend_device(by_name, findings)
     _mend_dummies(by_name, findings)
@@ -228,7 +228,7 @@ def _mend_object(section: Section, subs: dict[int, list[Section]], findings: Fin
     if kind is None:
         text = section.values["ObjectType"]
         findings.fault(
-            section.line_of("ObjectType"), f"[{section.name}] ObjectType {text!r} is no number"
+            section.line_of("ObjectType"), f"[{section.name}] ObjectType {text!r} is not a number"
         )
         return
     members = subs.get(index, [])

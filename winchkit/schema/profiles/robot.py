@@ -1,4 +1,4 @@
-"""What a profile of a cable robot declares: platform, home pose, priors and lines."""
+"""Contents of a profile of a cable robot: platform, home pose, priors and lines."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PriorName = Literal["exit_point", "anchor_point", "winding_radius", "swivel_radi
 
 @dataclass(frozen=True)
 class PriorSpec(Table):
-    """What is believed of a parameter before calibration; a bare quantity is ``std``."""
+    """Prior of a parameter for calibration; a quantity alone is ``std``."""
 
     std: PositiveLength
     """Standard deviation, m."""
@@ -69,22 +69,22 @@ class LineSpec(Table):
     swivel_axis: tuple[Number, Number, Number] = (0.0, 0.0, 1.0)
 
     def rules(self) -> Iterator[Rule]:
-        """A direction has a length."""
+        """A direction is not the zero vector."""
         if not any(self.swivel_axis):
-            yield "swivel_axis", "is zero; it is the direction of the rope at the pulley"
+            yield "swivel_axis", "is zero; it is the direction of the cable at the pulley"
 
 
 @dataclass(frozen=True)
 class FittedSpec(Table):
-    """Where the numbers of a calibrated robot came from; written by ``winchkit calibrate``."""
+    """Origin of the values of a calibrated robot; written by ``winchkit calibrate``."""
 
     date: datetime.date
     runs: tuple[str, ...] = ()
     poses: WholeNumber = 0
     position_rms: Length | None = None
-    """Of the poses fitted, m."""
+    """Rms position error of the fitted poses, m."""
     held_out_rms: Length | None = None
-    """Of poses that were not fitted, m."""
+    """Rms position error of held-out poses, m."""
     std: Mapping[str, str] = field(default_factory=dict)
     """Posterior standard deviation by parameter, with its unit."""
 

@@ -1,4 +1,4 @@
-"""What a sizing specification declares: what a winch must do, and the parts chosen for it."""
+"""Contents of a sizing specification: requirements of a winch, and the parts chosen for it."""
 
 from __future__ import annotations
 
@@ -38,29 +38,29 @@ Margin = Annotated[float, Quantity("ratio", 1.0)]
 
 @dataclass(frozen=True)
 class RequirementSpec(Table):
-    """What the winch must do."""
+    """Requirements of the winch."""
 
     force: PositiveForce
-    """Of the rope, N."""
+    """Of the cable, N."""
     speed: PositiveSpeed
-    """Of the rope, m/s."""
+    """Of the cable, m/s."""
     cable_length: PositiveLength
     """To be wound, without dead wraps, m."""
 
 
 @dataclass(frozen=True)
 class EfficiencySpec(Table):
-    """Losses between motor and rope."""
+    """Losses between motor and cable."""
 
     gearbox: Share
     belt: Share = 1.0
     """Of one belt drive."""
     belts: Annotated[float, Quantity("ratio", 0.0)] = 1.0
-    """How many belt drives stand in a row."""
+    """Number of belt drives in series."""
     bearing: Share = 1.0
     """Of one bearing."""
     bearings: Annotated[float, Quantity("ratio", 0.0)] = 0.0
-    """How many bearings."""
+    """Number of bearings."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class MotorChoice(Table):
     torque: PositiveTorque | None = None
     """N m; default is power over speed."""
     margin: Margin = 1.0
-    """Times that torque and power must suffice."""
+    """Safety factor of torque and power."""
 
     @property
     def rated_torque(self) -> float:
@@ -84,7 +84,7 @@ class MotorChoice(Table):
 
 @dataclass(frozen=True)
 class WormSpec(Table):
-    """A worm gear's geometry, which tells whether it locks."""
+    """Geometry of a worm gear, which determines whether it is self-locking."""
 
     lead_angle: Annotated[float, Quantity("angle", 0.0, above=True)]
     """Rad."""
@@ -109,18 +109,18 @@ class DrumChoice(Table):
     """A grooved drum."""
 
     winding_radius: PositiveLength
-    """Axis to rope centre, m."""
+    """Axis to cable centre, m."""
     groove_pitch: PositiveLength
     """m a turn."""
     width: PositiveLength
     """Of the groove, m."""
     full_radius: PositiveLength | None = None
-    """Axis to rope centre with all rope wound, m; default is ``winding_radius`` (one layer)."""
+    """Axis to cable centre with all cable wound, m; default is ``winding_radius`` (one layer)."""
     dead_wraps: Annotated[float, Quantity("ratio", 2.0)] = 2.0
     """Turns that never leave the drum."""
 
     def rules(self) -> Iterator[Rule]:
-        """Rope on the drum makes it no thinner."""
+        """The full radius is at least the winding radius."""
         if self.full_radius is not None and self.full_radius < self.winding_radius:
             yield (
                 "full_radius",
@@ -130,7 +130,7 @@ class DrumChoice(Table):
 
 @dataclass(frozen=True)
 class ScrewChoice(Table):
-    """The lead screw of the rope guide."""
+    """The lead screw of the cable guide."""
 
     lead: PositiveLength
     """m per screw turn."""
@@ -142,9 +142,9 @@ class ScrewChoice(Table):
         "fixed-fixed"
     )
     speed: Turning | None = None
-    """Fastest it is ever turned, rad/s; default is what the rope's speed asks for."""
+    """Highest speed, rad/s; default is the speed at the required cable speed."""
     nut: Annotated[float, Quantity("length", 0.0)] = 0.0
-    """Length of nut and bearings, which is no travel, m."""
+    """Length of nut and bearings, by which the travel is shorter than the screw, m."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ class BeltChoice(Table):
     centre_distance: PositiveLength
     """m."""
     power: Power
-    """That it carries, W."""
+    """Transmitted power, W."""
 
     @property
     def ratio(self) -> float:

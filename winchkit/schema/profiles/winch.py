@@ -1,4 +1,4 @@
-"""What a profile of a winch declares: drum, gearbox, guide, rope, pulleys, reference, effects."""
+"""Contents of a winch profile: drum, gearbox, guide, cable, pulleys, reference, effects."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class LedgerEntry(Table):
-    """One step: an effect added or removed, what it was judged on, and how to take it back."""
+    """One step: an effect added or removed, its held-out errors, and the data to undo it."""
 
     did: Literal["add", "remove"]
     effect: str
@@ -55,33 +55,33 @@ class LedgerEntry(Table):
 
 
 LAYERED = frozenset({"spiral", "archimedean"})
-"""Drum kinds that wind in layers."""
+"""Kinds of drum with layers."""
 
 SHORTHANDS: dict[str, str] = {
     "cable.axial_stiffness": "cable-elongation-linear",
     "cable.mass_per_length": "cable-weight",
     "gearbox.efficiency": "gear-efficiency",
 }
-"""Profile keys that say the same as an effect."""
+"""Profile keys that are equivalent to an effect."""
 
 
 @dataclass(frozen=True)
 class DrumSpec(Table):
-    """The drum; which of the optional numbers count depends on ``kind``."""
+    """The drum; ``kind`` determines which of the optional numbers apply."""
 
     kind: Literal["spiral", "archimedean", "grooved", "squared"]
     winding_radius: PositiveLength
-    """Axis to rope centre on the first layer, m."""
+    """Axis to cable centre on the first layer, m."""
     groove_pitch: Annotated[float, Quantity("length", 0.0)] | None = None
     """Of a grooved drum, m a turn."""
     layer_growth: Annotated[float, Quantity("length", 0.0)] | None = None
-    """Radius gained per turn (spiral, archimedean), m; default is the rope's diameter."""
+    """Radius gained per turn (spiral, archimedean), m; default is the cable's diameter."""
     build_up: Annotated[float, Quantity("length", 0.0)] | None = None
     """k of r² = r0² + k L (squared): an area per length, m."""
     width: PositiveLength | None = None
-    """Between the flanges, m; with ``groove_pitch`` it says how many turns the drum takes."""
+    """Between the flanges, m; with ``groove_pitch`` it determines the capacity in turns."""
     flange_radius: PositiveLength | None = None
-    """Axis to the flange's rim, m; says how many layers the drum takes."""
+    """Axis to the flange's rim, m; determines the capacity in layers."""
 
     def rules(self) -> Iterator[Rule]:
         """A grooved drum needs its pitch, a squared one its build-up."""
@@ -104,11 +104,11 @@ class DrumSpec(Table):
 
 @dataclass(frozen=True)
 class CableSpec(Table):
-    """The rope."""
+    """The cable."""
 
     diameter: PositiveLength | None = None
     dead_length: Annotated[float, Quantity("length", 0.0)] = 0.0
-    """Stressed rope between drum and exit point, m."""
+    """Stressed cable between drum and exit point, m."""
     axial_stiffness: PositiveForce | None = None
     """Shorthand for the effect cable-elongation-linear, N."""
     mass_per_length: LinearDensity | None = None
@@ -117,10 +117,10 @@ class CableSpec(Table):
 
 @dataclass(frozen=True)
 class PathSpec(Table):
-    """Where the free rope runs."""
+    """Direction of the free cable."""
 
     inclination: Angle = pi / 2
-    """Of the free rope against the horizontal, rad; 90 degrees is hanging."""
+    """Angle of the free cable to the horizontal, rad; 90 degrees is hanging."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class GearboxSpec(Table):
 
 @dataclass(frozen=True)
 class GuideSpec(Table):
-    """The lead-screw guide that lays the rope on the drum."""
+    """The lead-screw guide that lays the cable on the drum."""
 
     screw_lead: PositiveLength
     belt_ratio: PositiveNumber = 1.0
@@ -149,7 +149,7 @@ class GuideSpec(Table):
 
 @dataclass(frozen=True)
 class PulleySpec(Table):
-    """One pulley on the rope's way, in order from the drum to the platform."""
+    """One pulley, in order from the drum to the platform."""
 
     radius: PositiveLength
     wrap: Annotated[float, Quantity("angle", 0.0)] = pi / 2
@@ -158,7 +158,7 @@ class PulleySpec(Table):
 
 @dataclass(frozen=True)
 class ReferenceSpec(Table):
-    """The state that every angle and length is counted from."""
+    """Reference state of all angles and lengths."""
 
     motor_angle: Angle = 0.0
     cable_length: Length | None = None
@@ -194,7 +194,7 @@ class WinchProfile(Table):
     description: str = ""
 
     def rules(self) -> Iterator[Rule]:
-        """Layers grow by the rope's diameter unless told; a number is given in one place."""
+        """Layers grow by the cable's diameter by default; a value is given once."""
         drum = self.drum
         if drum.kind in LAYERED and drum.layer_growth is None and self.cable.diameter is None:
             yield (

@@ -1,4 +1,4 @@
-"""Reads benches, real and simulated: tables, and that winches, buses and devices fit together."""
+"""Reader of benches, real and simulated, with checks that winches, buses and devices match."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _FITTING = {
 
 
 def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> BenchSpec | None:
-    """Read a bench and check what it refers to."""
+    """Read a bench and check its references."""
     for key in tree.keys() & {"path", "latch_file"}:
         reading.fault((key,), "unknown key")
     _check_references(reading, tree, read_device)
@@ -42,14 +42,14 @@ def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> 
     for index, file in enumerate(spec.effect_files if spec is not None else ()):
         if not file.is_file():
             at: Key = ("effects", index)
-            reading.fault(at, f"no such file of effects: {file}; a path is as seen from this file")
+            reading.fault(at, f"no such file of effects: {file}; paths start at this file's folder")
     if spec is not None and not spec.winch:
         reading.fault(("winch",), "a bench has at least one winch, in a table [winch.NAME]")
     return spec
 
 
 def sim_bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> SimBench | None:
-    """Read a simulated bench: a bench, and what is true, hidden, noisy and faulty."""
+    """Read a simulated bench: a bench, its true values, hidden effects, noise and faults."""
     tree = dict(tree)
     noise = reading.table(NoiseSpec, tree.pop("noise", {}), ("noise",))
     faults = tuple(_numbered(reading, FaultSpec, tree.pop("fault", []), ("fault",)))
@@ -66,7 +66,7 @@ def sim_bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader)
     if wired is None or noise is None or None in truths.values():
         return None
     known = {name: truth for name, truth in truths.items() if truth is not None}
-    # A simulation dies with its process, and its trips with it.
+    # A simulation ends with its process, and its trips too.
     wired = replace(wired, latch_file="")
     return SimBench(wired.name, wired, known, noise, faults, wired.description)
 
@@ -98,7 +98,7 @@ def _check_override(reading: Reading, at: Key, key: str, value: object) -> None:
     marker = marker_at(WinchProfile, words)
     place: Key = (*at, key) if (*at, key) in reading.source.lines else (*at, *key.split("."))
     if marker is None:
-        message = "is no number of a winch profile; write such as drum.winding_radius"
+        message = "is not a number of a winch profile; write such as drum.winding_radius"
         reading.fault(place, message)
         return
     try:
@@ -110,7 +110,7 @@ def _check_override(reading: Reading, at: Key, key: str, value: object) -> None:
 def _numbered(
     reading: Reading, kind: type[HiddenSpec] | type[FaultSpec], raw: object, at: Key
 ) -> Iterator[Any]:
-    """Read ``[[hidden]]`` or ``[[fault]]`` tables; the keys that they do not know are numbers."""
+    """Read ``[[hidden]]`` or ``[[fault]]`` tables; their further keys are numbers."""
     if not isinstance(raw, list) or not all(isinstance(item, dict) for item in raw):
         reading.fault(at, f"expected tables, each opened by [[{'.'.join(map(str, at))}]]")
         return
@@ -191,5 +191,5 @@ def _check_device(
 
 
 def _is_addressed(device: DeviceSpec) -> bool:
-    """Whether a device must be given its address; one alone on a serial line need not."""
+    """Whether a device needs an address; a single one on a serial line does not."""
     return device.stream is None or "{address" in device.stream.poll

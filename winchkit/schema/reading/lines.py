@@ -1,6 +1,6 @@
-"""Finds the line of every key of a TOML text, which tomllib does not tell.
+"""Line number of every key of a TOML text, which tomllib does not report.
 
-The text has been parsed by tomllib before, so the scanner trusts its syntax.
+The text has been parsed by tomllib before, so that its syntax is valid.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Opens a declaration: TOML text to a tree of plain values with the line of every key."""
+"""Opening of a declaration: TOML text to a tree of plain values with the line of every key."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LARGEST = 4_000_000
 
 @dataclass(frozen=True)
 class Source:
-    """A TOML file as read: its values, and where each of them stands."""
+    """A TOML file as read: its values, and the line of each."""
 
     path: str
     kind: str
@@ -46,13 +46,13 @@ class Source:
 
 
 def spelled(key: Key) -> str:
-    """A place as the user counts: ``("pulley", 0, "radius")`` is ``pulley[1].radius``."""
+    """A key with positions counted from 1: ``("pulley", 0, "radius")`` is ``pulley[1].radius``."""
     words = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in key)
     return words.removeprefix(".")
 
 
 def open_source(path: str | Path) -> Source:
-    """Read a declaration of any kind; raises FileError when it is none."""
+    """Read a declaration of any kind; raises FileError for any other file."""
     text = _text(Path(path))
     if not text.strip():
         raise FileError(Fault("the file is empty; a declaration starts with schema = 1", str(path)))
@@ -76,9 +76,9 @@ def _text(path: Path) -> str:
     except OSError as error:
         raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
     except ValueError as error:
-        raise FileError(Fault(f"is no usable file name: {error}", repr(str(path)))) from None
+        raise FileError(Fault(f"is not a usable file name: {error}", repr(str(path)))) from None
     if len(data) > _LARGEST:
-        limit = f"larger than {_LARGEST / 1e6:g} MB, so it is no declaration"
+        limit = f"larger than {_LARGEST / 1e6:g} MB, so it is not a declaration"
         raise FileError(Fault(limit, str(path)))
     if b"\0" in data:
         raise FileError(Fault("is a binary file, not TOML text", str(path)))

@@ -1,4 +1,4 @@
-"""Reads one table of a declaration into its dataclass through pydantic, faults in our words."""
+"""Reader of one table of a declaration into its dataclass by pydantic, with messages of its own."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 def read_table(source: Source, kind: type[T], raw: object, at: Key = ()) -> T | list[Fault]:
-    """Read ``raw``, which stands ``at`` a place of the source, or list every fault of it."""
+    """Read ``raw``, the table at the key ``at`` of the source, or list all its faults."""
     try:
         table: T = _adapter(kind).validate_python(raw)  # type: ignore[arg-type] # classes hash
     except ValidationError as error:
@@ -38,7 +38,7 @@ def read_table(source: Source, kind: type[T], raw: object, at: Key = ()) -> T | 
         for key, message in _faults(kind, details)
     ]
     if unknown:
-        # pydantic checks no rule of a table with an unknown key: read it again without.
+        # pydantic checks no rule of a table with an unknown key: read it again without the key.
         known = raw
         for details in unknown:
             known = _without(known, details["loc"])
@@ -49,7 +49,7 @@ def read_table(source: Source, kind: type[T], raw: object, at: Key = ()) -> T | 
 
 @cache
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
-    """What validates a table: a tenth of a second to make, and the same each time."""
+    """Validator of a table, cached: it takes a tenth of a second to build."""
     return TypeAdapter(kind)
 
 
@@ -117,7 +117,7 @@ def _message(kind: type, error: str, place: Key, details: ErrorDetails) -> str:
 
 
 def _keys(table: Any) -> list[str]:
-    """The keys that a file may give; a field that is no part of the value is none of them."""
+    """Keys that a file may give; fields that are not part of the value are excluded."""
     if not is_dataclass(table):
         return []
     return sorted(field.name for field in fields(table) if field.compare)
@@ -166,7 +166,7 @@ def _is_mapping(kind: object) -> bool:
 
 
 def _wanted(kind: object) -> str:
-    """What a type expects in a file, in words."""
+    """Description of the value that a type expects in a file."""
     marker = _marker(kind)
     if marker is not None:
         return marker.wanted

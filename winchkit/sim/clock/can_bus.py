@@ -1,4 +1,4 @@
-"""A CAN bus in simulated time: arbitration by identifier, and frames that take their bit times."""
+"""A CAN bus in simulated time: arbitration by identifier, and frames of real duration."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from winchkit.sim.live.buses import Wire
 __all__ = ["SimulatedCanBus", "SimulatedCanPort"]
 
 _FRAME_BITS = 47
-"""Of a data frame of 11 bits without its data, interframe space included."""
+"""Bits of a data frame of an 11-bit identifier without its data, interframe space included."""
 _STUFFED_BITS = 34
-"""Of these, the ones among which stuff bits are inserted."""
+"""Bits of these that are subject to bit stuffing."""
 _STUFF_SHARE = 0.1
-"""Of stuff bits in typical data; at most 0.25."""
+"""Share of stuff bits in typical data; at most 0.25."""
 _ALL = range(0x800)
 
 
 class SimulatedCanBus:
     """One bus with its simulated devices at one side and any number of ports at the other.
 
-    ``deliver`` takes frames to the devices. ``wire`` is between the two sides: what it loses or
-    delays is lost or delayed for all of the other side.
+    ``deliver`` passes frames to the devices. ``wire`` is between the two sides: a frame that it
+    loses or delays is lost or delayed for the whole other side.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class SimulatedCanBus:
         self.transmit(identifier, data, None)
 
     def inject(self, identifier: int, data: bytes) -> None:
-        """Send a frame from a stranger at the host's side: host and devices hear it."""
+        """Send a frame of an unknown node at the host's side: host and devices receive it."""
         self.transmit(identifier, data, SimulatedCanPort(self, self._clock))
 
     def transmit(self, identifier: int, data: bytes, sender: SimulatedCanPort | None) -> None:
@@ -64,14 +64,14 @@ class SimulatedCanBus:
             self._begin()
 
     def tick(self) -> None:
-        """Deliver the frames that the wire has delayed until now."""
+        """Deliver the delayed frames that are due."""
         while (late := self.wire.due(from_drive=True)) is not None:
             self._to_ports(*late, None)
         while (late := self.wire.due(from_drive=False)) is not None:
             self._deliver(*late)
 
     def _begin(self) -> None:
-        """Put the frame of the highest priority on the bus."""
+        """Start the frame of the highest priority."""
         identifier, _, data, sender = heappop(self._pending)
         self._busy = True
         bits = _FRAME_BITS + 8 * len(data)
@@ -100,17 +100,17 @@ class SimulatedCanBus:
 
 
 class SimulatedCanPort:
-    """A port of the host; also what the canopen library needs of a python-can bus."""
+    """A port of the host, with the methods of a python-can bus that the canopen library needs."""
 
     def __init__(self, bus: SimulatedCanBus, clock: SimulatedClock) -> None:
         self._bus, self._clock = bus, clock
         self._received: deque[tuple[int, bytes]] = deque()
         self._arrived = clock.event()
         self.refusal: OSError | None = None
-        """What sending and receiving raise, e.g. of an adapter that was pulled out."""
+        """Error that sending and receiving raise, e.g. for a disconnected adapter."""
 
     def take(self, identifier: int, data: bytes) -> None:
-        """A frame has arrived."""
+        """Take a frame that has arrived."""
         self._received.append((identifier, data))
         self._arrived.set()
 
@@ -134,7 +134,7 @@ class SimulatedCanPort:
         self.transmit(message.arbitration_id, bytes(message.data))
 
     def close(self) -> None:
-        """Let the port go."""
+        """Close the port."""
         if self in self._bus.ports:
             self._bus.ports.remove(self)
         self._arrived.set()

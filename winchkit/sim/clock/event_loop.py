@@ -10,12 +10,12 @@ from typing import Any, Protocol
 __all__ = ["SimulatedEventLoop"]
 
 _LATENCY = 2e-4
-"""From one end of a connection to the other, s."""
+"""Delay from one end of a connection to the other, s."""
 _FIRST_PORT = 20_000
 
 
 class _Clock(Protocol):
-    """What an event loop needs of a simulated clock."""
+    """Members of a simulated clock that an event loop needs."""
 
     listeners: dict[tuple[str, int], Any]
     """TCP servers by host and port."""
@@ -39,7 +39,7 @@ class _Clock(Protocol):
 
 
 class _Selector:
-    """Waits on the clock where an ordinary loop waits for its sockets."""
+    """Waits on the clock instead of on sockets."""
 
     def __init__(self, clock: _Clock) -> None:
         self.woken = clock.event()
@@ -71,7 +71,7 @@ class SimulatedEventLoop(base_events.BaseEventLoop):
         server: _Server | None = self._simulated.listeners.get((host, int(port)))
         await asyncio.sleep(_LATENCY)
         if server is None:
-            raise ConnectionRefusedError(f"nobody listens at {host}:{port} of the simulation")
+            raise ConnectionRefusedError(f"there is no server at {host}:{port} of the simulation")
         near = _Transport(self, self._simulated, protocol_factory())
         far = _Transport(server.loop, self._simulated, None)
         near.peer, far.peer = far, near
@@ -82,7 +82,7 @@ class SimulatedEventLoop(base_events.BaseEventLoop):
     async def create_server(  # type: ignore[override]
         self, protocol_factory: Callable[[], Any], host: str, port: int, **_: Any
     ) -> _Server:
-        """Listen on the simulated network; port 0 is one that is free. Raises OSError."""
+        """Listen on the simulated network; port 0 means any free port. Raises OSError."""
         listeners = self._simulated.listeners
         number = int(port) or max((p for _, p in listeners), default=_FIRST_PORT) + 1
         if (host, number) in listeners:
@@ -109,7 +109,7 @@ class SimulatedEventLoop(base_events.BaseEventLoop):
             result, error = None, None
             try:
                 result = function(*arguments)
-            except BaseException as raised:  # noqa: BLE001 - handed to whoever awaits it
+            except BaseException as raised:  # noqa: BLE001 - raised in the awaiting code
                 error = raised
             if not self.is_closed():
                 self.call_soon_threadsafe(finish, result, error)
@@ -125,7 +125,7 @@ class SimulatedEventLoop(base_events.BaseEventLoop):
 
 
 class _Server(asyncio.AbstractServer):
-    """A listening end; also stands for its socket."""
+    """A listening end, which is its own socket object."""
 
     def __init__(
         self,
@@ -143,7 +143,7 @@ class _Server(asyncio.AbstractServer):
         return self._address
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._clock.listeners.pop(self._address, None)
 
     def is_serving(self) -> bool:
@@ -155,14 +155,14 @@ class _Server(asyncio.AbstractServer):
         return self.loop
 
     async def start_serving(self) -> None:
-        """It serves already."""
+        """Do nothing, since it serves already."""
 
     async def serve_forever(self) -> None:
         """Serve until cancelled."""
         await self.loop.create_future()
 
     async def wait_closed(self) -> None:
-        """Return; nothing has to be waited for."""
+        """Return at once."""
 
 
 class _Transport(asyncio.Transport):
@@ -177,15 +177,15 @@ class _Transport(asyncio.Transport):
         self._closed = False
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Nothing is known of a connection that has no socket."""
+        """Return the default: a connection without a socket has no such information."""
         return default
 
     def set_protocol(self, protocol: Any) -> None:
-        """Hand what comes to another protocol."""
+        """Set the protocol that receives data."""
         self.protocol = protocol
 
     def get_protocol(self) -> Any:
-        """Who takes what comes."""
+        """The protocol that receives data."""
         return self.protocol
 
     def is_closing(self) -> bool:
@@ -193,7 +193,7 @@ class _Transport(asyncio.Transport):
         return self._closed
 
     def accept(self, factory: Callable[[], Any]) -> None:
-        """Begin at the server's end, within its loop."""
+        """Start the server's end, in its loop."""
         self.is_server, self.protocol = True, factory()
         self.protocol.connection_made(self)
 
@@ -205,12 +205,12 @@ class _Transport(asyncio.Transport):
             self._later(self.peer, self.peer.take, bytes(data))
 
     def take(self, data: bytes) -> None:
-        """Bytes have arrived."""
+        """Take bytes that have arrived."""
         if not self._closed:
             self.protocol.data_received(data)
 
     def close(self) -> None:
-        """Close this end; the other one sees it."""
+        """Close this end, which is reported to the other one."""
         if self._closed:
             return
         self._closed = True

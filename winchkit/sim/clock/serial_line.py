@@ -13,7 +13,7 @@ __all__ = ["SimulatedSerialLine"]
 
 _TICK = 2e-3
 _TIMEOUT = 0.1
-"""Of a read without bytes, s."""
+"""Time-out of a read, s."""
 
 
 class SimulatedSerialLine:
@@ -32,12 +32,12 @@ class SimulatedSerialLine:
         self._plugged, self._stopped = True, False
 
     def start(self) -> None:
-        """Begin to serve."""
+        """Start serving."""
         self._clock.serve_serial(self.port, self._connect)
         self._tick()
 
     def stop(self) -> None:
-        """Take the port away."""
+        """Remove the port."""
         self._stopped = True
         self._unplug()
 
@@ -71,7 +71,7 @@ class SimulatedSerialLine:
         self._clock.call_at(self._clock.now() + _TICK, self._tick)
 
     def _serve(self, received: bytes) -> None:
-        """Let the instruments hear what came, and send what they have to say by now."""
+        """Pass received bytes to the instruments, and send their output that is due."""
         said = b""
         with self._up_to_date():
             now = self._clock.now()
@@ -84,7 +84,7 @@ class SimulatedSerialLine:
 
 
 class _SerialEnd:
-    """What is used of ``serial.Serial``."""
+    """The used part of the interface of ``serial.Serial``."""
 
     def __init__(self, line: SimulatedSerialLine, clock: SimulatedClock) -> None:
         self._line, self._arrived = line, clock.event()
@@ -93,7 +93,7 @@ class _SerialEnd:
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that have arrived."""
+        """Number of bytes that have arrived."""
         return len(self._bytes)
 
     def read(self, size: int = 1) -> bytes:
@@ -112,17 +112,17 @@ class _SerialEnd:
         return len(data)
 
     def close(self) -> None:
-        """Let the port go."""
+        """Close the port."""
         self._lost = True
         self._arrived.set()
 
     def take(self, data: bytes) -> None:
-        """Bytes have arrived."""
+        """Take bytes that have arrived."""
         self._bytes += data
         self._arrived.set()
 
     def lose(self) -> None:
-        """The adapter is unplugged."""
+        """Disconnect, as if the adapter were unplugged."""
         self.close()
 
     def _check(self) -> None:

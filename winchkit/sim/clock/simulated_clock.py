@@ -1,9 +1,9 @@
-"""A discrete-event clock: time advances to the next event as soon as nothing is left to do now.
+"""A discrete-event clock: time advances to the next event when all threads wait.
 
 Threads that wait on this clock run one at a time, in the order of their events (time, then order
-of scheduling). A thread that begins to wait executes the events that are due itself, and hands
-over to the thread whose event is next. Two runs with the same inputs are therefore identical, and
-a run takes only as long as its computations.
+of scheduling). A thread that starts to wait executes the events that are due, and transfers control
+to the thread whose event is next. Two runs with the same inputs are therefore identical, and a run
+takes only as long as its computations.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ class _Waiter:
 class SimulatedClock:
     """Time, threads, events, event loops and in-process lines of one simulated bench.
 
-    The thread that makes the clock takes part in it: time stands still while that thread
-    computes, and advances while it sleeps or waits on this clock. Threads are started by
-    :meth:`thread`. Any other thread may call :meth:`now` and :meth:`sleep`, but time does not
-    wait for it. Callbacks (:meth:`call_at`) run between the threads.
+    The thread that creates the clock is part of it: time stands still while that thread computes,
+    and advances while it sleeps or waits on this clock. Threads are started by :meth:`thread`. Any
+    other thread may call :meth:`now` and :meth:`sleep`, but time does not wait for it. Callbacks
+    (:meth:`call_at`) run between the threads.
     """
 
     def __init__(self, start: float = 1000.0) -> None:
         self.failure: BaseException | None = None
-        """First exception of a callback; raised in the thread that made the clock."""
+        """First exception of a callback; raised in the thread that created the clock."""
         self._time = start
         self._events: list[tuple[float, int, _Waiter | Callable[[], None]]] = []
         self._order = count()
@@ -57,7 +57,7 @@ class SimulatedClock:
         self.listeners: dict[tuple[str, int], Any] = {}
         """TCP servers of the simulated network by host and port, see ``event_loop``."""
         self.reply_filter: Callable[[bytes], bytes] | None = None
-        """Changes what TCP servers send, e.g. damages it; nothing is sent of what it empties."""
+        """Changes the data that TCP servers send, e.g. corrupts them; empty data are not sent."""
 
     # Time.
 
@@ -77,9 +77,9 @@ class SimulatedClock:
         self._push(max(time, self._time), callback)
 
     def stall(self, duration: float) -> None:
-        """Let the host computer stand still: its threads run no more until ``duration`` s later.
+        """Suspend the threads of the host computer for ``duration`` s.
 
-        Callbacks and threads of devices go on.
+        Callbacks and threads of devices continue.
         """
         self._stalled_until = max(self._stalled_until, self._time + duration)
 
@@ -88,9 +88,9 @@ class SimulatedClock:
     def thread(
         self, target: Callable[[], None], name: str, *, device: bool = False
     ) -> SimulatedThread:
-        """A thread that takes part in simulated time, not started yet.
+        """A thread in simulated time, not yet started.
 
-        ``device`` threads belong to simulated devices: a stall of the host leaves them running.
+        ``device`` threads belong to simulated devices: a stall of the host does not suspend them.
         """
         return SimulatedThread(self, target, name, device=device)
 
@@ -99,7 +99,7 @@ class SimulatedClock:
         return SimulatedEvent(self)
 
     def lock(self) -> SimulatedLock:
-        """A lock that may be held while its holder waits on this clock."""
+        """A lock whose holder may wait on this clock."""
         return SimulatedLock(self)
 
     def event_loop(self) -> asyncio.AbstractEventLoop:
@@ -111,11 +111,11 @@ class SimulatedClock:
     # Lines into the simulation.
 
     def serve_can(self, channel: str, connect: Callable[[], Any]) -> None:
-        """Make a simulated CAN bus known by its channel."""
+        """Register a simulated CAN bus by its channel."""
         self._can[channel] = connect
 
     def serve_serial(self, port: str, connect: Callable[[], Any]) -> None:
-        """Make a simulated serial line known by the name of its port."""
+        """Register a simulated serial line by the name of its port."""
         self._serial[port] = connect
 
     def can_port(self, channel: str) -> Any | None:
@@ -131,11 +131,11 @@ class SimulatedClock:
     # How threads take turns.
 
     def wake(self, waiter: _Waiter) -> None:
-        """Let a waiting thread run, after everything that is due already."""
+        """Resume a waiting thread after all events that are due already."""
         self._push(self._time, waiter)
 
     def wait(self, timeout: float | None, register: Callable[[_Waiter], None]) -> None:
-        """Wait until woken or for ``timeout`` s; ``register`` is given what is to be woken."""
+        """Wait until woken or for ``timeout`` s; ``register`` takes the handle of the wait."""
         waiter = self._waiter()
         register(waiter)
         if timeout is not None:
@@ -143,13 +143,13 @@ class SimulatedClock:
         self._wait(waiter)
 
     def enter(self, *, device: bool) -> None:
-        """Take the calling thread in; for :class:`SimulatedThread`."""
+        """Add the calling thread; for :class:`SimulatedThread`."""
         self._members.add(threading.get_ident())
         if device:
             self._device_threads.add(threading.get_ident())
 
     def leave(self) -> None:
-        """Let the calling thread go and hand over to the next one."""
+        """Remove the calling thread and transfer control to the next one."""
         self._members.discard(threading.get_ident())
         self._device_threads.discard(threading.get_ident())
         following = self._next(None)
@@ -180,7 +180,7 @@ class SimulatedClock:
         try:
             waiter.gate.acquire()
         except BaseException:
-            # An interrupt: go on only when it is this thread's turn, lest two threads run at once.
+            # An interrupt: continue only at this thread's turn, since one thread runs at a time.
             self.wake(waiter)
             waiter.gate.acquire()
             raise
@@ -217,7 +217,7 @@ class SimulatedClock:
 
 
 class SimulatedThread:
-    """A thread that takes its turn on a clock; used like ``threading.Thread``."""
+    """A thread in simulated time; used like ``threading.Thread``."""
 
     def __init__(
         self, clock: SimulatedClock, target: Callable[[], None], name: str, *, device: bool
@@ -229,7 +229,7 @@ class SimulatedThread:
         self._started = False
 
     def start(self) -> None:
-        """Let it begin at its turn."""
+        """Start it at its turn."""
         self._started = True
         self._clock.wake(self._turn)
         self._thread.start()
@@ -266,7 +266,7 @@ class SimulatedEvent:
         return self._set
 
     def set(self) -> None:
-        """Set it and let those who wait run."""
+        """Set it and resume the waiting threads."""
         self._set = True
         waiting, self._waiting = self._waiting, []
         for waiter in waiting:

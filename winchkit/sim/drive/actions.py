@@ -1,4 +1,4 @@
-"""The objects of a simulated drive that do something when they are written."""
+"""Objects of a simulated drive with an action when they are written."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 _POSITIVE = (0x6083, 0x6084, 0x6085, 0x609A, 0x60C5, 0x60C6)
-"""A ramp of zero would never end."""
+"""Objects whose value zero would give a ramp without end."""
 
 
 def guard_options(objects: ObjectDictionary, modes: frozenset[Mode], quirks: QuirkSpec) -> None:
@@ -53,7 +53,7 @@ _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTI
 
 
 class Actions:
-    """Connects an object dictionary with the power stage and the motion behind it."""
+    """Connects an object dictionary with the power stage and the motion."""
 
     def __init__(
         self,

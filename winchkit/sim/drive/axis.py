@@ -1,4 +1,4 @@
-"""The axis of a simulated drive: moves the shaft slice by slice and feeds back what it does."""
+"""The axis of a simulated drive: motion in short time steps, and feedback."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MIN_SLICE = 2e-5
 
 
 class Axis:
-    """Motion and feedback on one time line, which begins at ``now``.
+    """Motion and feedback, starting at the time ``now``.
 
     ``following_failed`` is called while the following error (60F4h) has been beyond its window
     (6065h) for longer than 6066h allows.
@@ -43,7 +43,7 @@ class Axis:
         self._following_since: float | None = None
 
     def advance(self, now: float) -> None:
-        """Move until ``now``; set-points are made in slices of at most a millisecond."""
+        """Move until ``now``; set-points are computed in steps of at most a millisecond."""
         duration = now - self.now
         if duration < _MIN_SLICE:
             return
@@ -61,7 +61,7 @@ class Axis:
         self.now = now
 
     def sample(self, error_code: int) -> None:
-        """Bring the actual values in the object dictionary up to now."""
+        """Update the actual values in the object dictionary."""
         put, motion = self._objects.put, self._motion
         put(0x6041, 0, self._status.word(self._power.state))
         put(0x603F, 0, error_code)
@@ -85,7 +85,7 @@ class Axis:
         put(0x60FD, 0, motion.switches.inputs(self._shaft.motor_angle))
 
     def forget_sample(self) -> None:
-        """Sample anew next time, in units that may have changed."""
+        """Discard the last sample, e.g. after a change of units."""
         self._sampled_at = -inf
 
     def _watch_following(self) -> None:

@@ -1,4 +1,4 @@
-"""The modes of a simulated drive in which the master makes the set-points: CSP, CSV, CST, IP."""
+"""The modes of a simulated drive with set-points of the master: CSP, CSV, CST, IP."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class MovingAverage:
         self._time = self._sum = 0.0
 
     def begin(self, value: float) -> None:
-        """Start anew, as if the signal had always had this value."""
+        """Restart, as if the signal had always had this value."""
         self._parts.clear()
         self._parts.append((self._duration, value))
         self._time, self._sum = self._duration, self._duration * value
@@ -56,7 +56,7 @@ _INTERPOLATE = 1 << 4
 
 
 class _Interpolation:
-    """Goes to each goal within the interpolation period (60C2h)."""
+    """Linear interpolation to each target within the interpolation period (60C2h)."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -64,7 +64,7 @@ class _Interpolation:
         self._elapsed = inf
 
     def aim(self, start: float, goal: float) -> None:
-        """A new goal, to be reached in one period from where the demand is."""
+        """Set a new target, to be reached in one period from the present demand."""
         self._from, self._goal, self._elapsed = start, goal, 0.0
 
     def step(self, dt: float) -> float:
@@ -93,13 +93,13 @@ class CyclicPosition(SetPoints):
         self._clipped = False
 
     def begin(self) -> None:
-        """Go on towards the target."""
+        """Continue towards the target."""
         self._wanted = self.demand.angle
         self._smooth.begin(self.demand.angle)
         self.aim()
 
     def aim(self) -> None:
-        """Go to the target within the software limits."""
+        """Move to the target within the software limits."""
         low, high = self.settings.soft_limits()
         wanted = self.target()
         goal = min(max(wanted, low), high)
@@ -107,12 +107,12 @@ class CyclicPosition(SetPoints):
         self._interpolation.aim(self._wanted, goal)
 
     def target(self) -> float:
-        """Motor angle that the master wants, rad."""
+        """Target motor angle of the master, rad."""
         number = self.settings.number
         return self.settings.angle(number(0x607A) + number(0x60B0, 0, 0))
 
     def step(self, angle: float, speed: float, dt: float) -> DriveCommand:
-        """Follow the interpolated target, no faster than the motor can."""
+        """Follow the interpolated target, at most at the motor's highest speed."""
         self._wanted = self._interpolation.step(dt)
         demand, wanted = self.demand, self._smooth.step(self._wanted, dt)
         before = demand.angle
@@ -128,7 +128,7 @@ class CyclicPosition(SetPoints):
 
 
 class InterpolatedPosition(CyclicPosition):
-    """IP: the data record 60C1h:1, while bit 4 of the control word asks for it."""
+    """IP: the data record 60C1h:1, while bit 4 of the control word is set."""
 
     cyclic = False
 
@@ -148,7 +148,7 @@ class InterpolatedPosition(CyclicPosition):
             self.aim()
 
     def target(self) -> float:
-        """Motor angle that the master wants, rad; where it stands while it does not ask."""
+        """Target motor angle of the master, rad; the present one while bit 4 is not set."""
         if not self._active:
             return self.demand.angle
         return self.settings.angle(self.settings.number(0x60C1, 1))
@@ -163,8 +163,8 @@ class InterpolatedPosition(CyclicPosition):
 class CyclicVelocity(SetPoints):
     """CSV: target velocity 60FFh and its offset 60B1h.
 
-    ``smoothing`` (s) averages the targets, as drives can: it keeps the jitter of a master's
-    cycle out of the rope.
+    ``smoothing`` (s) averages the targets, as drives can, to suppress the jitter of the master's
+    cycle.
     """
 
     cyclic = True
@@ -176,13 +176,13 @@ class CyclicVelocity(SetPoints):
         self._wanted = 0.0
 
     def begin(self) -> None:
-        """Go on from the present speed."""
+        """Continue from the present speed."""
         self._wanted = self.demand.speed
         self._smooth.begin(self.demand.speed)
         self.aim()
 
     def aim(self) -> None:
-        """Go to the target within the interpolation period."""
+        """Move to the target within the interpolation period."""
         number = self.settings.number
         goal = (number(0x60FF) + number(0x60B1, 0, 0)) * self.settings.units.speed
         self._interpolation.aim(self._wanted, goal)
@@ -210,7 +210,7 @@ class CyclicTorque(SetPoints):
     cyclic = True
 
     def step(self, angle: float, speed: float, dt: float) -> DriveCommand:
-        """Make the target torque."""
+        """Command with the target torque."""
         number = self.settings.number
         self.demand.torque = (number(0x6071) + number(0x60B2, 0, 0)) * self.settings.units.torque
         return self.by_torque(angle)

@@ -1,4 +1,4 @@
-"""What a simulated drive asks of its motor, and the base of the modes that make it."""
+"""Demand of a simulated drive on its motor, and the base class of the modes of operation."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ __all__ = ["Demand", "SetPoints", "Windows", "approach"]
 
 
 def approach(value: float, goal: float, step: float) -> float:
-    """Go from ``value`` towards ``goal`` by at most ``step``."""
+    """Move ``value`` towards ``goal`` by at most ``step``."""
     return goal if abs(goal - value) <= step else value + copysign(step, goal - value)
 
 
 @dataclass
 class Demand:
-    """Demanded now, at the shaft."""
+    """Present demand at the motor shaft."""
 
     angle: float = 0.0
-    """rad; the actual one where the mode controls speed or torque only."""
+    """rad; the actual angle where the mode controls only speed or torque."""
     speed: float = 0.0
     """rad/s."""
     torque: float = 0.0
     """N m, where the mode controls torque."""
     limited: bool = False
-    """Status bit 11: a limit holds the demand back."""
+    """Status bit 11: a limit restricts the demand."""
 
 
 @dataclass(frozen=True)
 class Windows:
-    """What the windows and thresholds of CiA 402 say of the motor now."""
+    """Present state of the windows and thresholds of CiA 402."""
 
     position_reached: bool
-    """6067h and 6068h."""
+    """Within the position window (6067h, 6068h)."""
     speed_reached: bool
-    """606Dh and 606Eh."""
+    """Within the velocity window (606Dh, 606Eh)."""
     slow: bool
-    """606Fh and 6070h."""
+    """Below the velocity threshold (606Fh, 6070h)."""
     following_error: bool
-    """Beyond 6065h."""
+    """Beyond the following error window (6065h)."""
 
 
 class SetPoints:
-    """One mode of operation; this one, of no mode at all, comes to rest and stays there.
+    """One mode of operation; the base class is that without a mode, which stops the motor.
 
-    ``position`` and ``torque`` say whether the demanded angle or torque is followed, ``cyclic``
-    whether bit 12 tells that the drive follows and bit 10 has no meaning of the mode's.
+    ``position`` and ``torque``: whether the demanded angle or torque is controlled; ``cyclic``:
+    whether bit 12 means that the drive follows the command and bit 10 has no mode-specific meaning.
     """
 
     position = False
@@ -59,16 +59,16 @@ class SetPoints:
         self.settings, self.demand = settings, demand
 
     def reset(self) -> None:
-        """The mode was chosen, or the motor is without power: forget moves under way."""
+        """Discard moves in progress, after a change of mode or without power."""
 
     def begin(self) -> None:
-        """Let the set-points go on from the present demand."""
+        """Start the set-points at the present demand."""
 
     def aim(self) -> None:
-        """A target was written."""
+        """Take a target that was written."""
 
     def control(self, word: int, rising: int, angle: float, *, enabled: bool) -> None:
-        """A control word was written; ``rising`` are the bits that it newly sets."""
+        """Take a control word; ``rising`` has the bits that change from 0 to 1."""
 
     def step(self, angle: float, speed: float, dt: float) -> DriveCommand:
         """Command for the next ``dt`` s; the motor is at ``angle`` (rad) with ``speed``."""
@@ -80,7 +80,7 @@ class SetPoints:
         """The mode's bits 10, 12 and 13 of the status word."""
         return 0
 
-    # What modes are made of.
+    # Building blocks of modes.
 
     def by_speed(self, angle: float) -> DriveCommand:
         """Command that follows the demanded speed from an angle."""
@@ -96,7 +96,7 @@ class SetPoints:
         )
 
     def by_torque(self, angle: float) -> DriveCommand:
-        """Command that makes the demanded torque."""
+        """Command with the demanded torque."""
         below, above = self.settings.torque_band()
         demand = self.demand
         demand.angle, demand.speed = angle, 0.0
@@ -109,14 +109,14 @@ class SetPoints:
         )
 
     def clamped(self, speed: float, fastest: float) -> float:
-        """Hold a speed to a limit, and tell so."""
+        """Limit a speed, and set the limit bit."""
         if abs(speed) <= fastest:
             return speed
         self.demand.limited = True
         return copysign(fastest, speed)
 
     def within(self, speed: float, angle: float, deceleration: float) -> float:
-        """Slow a speed so that the motor can stop before the software limit (607Dh)."""
+        """Reduce a speed so that the motor can stop before the software limit (607Dh)."""
         low, high = self.settings.soft_limits()
         room = high - angle if speed > 0 else angle - low
         if speed == 0 or room == inf:

@@ -1,4 +1,4 @@
-"""A simulated CiA 402 servo drive: an independent device on a CAN bus that moves a plant."""
+"""A simulated CiA 402 servo drive: an independent device on a CAN bus that drives a plant."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from winchkit.sim.drive.status import StatusBits
 __all__ = ["SimDrive"]
 
 _BOOT_SHARE = 0.8
-"""Of the boot time that a device file declares as the longest."""
+"""Default boot time as a share of the longest one that the device file declares."""
 _HEARTBEAT_LOST = FaultKind(0x8130)
 _PDO_TOO_SHORT = 0x8210
 _NMT_COMMANDS = {
@@ -37,13 +37,34 @@ _COMMUNICATION = range(0x1000, 0x2000)
 
 
 class SimDrive:
-    """One drive, driven by a clock that is handed in.
+    """One drive; its time is that of the calls.
 
-    ``objects`` is its object dictionary, which it takes over. ``send`` takes an identifier and
-    data. Frames come in through :meth:`receive`, time through
-    :meth:`tick`; both take the time in s of one steady clock and are called from one thread.
-    ``smoothing`` is the length of its set-point filter in CSV, CSP and IP, s. Raises FileError
-    where the objects do not suffice for the modes that the device file declares.
+    Frames enter by :meth:`receive`, time by :meth:`tick`; both take the time (s) of one steady
+    clock and are called from one thread.
+
+    Parameters
+    ----------
+    send : callable
+        Sends a frame, given its identifier and data.
+    node : int
+        Node id.
+    servo : ServoSpec
+        The device file's declaration.
+    objects : ObjectDictionary
+        Object dictionary, owned by the drive from then on.
+    shaft : Shaft
+        The driven plant.
+    brake : bool
+        Whether a holding brake is fitted.
+    smoothing : float
+        Length of the set-point filter in CSV, CSP and IP, s.
+    now : float
+        Time at the start, s.
+
+    Raises
+    ------
+    FileError
+        Where the object dictionary lacks objects of the declared modes.
     """
 
     def __init__(
@@ -87,11 +108,11 @@ class SimDrive:
         Actions(objects, shaft, self._power, self._motion, self._axis, quirks=self._quirks)
         self._show_modes()
 
-    # What it is doing.
+    # State.
 
     @property
     def state(self) -> State:
-        """Of CiA 402."""
+        """State of the power state machine of CiA 402."""
         return self._power.state
 
     @property
@@ -101,13 +122,13 @@ class SimDrive:
 
     @property
     def switches(self) -> Switches:
-        """Limit and home switches of the axis, which may be moved."""
+        """Limit and home switches of the axis, whose positions may be changed."""
         return self._motion.switches
 
-    # What happens to it.
+    # Inputs.
 
     def power_on(self, now: float, *, boot_time: float | None = None) -> None:
-        """Begin from power-on; by default it takes a good part of the declared boot time."""
+        """Start from power-on; the default boot time is a share of the declared one."""
         self.advance(now)
         wait = self._servo.boot_time * _BOOT_SHARE if boot_time is None else boot_time
         self._booted_at = now + wait
@@ -144,7 +165,7 @@ class SimDrive:
                 self._pdos.receive(identifier, data)
 
     def tick(self, now: float) -> None:
-        """Let time pass until ``now``."""
+        """Advance time to ``now``."""
         self.advance(now)
         if self.nmt is NmtState.BOOTING:
             if now >= self._booted_at:
@@ -156,7 +177,7 @@ class SimDrive:
             self._pdos.poll(now)
 
     def inject(self, kind: str) -> None:
-        """Make something go wrong now; raises UsageError for an unknown kind."""
+        """Inject a fault; raises UsageError for an unknown kind."""
         known(kind)
         if kind in FAULTS:
             self._fault(FAULTS[kind])
@@ -282,7 +303,7 @@ class SimDrive:
             self._emergency(0)
 
     def advance(self, now: float) -> None:
-        """Move until ``now``, without looking at the network's timers."""
+        """Move until ``now``, without evaluating the network's timers."""
         self._axis.advance(now)
 
     def _sample(self) -> None:

@@ -1,4 +1,4 @@
-"""What can be made to go wrong with a simulated drive, by name."""
+"""Faults that can be injected into a simulated drive, by name."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["CONDITIONS", "FAULTS", "FaultKind", "known"]
 
 @dataclass(frozen=True)
 class FaultKind:
-    """A fault that the drive detects: its error code, and whether it can still make a ramp."""
+    """A fault that the drive detects: its error code, and whether a ramp is still possible."""
 
     code: int
     cuts: bool = False
-    """The power goes at once, whatever 605Eh says."""
+    """The power is removed at once, independent of 605Eh."""
 
 
 FAULTS: dict[str, FaultKind] = {
@@ -32,22 +32,22 @@ FAULTS: dict[str, FaultKind] = {
 
 CONDITIONS = {
     "reboot": "restarts as after power-on",
-    "map lost": "forgets its PDO mapping without a restart",
-    "host lost": "no longer hears the host's heartbeat, until the next one",
+    "map lost": "loses its PDO mapping without a restart",
+    "host lost": "detects a loss of the host's heartbeat, until the next one",
     "heartbeat stop": "sends no heartbeat",
     "tpdo stop": "sends no PDO",
     "slow sdo": "answers every SDO late",
     "sdo abort": "answers every SDO with an abort",
     "emergency storm": "sends an emergency message with every tick",
     "enable input open": "has no torque and cannot be enabled, as with STO",
-    "silence": "neither hears nor sends anything, as with a cut cable",
-    "recover": "ends the lasting ones",
+    "silence": "neither receives nor sends frames, as with a cut cable",
+    "recover": "ends the lasting faults",
 }
-"""Fault kinds that need no code."""
+"""Fault kinds without an error code."""
 
 
 def known(kind: str) -> str:
-    """Check the name of a fault kind; raises UsageError naming those there are."""
+    """Check the name of a fault kind; raises UsageError with the known names."""
     names = [*FAULTS, *CONDITIONS]
     if kind not in names:
         raise UsageError(

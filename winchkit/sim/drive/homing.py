@@ -22,10 +22,10 @@ _TURN = 2 * pi
 
 @dataclass
 class Switches:
-    """Where the switches of an axis and the index pulse of its encoder are, rad of the motor.
+    """Positions of the switches of an axis and of its encoder's index pulse, rad of the motor.
 
-    A limit switch is on at and beyond its angle, the home switch between two; one at infinity
-    is not fitted.
+    A limit switch is on at and beyond its angle, the home switch between two angles; a switch at
+    infinity is not fitted.
     """
 
     negative: float = -inf
@@ -43,7 +43,7 @@ class Switches:
         return self.home[0] <= angle <= self.home[1]
 
     def fitted(self, name: str) -> bool:
-        """Whether there is such a switch."""
+        """Whether the switch is fitted."""
         places = {"negative": (self.negative,), "positive": (self.positive,), "home": self.home}
         return not all(isinf(place) for place in places[name])
 
@@ -55,7 +55,7 @@ class Switches:
 
 @dataclass(frozen=True)
 class _Leg:
-    """Go in a direction until a switch is on or off, or until the index pulse."""
+    """Motion in a direction until a switch is on or off, or until the index pulse."""
 
     direction: int
     speed: int
@@ -65,7 +65,7 @@ class _Leg:
 
 
 def _towards(switch: str, first: int, *, leave: bool) -> tuple[_Leg, _Leg]:
-    """Find a switch fast in a direction, and its edge slowly from the other side."""
+    """Fast search for a switch in a direction, and slow search for its edge from the other side."""
     there, back = ("on", "off") if leave else ("off", "on")
     return _Leg(first, _SWITCH, there, switch), _Leg(-first, _ZERO, back, switch)
 
@@ -90,7 +90,7 @@ _LEGS: dict[int, tuple[_Leg, ...]] = {
     37: (),
 }
 HOMING_METHODS = frozenset(_LEGS)
-"""Values of 6098h that are simulated: 1 to 6 are 17 to 22 with the index pulse after the edge."""
+"""Simulated values of 6098h: 1 to 6 are 17 to 22 with the index pulse after the edge."""
 
 
 class _Phase(Enum):
@@ -102,7 +102,7 @@ class _Phase(Enum):
 
 
 class Homing(SetPoints):
-    """HM: bit 4 of the control word starts a search, and taking it away ends it."""
+    """HM: a set bit 4 of the control word starts a search, a cleared one ends it."""
 
     def __init__(
         self, settings: Settings, demand: Demand, switches: Callable[[], Switches]
@@ -114,12 +114,12 @@ class Homing(SetPoints):
         self._until = 0.0
 
     def reset(self) -> None:
-        """Give up a search; what was attained stays attained."""
+        """Abort a search; an attained home position stays valid."""
         if self._phase is not _Phase.DONE:
             self._phase = _Phase.IDLE
 
     def control(self, word: int, rising: int, angle: float, *, enabled: bool) -> None:
-        """Start with a rising bit 4; go on while it is set."""
+        """Start with a rising bit 4; continue while it is set."""
         if rising & _START and enabled:
             self._start(angle)
         elif not word & _START and self._phase is _Phase.RUNNING:
@@ -136,7 +136,7 @@ class Homing(SetPoints):
             self._next_leg(angle)
 
     def _next_leg(self, angle: float) -> None:
-        """Begin the first of the legs that are left; without any the place is home."""
+        """Start the next leg; after the last one the position is home."""
         if not self._legs:
             self.settings.take_home(angle)
             self._phase = _Phase.STOPPING
@@ -147,7 +147,7 @@ class Homing(SetPoints):
             self._until = place + whole * _TURN
 
     def step(self, angle: float, speed: float, dt: float) -> DriveCommand:
-        """Search on, or come to rest."""
+        """Continue the search, or stop."""
         demand, rate = self.demand, self.settings.ramp(0x609A)
         if self._phase is _Phase.RUNNING:
             self._search(angle)

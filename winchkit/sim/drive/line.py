@@ -1,4 +1,4 @@
-"""What a simulated drive puts on its bus, and what disturbs that."""
+"""Output of a simulated drive to its bus, and its disturbances."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Line:
         self.storm = False
 
     def recover(self) -> None:
-        """End everything that lasts."""
+        """End all lasting disturbances."""
         self.cut = self.slow_sdo = self.storm = False
 
     def send(self, identifier: int, data: bytes) -> None:
@@ -48,7 +48,7 @@ class Line:
             self.send(identifier, data)
 
     def tick(self, now: float) -> None:
-        """Send what is due."""
+        """Send frames that are due."""
         while self._late and self._late[0][0] <= now:
             _, identifier, data = self._late.popleft()
             self.send(identifier, data)

@@ -1,4 +1,4 @@
-"""The modes of operation of CiA 402 that are simulated."""
+"""The simulated modes of operation of CiA 402."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def modes_of(names: Iterable[str]) -> frozenset[Mode]:
 
 
 def supported(modes: Iterable[Mode]) -> int:
-    """What 6502h says of the modes that a drive has."""
+    """Value of 6502h for the modes of a drive."""
     return sum(1 << (mode - 1) for mode in modes if mode)
 
 
 def check_objects(objects: ObjectDictionary, modes: Iterable[Mode], node: int) -> None:
-    """Raise FileError where an EDS lacks an object that a drive with these modes has."""
+    """Raise FileError where an EDS lacks an object that these modes need."""
     wanted = dict.fromkeys(_ALWAYS, "every drive")
     wanted |= {key: f"the mode {mode.name}" for mode in modes for key in _NEEDED[mode]}
     lacking = [(key, what) for key, what in wanted.items() if key not in objects]

@@ -1,4 +1,4 @@
-"""Motion of a simulated drive: its mode's set-points, or a stop, slice by slice."""
+"""Motion of a simulated drive: set-points of its mode, or a stop, in short time steps."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from winchkit.sim.plant.servo import DriveCommand
 __all__ = ["Motion"]
 
 _STANDSTILL = 0.05
-"""rad/s below which a ramp has ended."""
+"""Speed below which a ramp has ended, rad/s."""
 _PATIENCE = 0.5
-"""s for which a stop waits for the motor to stand after its ramp."""
+"""Longest wait for standstill after the ramp of a stop, s."""
 
 
 class Motion:
-    """Makes :class:`DriveCommand` of an order, the mode and the targets.
+    """Computes a :class:`DriveCommand` from an order, the mode and the targets.
 
-    ``angle`` and ``speed`` of the methods are the motor's own, in rad and rad/s.
+    ``angle`` and ``speed`` of the methods are those of the motor, rad and rad/s.
     """
 
     def __init__(
@@ -56,16 +56,16 @@ class Motion:
 
     @property
     def set_points(self) -> SetPoints:
-        """Those of the present mode."""
+        """Set-points of the present mode."""
         return self._set_points[self.mode]
 
     @property
     def controls_position(self) -> bool:
-        """Whether the demanded angle is followed now."""
+        """Whether the demanded angle is controlled at present."""
         return self._following and not self.stopping and self.set_points.position
 
     def set_mode(self, mode: Mode, angle: float) -> None:
-        """Change the mode; set-points begin where the motor is."""
+        """Change the mode; set-points start at the motor's angle."""
         self.mode = mode
         self.set_points.reset()
         self._begin(angle)
@@ -76,11 +76,11 @@ class Motion:
         self.set_points.control(word, rising, angle, enabled=enabled)
 
     def aim(self) -> None:
-        """A target of a cyclic mode was written."""
+        """Take a target of a cyclic mode that was written."""
         self.set_points.aim()
 
     def step(self, order: Order, angle: float, speed: float, dt: float) -> DriveCommand:
-        """Command for the next ``dt`` s, given where the motor is."""
+        """Command for the next ``dt`` s, given the motor's angle and speed."""
         if order in (Order.OFF, Order.CUT):
             self._brake.off(dt, still=abs(speed) < _STANDSTILL, cut=order is Order.CUT)
             return self._rest(angle, speed)
@@ -100,20 +100,20 @@ class Motion:
         return self.set_points.step(angle, speed, dt)
 
     def at_rest(self, speed: float) -> bool:
-        """Whether it stands still at the end of a stop."""
+        """Whether the motor is at standstill at the end of a stop."""
         return self.stopping and self.demand.speed == 0 and abs(speed) < _STANDSTILL
 
     def stop_is_over(self, speed: float) -> bool:
-        """Whether a stop has ended, or has had time enough: a motor may be dragged along."""
+        """Whether a stop has ended, or its time-out has passed: a load may turn the motor."""
         return self.at_rest(speed) or (self.stopping and self._stood > _PATIENCE)
 
     def _begin(self, angle: float) -> None:
-        """Let the set-points go on from the present speed, at an angle."""
+        """Start the set-points at the present speed and an angle."""
         self.demand.angle = angle
         self.set_points.begin()
 
     def _rest(self, angle: float, speed: float) -> DriveCommand:
-        """Follow nothing: the brake holds, or the motor until it does, or nobody."""
+        """Command without set-points: the brake holds, or the motor until it does, or neither."""
         self._following = self.stopping = False
         self.set_points.reset()
         self.demand.angle, self.demand.speed = angle, speed

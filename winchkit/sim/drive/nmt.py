@@ -1,4 +1,4 @@
-"""The network side of a simulated drive: NMT slave, heartbeats both ways, emergencies."""
+"""Network functions of a simulated drive: NMT slave, heartbeat producer and consumer, EMCY."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MS = 1e-3
 
 
 class NmtState(IntEnum):
-    """As in a heartbeat."""
+    """NMT state as in a heartbeat."""
 
     BOOTING = 0
     STOPPED = 4
@@ -27,10 +27,10 @@ class NmtState(IntEnum):
 
 
 class Heartbeats:
-    """Produces the drive's heartbeat (1017h) and watches those of others (1016h).
+    """Produces the drive's heartbeat (1017h) and monitors those of other nodes (1016h).
 
-    A watch is armed by the first heartbeat of its node, as CiA 301 asks, and disarmed when it
-    fails; ``lost`` is then called.
+    Monitoring of a node starts with its first heartbeat, as CiA 301 requires. It ends when a
+    heartbeat is missing; ``lost`` is then called.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Heartbeats:
     ) -> None:
         self._objects = objects
         self.needs_both = False
-        """Whether nothing is watched while nothing is produced."""
+        """Whether monitoring needs heartbeat production."""
         self._send, self._lost, self._back = send, lost, back
         self._due = inf
         self._deadlines: dict[int, float] = {}
@@ -54,14 +54,14 @@ class Heartbeats:
         objects.watchers[_PRODUCER] = self._produce_again
 
     def start(self, now: float) -> None:
-        """Begin after boot-up; nothing is armed."""
+        """Start after boot-up; no node is monitored yet."""
         self._deadlines.clear()
         self._failed.clear()
         self._due = now + self._period if self._period else inf
 
     @property
     def armed(self) -> bool:
-        """Whether somebody's heartbeat is being watched."""
+        """Whether the heartbeat of a node is monitored."""
         return bool(self._deadlines)
 
     def heard(self, node: int, now: float) -> None:
@@ -75,7 +75,7 @@ class Heartbeats:
             self._back()
 
     def tick(self, now: float) -> None:
-        """Send what is due and notice what is missing."""
+        """Send a heartbeat that is due and detect missing ones."""
         if self._changed:
             self._changed = False
             self._due = now if self._period else inf
@@ -87,7 +87,7 @@ class Heartbeats:
             self._fail(node)
 
     def lose(self) -> None:
-        """Hear nobody any more, as if every time had run out."""
+        """Lose all monitored nodes, as after their time-outs."""
         for node in list(self._limits()):
             self._fail(node)
 
@@ -130,7 +130,7 @@ class Heartbeats:
 
 
 def error_register(code: int) -> int:
-    """Error register (1001h) that goes with an emergency error code; 0 for none."""
+    """Error register (1001h) of an emergency error code; 0 for none."""
     if code == 0:
         return 0
     groups = {0x2: 0x02, 0x3: 0x04, 0x4: 0x08, 0x81: 0x10, 0x82: 0x10}
@@ -138,7 +138,7 @@ def error_register(code: int) -> int:
 
 
 def emergency_frame(objects: ObjectDictionary, code: int) -> bytes:
-    """Note an error (0: none any more) in 1001h and 1003h, and give the EMCY frame's data."""
+    """Enter an error (0: none) into 1001h and 1003h, and return the data of the EMCY frame."""
     register = error_register(code)
     objects.put(0x1001, 0, register)
     if code:

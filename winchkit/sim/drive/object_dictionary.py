@@ -19,16 +19,16 @@ __all__ = ["Abort", "Entry", "Guard", "Key", "ObjectDictionary", "Value", "read_
 Key = tuple[int, int]
 """Index and sub-index."""
 Value = int | bytes
-"""Numbers are ints, everything else bytes."""
+"""An int for numbers, bytes for all other types."""
 Guard = Callable[[int, int], "Abort | None"]
 Watcher = Callable[[int, int], None]
 
 _FORMATS = {0x02: "b", 0x03: "h", 0x04: "i", 0x05: "B", 0x06: "H", 0x07: "I", 0x15: "q", 0x1B: "Q"}
 _BOOLEAN = 0x01
 _LIMITS = {0x6065, 0x6072, 0x6073, 0x607F, 0x6080, 0x60E0, 0x60E1}
-"""Limits that do not limit where the EDS states no default."""
+"""Defaults without effect for limits whose default the EDS does not declare."""
 _FIRST_OBJECT = 0x1000
-"""Below stand data types."""
+"""Lowest index of objects; lower ones are data types."""
 _SAVE = 0x65766173
 _LOAD = 0x64616F6C
 
@@ -54,7 +54,7 @@ class Abort(IntEnum):
 
 @dataclass(frozen=True)
 class Entry:
-    """One object as the EDS declares it."""
+    """One object as declared in the EDS."""
 
     name: str
     format: str
@@ -68,7 +68,7 @@ class Entry:
 
     @property
     def size(self) -> int:
-        """In bytes; 0 where it varies."""
+        """Size in bytes; 0 where it varies."""
         return struct.calcsize(self.format) if self.format else 0
 
     @property
@@ -82,11 +82,11 @@ class Entry:
         return self.access not in ("ro", "const")
 
     def pack(self, value: Value) -> bytes:
-        """Bytes on the wire, little end first."""
+        """Bytes on the bus, little-endian."""
         return value if isinstance(value, bytes) else struct.pack("<" + self.format, value)
 
     def unpack(self, data: bytes) -> Value | Abort:
-        """Value of bytes on the wire, or why they are none."""
+        """Value of bytes on the bus, or the abort code for invalid ones."""
         if not self.format:
             return data
         if len(data) != self.size:
@@ -97,8 +97,8 @@ class Entry:
 class ObjectDictionary:
     """Entries with their present values.
 
-    ``guards`` may refuse a new number before it is stored, ``watchers`` hear of it afterwards;
-    both are kept by index. Storing (1010h) and restoring (1011h) take effect at ``reset``.
+    ``guards`` may refuse a new number before it is stored, ``watchers`` are called afterwards; both
+    are kept by index. Storing (1010h) and restoring (1011h) take effect at ``reset``.
     """
 
     def __init__(self, entries: Mapping[Key, Entry]) -> None:
@@ -117,14 +117,14 @@ class ObjectDictionary:
         return iter(self._entries)
 
     def entry(self, key: Key) -> Entry | Abort:
-        """Look up a declaration, or the abort code that says what does not exist."""
+        """Look up a declaration, or the abort code for a missing index or sub-index."""
         found = self._entries.get(key)
         if found is not None:
             return found
         return Abort.NO_SUB_INDEX if key[0] in self._indices else Abort.NO_OBJECT
 
     def reset(self, indices: range = range(0x10000)) -> None:
-        """Take the stored values, else the defaults, as after power-on, of a range of indices."""
+        """Load the stored values, else the defaults, of a range of indices, as after power-on."""
         for key, entry in self._entries.items():
             if key[0] in indices:
                 self._values[key] = self._stored.get(key, entry.default)
@@ -140,26 +140,26 @@ class ObjectDictionary:
         return value if isinstance(value, int) else int.from_bytes(value, "little")
 
     def put(self, index: int, sub: int, value: int) -> None:
-        """Set a value from the device's inside: no access rights, guards or watchers."""
+        """Set a value by the device itself, without access rights, guards and watchers."""
         if (index, sub) in self._entries:
             self._values[index, sub] = value
 
     def read(self, key: Key) -> bytes | Abort:
-        """Read as a client does."""
+        """Read by a client."""
         entry = self.entry(key)
         if isinstance(entry, Abort):
             return entry
         return entry.pack(self._values[key]) if entry.readable else Abort.WRITE_ONLY
 
     def refusal(self, key: Key) -> Abort | None:
-        """Why a client could not write here whatever the value; None where it could."""
+        """Abort code for a write of any value by a client; None where writing is permitted."""
         entry = self.entry(key)
         if isinstance(entry, Abort):
             return entry
         return None if entry.writable else Abort.READ_ONLY
 
     def write(self, key: Key, data: bytes) -> Abort | None:
-        """Write as a client does; None when it was taken."""
+        """Write by a client; None when the value was accepted."""
         entry = self.entry(key)
         if isinstance(entry, Abort):
             return entry
@@ -202,7 +202,7 @@ class ObjectDictionary:
 
 
 def read_eds(path: Path, node: int) -> dict[Key, Entry]:
-    """Objects that an EDS or DCF file declares for a node id; FileError where it is none."""
+    """Objects that an EDS or DCF file declares for a node id; FileError for any other file."""
     from canopen.objectdictionary import eds
 
     library: Any = eds
@@ -243,6 +243,6 @@ def _most(letter: str) -> int:
 
 
 def _fitting(value: int, letter: str) -> int:
-    """A signed number from one whose bits were written as unsigned, as EDS files do."""
+    """The signed number whose bits are written as an unsigned number, as in EDS files."""
     bits = 8 * struct.calcsize(letter)
     return value - (1 << bits) if letter.islower() and value >= 1 << (bits - 1) else value

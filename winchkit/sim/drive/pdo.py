@@ -1,4 +1,4 @@
-"""The PDOs of a simulated drive: mapping by the standard's rules, SYNC, events, timers."""
+"""The PDOs of a simulated drive: mapping by the rules of CiA 301, SYNC, events, timers."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _TICK_EVENT = 1e-3
 
 @dataclass
 class _Pdo:
-    """One PDO that is valid, with its mapping resolved."""
+    """One valid PDO with its resolved mapping."""
 
     number: int
-    """From 0."""
+    """Number, from 0."""
     identifier: int
     kind: int
     """Transmission type."""
@@ -37,7 +37,7 @@ class _Pdo:
     inhibit: float = 0.0
     event: float = 0.0
     waiting: bytes | None = None
-    """An RPDO that SYNC has yet to put into effect."""
+    """Data of an RPDO that take effect at the next SYNC."""
     syncs: int = 0
     sent: bytes | None = None
     sent_at: float = -inf
@@ -54,8 +54,8 @@ class _Pdo:
 class Pdos:
     """Serves the records 1400h–1BFFh of an object dictionary.
 
-    ``send`` takes an identifier and data, ``short`` hears of an RPDO with too few bytes, and
-    ``sample`` is called before objects are packed, so that they are of now.
+    ``send`` takes an identifier and data, ``short`` is called for an RPDO with too few bytes, and
+    ``sample`` before objects are packed, to update their values.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Pdos:
         self._receive: dict[int, _Pdo] = {}
         self._transmit: list[_Pdo] = []
         self.mute = False
-        """Whether nothing is sent."""
+        """Whether sending is disabled."""
         for index in {key[0] for key in objects}:
             for base, mapping in ((0x1400, False), (0x1600, True), (0x1800, False), (0x1A00, True)):
                 if index - base in _PDOS:
@@ -86,7 +86,7 @@ class Pdos:
         self._objects.watchers[index] = lambda _sub, _value: self.rebuild()
 
     def rebuild(self) -> None:
-        """Resolve what the object dictionary says now; forgets what waited."""
+        """Resolve the mappings in the object dictionary; discards waiting RPDOs."""
         self._receive = {pdo.identifier: pdo for pdo in self._valid(0x1400)}
         self._transmit = self._valid(0x1800)
 
@@ -103,14 +103,14 @@ class Pdos:
             self._apply(pdo, data)
 
     def latch(self) -> None:
-        """SYNC: put the RPDOs that waited for it into effect."""
+        """SYNC: apply the waiting RPDOs."""
         for pdo in self._receive.values():
             if pdo.waiting is not None:
                 data, pdo.waiting = pdo.waiting, None
                 self._apply(pdo, data)
 
     def on_sync(self, now: float) -> None:
-        """SYNC: send the TPDOs that it is the turn of."""
+        """SYNC: send the TPDOs that are due."""
         sampled = False
         for pdo in self._transmit:
             if not pdo.synchronous:
@@ -126,7 +126,7 @@ class Pdos:
                 self._emit(pdo, data, now)
 
     def poll(self, now: float) -> None:
-        """Send the event-driven TPDOs whose data changed or whose timer ran out."""
+        """Send the event-driven TPDOs whose data changed or whose timer expired."""
         sampled = False
         for pdo in self._transmit:
             if pdo.synchronous or pdo.kind in _RTR_TYPES or now - pdo.sent_at < pdo.inhibit:

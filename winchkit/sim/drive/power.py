@@ -1,4 +1,4 @@
-"""The power stage of a simulated drive: its CiA 402 state, and how motion ends when it must."""
+"""The power stage of a simulated drive: state machine of CiA 402, and stops."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class State(IntEnum):
 
 
 class Command(IntEnum):
-    """What bits 0 to 3 of a control word ask for."""
+    """Commands in bits 0 to 3 and 7 of a control word."""
 
     DISABLE_VOLTAGE = 0
     QUICK_STOP = 1
@@ -48,7 +48,7 @@ class Command(IntEnum):
 
 
 class Transition(NamedTuple):
-    """A row of the standard's table."""
+    """A row of the table of transitions in CiA 402."""
 
     number: int
     target: State
@@ -75,7 +75,7 @@ TRANSITIONS: dict[tuple[State, Command], Transition] = {
 
 
 def command_of(word: int) -> Command:
-    """Decode a control word; bits that a command ignores do not count."""
+    """Decode a control word without the bits that a command ignores."""
     if not word & 0b0010:
         return Command.DISABLE_VOLTAGE
     if not word & 0b0100:
@@ -87,14 +87,14 @@ def command_of(word: int) -> Command:
 
 _ABORT_FAULT, _ABORT_DISABLE, _ABORT_QUICK_STOP = 1, 2, 3
 _STAYS = 5
-"""From this quick-stop option code on, the drive stays in Quick Stop Active."""
+"""Lowest quick-stop option code with which the drive stays in Quick Stop Active."""
 
 
 class Order(Enum):
-    """What the motion is told."""
+    """Order to the motion."""
 
     OFF = "no torque"
-    CUT = "no torque at once, whatever hangs on it"
+    CUT = "no torque at once, independent of the load"
     FOLLOW = "follow the set-points"
     SLOW_DOWN = "stop on 6084h"
     QUICK_STOP = "stop on 6085h"
@@ -102,16 +102,16 @@ class Order(Enum):
 
 
 RAMPS = {1: Order.SLOW_DOWN, 2: Order.QUICK_STOP, 3: Order.HARD_STOP, 4: Order.HARD_STOP}
-"""Ramps of the option codes 605Ah (which adds 4 for staying), 605Dh and 605Eh."""
+"""Ramps of the option codes 605Ah (plus 4 for staying in quick stop), 605Dh and 605Eh."""
 _DEFAULTS = {0x605A: 2, 0x605B: 0, 0x605C: 1, 0x605E: 2, 0x6007: 1}
-"""What the standard asks of a drive that lacks an option code."""
+"""Defaults of CiA 402 for missing option codes."""
 
 
 class PowerStage:
-    """Takes control words as they are written, and keeps the state.
+    """State machine of the power stage, driven by control words.
 
-    A ramp is under way while ``order`` is one of the stops; :meth:`standstill` ends it. Commands
-    count when they are written: an old control word never moves a drive that stopped by itself.
+    A ramp is in progress while ``order`` is one of the stops; :meth:`standstill` ends it. A command
+    takes effect when it is written: an earlier control word does not move a drive that has stopped.
     """
 
     def __init__(self, objects: ObjectDictionary, changed: Callable[[State], None]) -> None:
@@ -123,7 +123,7 @@ class PowerStage:
         self._after: State | None = None
         self._last_word = 0
         self.cause_persists = False
-        """A fault whose cause is still there cannot be reset."""
+        """Whether the cause of a fault persists, so that it cannot be reset."""
 
     def reset(self) -> None:
         """Power on: not ready to switch on."""
@@ -149,22 +149,22 @@ class PowerStage:
             pass
 
     def quick_stop(self) -> None:
-        """Stop as if a control word had asked for it."""
+        """Quick stop, as by a control word."""
         while self._obey(Command.QUICK_STOP):
             pass
 
     def shut_down(self) -> None:
-        """Go down to ready to switch on as if a control word had asked for it."""
+        """Shut down to Ready To Switch On, as by a control word."""
         while self._obey(Command.SHUTDOWN):
             pass
 
     def disable_voltage(self) -> None:
-        """Remove the power as if a control word had asked for it."""
+        """Disable the voltage, as by a control word."""
         while self._obey(Command.DISABLE_VOLTAGE):
             pass
 
     def abort_connection(self) -> None:
-        """React to a lost connection as 6007h says, short of the fault, which the drive raises."""
+        """React to a lost connection by 6007h, except for the fault, which the drive raises."""
         option = self._option(0x6007)
         if option == _ABORT_DISABLE:
             self.disable_voltage()
@@ -173,7 +173,7 @@ class PowerStage:
 
     @property
     def faults_on_abort(self) -> bool:
-        """Whether 6007h makes a fault of a lost connection."""
+        """Whether a lost connection is a fault by 6007h."""
         return self._option(0x6007) == _ABORT_FAULT
 
     def fault(self, *, cut: bool = False) -> None:
@@ -188,7 +188,7 @@ class PowerStage:
             self._ramp(ramp, State.FAULT_REACTION, State.FAULT)
 
     def standstill(self) -> None:
-        """A ramp has ended."""
+        """End a ramp."""
         after, self._after = self._after, None
         if after is not None:
             self._enter(after)

@@ -1,4 +1,4 @@
-"""The modes of a simulated drive in which the drive makes the ramps: PP, PV, PT."""
+"""The modes of a simulated drive with ramps of the drive: PP, PV, PT."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Move:
-    """A set-point as it was when it was taken, SI."""
+    """A set-point with the values at its acceptance, SI."""
 
     target: float
     """rad."""
@@ -35,20 +35,20 @@ class Moves:
     def __init__(self) -> None:
         self.current: Move | None = None
         self.next: Move | None = None
-        """The set-point in reserve."""
+        """The next set-point."""
 
     def reset(self) -> None:
-        """Forget the moves."""
+        """Discard the moves."""
         self.current = self.next = None
 
     @property
     def last(self) -> float | None:
-        """The target taken last, while it is not reached."""
+        """The target accepted last, until it is reached."""
         last = self.next or self.current
         return None if last is None else last.target
 
     def accept(self, move: Move, *, at_once: bool) -> bool:
-        """Take a set-point; False where one is in reserve already."""
+        """Accept a set-point; False where a next one is waiting already."""
         if at_once or self.current is None:
             self.current, self.next = move, None
             return True
@@ -80,7 +80,7 @@ _REACHED, _BIT_12, _BIT_13 = 1 << 10, 1 << 12, 1 << 13
 
 
 class ProfilePosition(SetPoints):
-    """PP: trapezoids to target positions 607Ah, taken one by one in a handshake of bits."""
+    """PP: trapezoidal moves to target positions 607Ah, with the handshake of set-point bits."""
 
     position = True
 
@@ -90,7 +90,7 @@ class ProfilePosition(SetPoints):
         self._taken = False
 
     def reset(self) -> None:
-        """Forget the moves."""
+        """Discard the moves."""
         self._moves.reset()
 
     def control(self, word: int, rising: int, angle: float, *, enabled: bool) -> None:
@@ -116,7 +116,7 @@ class ProfilePosition(SetPoints):
         )
 
     def step(self, angle: float, speed: float, dt: float) -> DriveCommand:
-        """Follow the trapezoid; without one come to rest."""
+        """Follow the trapezoid; without a move, stop."""
         demand, fastest = self.demand, self.settings.profile_speed()
         if self._moves.current is None:
             demand.speed = approach(demand.speed, 0.0, self.settings.ramp(0x6084) * dt)
@@ -165,11 +165,11 @@ class ProfileTorque(SetPoints):
         self._arrived = False
 
     def reset(self) -> None:
-        """Begin without torque."""
+        """Start without torque."""
         self.demand.torque = 0.0
 
     def step(self, angle: float, speed: float, dt: float) -> DriveCommand:
-        """Make the torque of the slope."""
+        """Command with the torque of the slope."""
         settings, demand = self.settings, self.demand
         unit = settings.units.torque
         goal, slope = settings.number(0x6071) * unit, settings.number(0x6087, 0, 0) * unit

@@ -15,30 +15,30 @@ _SEGMENT = 7
 
 @dataclass
 class _Transfer:
-    """A segmented transfer that has begun."""
+    """A segmented transfer in progress."""
 
     key: Key
     upload: bool
     data: bytes
-    """Still to send, or received so far."""
+    """Data to send, or received so far."""
     size: int | None = None
-    """Announced by the client."""
+    """Size announced by the client."""
     toggle: int = 0
 
 
 class SdoServer:
-    """Answers requests one at a time; a new request ends a transfer that was under way."""
+    """Answers requests one at a time; a new request ends a transfer in progress."""
 
     def __init__(self, objects: ObjectDictionary) -> None:
         self._objects = objects
         self._transfer: _Transfer | None = None
 
     def reset(self) -> None:
-        """Forget a transfer under way."""
+        """Discard a transfer in progress."""
         self._transfer = None
 
     def answer(self, request: bytes) -> bytes | None:
-        """Reply to a frame of eight bytes; None where the standard asks for silence."""
+        """Reply to a frame of eight bytes; None where CiA 301 requires no reply."""
         if len(request) != 8:
             return None
         command = request[0] >> 5

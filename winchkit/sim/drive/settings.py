@@ -1,4 +1,4 @@
-"""What the object dictionary of a simulated drive says of motion, in SI at the motor shaft."""
+"""Motion settings in the object dictionary of a simulated drive, in SI at the motor shaft."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ __all__ = ["Settings"]
 
 _RPM = 2 * pi / 60
 _RAMP_FROM = 3000 * _RPM
-"""Speed that ramps declared as times reach, rad/s."""
+"""Final speed of ramps that are declared as times, rad/s."""
 _TIMES = (0x6083, 0x6084, 0x6085, 0x609A)
 _STEP = 1e6
-"""Ramp of a drive that has none, rad/s²."""
+"""Ramp of a drive without such an object, rad/s²."""
 _MS = 1e-3
 _NO_LIMITS = (-(2**31), 2**31 - 1)
 _INSTEAD = {0x6084: 0x6083, 0x6085: 0x6084, 0x60C6: 0x6085}
-"""Ramps that stand in for one that a drive lacks."""
+"""Ramps that replace a missing one."""
 _UNWATCHED = 0xFFFFFFFF
 
 
 class Settings:
-    """Units, zero, limits and ramps as they are set now.
+    """Present units, zero, limits and ramps.
 
     ``zero`` is the motor angle (rad) at which the position counts 0; homing moves it.
     """
@@ -36,7 +36,7 @@ class Settings:
         self.read_units()
 
     def read_units(self) -> None:
-        """Take over a change of scale."""
+        """Read the units again after a change."""
         self.units = units_of(self._objects, self._servo)
 
     def angle(self, counts: int) -> float:
@@ -53,7 +53,7 @@ class Settings:
         self.zero = angle + (-offset if self._servo.quirks.home_gets_offset else offset)
 
     def ramp(self, index: int) -> float:
-        """Acceleration of an object such as 6083h, rad/s²; a step where the drive has none."""
+        """Acceleration of an object such as 6083h, rad/s²; nearly a step where it is missing."""
         while not (value := self.number(index, 0, 0)):
             if index not in _INSTEAD:
                 return _STEP
@@ -63,11 +63,11 @@ class Settings:
         return value * self.units.speed
 
     def top_speed(self) -> float:
-        """Of the motor (6080h), rad/s."""
+        """Maximum motor speed (6080h), rad/s."""
         return self.number(0x6080) * _RPM if (0x6080, 0) in self._objects else inf
 
     def profile_speed(self) -> float:
-        """Fastest of a profile (607Fh), rad/s."""
+        """Maximum profile velocity (607Fh), rad/s."""
         fastest = inf
         if (0x607F, 0) in self._objects:
             fastest = self.number(0x607F) * self.units.speed
@@ -76,7 +76,8 @@ class Settings:
     def torque_band(self) -> tuple[float, float]:
         """Greatest negative and positive torque, both as positive numbers, N m.
 
-        A current counts per mille of the rated one as a torque does of its own.
+        A current limit is in per mille of the rated current, like a torque limit of the rated
+        torque.
         """
         number, most = self.number, 0xFFFF
         both = min(number(0x6072, 0, most), number(0x6073, 0, most))
@@ -84,21 +85,21 @@ class Settings:
         return min(both, number(0x60E1, 0, most)) * unit, min(both, number(0x60E0, 0, most)) * unit
 
     def soft_limits(self) -> tuple[float, float]:
-        """Motor angles between which positions stay (607Dh), rad."""
+        """Lowest and highest motor angle by 607Dh, rad."""
         low, high = self.number(0x607D, 1, _NO_LIMITS[0]), self.number(0x607D, 2, _NO_LIMITS[1])
         if (low, high) == _NO_LIMITS or low >= high:
             return -inf, inf
         return self.angle(low), self.angle(high)
 
     def period(self) -> float:
-        """Of cyclic set-points (60C2h), s; 0 where the drive does not interpolate."""
+        """Interpolation period (60C2h), s; 0 where the drive does not interpolate."""
         return self.number(0x60C2, 1, 0) * 10.0 ** self.number(0x60C2, 2, -3)
 
     def following_window(self) -> float:
-        """Following error that is a fault (6065h), rad."""
+        """Following error window (6065h), rad."""
         window = self.number(0x6065, 0, _UNWATCHED)
         return inf if window == _UNWATCHED else window * self.units.angle
 
     def following_time(self) -> float:
-        """For which the window may be left (6066h), s."""
+        """Following error time-out (6066h), s."""
         return self.number(0x6066, 0, 0) * _MS

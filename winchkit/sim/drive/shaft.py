@@ -1,4 +1,4 @@
-"""What a simulated drive needs of whatever its motor turns."""
+"""Interface between a simulated drive and the plant that its motor turns."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = [
 
 
 class Reading(Protocol):
-    """What the drive's own sensors tell, SI, with their noise."""
+    """Readings of the drive's sensors with noise, SI."""
 
     @property
     def motor_angle(self) -> float:
@@ -31,7 +31,7 @@ class Reading(Protocol):
 
 
 class Shaft(Protocol):
-    """Something that a motor turns, such as a WinchPlant; SI."""
+    """A plant that a motor turns, such as a WinchPlant; SI."""
 
     @property
     def motor_angle(self) -> float:
@@ -42,17 +42,17 @@ class Shaft(Protocol):
         """True, rad/s."""
 
     def advance(self, duration: float, command: DriveCommand) -> None:
-        """Let ``duration`` s pass under one command."""
+        """Advance by ``duration`` s under one command."""
 
     def measure(self) -> Reading:
-        """Read the sensors now."""
+        """Read the sensors."""
 
 
 class HoldingBrake:
-    """Opens ``release`` s after power comes, closes ``apply`` s after it goes.
+    """Holding brake: opens ``release`` s after power-on, closes ``apply`` s after power-off.
 
-    Where the motor stands still when its power is to go, it holds the load until the brake does.
-    Without a brake (``fitted`` false) nothing holds.
+    A motor at standstill holds the load until the brake has closed. Without a brake (``fitted``
+    false) the load is not held.
     """
 
     def __init__(self, *, fitted: bool, release: float = 0.0, apply: float = 0.0) -> None:
@@ -64,13 +64,13 @@ class HoldingBrake:
         self._off = inf
 
     def power(self, dt: float) -> None:
-        """Power is on for another ``dt`` s."""
+        """Advance by ``dt`` s with power on."""
         self._off, self.holding = 0.0, False
         self.closed = self._fitted and self._powered < self._release
         self._powered += dt
 
     def off(self, dt: float, *, still: bool, cut: bool) -> None:
-        """Power is to be off for another ``dt`` s; ``cut`` is off at once, come what may."""
+        """Advance by ``dt`` s with power off; ``cut`` removes it without waiting for the brake."""
         if not self._fitted:
             return
         if self._powered:

@@ -1,4 +1,4 @@
-"""The status word of a simulated drive: state, and the bits whose meaning the mode gives."""
+"""The status word of a simulated drive: state, and mode-specific bits."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ __all__ = ["StatusBits"]
 
 _VOLTAGE, _REMOTE, _REACHED, _LIMIT = 1 << 4, 1 << 9, 1 << 10, 1 << 11
 _NARROW = 100
-"""Counts of a window that a drive lacks."""
+"""Default of a missing window, counts."""
 _MS = 1e-3
 
 
 class StatusBits:
-    """Keeps the times for which the motor has been within its windows.
+    """Times for which the motor has been within its windows, and status bits.
 
-    With ``toggling`` bit 10 shows the parity of ``syncs`` in the cyclic modes.
+    With ``toggling``, bit 10 is the parity of ``syncs`` in the cyclic modes.
     """
 
     def __init__(self, objects: ObjectDictionary, motion: Motion, *, toggling: bool) -> None:
@@ -30,7 +30,7 @@ class StatusBits:
         self._speed = 0.0
 
     def advance(self, angle: float, speed: float, dt: float) -> None:
-        """Let ``dt`` s pass with the motor at ``angle`` (rad) and ``speed`` (rad/s)."""
+        """Advance by ``dt`` s with the motor at ``angle`` (rad) and ``speed`` (rad/s)."""
         number, settings = self._objects.number, self._motion.settings
         unit = settings.units
         self._speed = speed

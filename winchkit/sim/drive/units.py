@@ -1,4 +1,4 @@
-"""What a simulated drive's counts mean at the motor shaft, in SI."""
+"""Units of a simulated drive: SI values of its counts at the motor shaft."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ __all__ = ["SCALES", "Units", "units_of", "wrapped"]
 
 _TURN = 2 * pi
 SCALES = (0x608F, 0x6091, 0x6092, 0x6076, 0x60A8, 0x60A9)
-"""Objects that say what a count is."""
+"""Objects that determine units."""
 _ANGLES = {0x10: 1.0, 0x41: pi / 180, 0xB4: _TURN}
-"""rad, degree and revolution by their codes of CiA 303-2, in rad."""
+"""Radian, degree and revolution by their codes of CiA 303-2, in rad."""
 _TIMES = {0x03: 1.0, 0x47: 60.0}
 """Second and minute, in s."""
 
@@ -24,18 +24,18 @@ class Units:
     """SI value of one count."""
 
     angle: float
-    """rad of 6064h and 607Ah."""
+    """Of 6064h and 607Ah, rad."""
     speed: float
-    """rad/s of 606Ch, 60FFh and, per second, of the accelerations."""
+    """Of 606Ch and 60FFh, rad/s; of accelerations, rad/s²."""
     torque: float
-    """N m of 6077h, which counts per mille of the rated torque."""
+    """Of 6077h, which is in per mille of the rated torque, N m."""
 
 
 def units_of(objects: ObjectDictionary, servo: ServoSpec) -> Units:
     """Units by 608Fh, 6091h, 6092h, 60A8h, 60A9h and 6076h; the device file for what is absent.
 
-    A device file may also declare that the drive's own scales say nothing. By CiA 402 a position
-    counts the feed constant a shaft turn, or the encoder's increments where there is none.
+    A device file may also declare that the drive does not use its scale objects. By CiA 402 a
+    position has the unit of the feed constant per shaft turn, or else of encoder increments.
     """
     by_drive = servo.units == "drive"
 
@@ -56,12 +56,12 @@ def units_of(objects: ObjectDictionary, servo: ServoSpec) -> Units:
 
 
 def _angle_of(code: int) -> float:
-    """Angle (rad) that an SI unit names; 0 for increments and what is no angle."""
+    """Angle (rad) of an SI unit code; 0 for increments and units other than angles."""
     return _prefix(code) * _ANGLES.get(code >> 16 & 0xFF, 0.0)
 
 
 def _speed_of(code: int) -> float:
-    """Speed (rad/s) that an SI unit names; 0 for increments and what is no angle per time."""
+    """Speed (rad/s) of an SI unit code; 0 for increments and units other than angular speeds."""
     time = _TIMES.get(code >> 8 & 0xFF)
     return _angle_of(code) / time if time else 0.0
 

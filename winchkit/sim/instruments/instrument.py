@@ -1,4 +1,4 @@
-"""What simulated instruments of every kind share: conversions, zero, tare, faults, status."""
+"""Base of all simulated instruments: conversions, zero, tare, faults, status."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 _FAST, _SLOW = 0.05, 0.5
-"""Time constants of the averages whose difference is motion, s."""
+"""Time constants of the two averages whose difference indicates motion, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,17 +28,17 @@ class Converted:
     """One conversion, in the unit of the device."""
 
     due: float
-    """When it has passed the filter, s."""
+    """Time at which it has passed the filter, s."""
     value: float
-    """NaN where nothing could be measured."""
+    """NaN where no measurement was possible."""
     overload: bool = False
     broken: bool = False
 
 
 class Converter:
-    """Samples ``measure`` at the instants of :attr:`next_conversion`, and at no others.
+    """Samples ``measure`` at the instants of :attr:`next_conversion` only.
 
-    The filter delays and does not smooth, since a lag would be an effect of its own.
+    The filter delays and does not smooth, since a lag would be a further effect.
     """
 
     def __init__(
@@ -52,14 +52,14 @@ class Converter:
         self._fast: float | None = None
         self._slow: float | None = None
         self._last = nan
-        """What was measured last; one that is frozen says it again."""
+        """The last measured value, which a frozen instrument repeats."""
 
     def deviate(self, share: float) -> None:
-        """Let its clock run slower by a share of the declared period."""
+        """Make its clock slower by a share of the declared period."""
         self._step *= 1.0 + share
 
     def convert(self, faults: set[str]) -> None:
-        """Sample at the instant ``next_conversion``, which then moves on by one period."""
+        """Sample at the instant ``next_conversion``, and advance this by one period."""
         now = self.next_conversion
         self.next_conversion = now + self._step
         value = self._last if "frozen" in faults else self._measure()
@@ -71,7 +71,7 @@ class Converter:
             self._average(value)
 
     def take(self, now: float) -> list[Converted]:
-        """Conversions that have come through the filter by ``now``, each once."""
+        """Conversions that have passed the filter by ``now``, each once."""
         found = []
         while self._pipeline and self._pipeline[0].due <= now:
             found.append(self._pipeline.popleft())
@@ -79,7 +79,7 @@ class Converter:
 
     @property
     def motion(self) -> float:
-        """How far a fast and a slow average are apart, in the unit of the device."""
+        """Difference of a fast and a slow average, in the unit of the device."""
         if self._fast is None or self._slow is None:
             return 0.0
         return abs(self._fast - self._slow)
@@ -93,20 +93,20 @@ class Converter:
 
 
 class SimulatedInstrument:
-    """Converts at its own instants, shows what has passed its filter, zeroes and tares itself."""
+    """An instrument with conversions at its own instants, a filter, zero and tare."""
 
     KIND: ClassVar[str]
-    """What it is called in messages."""
+    """Name in messages."""
     FAULTS: ClassVar[tuple[str, ...]]
-    """What can go wrong; ``recover`` ends it."""
+    """Names of its faults; ``recover`` ends them."""
 
     def __init__(
         self, measure: Callable[[], float], rate: float, filter_delay: float, *, now: float
     ) -> None:
-        """``measure`` gives the quantity now in the unit of the device; nobody else looks at it."""
+        """``measure`` returns the present quantity in the unit of the device."""
         self.faults: set[str] = set()
         self.stored = 0
-        """How often its EEPROM was written."""
+        """Number of writes to its EEPROM."""
         self._converter = Converter(measure, rate, filter_delay, now=now)
         self._shown = Converted(now, 0.0)
         self._zero = self._tare = 0.0
@@ -119,29 +119,29 @@ class SimulatedInstrument:
 
     @property
     def gross(self) -> float:
-        """What it shows before any tare; NaN where it can measure nothing."""
+        """Reading before the tare; NaN where no measurement is possible."""
         return self._shown.value - self._zero
 
     def deviate(self, share: float) -> None:
-        """Let its clock run slower by a share of the declared period."""
+        """Make its clock slower by a share of the declared period."""
         self._converter.deviate(share)
 
     def convert(self) -> None:
-        """Sample at the instant ``next_conversion``, which then moves on by one period."""
+        """Sample at the instant ``next_conversion``, and advance this by one period."""
         self._converter.convert(self.faults)
 
     def show(self, now: float) -> None:
-        """Let the conversions that are through the filter by ``now`` be seen."""
+        """Show the conversions that have passed the filter by ``now``."""
         for shown in self._converter.take(now):
             self._shown = shown
             self._showing()
 
     def _showing(self) -> None:
-        """A conversion is seen for the first time; nothing follows, unless a kind says so."""
+        """Called when a conversion is shown first; without effect in the base class."""
         return
 
     def inject(self, kind: str) -> None:
-        """Make something go wrong; raises UsageError for an unknown kind."""
+        """Inject a fault; raises UsageError for an unknown kind."""
         self.check_fault(kind)
         if kind == "recover":
             self.faults.clear()
@@ -150,7 +150,7 @@ class SimulatedInstrument:
 
     @classmethod
     def check_fault(cls, kind: str) -> None:
-        """Raise UsageError for a fault that it cannot have."""
+        """Raise UsageError for an unknown fault."""
         if kind not in cls.FAULTS:
             raise UsageError(
                 f"{cls.KIND} has no fault '{kind}'; use one of {', '.join(cls.FAULTS)}"
@@ -158,7 +158,7 @@ class SimulatedInstrument:
             )
 
     def _obey(self, name: str) -> None:
-        """Zero or tare itself; one that measures nothing does not."""
+        """Zero or tare the instrument, if it measures."""
         if name == "gross":
             self._tare, self._net = 0.0, False
         elif name == "zero" and not self._shown.broken:
@@ -170,5 +170,5 @@ class SimulatedInstrument:
 def status_word(
     bits: Mapping[StatusMeaning, Sequence[int]], says: Mapping[StatusMeaning, bool]
 ) -> int:
-    """The status with the first declared bit of each meaning that holds."""
+    """The status word with the first declared bit of each meaning that is true."""
     return sum(1 << numbers[0] for meaning, numbers in bits.items() if says.get(meaning, False))

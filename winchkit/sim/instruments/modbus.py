@@ -1,4 +1,4 @@
-"""A simulated Modbus instrument: converts at its rate, filters, tares, sets its status bits."""
+"""A simulated Modbus instrument: conversion, filter, tare, status bits, registers."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ def counts_of(field: FieldSpec, value: float) -> tuple[float, bool]:
 
 
 def decimals_of(field: FieldSpec) -> int:
-    """Decimals that a simulated device is set to, where it tells them itself."""
+    """Decimals of a simulated device, where it has a register for them."""
     return _DECIMALS if field.decimals is not None else 0
 
 
 def encode(field: FieldSpec, counts: float) -> list[int]:
     """Registers of a field, in the order of their addresses.
 
-    With a sign bit the registers hold the magnitude; the sign is the status word's business.
+    With a sign bit the registers have the magnitude; the sign is in the status word.
     """
     return encode_number(
         field.type, field.order, abs(counts) if field.sign_bit is not None else counts
@@ -81,7 +81,7 @@ def encode_number(kind: ValueType, order: Order, number: float) -> list[int]:
 
 _STABLE_COUNTS = 100
 _IDENTITY = 4711
-"""Serial number and the like of every simulated instrument."""
+"""Serial number and similar data of every simulated instrument."""
 
 
 class ModbusInstrument(SimulatedInstrument):
@@ -107,20 +107,20 @@ class ModbusInstrument(SimulatedInstrument):
         self._peak = 0.0
         self._unlocked: list[tuple[int, int]] = []
         self.reply_delay = 2 * spec.longest_reply
-        """How late a late reply is, s; twice what the device declares as its longest."""
+        """Delay of a late reply, s; twice the longest one that the device file declares."""
 
     def _showing(self) -> None:
         if not self._shown.broken:
             self._peak = max(self._peak, self.gross)
 
-    # What a master does.
+    # Interface for the master.
 
     @property
     def addresses(self) -> list[int]:
         """Registers that exist: fields, status, commands, and one past the block that is read.
 
-        The register past the block lets a master ask for one more, unless the device answers
-        one length only.
+        With the register past the block a master can read one more, unless the device answers only
+        one length.
         """
         found: set[int] = set()
         for block in (self.spec.read, self.spec.status_read):
@@ -136,7 +136,7 @@ class ModbusInstrument(SimulatedInstrument):
         return sorted(found)
 
     def registers(self) -> dict[int, int]:
-        """Contents of the registers that carry something, by address."""
+        """Contents of the registers in use, by address."""
         contents: dict[int, int] = {}
         status = 0
         clipped = False
@@ -163,7 +163,7 @@ class ModbusInstrument(SimulatedInstrument):
         return contents
 
     def command(self, register: int, *words: int) -> bool:
-        """Obey a write of registers; False where they take no such command."""
+        """Execute a write of registers; False where they have no such command."""
         for name, command in self.spec.command.items():
             steps = [(step.register, step.value) for step in command.unlock]
             if (register, words[0]) in steps and len(words) == 1:
@@ -207,7 +207,7 @@ class ModbusInstrument(SimulatedInstrument):
 
 
 def in_unit_of(spec: ModbusSpec, measure: Callable[[], float]) -> Callable[[], float]:
-    """Turn a measurement in SI into one in the unit of the device's value."""
+    """Convert a measurement in SI to the unit of the device's value."""
     unit = next(field.unit for field in spec.field if field.name == spec.value)
     dimension = dimension_of(unit)
     if dimension is None:

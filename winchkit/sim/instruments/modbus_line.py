@@ -1,4 +1,4 @@
-"""Simulated Modbus instruments behind a real pymodbus server, on a thread of its own."""
+"""Simulated Modbus instruments behind a pymodbus server, on a separate thread."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _WAIT = 0.05
 
 
 class PtyCable:
-    """Two ports by path, ``near`` and ``far``, joined until closed; raises ConnectionLost."""
+    """Two connected ports by path, ``near`` and ``far``; raises ConnectionLost."""
 
     def __init__(self) -> None:
         if sys.platform == "win32":
@@ -45,7 +45,7 @@ class PtyCable:
             master, slave = os.openpty()
             tty.setraw(slave)
             self._masters.append(master)
-            # Kept open, so that a client that goes away does not hang the line up.
+            # Kept open, so that a client that closes its end does not close the line.
             self._slaves.append(slave)
         self.near, self.far = (os.ttyname(slave) for slave in self._slaves)
         self._stopping = threading.Event()
@@ -53,7 +53,7 @@ class PtyCable:
         self._thread.start()
 
     def close(self) -> None:
-        """Pull it out at both ends."""
+        """Close both ends."""
         self._stopping.set()
         self._thread.join()
         for end in (*self._masters, *self._slaves):
@@ -72,16 +72,16 @@ _WRITE_ONE, _WRITE_MANY = 6, 16
 _BAUDRATE = 115_200
 _START_TIMEOUT = 5.0
 
-# A client that is killed is no news for the simulation's terminal.
+# A client that was killed is not reported at the simulation's terminal.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
 class ModbusLine:
     """One Modbus server with several instruments by unit id: over TCP, or RTU where ``serial``.
 
-    ``up_to_date`` is called, on this line's thread, before registers are read or written; it
-    brings the simulation to now, and is a context in which nobody else touches it. With a
-    ``clock`` it serves in simulated time, over TCP within the process.
+    ``up_to_date`` is entered on this line's thread before registers are read or written: it
+    advances the simulation to the present time and locks it. With a ``clock`` the line is served in
+    simulated time, over TCP within the process.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class ModbusLine:
         """Path of the port on a serial line, once it serves."""
 
     def start(self) -> None:
-        """Begin to serve; raises ConnectionLost where the address is taken."""
+        """Start serving; raises ConnectionLost where the address is in use."""
         if self._serial:
             self._cable = PtyCable()
             self.port = self._cable.far
@@ -152,7 +152,7 @@ class ModbusLine:
     async def _serve(self) -> None:
         devices = [self._device(unit, one) for unit, one in self._instruments.items()]
         if 0 not in self._instruments:
-            devices.append(_nobody())
+            devices.append(_absent())
         if self._cable is not None:
             server: Any = ModbusSerialServer(
                 devices, port=self._cable.near, baudrate=_BAUDRATE, ignore_missing_devices=True
@@ -171,7 +171,7 @@ class ModbusLine:
     async def _close(self) -> None:
         if self._server is not None:
             await self._server.shutdown()
-        await asyncio.sleep(0.01)  # a request that has just come becomes a task turns later
+        await asyncio.sleep(0.01)  # a request that has just arrived becomes a task a little later
         tasks = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
         for task in tasks:
             task.cancel()
@@ -186,7 +186,7 @@ class ModbusLine:
         return SimDevice(unit, simdata=blocks, action=act)
 
     async def _act(self, instrument: ModbusInstrument, *query: Any) -> ExcCodes | None:
-        """Answer one query as the instrument does at this moment."""
+        """Answer one query by the present state of the instrument."""
         function, start, address, count, registers, values = query
         if "silence" in instrument.faults:
             raise NoSuchIdException("the simulated instrument is silent")
@@ -208,7 +208,7 @@ def _read(
 ) -> ExcCodes | None:
     start, count = span
     spec = instrument.spec
-    # The server reads back what a function 6 has written.
+    # The server reads back the registers that a function 6 has written.
     if function not in (spec.read.function, _WRITE_ONE):
         return ExcCodes.ILLEGAL_FUNCTION
     if count > spec.max_registers:
@@ -231,8 +231,8 @@ def _write(
     return None if taken else ExcCodes.ILLEGAL_VALUE
 
 
-def _nobody() -> SimDevice:
-    """Stand for every unit that does not exist: nobody answers."""
+def _absent() -> SimDevice:
+    """Stand-in for all units that do not exist, which do not answer."""
 
     async def silent(*_: Any) -> ExcCodes | None:
         raise NoSuchIdException("no such unit")

@@ -26,7 +26,7 @@ _NO_NUMBER = 0x7FC00000
 
 
 class ProcessInstrument(SimulatedInstrument):
-    """One node. ``measure`` gives the quantity now in the unit of the device file.
+    """One node. ``measure`` returns the present quantity in the unit of the device file.
 
     ``send`` takes an identifier and data.
     """
@@ -63,7 +63,7 @@ class ProcessInstrument(SimulatedInstrument):
     # Time.
 
     def show(self, now: float) -> None:
-        """Let the conversions that are through the filter by ``now`` reach the objects."""
+        """Write the conversions that have passed the filter by ``now`` to the objects."""
         super().show(now)
         self.objects.put(*self._value, self._raw((self.gross - self._tare) / self.spec.scale))
         if self._status is not None:
@@ -72,7 +72,7 @@ class ProcessInstrument(SimulatedInstrument):
     # Network.
 
     def tick(self, now: float) -> None:
-        """Let the network's timers run."""
+        """Evaluate the network's timers."""
         self.show(now)
         if self.nmt is NmtState.BOOTING:
             self._send(0x700 + self.node, b"\0")
@@ -98,7 +98,7 @@ class ProcessInstrument(SimulatedInstrument):
             self._pdos.on_sync(now)
 
     def inject(self, kind: str) -> None:
-        """Make something go wrong; raises UsageError for an unknown kind."""
+        """Inject a fault; raises UsageError for an unknown kind."""
         if kind == "reboot":
             self._reboot()
         else:
@@ -159,7 +159,7 @@ def _key(text: str) -> Key:
 
 
 def _numeric(entries: dict[Key, Entry]) -> dict[Key, Entry]:
-    """Entries whose REAL32 are kept as their 32 bits."""
+    """Entries with REAL32 values kept as their 32 bits."""
     return {
         key: replace(entry, format="I", default=0) if not entry.format and entry.mappable else entry
         for key, entry in entries.items()

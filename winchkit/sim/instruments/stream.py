@@ -1,4 +1,4 @@
-"""A simulated instrument on a serial line: answers, sends by itself, tares, goes wrong."""
+"""A simulated instrument on a serial line: replies, continuous sending, tare, faults."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["StreamInstrument", "shown_by"]
 
 
 class StreamInstrument(SimulatedInstrument):
-    """One device on a serial line; ``receive`` what the host sends, ``take_output`` what it gets.
+    """One device on a serial line, with input :meth:`receive` and output :meth:`take_output`.
 
-    ``measure`` gives the quantity now as the device counts it (see :func:`shown_by`).
+    ``measure`` returns the present quantity in counts of the device (:func:`shown_by`).
     """
 
     KIND = "a simulated serial instrument"
@@ -35,7 +35,7 @@ class StreamInstrument(SimulatedInstrument):
         "replug",
         "recover",
     )
-    """``unplug`` and ``replug`` are of the whole line."""
+    """``unplug`` and ``replug`` concern the whole line."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class StreamInstrument(SimulatedInstrument):
         self.spec = spec
         self.address = address
         self.reply_delay = 2 * spec.longest_reply
-        """How late a late reply is, s."""
+        """Delay of a late reply, s."""
         self._old = True
         self._sending = spec.mode == "continuous" and not spec.start
         self._open = spec.select is None or address is None
@@ -64,7 +64,7 @@ class StreamInstrument(SimulatedInstrument):
         if self._sending:
             self._send(self._speech.frame(self._state()), self._shown.due)
 
-    # What the host does and gets.
+    # Interface for the host.
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that the host sent."""
@@ -86,13 +86,13 @@ class StreamInstrument(SimulatedInstrument):
         return b"".join(due)
 
     def inject(self, kind: str) -> None:
-        """Make something go wrong; raises UsageError for an unknown kind."""
+        """Inject a fault; raises UsageError for an unknown kind."""
         super().inject(kind)
         if kind == "recover":
             self.faults.add("replug")
 
     def _known_requests(self) -> dict[bytes, Callable[[float], None]]:
-        """What this device understands, longest first, and what it does then."""
+        """Requests of this device, longest first, with their actions."""
         spec = self.spec
         known: dict[str, Callable[[float], None]] = {}
         if spec.poll:
@@ -154,14 +154,14 @@ class StreamInstrument(SimulatedInstrument):
             data = data[len(data) // 2 :]
         self._output.append((time, data))
 
-    # What is said.
+    # Output.
 
     def _read(self) -> bytes:
         self._old = True
         return self._speech.frame(self._state())
 
     def _state(self) -> State:
-        """What it knows of the conversion that is shown."""
+        """State of the conversion that is shown."""
         shown = self._shown
         gross = self.gross
         capacity = self.spec.capacity
@@ -194,7 +194,7 @@ class _Digits:
 
 
 def shown_by(spec: StreamSpec, measure: Callable[[], float]) -> Callable[[], float]:
-    """Turn a measurement in SI into what the device counts, in the unit of its example."""
+    """Convert a measurement in SI to counts of the device, in the unit of its example."""
     one = UnitSpec(spec.scale, spec.unit)
     if spec.units:
         one = spec.units[example_fields(spec)["unit"].strip()]

@@ -1,4 +1,4 @@
-"""What a simulated serial instrument says: its frames, status and replies."""
+"""Frames, status and replies of a simulated serial instrument."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ __all__ = [
 
 @dataclass(frozen=True)
 class NumberStyle:
-    """How a number is written."""
+    """Format of a number."""
 
     width: int | None
     decimals: int
     plus: bool
     zeros: bool
-    """Padded by zeros, else by spaces."""
+    """Padded with zeros, else with spaces."""
     sign_first: bool
-    """The sign stands before the padding."""
+    """The sign precedes the padding."""
 
     def write(self, number: float) -> str | None:
         """Text of a number, None where it does not fit its width."""
@@ -51,7 +51,7 @@ class NumberStyle:
 
 
 def style_of(text: str, width: int | None) -> NumberStyle:
-    """The style of a number as an example shows it."""
+    """Format of a number in an example."""
     bare = text.strip()
     signed = bare[:1] in "+-"
     digits = bare[signed:]
@@ -107,10 +107,10 @@ _IN_BITS: tuple[Says, ...] = ("overload", "underload", "fault", "unstable", "sta
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What an instrument knows, in the unit that its frames count."""
+    """State of an instrument, in the unit of its frames."""
 
     net: float
-    """NaN where nothing could be measured."""
+    """NaN where no measurement was possible."""
     gross: float
     motion: float
     tared: bool
@@ -118,11 +118,11 @@ class State:
     broken: bool
     address: int | None
     spoilt: bool = False
-    """The check sum is to be wrong."""
+    """Whether the check sum is made wrong."""
 
 
 class Speech:
-    """Writes what one kind of device says."""
+    """Output of one kind of device."""
 
     def __init__(self, spec: StreamSpec) -> None:
         """Raise FileError where the device file's example does not fit its frame."""
@@ -134,18 +134,18 @@ class Speech:
         return (text + self._spec.terminator).encode("latin-1")
 
     def reply(self, *wanted: Says) -> str | None:
-        """The reply that says one of these, None where the device has none."""
+        """The reply with one of these meanings, None where the device has none."""
         found = [text for text, says in self._spec.replies.items() if says in wanted]
         return found[0].replace("*", " ").strip() if found else None
 
     def status(self, state: State, *, old: bool) -> bytes:
-        """The answer to the question whether there is a new value."""
-        assert self._spec.fresh is not None, "asked where the device file has the question"
+        """The reply to the request for the presence of a new value."""
+        assert self._spec.fresh is not None, "called only where the device file has the request"
         bits = self._bits(self._truths(state)) | self._bit("stale", old)
         return self.line(self._spec.fresh.frame.replace("{bits}", str(bits)))
 
     def frame(self, state: State) -> bytes:
-        """The frame that says the state."""
+        """The frame with the state."""
         truths = self._truths(state)
         if self._spec.binary is not None:
             return self._binary(state, truths)
@@ -194,7 +194,7 @@ class Speech:
         return bytes(frame) + self._spec.terminator.encode("latin-1")
 
     def _truths(self, state: State) -> dict[Says, bool]:
-        """What is true of the conversion that is shown."""
+        """Meanings that are true for the shown conversion."""
         alarm = state.overload or state.broken
         stable = state.motion < _STABLE_DIGITS * self._one_digit()
         says_fault = self._can_say("fault")

@@ -1,4 +1,4 @@
-"""Simulated serial instruments behind a pseudo-terminal, on a thread of its own."""
+"""Simulated serial instruments behind a pseudo-terminal, on a separate thread."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _AT_ONCE = 4096
 class StreamLine:
     """One serial line with its instruments, reached at :attr:`port`.
 
-    ``up_to_date`` is called on this line's thread; it brings the simulation to now, and is a
-    context in which nobody else touches it. ``now`` is the simulation's time then. The port is a
-    link that stays the same when the line is unplugged and plugged in again.
+    ``up_to_date`` is entered on this line's thread: it advances the simulation to the present time
+    and locks it. ``now`` is the simulation's time then. The port is a symbolic link, which does not
+    change when the line is unplugged and plugged in again.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class StreamLine:
         self._thread = threading.Thread(target=self._run, name="sim-serial", daemon=True)
 
     def start(self) -> None:
-        """Begin to serve; raises ConnectionLost where the system has no pseudo-terminals."""
+        """Start serving; raises ConnectionLost where the system has no pseudo-terminals."""
         if sys.platform == "win32":
             self._folder.cleanup()
             raise ConnectionLost(
@@ -55,7 +55,7 @@ class StreamLine:
         self._thread.start()
 
     def stop(self) -> None:
-        """Take the port away and end the thread."""
+        """Remove the port and end the thread."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join(_JOIN)
@@ -96,7 +96,7 @@ class StreamLine:
                 _write(ours, data)
 
     def _obey_the_cable(self) -> None:
-        """Do what the faults ``unplug`` and ``replug`` say; each is done once."""
+        """Execute the faults ``unplug`` and ``replug``, each once."""
         for instrument in self._instruments:
             if "unplug" in instrument.faults:
                 instrument.faults.discard("unplug")
@@ -106,7 +106,7 @@ class StreamLine:
                 self._plug_in()
 
     def _serve(self, received: bytes) -> bytes:
-        """Let the instruments hear what came; what they have to say by now."""
+        """Pass received bytes to the instruments and return their output that is due."""
         said = b""
         with self._up_to_date():
             now = self._now()
@@ -118,7 +118,7 @@ class StreamLine:
 
 
 def _write(end: int, data: bytes) -> None:
-    """Put bytes on the line; where nobody reads them they are lost, as on a real one."""
+    """Write bytes to the line; without a reader they are lost, as on a real one."""
     try:
         os.write(end, data)
     except BlockingIOError:

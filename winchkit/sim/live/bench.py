@@ -29,23 +29,39 @@ from winchkit.units import suggest
 __all__ = ["LiveBench"]
 
 _OVERRUN = 0.02
-"""A tick later than this is counted, s."""
+"""Lateness of a tick from which it is counted, s."""
 _SUSPENDED = 1.0
-"""After a longer gap the process was suspended, and simulated time stood still with it, s."""
+"""Gap from which the process counts as suspended, in which simulated time stands still, s."""
 
 
 class LiveBench:
-    """A simulated bench that runs while the ``with`` block does.
+    """A simulated bench that runs within a ``with`` block.
 
-    ``bench_spec`` is the wiring that a user connects to: the declaration with channels and
-    ports of this run. ``hidden`` replaces what the declaration hides, as in
-    :func:`winchkit.sim.bench.hiding`. CAN is python-can's ``virtual`` (within this process) or
-    ``udp_multicast`` (between processes); Modbus instruments are reached over TCP on
-    127.0.0.1, serial ones at a pseudo-terminal. Raises FileError for a declaration that
-    does not hold together, ConnectionLost where a bus cannot be opened.
+    ``bench_spec`` is the bench to open: the declaration with the channels and ports of this run.
 
-    With ``simulated_time`` it runs on that clock instead of in real time: everything stays within
-    the process, and whoever opens ``bench_spec`` on the same clock is connected to it.
+    Parameters
+    ----------
+    sim_bench : SimBench
+        Declaration of the bench.
+    seed : int
+        Seed of the noise.
+    hidden : sequence of str, optional
+        Effects in place of the declared hidden ones, as of :func:`winchkit.sim.bench.hiding`.
+    interface : str
+        python-can's ``virtual`` (within this process) or ``udp_multicast`` (between processes).
+        Modbus instruments are on TCP at 127.0.0.1, serial ones at a pseudo-terminal.
+    clock : callable
+        Time, s.
+    simulated_time : SimulatedClock, optional
+        Clock on which the bench runs instead of in real time; it and its user are then in one
+        process, and the user opens ``bench_spec`` on the same clock.
+
+    Raises
+    ------
+    FileError
+        For an inconsistent declaration.
+    ConnectionLost
+        Where a bus cannot be opened.
     """
 
     def __init__(
@@ -70,11 +86,11 @@ class LiveBench:
         self._ports: dict[str, CanPort | SimulatedCanBus] = {}
         self._lines: dict[str, Line] = {}
         self.wire: dict[str, Wire] = {}
-        """Cables of the CAN buses, by bus."""
+        """Wires of the CAN buses, by bus."""
         self.winches: dict[str, LiveWinch] = {}
         self.bench_spec: BenchSpec = self.sim_bench.bench
         self.overruns = 0
-        """Ticks that came later than 20 ms, because the machine was busy."""
+        """Number of ticks that were more than 20 ms late."""
         self.worst_lateness = 0.0
         """s."""
         self._skipped = 0.0
@@ -99,14 +115,14 @@ class LiveBench:
         if kind is None:
             self.check()
 
-    # What a user does.
+    # Interface for the user.
 
     def write_bench_file(self, path: str | Path) -> Path:
-        """Write the wiring file to connect to; returns its path."""
+        """Write the bench file of this run; returns its path."""
         return write_bench(self.bench_spec, Path(path))
 
     def answer(self, step: Step) -> None:
-        """Do what a programme's ``ask`` asks for: its ``load_mass``, its ``temperature``."""
+        """Execute an operator request of a programme: its ``load_mass``, its ``temperature``."""
         for name in self.winches if step.winch == "all" else [step.winch]:
             if step.load_mass is not None:
                 self.hang(name, step.load_mass)
@@ -114,17 +130,17 @@ class LiveBench:
                 self.warm(name, step.temperature)
 
     def hang(self, winch: str, mass: float) -> None:
-        """Hang a load (kg) on a winch; NotPermitted while it moves."""
+        """Attach a load (kg) to a winch; NotPermitted while it moves."""
         with self.up_to_date():
             self._winch(winch).hang(mass)
 
     def warm(self, winch: str, temperature: float) -> None:
-        """Bring a winch to a temperature (degC); NotPermitted while it moves."""
+        """Set the temperature (degC) of a winch; NotPermitted while it moves."""
         with self.up_to_date():
             self._winch(winch).warm(temperature)
 
     def inject(self, target: str, kind: str) -> None:
-        """Make ``WINCH.ROLE`` go wrong, e.g. ``A.servo`` or ``A.cell``."""
+        """Inject a fault into ``WINCH.ROLE``, e.g. ``A.servo`` or ``A.cell``."""
         winch, _, role = target.partition(".")
         with self.up_to_date():
             self._winch(winch).inject(role, kind)
@@ -135,14 +151,14 @@ class LiveBench:
             return self._winch(winch).plant.temperature
 
     def check(self) -> None:
-        """Raise what ended the simulation, if something has."""
+        """Raise the error that ended the simulation, if there was one."""
         for loop in self._loops:
             if loop.done():
                 loop.result()
 
     @contextmanager
     def up_to_date(self) -> Iterator[None]:
-        """Hold the simulation still at this very moment."""
+        """Advance the simulation to the present time and lock it."""
         with self._lock:
             now = self._now()
             for winch in self.winches.values():

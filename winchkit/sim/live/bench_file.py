@@ -1,4 +1,4 @@
-"""Writes the wiring file of a live simulated bench."""
+"""Writing of the bench file of a live simulated bench."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _items(table: Any, beside: str) -> Iterator[tuple[str, Any, str | None]]:
 
 
 def _located(key: str, value: Any, beside: str) -> Any:
-    """What stands beside the declaration, by a path that holds elsewhere."""
+    """Absolute path of a file that is declared relative to the declaration."""
     if key == "effects" and beside:
         return tuple(str((Path(beside).parent / file).resolve()) for file in value)
     if key == "calibration" and beside:

@@ -1,4 +1,4 @@
-"""CAN buses of a simulated bench, and which of them reach other processes."""
+"""CAN buses of a simulated bench, within the process or between processes."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A frame between the simulated drives and everybody else."""
+    """A frame between the simulated drives and the other nodes."""
 
     time: float
-    """On the simulation's clock, s."""
+    """Time on the simulation's clock, s."""
     identifier: int
     data: bytes
     from_drive: bool
     lost: bool = False
-    """Whether it never arrived."""
+    """Whether it was lost."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,11 @@ class _Trouble:
     identifiers: Container[int]
     share: float
     delay: float | None
-    """s; None loses the frame."""
+    """Delay, s; None for a lost frame."""
 
 
 class Wire:
-    """Between the simulated drives and everybody else on one bus.
+    """Connection between the simulated drives and the other nodes of one bus.
 
     ``taps`` are called with every frame, in the order of their arrival at the other end. Safe to
     use from several threads.
@@ -66,9 +66,9 @@ class Wire:
     def disturb(
         self, identifiers: Container[int], *, share: float = 1.0, delay: float | None = None
     ) -> Callable[[], None]:
-        """Lose a share of these frames, or let them come ``delay`` s late.
+        """Lose a share of these frames, or delay it by ``delay`` s.
 
-        Returns a function that ends it. Raises UsageError for a share or a delay that cannot be.
+        Returns a function that ends it. Raises UsageError for an impossible share or delay.
         """
         if not 0 < share <= 1 or not (delay is None or delay > 0):
             raise UsageError(
@@ -86,7 +86,7 @@ class Wire:
         return end
 
     def carry(self, identifier: int, data: bytes, *, from_drive: bool) -> bool:
-        """Take a frame; True where it goes through at once, else it is lost or comes ``due``."""
+        """Take a frame; True where it passes at once, else it is lost or delayed (:meth:`due`)."""
         with self._lock:
             if not self.taps and not self._troubles:
                 return True
@@ -100,7 +100,7 @@ class Wire:
             return trouble is None
 
     def due(self, *, from_drive: bool) -> tuple[int, bytes] | None:
-        """Next late frame whose time has come, of one direction."""
+        """Next delayed frame of one direction that is due."""
         with self._lock:
             late = self._late[from_drive]
             if not late:
@@ -126,10 +126,10 @@ class Wire:
 Interface = Literal["udp_multicast", "virtual"]
 
 _GROUP = "239.74.163.2"
-"""The group of python-can's own default."""
+"""The default group of python-can."""
 _BETWEEN_PROCESSES = 0.2
-"""Least heartbeat period of a bench that is served to other processes, s: its drives are a program
-without priority, which stands still for 0.25 s now and then while other programs start."""
+"""Least heartbeat period of a bench that is served to other processes, s: its drives run in a
+program of normal priority, which may be suspended for up to 0.25 s."""
 _PROBE = can.Message(arbitration_id=0x7FF, is_extended_id=False)
 _ROUTE = (
     "this machine has no route for multicast; add one with: ip route add 239.0.0.0/8 dev lo "
@@ -156,9 +156,9 @@ def wired(spec: BusSpec, name: str, interface: Interface) -> BusSpec:
 
 
 class CanPort:
-    """An open CAN bus that hands frames over and takes them; raises ConnectionLost.
+    """An open CAN bus; raises ConnectionLost.
 
-    ``wire`` stands between the simulated drives and the bus.
+    ``wire`` is between the simulated drives and the bus.
     """
 
     def __init__(self, spec: BusSpec, wire: Wire) -> None:
@@ -216,7 +216,7 @@ class CanPort:
         return frame if self.wire.carry(*frame, from_drive=False) else None
 
     def close(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         with suppress(can.CanError, OSError):
             self._bus.shutdown()
 

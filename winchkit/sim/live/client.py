@@ -1,7 +1,7 @@
-"""Talks to a simulated bench in another process, found beside its wiring file.
+"""Client of a simulated bench in another process.
 
-``winchkit sim serve`` writes ``BENCH.toml.sim`` next to ``BENCH.toml``: the host and port on
-which it takes lines such as ``load A 32 kg``. No file, no simulation.
+``winchkit sim serve`` writes ``BENCH.toml.sim`` beside ``BENCH.toml``, with the host and port at
+which it takes lines such as ``load A 32 kg``. Without this file the bench is not simulated.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from pathlib import Path
 from winchkit.errors import ConnectionLost, DeviceRefused
 from winchkit.schema.programme import Step
 
-__all__ = ["REFUSED", "address_file", "answer", "is_simulated", "tell"]
+__all__ = ["REFUSED", "address_file", "answer", "is_simulated", "send"]
 
 REFUSED = "refused: "
-"""Begins a reply to a line that could not be obeyed."""
+"""Start of the reply to a line that could not be executed."""
 _TIMEOUT = 5.0
 
 
 def address_file(bench_file: str | Path) -> Path:
-    """Where the address of the simulation behind a wiring file stands."""
+    """File with the address of the simulation of a bench file."""
     path = Path(bench_file)
     return path.with_name(path.name + ".sim")
 
 
 def is_simulated(bench_file: str | Path) -> bool:
-    """Whether ``sim serve`` wrote this wiring file and has not ended."""
+    """Whether ``sim serve`` wrote this bench file and is running."""
     return address_file(bench_file).is_file()
 
 
-def tell(bench_file: str | Path, line: str) -> str:
+def send(bench_file: str | Path, line: str) -> str:
     """Send a line and return the reply; ConnectionLost, or DeviceRefused with the reason."""
     where = address_file(bench_file)
     try:
@@ -48,16 +48,30 @@ def tell(bench_file: str | Path, line: str) -> str:
 
 
 def answer(bench_file: str | Path, step: Step) -> bool:
-    """Do what a programme's ``ask`` asks for, where the bench is simulated.
+    """Execute an operator request of a programme, where the bench is simulated.
 
-    Its ``load_mass``, its ``temperature``; True where that was done, False for a real bench or
-    a question about something else. Raises as :func:`tell`.
+    Parameters
+    ----------
+    bench_file : str or Path
+        The bench.
+    step : Step
+        A step with ``ask``; its ``load_mass`` and ``temperature`` are set.
+
+    Returns
+    -------
+    bool
+        True where the request was executed, False for a real bench or another request.
+
+    Raises
+    ------
+    ConnectionLost, DeviceRefused
+        As of :func:`send`.
     """
     told = step.load_mass is not None or step.temperature is not None
     if not told or not is_simulated(bench_file):
         return False
     if step.load_mass is not None:
-        tell(bench_file, f"load {step.winch} {step.load_mass!r} kg")
+        send(bench_file, f"load {step.winch} {step.load_mass!r} kg")
     if step.temperature is not None:
-        tell(bench_file, f"warm {step.winch} {step.temperature!r} degC")
+        send(bench_file, f"warm {step.winch} {step.temperature!r} degC")
     return True

@@ -1,4 +1,4 @@
-"""Lines that a live simulated bench obeys, typed or sent by another process."""
+"""Lines that a live simulated bench executes, typed or sent by another process."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from winchkit.units import parse, suggest
 __all__ = ["HELP", "ControlServer", "obey"]
 
 HELP = """\
-load WINCH MASS     hang another load, e.g. load A 32 kg (WINCH may be all)
-warm WINCH TEMP     bring rope and machine to a temperature, e.g. warm A 35 degC
-fault TARGET KIND   make a device go wrong, e.g. fault A.cell silence
+load WINCH MASS     attach another load, e.g. load A 32 kg (WINCH may be all)
+warm WINCH TEMP     set the temperature of cable and machine, e.g. warm A 35 degC
+fault TARGET KIND   inject a fault into a device, e.g. fault A.cell silence
 recover TARGET      end its lasting faults, e.g. recover A.cell
-status              what is true now
+status              print the true state
 quit                end the simulation"""
 
 
 def obey(live: LiveBench, line: str) -> str:
-    """Do what a line says and return what to print; UsageError, NotPermitted where it cannot."""
+    """Execute a line and return the reply; raises UsageError, NotPermitted."""
     word, _, rest = line.strip().partition(" ")
     first, _, more = rest.strip().partition(" ")
     if word == "load":
@@ -61,10 +61,10 @@ def _status(live: LiveBench) -> str:
 
 
 class ControlServer:
-    """Takes lines on a loopback port while the ``with`` block runs.
+    """Takes lines on a loopback port within a ``with`` block.
 
-    Its address stands in ``BENCH.toml.sim`` beside the bench file, where
-    :mod:`winchkit.sim.live.client` looks for it. ``quit`` calls ``on_quit``.
+    Its address is written to ``BENCH.toml.sim`` beside the bench file, where
+    :mod:`winchkit.sim.live.client` reads it. ``quit`` calls ``on_quit``.
     """
 
     def __init__(self, live: LiveBench, bench_file: Path, on_quit: Callable[[], None]) -> None:

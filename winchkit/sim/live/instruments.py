@@ -1,4 +1,4 @@
-"""Simulated instruments of a winch by role, as the device files of its wiring declare them."""
+"""Simulated instruments of a winch by role, as their device files declare them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Instrument", "device_of", "instruments_of"]
 
 Instrument = ModbusInstrument | StreamInstrument | ProcessInstrument
 Send = Callable[[int, bytes], None]
-"""Takes an identifier and data to a CAN bus."""
+"""Sends an identifier and data to a CAN bus."""
 
 
 def instruments_of(
@@ -29,7 +29,7 @@ def instruments_of(
     *,
     now: float,
 ) -> dict[str, Instrument]:
-    """Instruments by role; ``quantities`` say what each role measures, SI.
+    """Instruments by role; ``quantities`` return the measured quantity of each role, SI.
 
     ``send`` is for instruments on the CAN bus of the servo.
     """
@@ -42,7 +42,7 @@ def instruments_of(
 
 
 def device_of(ref: DeviceRef, beside: str) -> tuple[Path, DeviceSpec]:
-    """The device file that a wiring file refers to, and where it stands."""
+    """Path and content of a device file to which a bench file refers."""
     from winchkit.schema.read import read_device
 
     path = find("devices", ref.device, beside=beside or None)
@@ -64,4 +64,4 @@ def _instrument(
         return ProcessInstrument(
             spec, path.parent / spec.eds, ref.node, lambda: measure() / size, send, now=now
         )
-    raise FileError(f"{path}: '{ref.device}' is no instrument that can be simulated here")
+    raise FileError(f"{path}: '{ref.device}' is not an instrument that can be simulated here")

@@ -23,10 +23,10 @@ Line = ModbusLine | StreamLine | SimulatedSerialLine
 
 
 class Placed(NamedTuple):
-    """An instrument and where it is wired."""
+    """An instrument and its address on a bus."""
 
     where: str
-    """For messages: winch and role."""
+    """Winch and role, for messages."""
     ref: DeviceRef
     instrument: Instrument
 
@@ -37,11 +37,11 @@ def open_line(
     up_to_date: Callable[[], AbstractContextManager[None]],
     time: Callable[[], float] | SimulatedClock,
 ) -> tuple[Line, BusSpec]:
-    """Serve the instruments of one bus; the line, and the bus as a user reaches it.
+    """Serve the instruments of one bus; returns the line, and the bus for the user.
 
-    Modbus is served over TCP whatever the declaration names, a serial line at a pseudo-terminal;
-    in simulated time, where ``time`` is such a clock, both stay within the process.
-    Raises UsageError where two share an address, ConnectionLost where it cannot be served.
+    Modbus is served over TCP whatever the declaration has, a serial line at a pseudo-terminal; in
+    simulated time, where ``time`` is such a clock, both are within the process. Raises UsageError
+    where two instruments share an address, ConnectionLost where the bus cannot be served.
     """
     instruments = list(placed)
     _refuse_shared(instruments)

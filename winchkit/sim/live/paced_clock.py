@@ -1,4 +1,4 @@
-"""A clock for a bench and its simulation in one process, on a machine that is busy elsewhere."""
+"""A clock for a bench and its simulation in one process on a busy computer."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _NAP = 1e-3
 
 
 class PacedClock:
-    """A steady clock that stands still while one of those who must keep pace does not.
+    """A steady clock that stands still while one of its participants is suspended.
 
-    Whoever must keep pace beats. The clock never runs further than ``slack`` ahead of the beat
-    that is oldest, so that a stall of the process looks to everybody as if it had not been: no
-    drive coasts on for a tenth of a second because another program took the processor. One who
-    has not beaten for a second is taken to have ended.
+    Every participant reports at each of its cycles (:meth:`beat`). The clock runs at most ``slack``
+    ahead of the oldest report, so that a suspension of the process has no effect on the simulation:
+    otherwise a drive would run on while another program has the processor. A participant without a
+    report for a second counts as ended.
     """
 
     def __init__(self, slack: float = _SLACK) -> None:
@@ -28,7 +28,7 @@ class PacedClock:
         self._time = self._wall
         self._beats: dict[str, tuple[float, float]] = {}
         self.stood_still = 0.0
-        """How much time was left out so far, s."""
+        """Total of the skipped time, s."""
 
     def now(self) -> float:
         """Seconds since an arbitrary start."""
@@ -42,17 +42,17 @@ class PacedClock:
             time.sleep(min(left, _NAP))
 
     def beat(self, who: str) -> float:
-        """Keep pace; returns the time."""
+        """Report a cycle of a participant; returns the time."""
         with self._lock:
             self._beats[who] = self._advance(), self._wall
             return self._time
 
     def simulation(self) -> float:
-        """Beat as the simulation: the clock to hand to a ``LiveBench``."""
+        """Report of the simulation: the clock for a ``LiveBench``."""
         return self.beat("simulation")
 
     def control(self, _snapshot: object) -> None:
-        """Beat as the control loop: the callback to hand to ``Bench.on_cycle``."""
+        """Report of the control loop: the callback for ``Bench.on_cycle``."""
         self.beat("control")
 
     def _advance(self) -> float:

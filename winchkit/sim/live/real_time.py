@@ -1,4 +1,4 @@
-"""Serves one CAN bus of a simulated bench in real time."""
+"""Serving of one CAN bus of a simulated bench in real time."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def serve(
     tick: Callable[[], None],
     late: Callable[[float], None],
 ) -> None:
-    """Deliver frames as they come and tick every two milliseconds, until ``stopped``.
+    """Deliver frames when they arrive and tick every two milliseconds, until ``stopped``.
 
-    Frames that wait are taken before the tick, so that a stall of this process is not mistaken
-    for a master that fell silent. ``late`` is called with each tick's lateness, s.
+    Waiting frames are taken before the tick, so that a stall of this process is not taken for a
+    loss of the master. ``late`` is called with each tick's lateness, s.
     """
     due = clock()
     while not stopped():

@@ -1,4 +1,4 @@
-"""One winch of a live simulated bench: plant, drive and instruments on one time line."""
+"""One winch of a live simulated bench: plant, drive and instruments with a common time."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ _QUANTITIES = {
     "length": "cable_length",
     "temperature": "temperature",
 }
-"""What the instrument in each role of a wiring file measures."""
+"""Measured quantity of each role in a bench file."""
 _SMOOTHING = 0.024
-"""Set-point filter of the drives, s: an ordinary computer's cycle jitters by a millisecond."""
+"""Set-point filter of the drives, s: the cycle of an ordinary computer has 1 ms of jitter."""
 _TO_ALL, _NODE = 0x080, 0x07F
-"""Identifiers up to SYNC concern every node, others mostly the node in their lower bits."""
+"""Highest identifier for all nodes (SYNC); others mostly concern the node in their lower bits."""
 _DEVIATION = (1e-3, 3e-3)
-"""Of an instrument's clock in simulated time: without it its conversions would stay in step with
-the host's polls, at one age, which no time stamp can know."""
+"""Deviation of an instrument's clock in simulated time: without it its conversions would be
+synchronous with the host's polls, with a constant age that no time stamp shows."""
 _AT_REST = 0.5
-"""rad/s of the motor, below which a load can be changed."""
+"""Motor speed below which a load can be changed, rad/s."""
 
 
 class LiveWinch:
-    """Advances drive, rope and instruments together; not safe for threads by itself."""
+    """Drive, cable and instruments, advanced together; not thread-safe."""
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class LiveWinch:
                 one.deviate(random.choice((-1.0, 1.0)) * random.uniform(*_DEVIATION))
 
     def advance(self, now: float) -> None:
-        """Move everything up to ``now``, each conversion at its own instant."""
+        """Advance to ``now``, with each conversion at its own instant."""
         instruments = list(self.instruments.values())
         while (due := min([one.next_conversion for one in instruments], default=inf)) <= now:
             self.drive.advance(due)
@@ -106,19 +106,19 @@ class LiveWinch:
                 one.receive(identifier, data, now)
 
     def tick(self, now: float) -> None:
-        """Let the timers of what hangs on the CAN bus run."""
+        """Evaluate the timers of the devices on the CAN bus."""
         self.drive.tick(now)
         for one in self.instruments.values():
             if isinstance(one, ProcessInstrument):
                 one.tick(now)
 
     def hang(self, mass: float) -> None:
-        """Hang another load (kg); NotPermitted while the winch moves."""
+        """Attach another load (kg); NotPermitted while the winch moves."""
         self._at_rest("a load")
         self.plant.hang(mass)
 
     def warm(self, temperature: float) -> None:
-        """Bring rope and machine to a temperature (degC); NotPermitted while the winch moves."""
+        """Set the temperature (degC) of cable and machine; NotPermitted while the winch moves."""
         self._at_rest("the temperature")
         self.plant.warm(temperature)
 
@@ -131,7 +131,7 @@ class LiveWinch:
             )
 
     def check_fault(self, role: str, kind: str) -> None:
-        """Raise UsageError where there is no such device on this winch, or no such fault of it."""
+        """Raise UsageError for an unknown device of this winch, or an unknown fault."""
         if role == "servo":
             known(kind)
             return
@@ -144,7 +144,7 @@ class LiveWinch:
         self.instruments[role].check_fault(kind)
 
     def inject(self, role: str, kind: str) -> None:
-        """Make a device of this winch go wrong; raises as :meth:`check_fault`."""
+        """Inject a fault into a device of this winch; raises as :meth:`check_fault`."""
         self.check_fault(role, kind)
         if role == "servo":
             self.drive.inject(kind)
@@ -155,5 +155,5 @@ class LiveWinch:
 def _servo(ref: DeviceRef, beside: str) -> tuple[ServoSpec, Path]:
     path, device = device_of(ref, beside)
     if device.servo is None:
-        raise FileError(f"{path}: '{ref.device}' is no servo drive; it has no [servo] table")
+        raise FileError(f"{path}: '{ref.device}' is not a servo drive; it has no [servo] table")
     return device.servo, path.parent / device.servo.eds

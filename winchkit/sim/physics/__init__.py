@@ -1,1 +1,1 @@
-"""The simulator's own physics, one small class a phenomenon, written without the catalogue."""
+"""The simulator's physics, one class per effect, independent of the catalogue of effects."""

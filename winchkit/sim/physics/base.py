@@ -1,4 +1,4 @@
-"""What a piece of the simulator's physics is: numbers, and hooks on the winch's two chains."""
+"""Base class of the simulator's physics: parameters, and hooks in the winch's two chains."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MOTOR_STANDSTILL = 0.5
 
 
 def rope_direction(state: State) -> float:
-    """Direction of the rope, +1 winding in, smooth within about 1 mm/s of standstill."""
+    """Direction of the cable, +1 winding in, smooth within about 1 mm/s of standstill."""
     return tanh(state.rope_speed / _ROPE_STANDSTILL)
 
 
@@ -46,46 +46,46 @@ def motor_direction(state: State) -> float:
 
 @dataclass
 class Physics:
-    """One piece of physics; its fields are the numbers a file may give, with typical defaults.
+    """One effect; its fields are the parameters in files, with typical defaults.
 
-    A hook that a class does not override costs nothing: the plant calls only overridden ones,
-    in the order of the table of physics. Objects may keep state; a plant has its own.
+    The plant calls only overridden hooks, in the order of the table of physics. Objects may have
+    state; every plant has its own objects.
     """
 
     size: ClassVar[str] = ""
-    """The field that scales how strongly it shows."""
+    """The field of its size."""
     inverse: ClassVar[bool] = False
-    """Whether a larger ``size`` shows less (a stiffness)."""
+    """Whether a larger ``size`` is a smaller effect (a stiffness)."""
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
-        """Give the profile that is true instead; called once."""
+        """Return the true profile; called once."""
         return profile
 
     def begin(self, profile: WinchProfile) -> None:
-        """Note what is needed of the true profile; called once, after every ``reshape``."""
+        """Read values of the true profile; called once, after every ``reshape``."""
 
     def rotor_inertia(self) -> float:
-        """Inertia that the motor accelerates besides the load, kg m²."""
+        """Inertia that the motor accelerates in addition to the load, kg m²."""
         return 0.0
 
     def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
-        """Angle added to the drum's, its slope by the drum angle, and its rate in time."""
+        """Angle added to the drum angle, its slope by the drum angle, and its rate in time."""
         raise NotImplementedError
 
     def wound_length(self, state: State) -> tuple[float, float]:
-        """Length added to what is wound, and its slope by the drum angle, m and m/rad."""
+        """Length added to the wound length, and its slope by the drum angle, m and m/rad."""
         raise NotImplementedError
 
     def compliance(self, state: State) -> float:
-        """Stretch per tension at the platform, m/N."""
+        """Elongation per tension at the platform, m/N."""
         raise NotImplementedError
 
     def stretch(self, state: State, dt: float) -> float:
-        """Length added to the rope that is no linear spring, m."""
+        """Elongation other than that of a linear spring, m."""
         raise NotImplementedError
 
     def weight(self, state: State) -> float:
-        """Tension added on the way from the platform to the pulleys, N."""
+        """Tension added between the platform and the pulleys, N."""
         raise NotImplementedError
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
@@ -93,23 +93,23 @@ class Physics:
         raise NotImplementedError
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """What the load cell makes of a reading, N."""
+        """Reading of the load cell after this effect, N."""
         raise NotImplementedError
 
     def gear(self, state: State, torque: float) -> float:
-        """Torque at the motor that carries ``torque`` of the rope, N m."""
+        """Torque at the motor that carries ``torque`` of the cable, N m."""
         raise NotImplementedError
 
     def motor(self, state: State) -> float:
-        """Torque that the motor spends on itself, N m."""
+        """Torque for the motor itself, N m."""
         raise NotImplementedError
 
     def torque_signal(self, state: State, reading: float, dt: float) -> float:
-        """What the drive reports for a torque, N m."""
+        """Torque reported by the drive after this effect, N m."""
         raise NotImplementedError
 
     def length_signal(self, state: State, reading: float, dt: float) -> float:
-        """What the length instrument makes of a reading, m."""
+        """Reading of the length instrument after this effect, m."""
         raise NotImplementedError
 
 

@@ -1,4 +1,4 @@
-"""Physics that no catalogue of effects has: what a diagnosis must call unknown."""
+"""Physics outside the catalogue of effects, which a diagnosis must report as unknown."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = [
 
 @dataclass
 class FiveCornerDrum(Physics):
-    """The drum has corners: a wave of a higher order per drum turn."""
+    """The drum is a polygon: a sine of a higher order per drum turn."""
 
     amplitude: Length = 0.0003
     order: PositiveNumber = 5.0
@@ -45,26 +45,26 @@ class FiveCornerDrum(Physics):
 
 @dataclass
 class TorqueCrosstalk(Physics):
-    """The motor's current leaks into the cell's wires, with the sign of its motion."""
+    """Crosstalk of the motor current into the cell's wires, with the sign of the motion."""
 
     per_torque: Annotated[float, Quantity("ratio")] = 8.0
     """N per N m of motor torque."""
     wave: PositiveNumber = 3.0
-    """Waves per motor torque of 1 N m: the leak rectifies in lobes."""
+    """Periods per motor torque of 1 N m, by rectification."""
     size: ClassVar[str] = "per_torque"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Add the leak."""
+        """Add the crosstalk."""
         return reading + self.per_torque * sin(2 * pi * self.wave * state.motor_torque)
 
 
 @dataclass
 class TemperatureCrosstalk(Physics):
-    """The cell's zero swings with temperature, back and forth."""
+    """The cell's zero is periodic in temperature."""
 
     swing: Force = 3.0
     period: Annotated[float, Quantity("ratio", 0.0, above=True)] = 1.5
-    """K per swing."""
+    """Period, K."""
     size: ClassVar[str] = "swing"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
@@ -74,16 +74,16 @@ class TemperatureCrosstalk(Physics):
 
 @dataclass
 class StickyPlace(Physics):
-    """Something rubs at one place of the stroke."""
+    """Coulomb friction at one position of the stroke."""
 
     force: Force = 12.0
     at: Length = 2.4
-    """Cable length where it rubs, m."""
+    """Cable length of the friction, m."""
     width: PositiveLength = 0.1
     size: ClassVar[str] = "force"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Rub at the first pulley of the drum, against the motion, around the place."""
+        """Friction at the first pulley of the drum, against the motion, around the position."""
         if index != 0:
             return 0.0
         where = (state.unstrained - self.at) / self.width
@@ -92,7 +92,7 @@ class StickyPlace(Physics):
 
 @dataclass
 class GivingJoint(Physics):
-    """A joint opens above a load."""
+    """A joint that opens above a load."""
 
     above: PositiveForce = 150.0
     stiffness: Stiffness = 20e3
@@ -102,7 +102,7 @@ class GivingJoint(Physics):
     _SETTLE: ClassVar[float] = 0.01
 
     def stretch(self, state: State, dt: float) -> float:
-        """Open with the excess of tension, settling within hundredths of a second."""
+        """Opening in proportion to the excess of tension, with a time constant of some 10 ms."""
         goal = max(0.0, state.load - self.above) / self.stiffness
         self._opening += (goal - self._opening) * (1.0 - exp(-dt / self._SETTLE))
         return self._opening
@@ -110,7 +110,7 @@ class GivingJoint(Physics):
 
 @dataclass
 class WanderingLength(Physics):
-    """The length instrument wanders slowly, up and down."""
+    """Slow periodic error of the length instrument."""
 
     amplitude: Length = 0.0015
     period: PositiveDuration = 7.0
@@ -128,5 +128,5 @@ class ClippingCell(Physics):
     limit: PositiveForce = 195.0
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Cut off above the limit."""
+        """Limit the reading."""
         return min(reading, self.limit)

@@ -1,4 +1,4 @@
-"""Physics of the rope and what carries it: stretch, creep, heat, weight, frame."""
+"""Physics of the cable and the frame: elongation, creep, thermal expansion, weight."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _WARM = 20.0
 
 @dataclass
 class ElasticRope(Physics):
-    """The rope is a spring of stiffness EA over all of its stressed length."""
+    """The cable is a spring of stiffness EA over all of its stressed length."""
 
     axial_stiffness: PositiveForce = 300e3
     size: ClassVar[str] = "axial_stiffness"
@@ -43,7 +43,7 @@ class ElasticRope(Physics):
 
 @dataclass
 class SoftFrame(Physics):
-    """The frame yields, however long the rope is."""
+    """The frame is compliant, independent of the cable length."""
 
     stiffness: Stiffness = 60e3
     size: ClassVar[str] = "stiffness"
@@ -56,7 +56,7 @@ class SoftFrame(Physics):
 
 @dataclass
 class WarmRope(Physics):
-    """The rope lengthens with temperature above 20 degC."""
+    """The cable lengthens with temperature above 20 degC."""
 
     expansion: Expansion = 1.1e-5
     size: ClassVar[str] = "expansion"
@@ -86,7 +86,7 @@ class CreepingRope(Physics):
 
 @dataclass
 class LaggingRope(Physics):
-    """Inner friction of the strands holds back strain: a loop of strain over tension.
+    """Internal friction of the strands withholds strain: a hysteresis of strain over tension.
 
     The friction takes half of a change of tension from rest, all of it after a full reversal,
     and at most ``fraction`` of the tension.
@@ -100,7 +100,7 @@ class LaggingRope(Physics):
     _SLOPE: ClassVar[float] = 0.5
 
     def stretch(self, state: State, dt: float) -> float:
-        """Strain that the friction holds back, over the stressed length; a Dahl law in tension."""
+        """Strain withheld by friction, times the stressed length; a Dahl law in tension."""
         change = 0.0 if self._before is None else state.load - self._before
         self._before = state.load
         self._held = relax(self._held, change, self.fraction * state.load, self._SLOPE, 1.0)
@@ -109,11 +109,11 @@ class LaggingRope(Physics):
 
 @dataclass
 class HeavyRope(Physics):
-    """The hanging rope weighs on everything above the platform."""
+    """Weight of the free cable."""
 
     mass_per_length: LinearDensity = 0.15
     size: ClassVar[str] = "mass_per_length"
 
     def weight(self, state: State) -> float:
-        """Weight of the free rope along its slope."""
+        """Weight of the free cable along its slope."""
         return self.mass_per_length * GRAVITY * state.unstrained * sin(state.inclination)

@@ -48,7 +48,7 @@ class ShiftedCell(Physics):
 
 @dataclass
 class BentCell(Physics):
-    """The cell's curve is bent: ``quadratic`` N at 500 N."""
+    """The cell's characteristic is quadratic: ``quadratic`` N at 500 N."""
 
     quadratic: Force = 25.0
     size: ClassVar[str] = "quadratic"
@@ -60,7 +60,7 @@ class BentCell(Physics):
 
 @dataclass
 class DriftingCell(Physics):
-    """The cell's zero wanders off with time."""
+    """The cell's zero drifts with time."""
 
     drift: ForceDrift = 0.4
     size: ClassVar[str] = "drift"
@@ -72,7 +72,7 @@ class DriftingCell(Physics):
 
 @dataclass
 class WarmCell(Physics):
-    """The cell's zero moves with temperature above 20 degC."""
+    """The cell's zero depends on the temperature above 20 degC."""
 
     sensitivity: ThermalForce = 0.5
     size: ClassVar[str] = "sensitivity"
@@ -100,14 +100,14 @@ class SlowCell(Physics):
 
 @dataclass
 class LateLength(Physics):
-    """The length instrument reports what was ``delay`` ago."""
+    """The length instrument has a delay of ``delay``."""
 
     delay: PositiveDuration = 0.003
     size: ClassVar[str] = "delay"
     _past: deque[tuple[float, float]] = field(default_factory=deque)
 
     def length_signal(self, state: State, reading: float, dt: float) -> float:
-        """Interpolate the past; before it began, the first value."""
+        """Interpolate the past values; before the start, the first value."""
         past = self._past
         past.append((state.time, reading))
         wanted = state.time - self.delay

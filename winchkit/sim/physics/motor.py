@@ -1,4 +1,4 @@
-"""Physics of the gearbox's losses, of the motor and of its torque signal."""
+"""Physics of the gearbox losses, the motor and its torque signal."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Efficiency = Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)]
 
 @dataclass
 class LossyGear(Physics):
-    """The gearbox takes its share: more torque to wind in, less to hold while paying out."""
+    """Losses of the gearbox: more torque for winding in, less for paying out."""
 
     efficiency: Efficiency = 0.94
 
@@ -52,7 +52,7 @@ class LossyGear(Physics):
 
 @dataclass
 class MotorDrag(Physics):
-    """Dry friction of motor and seals, free of load."""
+    """Coulomb friction of motor and seals, independent of the load."""
 
     torque: Torque = 0.025
     size: ClassVar[str] = "torque"
@@ -76,33 +76,33 @@ class MotorGrease(Physics):
 
 @dataclass
 class OneWayGrease(Physics):
-    """Viscous friction that differs between the two directions, by this much from their mean."""
+    """Viscous friction with a difference of the two directions from their mean."""
 
     viscosity_difference: RotationalViscosity = 1e-4
     size: ClassVar[str] = "viscosity_difference"
 
     def motor(self, state: State) -> float:
-        """Torque proportional to how fast, whichever way."""
+        """Torque proportional to the magnitude of the speed."""
         return self.viscosity_difference * abs(state.motor_speed)
 
 
 @dataclass
 class MotorStiction(Physics):
-    """Friction of the motor that is there only at creep speed (Stribeck)."""
+    """Friction of the motor at low speed only (Stribeck)."""
 
     torque: Torque = 0.03
     stribeck_speed: AngularSpeed = 20.0
     size: ClassVar[str] = "torque"
 
     def motor(self, state: State) -> float:
-        """Falls off with the square of speed."""
+        """Torque that decreases with the square of the speed."""
         fall = exp(-((state.motor_speed / self.stribeck_speed) ** 2))
         return motor_direction(state) * self.torque * fall
 
 
 @dataclass
 class Cogging(Physics):
-    """Torque that poles and slots ask for, a whole number of waves per motor turn."""
+    """Cogging torque of poles and slots, a whole number of periods per motor turn."""
 
     amplitude: Torque = 0.015
     order: PositiveNumber = 4.0
@@ -116,7 +116,7 @@ class Cogging(Physics):
 
 @dataclass
 class HeavyRotor(Physics):
-    """Inertia of rotor and gearbox, seen at the motor."""
+    """Inertia of rotor and gearbox, at the motor."""
 
     inertia: Inertia = 1e-4
     size: ClassVar[str] = "inertia"
@@ -132,7 +132,7 @@ class HeavyRotor(Physics):
 
 @dataclass
 class WeakMotor(Physics):
-    """The drive's torque constant is wrong, so it reports another torque than there is."""
+    """The drive's torque constant is wrong, and its reported torque with it."""
 
     gain_error: Number = 0.05
     size: ClassVar[str] = "gain_error"

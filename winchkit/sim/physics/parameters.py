@@ -1,4 +1,4 @@
-"""Reads numbers with units into dataclass fields by their markers, and overrides of a profile."""
+"""Readers of numbers with units into dataclass fields, and of overrides of a profile."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def with_unit(kind: type, name: str, value: float) -> str | float:
 
 
 def overridden(profile: WinchProfile, overrides: Mapping[str, Any]) -> WinchProfile:
-    """Put true numbers in place of a profile's, by dotted keys as ``pulley.0.radius``.
+    """Replace numbers of a profile by the true ones, by dotted keys such as ``pulley.0.radius``.
 
     Raises FileError with every key that does not exist and every number that cannot be read.
     """
@@ -96,7 +96,7 @@ def _replaced(owner: Any, path: list[str], raw: Any) -> Any:
     head, rest = path[0], path[1:]
     if isinstance(owner, tuple):
         if not head.isdigit() or int(head) >= len(owner) or not rest:
-            raise UsageError(f"'{head}' is no place in a list of {len(owner)}, counted from 0")
+            raise UsageError(f"'{head}' is not a position in a list of {len(owner)}, from 0")
         place = int(head)
         return (*owner[:place], _replaced(owner[place], rest, raw), *owner[place + 1 :])
     names = [field.name for field in fields(owner)] if is_dataclass(owner) else []
@@ -109,5 +109,5 @@ def _replaced(owner: Any, path: list[str], raw: Any) -> Any:
         return replace(owner, **{head: _replaced(inner, rest, raw)})
     markers = _markers(type(owner))
     if head not in markers:
-        raise UsageError(f"'{head}' is no number and cannot be overridden")
+        raise UsageError(f"'{head}' is not a number and cannot be overridden")
     return replace(owner, **{head: markers[head].read(raw)})

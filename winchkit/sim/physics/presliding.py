@@ -8,7 +8,7 @@ __all__ = ["relax"]
 
 _SMALL = 0.2
 _ABRUPT = 0.01
-"""Below shape 1 the force arrives at the limit with a corner, which larger steps round off."""
+"""Largest step below shape 1, where the force reaches the limit with a discontinuous slope."""
 _LONG = 100.0
 """Travel over limit/slope after which the force has settled to a hundredth, for shapes to 2."""
 
@@ -16,8 +16,8 @@ _LONG = 100.0
 def relax(force: float, travel: float, limit: float, slope: float, shape: float) -> float:
     """Integrate dF/dx = slope·|1 − sF/limit|^shape·sgn(1 − sF/limit) over ``travel``.
 
-    ``limit`` is the sliding force, s the direction of travel. Classical Runge-Kutta in steps
-    that are small beside the distance over which the law relaxes.
+    ``limit`` is the sliding force, s the direction of travel. Classical Runge-Kutta with steps that
+    are small compared with the relaxation distance of the law.
     """
     if travel == 0.0 or limit <= 0.0:
         return force if limit > 0.0 else 0.0
@@ -39,7 +39,7 @@ def relax(force: float, travel: float, limit: float, slope: float, shape: float)
         k4 = -_rate(load + step * k3, shape)
         load += step * (k1 + 2 * k2 + 2 * k3 + k4) / 6
         if load * before <= 0.0:
-            # A shape below 1 gets there in finite travel, and stays.
+            # With a shape below 1 the limit is reached in finite travel.
             return sign * limit
     return sign * limit * (1.0 - load)
 

@@ -1,4 +1,4 @@
-"""Physics of the pulleys: what they add to the tension between platform and drum."""
+"""Physics of the pulleys: change of the tension between platform and drum."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _pressure(before: float, after: float, wrap: float) -> float:
 
 
 def _dragged(tension: float, wrap: float, friction: float) -> float:
-    """Friction force of an axle whose pressure holds that friction too (Eq. 23)."""
+    """Friction force of an axle whose load includes this friction (Eq. 23)."""
     force = friction * _pressure(tension, tension, wrap)
     for _ in range(2):
         force = friction * _pressure(tension, tension + force, wrap)
@@ -30,19 +30,19 @@ def _dragged(tension: float, wrap: float, friction: float) -> float:
 
 @dataclass
 class StickyPulleys(Physics):
-    """Dry friction of the axles, odd in direction."""
+    """Coulomb friction of the axles, odd in direction."""
 
     friction: Number = 0.01
     size: ClassVar[str] = "friction"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Coulomb friction of the axle's pressure."""
+        """Coulomb friction in proportion to the axle load."""
         return _dragged(tension, wrap, rope_direction(state) * self.friction)
 
 
 @dataclass
 class PreslidingPulleys(Physics):
-    """Friction that gives elastically before it slides: Dahl, over the rope's travel."""
+    """Presliding friction (Dahl) over the cable's travel."""
 
     friction: Number = 0.012
     stiffness: Stiffness = 500.0
@@ -51,7 +51,7 @@ class PreslidingPulleys(Physics):
     _force: dict[int, float] = field(default_factory=dict)
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Dahl force with the sliding force of the present pressure."""
+        """Dahl force with the sliding force of the present axle load."""
         force = self._force.get(index, 0.0)
         limit = self.friction * _pressure(tension, tension + force, wrap)
         force = relax(force, state.rope_speed * dt, limit, self.stiffness, self.shape)
@@ -61,7 +61,7 @@ class PreslidingPulleys(Physics):
 
 @dataclass
 class ViscousPulleys(Physics):
-    """Grease in the bearings, proportional to speed."""
+    """Viscous friction of the bearings."""
 
     viscosity: Viscosity = 8.0
     size: ClassVar[str] = "viscosity"
@@ -73,7 +73,7 @@ class ViscousPulleys(Physics):
 
 @dataclass
 class CreepPulleys(Physics):
-    """Dry friction that is larger at creep speed (Stribeck)."""
+    """Coulomb friction with a higher value at low speed (Stribeck)."""
 
     coulomb: Number = 0.008
     static: Number = 0.03
@@ -81,7 +81,7 @@ class CreepPulleys(Physics):
     size: ClassVar[str] = "static"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Stribeck curve times the axle's pressure."""
+        """Stribeck curve times the axle load."""
         fall = exp(-((state.rope_speed / self.stribeck_speed) ** 2))
         friction = self.coulomb + (self.static - self.coulomb) * fall
         return _dragged(tension, wrap, rope_direction(state) * friction)
@@ -89,11 +89,11 @@ class CreepPulleys(Physics):
 
 @dataclass
 class HeavyPulleys(Physics):
-    """Inertia of the sheaves, as a mass that moves with the rope."""
+    """Inertia of the sheaves, as a mass that moves with the cable."""
 
     equivalent_mass: Mass = 1.0
     size: ClassVar[str] = "equivalent_mass"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Force proportional to the rope's acceleration."""
+        """Force proportional to the cable's acceleration."""
         return self.equivalent_mass * state.rope_acceleration

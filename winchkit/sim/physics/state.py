@@ -11,7 +11,7 @@ GRAVITY = 9.80665
 
 @dataclass(slots=True)
 class State:
-    """What is true now; SI, mutable, owned by the plant."""
+    """Present true state; SI, mutable, owned by the plant."""
 
     time: float = 0.0
     temperature: float = 20.0
@@ -24,12 +24,12 @@ class State:
     wound_angle: float = 0.0
     """Total on the drum, rad."""
     arm: float = 0.0
-    """Rope wound in per motor radian, m/rad, signed."""
+    """Cable wound in per motor radian, m/rad, signed."""
     rope_speed: float = 0.0
     """Positive winds in, m/s."""
     rope_acceleration: float = 0.0
     unstrained: float = 0.0
-    """Free rope as it comes off the drum, before it stretches, m."""
+    """Unstrained free cable length, m."""
     dead_length: float = 0.0
     inclination: float = 0.0
     cable_length: float = 0.0

@@ -1,4 +1,4 @@
-"""The simulator's own table of physics: a plain name for each, in the order it acts."""
+"""The simulator's table of physics: a name for each effect, in the order in which they act."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ _ORDER = {kind: place for place, kind in enumerate(PHYSICS.values())}
 
 
 def build(hidden: Sequence[HiddenSpec]) -> list[Physics]:
-    """Make each named piece of physics, in the order in which they act.
+    """Create the named effects in the order in which they act.
 
     Raises FileError with every fault: an unknown name, an unknown number, a wrong unit.
     """
@@ -97,7 +97,7 @@ def _in_order(pieces: Iterable[Physics]) -> list[Physics]:
 
 
 def declared(profile: WinchProfile, pieces: Sequence[Physics]) -> list[Physics]:
-    """Add what the profile itself declares by shorthand: elastic rope, its weight, efficiency."""
+    """Add the effects of a profile's shorthand keys: elastic cable, cable weight, efficiency."""
     own: list[Physics] = []
     if profile.cable.axial_stiffness is not None:
         own.append(rope.ElasticRope(profile.cable.axial_stiffness))
@@ -116,7 +116,7 @@ def declared(profile: WinchProfile, pieces: Sequence[Physics]) -> list[Physics]:
 
 
 def scaled(spec: HiddenSpec, factor: float) -> HiddenSpec:
-    """Show the same physics ``factor`` times as strongly, by the number that sets its size."""
+    """The same effect, ``factor`` times as large, by the parameter of its size."""
     piece = _build_one(spec)
     if not piece.size:
         return spec
@@ -128,7 +128,7 @@ def scaled(spec: HiddenSpec, factor: float) -> HiddenSpec:
 
 
 def listed_physics() -> list[dict[str, object]]:
-    """Every piece of physics: name, description, and its numbers of typical size."""
+    """Every effect: name, description, and its parameters of typical size."""
     return [
         {
             "name": name,

@@ -1,4 +1,4 @@
-"""Physics of what turns: gearbox, drum, guide."""
+"""Physics of gearbox, drum and guide."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class WrongRatio(Physics):
 
 @dataclass
 class ThickLayers(Physics):
-    """Each turn on a layered drum lies higher than declared."""
+    """The growth of the layers on a drum is larger than declared."""
 
     growth_error: Length = 0.00005
     size: ClassVar[str] = "growth_error"
@@ -64,15 +64,13 @@ class ThickLayers(Physics):
         drum = profile.drum
         growth = drum.layer_growth if drum.layer_growth is not None else profile.cable.diameter
         if drum.kind not in ("spiral", "archimedean") or growth is None:
-            raise FileError(
-                f"hidden 'thick layers': a {drum.kind} drum has no layers that could be too thick"
-            )
+            raise FileError(f"hidden 'thick layers': a {drum.kind} drum has no layers")
         return replace(profile, drum=replace(drum, layer_growth=growth + self.growth_error))
 
 
 @dataclass
 class EccentricDrum(Physics):
-    """The drum runs out of true: once per turn in length and torque arm."""
+    """Runout of the drum: one period per turn in length and torque arm."""
 
     eccentricity: Length = 0.0005
     phase: Angle = 0.7
@@ -87,7 +85,7 @@ class EccentricDrum(Physics):
 
 @dataclass
 class GuideOffset(Physics):
-    """The guide stands off the rope's place on the drum, so the rope takes a longer way."""
+    """Axial offset of the guide from the winding point, which makes the cable path longer."""
 
     offset: Length = 0.03
     mismatch: Length = 0.002
@@ -98,13 +96,11 @@ class GuideOffset(Physics):
     def begin(self, profile: WinchProfile) -> None:
         """Take the guide's distance; FileError without a guide."""
         if profile.guide is None:
-            raise FileError(
-                f"hidden 'guide offset': {profile.name} has no guide that could stand off"
-            )
+            raise FileError(f"hidden 'guide offset': {profile.name} has no guide")
         self._distance = profile.guide.distance
 
     def wound_length(self, state: State) -> tuple[float, float]:
-        """Length of the slant over the straight way."""
+        """Length of the oblique path less that of the straight one."""
         per_radian = self.mismatch / (2 * pi)
         aside = self.offset + per_radian * state.wound_angle
         slant = hypot(self._distance, aside)
@@ -113,7 +109,7 @@ class GuideOffset(Physics):
 
 @dataclass
 class WavyGear(Physics):
-    """Transmission error of the gearbox, a whole number of waves per motor turn."""
+    """Transmission error of the gearbox, a whole number of periods per motor turn."""
 
     amplitude: Angle = 0.0002
     order: PositiveNumber = 1.0
@@ -134,7 +130,7 @@ class WavyGear(Physics):
 
 @dataclass
 class Slip(Physics):
-    """The coupling behind the encoder slips once and does not return."""
+    """A single slip of the encoder's coupling."""
 
     step: Angle = 0.03
     time: Duration = 5.0
@@ -153,10 +149,10 @@ class Slip(Physics):
 
 @dataclass
 class LooseGear(Physics):
-    """Backlash: the drum rests within the gap while its drag outweighs the load.
+    """Backlash: the drum rests within the gap while its friction exceeds the load torque.
 
-    With a drag below the load's torque the teeth stay on one flank and nothing shows. The drag
-    itself costs the motor torque.
+    With a lower friction the teeth stay on one flank, and the backlash has no effect. The friction
+    adds to the motor torque.
     """
 
     gap: Angle = 0.01
@@ -168,7 +164,7 @@ class LooseGear(Physics):
     _drum: float | None = None
 
     def begin(self, profile: WinchProfile) -> None:
-        """Take the ratio and the radius at which the load pulls."""
+        """Read the ratio and the winding radius."""
         self._ratio = profile.gearbox.ratio
         self._radius = profile.drum.winding_radius
 
@@ -186,5 +182,5 @@ class LooseGear(Physics):
         return self._drum - driven, -1.0 if inside else 0.0, 0.0
 
     def gear(self, state: State, torque: float) -> float:
-        """Add the drag."""
+        """Add the friction."""
         return torque + motor_direction(state) * self.drag / self._ratio

@@ -1,4 +1,4 @@
-"""Laws of the drum: rope wound over the total wound angle, and back; plain floats."""
+"""Winding laws of the drum: wound length over the total wound angle, and inverse; plain floats."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ __all__ = ["Drum", "drum_of"]
 
 _TURN = 2 * pi
 CLIMB = 0.1
-"""Angle over which a rope climbs to the next turn of a spiral, rad; Eq. 2 has it in a point."""
+"""Angle over which a cable climbs to the next turn of a spiral, rad; zero in Eq. 2."""
 
 
 class Drum(ABC):
-    """Rope on a drum: all angles are the total wound angle in rad, all lengths in m."""
+    """Cable on a drum: all angles are the total wound angle in rad, all lengths in m."""
 
     @abstractmethod
     def wound(self, angle: float) -> tuple[float, float]:
@@ -25,12 +25,12 @@ class Drum(ABC):
 
     @abstractmethod
     def angle(self, wound: float) -> float:
-        """Wound angle that holds a wound length."""
+        """Wound angle of a wound length."""
 
 
 @dataclass(frozen=True)
 class Spiral(Drum):
-    """Every turn lies ``growth`` higher than the one before (Eq. 2 of the CABTIVE paper).
+    """The radius of every turn is larger by ``growth`` (Eq. 2 of the CABTIVE paper).
 
     The corner between two turns is rounded over ``climb`` rad, which moves the length by at
     most growth·climb/8; with ``climb = 0`` the law is Eq. 2 itself.
@@ -75,7 +75,7 @@ class Spiral(Drum):
 
 @dataclass(frozen=True)
 class Growing(Drum):
-    """The radius grows evenly with the angle: archimedean, and r² = r0² + kL alike."""
+    """The radius grows in proportion to the angle: archimedean, and r² = r0² + kL."""
 
     radius: float
     slope: float
@@ -97,7 +97,7 @@ class Growing(Drum):
 
 
 def drum_of(profile: WinchProfile, climb: float = 0.0) -> Drum:
-    """Build the drum law of a profile; raises UsageError where a number for its kind lacks."""
+    """Build the winding law of a profile; raises UsageError where a number is missing."""
     spec = profile.drum
     if spec.kind == "grooved":
         if spec.groove_pitch is None:

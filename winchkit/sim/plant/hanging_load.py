@@ -1,4 +1,4 @@
-"""A weight on a rope: rigid where nothing yields, else a mass on a damped spring."""
+"""A load on a cable: rigid without compliance, else a mass on a damped spring."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from winchkit.sim.physics.state import GRAVITY
 __all__ = ["HangingLoad"]
 
 _DAMPING_RATIO = 0.4
-"""Of a fibre rope with its load; a steel rope would swing for longer."""
+"""Damping ratio of a fibre cable with its load; that of a steel cable is lower."""
 _STIFF = 1.0
-"""A spring of a natural angular frequency above this, in 1/step, is followed without its swing."""
+"""Natural angular frequency, in 1/step, above which the oscillation is neglected."""
 
 
 @dataclass(slots=True)
 class HangingLoad:
-    """Where the load is, how fast it sinks, and what it pulls."""
+    """Position, speed and force of the load."""
 
     mass: float
     position: float
     """Cable length at the attachment, m."""
     speed: float = 0.0
-    """Positive sinks, m/s."""
+    """Positive downwards, m/s."""
     tension: float = 0.0
     """At the platform, N."""
 
     def rest(self, rope_end: float, compliance: float) -> None:
-        """Hang still below a rope that ends at ``rope_end`` while unloaded."""
+        """Set the load to rest on a cable whose unloaded end is at ``rope_end``."""
         self.tension = self.mass * GRAVITY
         self.position = rope_end + compliance * self.tension
         self.speed = 0.0
 
     def step(self, rope_end: float, rope_speed: float, compliance: float, dt: float) -> None:
-        """Advance by ``dt`` s to a rope that ends at ``rope_end``, sinking at ``rope_speed``.
+        """Advance by ``dt`` s; the unloaded end of the cable is then at ``rope_end``.
 
-        The spring-damper is stepped by the trapezoidal rule, solved in closed form; a slack
-        rope lets the load fall freely.
+        ``rope_speed`` is its downward speed. The spring and damper are integrated by the
+        trapezoidal rule in closed form; on a slack cable the load falls freely.
         """
         mass = self.mass
         if compliance * mass < (dt / _STIFF) ** 2:
@@ -59,7 +59,7 @@ class HangingLoad:
         self.tension = tension
 
     def _follow(self, rope_end: float, rope_speed: float, compliance: float, dt: float) -> None:
-        """A rope too stiff to swing: the load moves with it, and is never pushed."""
+        """Step for a stiff cable: the load moves with it, and the tension is not negative."""
         self.tension = max(0.0, self.mass * (GRAVITY - (rope_speed - self.speed) / dt))
         self.speed = rope_speed
         self.position = rope_end + compliance * self.tension

@@ -1,4 +1,4 @@
-"""The nominal way from motor angle to cable length and back, as a profile declares it."""
+"""Nominal kinematics of a profile: motor angle to cable length and inverse."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Kinematics"]
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Rigid rope on a drum behind a gearbox; angles of the motor in rad, lengths in m."""
+    """Rigid cable on a drum behind a gearbox; angles of the motor in rad, lengths in m."""
 
     drum: Drum
     gain: float
@@ -26,7 +26,7 @@ class Kinematics:
 
     @classmethod
     def of(cls, profile: WinchProfile, climb: float = 0.0) -> Kinematics:
-        """Kinematics of a profile; raises UsageError where reference.cable_length lacks."""
+        """Kinematics of a profile; raises UsageError where reference.cable_length is missing."""
         length = profile.reference.cable_length
         if length is None:
             raise UsageError(
@@ -41,7 +41,7 @@ class Kinematics:
         )
 
     def motor_angle(self, cable_length: float) -> float:
-        """Motor angle at which the free rope has this length."""
+        """Motor angle at which the free cable has this length."""
         wound = self.drum.wound(self.wound_reference)[0] + self.length_reference - cable_length
         return (self.drum.angle(wound) - self.wound_reference) / self.gain + self.motor_reference
 
@@ -52,6 +52,6 @@ class Kinematics:
         return self.length_reference - wound
 
     def arm(self, motor_angle: float) -> float:
-        """Rope wound in per motor radian, m/rad; negative where the gearbox turns it round."""
+        """Cable wound in per motor radian, m/rad; negative with a reversing gearbox."""
         angle = self.wound_reference + (motor_angle - self.motor_reference) * self.gain
         return self.drum.wound(angle)[1] * self.gain

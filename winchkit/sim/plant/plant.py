@@ -1,4 +1,4 @@
-"""One simulated winch with its rope, pulleys, load and instruments, integrated in time."""
+"""One simulated winch with its cable, pulleys, load and instruments, integrated in time."""
 
 from __future__ import annotations
 
@@ -27,12 +27,28 @@ _SMALLEST_INERTIA_SHARE = 0.05
 
 
 class WinchPlant:
-    """The truth of one winch, advanced in steps of at most 1 ms.
+    """Mechanics of one winch, integrated in steps of at most 1 ms.
 
-    ``profile`` is what is declared, ``truth`` how reality differs. It starts at rest at
-    ``cable_length`` (default: the reference), loaded, with every memory at its null. Raises
-    FileError or UsageError where the truth does not fit the profile. Formulas and signs are
-    those of the design's line model; the code shares nothing with it.
+    It starts at rest, loaded, with all effects with memory at their null. Formulas and signs are
+    those of the line model; the code is independent of it.
+
+    Parameters
+    ----------
+    profile : WinchProfile
+        The declared profile.
+    truth : WinchTruth
+        Differences from it.
+    seed : int or str
+        Seed of the noise.
+    noise : NoiseSpec, optional
+        Noise of the instruments.
+    cable_length : float, optional
+        Initial cable length, m; by default that of the reference.
+
+    Raises
+    ------
+    FileError, UsageError
+        Where the truth does not match the profile.
     """
 
     def __init__(
@@ -86,11 +102,11 @@ class WinchPlant:
         self._torque_signal = bound["torque_signal"]
         self._length_signal = bound["length_signal"]
 
-    # What is true now.
+    # True state.
 
     @property
     def time(self) -> float:
-        """Since the plant was made, s."""
+        """Time since the start, s."""
         return self._state.time
 
     @property
@@ -120,7 +136,7 @@ class WinchPlant:
 
     @property
     def load_mass(self) -> float:
-        """What hangs on the rope, kg."""
+        """Mass of the load, kg."""
         return self._load.mass
 
     @property
@@ -133,19 +149,19 @@ class WinchPlant:
         """degC."""
         return self._state.temperature
 
-    # What can be done to it.
+    # Inputs.
 
     def hang(self, mass: float) -> None:
-        """Hang another load, which comes to rest at once; UsageError unless positive."""
+        """Attach another load (kg), which is at rest at once; UsageError unless positive."""
         if not mass > 0:
             raise UsageError(
-                f"a load of {mass:g} kg cannot hang; an empty hook has some grams, 0.01 kg"
+                f"a load of {mass:g} kg is impossible; an empty hook has some grams, 0.01 kg"
             )
         self._load.mass = mass
         self._settle()
 
     def warm(self, temperature: float) -> None:
-        """Bring everything to a temperature (degC), from where it drifts on."""
+        """Set the temperature (degC), from which the declared drift continues."""
         drifted = self._truth.temperature_drift / 3600 * self._state.time
         self._truth = replace(self._truth, temperature=temperature - drifted)
         self._state.temperature = temperature
@@ -160,7 +176,7 @@ class WinchPlant:
             self._step(duration / count, command)
 
     def measure(self) -> Measurement:
-        """Read every instrument now, each with fresh noise."""
+        """Read every instrument, each with new noise."""
         return self._instruments.read(
             self._state,
             motor_torque=self._torque_reading,
@@ -169,12 +185,12 @@ class WinchPlant:
         )
 
     def read(self, quantity: str) -> float:
-        """Read one instrument now, by the name of its quantity in :class:`Measurement`."""
+        """Read one instrument, by the name of its quantity in :class:`Measurement`."""
         read = {"tension": self._cell_reading, "cable_length": self._length_reading}
         true: float = read.get(quantity, getattr(self._state, quantity))
         return true + self._instruments.noise(quantity, self._state.time)
 
-    # How it goes on.
+    # Integration.
 
     def _settle(self) -> None:
         """Find the state at rest under the present load."""
@@ -182,7 +198,7 @@ class WinchPlant:
         state.motor_speed = state.motor_acceleration = 0.0
         state.rope_speed = state.rope_acceleration = 0.0
         state.load_mass = load.mass
-        # Compliance needs the rope's end and a stretch may need the tension: settle in two goes.
+        # The compliance depends on the cable's end, an elongation on the tension: two iterations.
         for _ in range(2):
             self._wind(0.0)
             compliance = sum(hook(state) for hook in self._compliance)
@@ -223,7 +239,7 @@ class WinchPlant:
         self._sense(dt)
 
     def _wind(self, dt: float) -> float:
-        """Motor angle to unstrained rope; returns the speed at which it is wound in."""
+        """Motor angle to unstrained cable; returns the winding speed."""
         state, chain = self._state, self._kinematics
         slope, rate = 1.0, 0.0
         state.drum_angle = (state.motor_angle - chain.motor_reference) * chain.gain
@@ -250,7 +266,7 @@ class WinchPlant:
         return total
 
     def _pull(self, dt: float) -> None:
-        """Tension from the platform to the drum, and what the motor needs against it."""
+        """Tension from the platform to the drum, and the motor torque against it."""
         state = self._state
         tension = state.load
         for weigh in self._weight:
@@ -273,7 +289,7 @@ class WinchPlant:
         state.motor_torque = torque if self._powered else 0.0
 
     def _sense(self, dt: float) -> None:
-        """What the instruments would read without noise."""
+        """Readings of the instruments without noise."""
         state = self._state
         reading = state.tension
         for sense in self._cell:
@@ -290,7 +306,7 @@ class WinchPlant:
 
 
 def _true_winch(profile: WinchProfile, truth: WinchTruth) -> tuple[WinchProfile, list[Physics]]:
-    """The profile as it truly is, and the physics that it does not declare."""
+    """The true profile, and the effects outside it."""
     true = overridden(profile, truth.overrides)
     pieces = declared(true, build(truth.hidden))
     for piece in pieces:

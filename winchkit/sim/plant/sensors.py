@@ -1,4 +1,4 @@
-"""The instruments of a simulated winch: what they read, with their noise."""
+"""The instruments of a simulated winch: readings with noise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = [
 
 
 class Noise:
-    """Zero-mean Gaussian noise of standard deviation ``sigma``, sampled whenever it is asked.
+    """Zero-mean Gaussian noise of standard deviation ``sigma``, sampled at any times.
 
     ``colour`` is the share of the variance in an Ornstein-Uhlenbeck process of correlation
     time ``colour_time`` s, stepped exactly over any interval.
@@ -44,7 +44,7 @@ _NOISY = ("motor_torque", "tension", "load", "cable_length", "temperature")
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """What the instruments read at one instant, SI, with their noise."""
+    """Readings of the instruments at one instant with noise, SI."""
 
     time: float
     motor_angle: float
@@ -57,7 +57,7 @@ class Measurement:
 
 
 class Instruments:
-    """Adds to every reading noise of its own, which a seed brings back."""
+    """Adds independent noise to every reading, reproducible by a seed."""
 
     def __init__(self, noise: NoiseSpec, seed: int | str) -> None:
         self._noise = {
@@ -76,7 +76,7 @@ class Instruments:
     def read(
         self, state: State, *, motor_torque: float, tension: float, cable_length: float
     ) -> Measurement:
-        """Read now; the arguments are what drive, cell and length instrument make of the truth."""
+        """Read; the arguments are outputs of drive, cell and length instrument without noise."""
         noise = {name: self.noise(name, state.time) for name in _NOISY}
         return Measurement(
             state.time,

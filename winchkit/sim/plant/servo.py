@@ -1,4 +1,4 @@
-"""The inner loops of a drive: how the motor follows a command, within its torque, or not at all."""
+"""The inner control loops of a drive: response of the motor to a command within its torque."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _BRAKE_DECELERATION = 2000.0
 
 @dataclass(frozen=True)
 class DriveCommand:
-    """What a drive's power stage is told, SI, in the motor's frame.
+    """Command to a drive's power stage, SI, in the motor's frame.
 
-    With ``power`` the motor follows ``speed``, and ``angle`` where one is given (``speed`` is
-    then its feed-forward); with a ``torque`` it makes that torque instead, as long as it turns
-    no faster than ``top_speed``. Without power the motor is free, held only by the ``brake``.
+    With ``power`` the motor follows ``speed``, and ``angle`` if given (``speed`` is then its feed
+    forward); with a ``torque`` it produces this torque up to ``top_speed``. Without power the motor
+    is free or held by the ``brake``.
     """
 
     power: bool = True
@@ -29,11 +29,11 @@ class DriveCommand:
     angle: float | None = None
     """rad; None for a plain speed command."""
     brake: bool = False
-    """Whether the brake is closed; it wins over the motor."""
+    """Whether the brake is closed, which stops the motor in any case."""
     torque_limit: float = inf
-    """N m, of positive torque, and of negative torque unless that has its own limit."""
+    """Limit of positive torque, and of negative torque without a limit of its own, N m."""
     negative_limit: float | None = None
-    """N m, of negative torque, as a positive number."""
+    """Limit of negative torque, as a positive number, N m."""
     torque: float | None = None
     """N m."""
     top_speed: float = inf
@@ -41,7 +41,7 @@ class DriveCommand:
 
     @property
     def torque_band(self) -> tuple[float, float]:
-        """Least and greatest torque that the motor may make, N m."""
+        """Lowest and highest permitted motor torque, N m."""
         below = self.torque_limit if self.negative_limit is None else self.negative_limit
         return -below, self.torque_limit
 
@@ -52,11 +52,11 @@ class DriveCommand:
 
 
 class Servo:
-    """Speed loop and set-point filter, both first order of 4 ms, under a position loop.
+    """Speed loop and set-point filter, both first order of 4 ms, within a position loop.
 
-    Both are stepped exactly for a held goal. A bench in real time is stepped whenever anything
-    happens on it; a force that depended on the length of the last step would be read by a load
-    cell that converts in step with those happenings, as if the load's mass were another.
+    Both are integrated exactly for a constant target. A bench in real time is integrated in steps
+    of irregular length. A force that depended on the step length would bias a load cell whose
+    conversions are synchronous with the steps.
     """
 
     def __init__(self) -> None:
@@ -74,8 +74,8 @@ class Servo:
     ) -> float:
         """Mean acceleration of the motor over the next ``dt`` s, rad/s².
 
-        ``idle_torque`` is what the motor needs at constant speed, ``inertia`` (kg m²) what it
-        accelerates: together they tell what a torque limit allows.
+        ``idle_torque`` (N m) is the torque at constant speed, ``inertia`` (kg m²) the accelerated
+        inertia; a torque limit restricts the acceleration by both.
         """
         if not dt > 0:
             raise UsageError(f"a time step of {dt:g} s must be positive")
@@ -102,7 +102,7 @@ class Servo:
         return (torque - idle_torque) / inertia
 
     def _towards(self, goal: float, speed: float, dt: float) -> float:
-        """Mean acceleration of two equal lags in a row while their goal is held."""
+        """Mean acceleration of two equal lags in series at a constant target."""
         keep = exp(-dt / _LAG)
         before = self._filtered - goal
         self._filtered = goal + keep * before
@@ -111,6 +111,6 @@ class Servo:
 
 
 def _below(top: float, speed: float, acceleration: float, dt: float) -> float:
-    """The acceleration that does not lead beyond a top speed."""
+    """Acceleration limited so that the top speed is not exceeded."""
     reached = speed + acceleration * dt
     return acceleration if abs(reached) <= top else (copysign(top, reached) - speed) / dt

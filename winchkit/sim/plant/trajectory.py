@@ -12,7 +12,7 @@ __all__ = ["SCurve", "plan"]
 
 @dataclass(frozen=True)
 class SCurve:
-    """A move of ``distance`` from rest to rest; SI units of whatever moves (m or rad)."""
+    """A move of ``distance`` from rest to rest; SI units of the moved coordinate (m or rad)."""
 
     distance: float
     jerk: float
@@ -28,7 +28,7 @@ class SCurve:
         return 4 * self.jerk_time + 2 * self.constant_time + self.cruise_time
 
     def at(self, time: float) -> tuple[float, float]:
-        """Distance gone and speed at ``time``; the ends hold outside the move."""
+        """Distance and speed at ``time``; constant outside the move."""
         if time < 0.0:
             return 0.0, 0.0
         if time >= self.duration:

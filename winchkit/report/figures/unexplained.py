@@ -1,4 +1,4 @@
-"""The unexplained rest as a curve along what it lives over, of winches and of robots."""
+"""The unexplained residual as a curve over its main variable, of winches and of robots."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from winchkit.report.figures.reduction import curve_of
 from winchkit.report.html.chart import Chart, axis_over, reading
 from winchkit.report.html.markup import Markup, element
 from winchkit.report.words.numbers import scale_for, unbroken
-from winchkit.report.words.sentence import capital, telling, where_text
+from winchkit.report.words.sentence import capital, main_patterns, where_text
 
 __all__ = [
-    "rest_figures",
-    "rest_of",
+    "unexplained_curve",
+    "unexplained_figures",
 ]
 
 
-def rest_of(answer: Answer, where: Where) -> tuple[Array, Array]:
+def unexplained_curve(answer: Answer, where: Where) -> tuple[Array, Array]:
     """Mean of the variable and of the residual in every bin, (bins,) each, SI."""
     over = Followed(where.output, where.variable, where.share, where.order, line=where.line)
     if isinstance(answer, RobotAnswer):
@@ -35,17 +35,17 @@ def rest_of(answer: Answer, where: Where) -> tuple[Array, Array]:
     return curve.x, curve.mean
 
 
-def rest_figures(answer: Answer) -> list[Markup]:
-    """One figure per output; none where nothing is left, or where only a frequency is known."""
+def unexplained_figures(answer: Answer) -> list[Markup]:
+    """One figure per output; none without a residual, or where only its frequency is known."""
     if answer.diagnosis.verdict not in {"partly", "unknown"}:
         return []
-    places = [w for w in telling(answer.diagnosis.where) if w.frequency is None]
+    places = [w for w in main_patterns(answer.diagnosis.where) if w.frequency is None]
     figures = [_figure(answer, where) for where in places]
     return [element("div", *figures, class_="pair maps")] if figures else []
 
 
 def _figure(answer: Answer, where: Where) -> Markup:
-    at, residual = rest_of(answer, where)
+    at, residual = unexplained_curve(answer, where)
     how = reading(where.variable, within_turn=where.order is not None)
     x = [float(v) for v in how.shown(at)]
     scale = scale_for(3 * float(abs(residual).max()), LADDER_UNITS[where.output])
