@@ -14,6 +14,8 @@ from socketcan.machine import CHANNELS, Finished, Unavailable, run
 pytestmark = pytest.mark.realtime
 
 SUITE = Path(__file__).parents[1] / "support" / "socketcan" / "suite.py"
+STALL = "decides nothing: this computer did not run the test's processes"
+"""In the reason of a skip by tests/conftest.py; the machine has one processor inside a busy one."""
 _LINE = re.compile(rf"\(\d+\.\d+\) {CHANNELS[0]} ([0-9A-F]{{3}}#[0-9A-F]*)")
 
 
@@ -37,17 +39,14 @@ def boot(folder: Path) -> Finished:
 
 @pytest.mark.timeout(900)
 def test_the_conformance_suite_passes_and_candump_saw_it(tmp_path: Path) -> None:
-    logs = tmp_path / "first"
+    logs = tmp_path / "logs"
     done = boot(logs)
-    if done.returncode != 0:
-        # One processor inside another busy one; a defect fails twice.
-        logs = tmp_path / "second"
-        done = boot(logs)
     assert done.returncode == 0, done.output
     passed = re.search(r"(\d+) passed", done.output)
     assert passed is not None
     assert int(passed[1]) > 30
-    assert "skipped" not in done.output
+    skipped = re.findall(r"^SKIPPED .*", done.output, re.MULTILINE)
+    assert all(STALL in line for line in skipped), skipped
     log = (logs / "candump.log").read_text(encoding="ascii")
     assert "DROPCOUNT" not in log
     dumped = [match[1] for match in map(_LINE.fullmatch, log.splitlines()) if match]
@@ -55,3 +54,5 @@ def test_the_conformance_suite_passes_and_candump_saw_it(tmp_path: Path) -> None
     seen = (logs / "seen.log").read_text(encoding="ascii").splitlines()
     assert len(seen) > 2000
     assert by_identifier(seen) == by_identifier(dumped)
+    if skipped:
+        pytest.skip(f"in the machine: {'; '.join(skipped)}")

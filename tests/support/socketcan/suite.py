@@ -29,7 +29,7 @@ def main(folder: Path) -> int:
         # -d tells of frames that it lost, -L is its log format.
         witness = subprocess.Popen(["candump", "-d", "-L", "-r", "4000000", CHANNEL], stdout=log)
         time.sleep(_WAKE)
-        options = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--durations=3"]
+        options = ["-q", "-rs", "-p", "no:cacheprovider", "-p", "no:xdist", "--durations=3"]
         suite = [sys.executable, "-m", "pytest", *map(str, SUITES), *options]
         code = subprocess.run(suite, check=False).returncode
         time.sleep(_WAKE)

@@ -17,7 +17,7 @@ from winchkit.units import suggest
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.design.plan import Offer
-    from winchkit.diagnosis.design.programmes import Room
+    from winchkit.diagnosis.design.programmes import OperatingRange
     from winchkit.diagnosis.robot.plan import PosePlan
     from winchkit.effects.term import Term
     from winchkit.schema.bench import LimitSpec
@@ -99,13 +99,13 @@ def _poses_text(plan: PosePlan) -> str:
 
 def _indistinguishable(plan: PosePlan) -> list[str]:
     """What no poses tell apart, and what does."""
-    from winchkit.diagnosis.robot.pose_design import WORTHWHILE
+    from winchkit.diagnosis.robot.pose_design import LEAST_POWER
     from winchkit.effects.effect import told_apart
     from winchkit.report.words.columns import paragraph
 
     lines = []
     for index, (first, second) in enumerate(plan.pairs):
-        if max(offer.powers[index] for offer in plan.offers) < WORTHWHILE:
+        if max(offer.powers[index] for offer in plan.offers) < LEAST_POWER:
             names = f"{first.effect.id} / {second.effect.id}"
             what = told_apart(first.effect, second.effect)
             lines += paragraph(f"{names}: no such poses tell them apart. What does: {what}")
@@ -185,7 +185,7 @@ def _plan_winch(
 ) -> None:
     """The next programme of one winch."""
     from winchkit.diagnosis.design.plan import offers, programme_of
-    from winchkit.diagnosis.design.programmes import allowed, seen
+    from winchkit.diagnosis.design.programmes import range_of_limits, range_of_runs
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.schema.programme import write_programme
 
@@ -193,19 +193,32 @@ def _plan_winch(
     catalogue = asked.catalogue
     answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
     regression, pairs = answer.engine.regression, answer.pairs
-    room = seen(regression.dataset) if limits is None else allowed(regression.dataset, limits)
+    operating_range = (
+        range_of_runs(regression.dataset)
+        if limits is None
+        else range_of_limits(regression.dataset, limits)
+    )
     noise = answer.result.noise.rms
-    found = offers(regression, pairs, noise, list(catalogue), bar=answer.bar, room=room)
+    found = offers(
+        regression,
+        pairs,
+        noise,
+        list(catalogue),
+        threshold=answer.threshold,
+        operating_range=operating_range,
+    )
     if output:
         path = Path(output)
-        write_programme(programme_of(regression.dataset, found[0].kind, path.stem, room), path)
+        write_programme(
+            programme_of(regression.dataset, found[0].kind, path.stem, operating_range), path
+        )
         click.echo(f"written: {output}", err=True)
     if as_json:
         listed = [offer.to_json(pairs) for offer in found]
         echo_json({"schema": 1, "offers": listed, "programme": output})
     else:
         click.echo(_text(found, pairs, named=bool(answer.sets)))
-        for line in _silent(found, pairs, room, widened=limits is not None):
+        for line in _silent(found, pairs, operating_range, widened=limits is not None):
             click.echo(line)
 
 
@@ -226,18 +239,23 @@ def _limits(bench: str, winch: str | None) -> LimitSpec:
 
 
 def _silent(
-    found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], room: Room, *, widened: bool
+    found: Sequence[Offer],
+    pairs: Sequence[tuple[Term, Term]],
+    operating_range: OperatingRange,
+    *,
+    widened: bool,
 ) -> list[str]:
     """What none of these programmes tells apart, and what does."""
-    from winchkit.diagnosis.design.plan import hopeless
+    from winchkit.diagnosis.design.plan import inseparable
     from winchkit.effects.effect import told_apart
 
     lines = []
-    for first, second in hopeless(found, pairs):
+    for first, second in inseparable(found, pairs):
         names = f"{first.effect.id} / {second.effect.id}"
         lines.append(
-            f"{names}: no such motion within {room.low:.2f} m to {room.high:.2f} m tells them "
-            f"apart. What does: {told_apart(first.effect, second.effect)}"
+            f"{names}: no such motion within {operating_range.low:.2f} m to "
+            f"{operating_range.high:.2f} m tells them apart. What does: "
+            f"{told_apart(first.effect, second.effect)}"
         )
     if lines and not widened:
         lines.append("With --bench BENCH.toml the plan goes as far as that bench may.")
