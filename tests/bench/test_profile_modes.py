@@ -73,7 +73,7 @@ def test_a_coasting_code_is_refused_without_a_brake() -> None:
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("in_drive = true", "there is no `length` for the drive to keep"),
+        ("in_drive = true", "needs `length`, the limits that the drive"),
         ('torque = "1"', "has no unit"),
         ('following_error = "-1 mm"', "above 0"),
     ],

@@ -90,7 +90,7 @@ def test_a_file_of_ones_own_says_the_same(effect_id: str, tmp_path: Path) -> Non
     assert mine == pytest.approx(begun, rel=1e-5)
     null = predicted_with("spiral", Term(own, own.null), motion)["tension"]
     assert np.array_equal(null, predicted_with("spiral", None, motion)["tension"])
-    with pytest.raises(FileError, match="is there already"):
+    with pytest.raises(FileError, match="exists already"):
         write_own(Term(effect, values), "own-idea", file)
 
 

@@ -160,7 +160,7 @@ def test_every_fault_of_a_robots_effects_is_told_with_its_line(tmp_path: Path) -
         "acts in motion only",
         "did you mean 'exit-point'",
         "unknown key; it has radius_error",
-        "stands twice at one place",
+        "is declared twice for one line or for all",
     ):
         assert words in told
     assert all(fault.line for fault in check_robot(profile))

@@ -74,7 +74,7 @@ def test_what_keeps_them_is_read(tmp_path: Path, formula: str) -> None:
         (
             'value + 1 + values["scale"]',
             r"mine.py: effect 'mine' changes the tension by up to 1 N where it should vanish "
-            r"\(scale = 0\); at its null it must return the value as it is",
+            r"\(scale = 0\); at its null it must return its input",
         ),
         ('value + values["scale"] * np.nan', "changes the tension into no number where it should"),
         ("value / 0.0", "changes the tension into no number where it should vanish"),

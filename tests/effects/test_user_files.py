@@ -101,11 +101,11 @@ def test_an_id_that_is_taken_is_refused_and_a_file_given_twice_is_one(tmp_path: 
 @pytest.mark.parametrize(
     ("effect_id", "name", "said"),
     [
-        ("my-own", "mine.txt", "is no Python file; name it mine.py"),
-        ("my own", "mine.py", "'my own' is no id of an effect"),
-        ("Mine", "mine.py", "'Mine' is no id of an effect"),
+        ("my-own", "mine.txt", "is not a Python file; name it mine.py"),
+        ("my own", "mine.py", "'my own' is not an id of an effect"),
+        ("Mine", "mine.py", "'Mine' is not an id of an effect"),
         ("cell-gain", "mine.py", "there is an effect 'cell-gain' already"),
-        ("my-own", "there.py", "there.py: is there already"),
+        ("my-own", "there.py", "there.py: exists already"),
     ],
 )
 def test_a_new_file_is_refused_before_any_work(

@@ -64,7 +64,7 @@ def test_every_verdict_has_the_detectable_effects(bench: str) -> None:
 
 def test_the_shape_of_a_rest_is_drawn_where_it_lives() -> None:
     lines = report_text(answer_of("five-cornered-drum")).splitlines()
-    at = next(n for n, line in enumerate(lines) if "5 times per drum turn" in line and n > 5)
+    at = next(n for n, line in enumerate(lines) if "5 periods per drum turn" in line and n > 5)
     heights = np.array(["▁▂▃▄▅▆▇█".index(bar) for bar in lines[at + 1].split()[0]])
     # The bench hides a drum with five corners.
     assert int(np.argmax(np.abs(np.fft.rfft(heights - heights.mean())))) == 5

@@ -120,7 +120,7 @@ def test_what_cannot_be_recovered(tmp_path: Path, data: bytes) -> None:
     with pytest.raises(FileError, match="cannot be written"):
         recover(path, tmp_path / "nowhere" / "b.mcap")
     (tmp_path / "b.mcap").write_text("time [s]\n")
-    with pytest.raises(RunError, match="no MCAP file"):
+    with pytest.raises(RunError, match="not an MCAP file"):
         recover(tmp_path / "b.mcap")
     (tmp_path / "b.txt").write_text("x")
     with pytest.raises(RunError, match="no format of a log"):

@@ -133,7 +133,7 @@ def test_a_shorthand_beside_its_effect(file: Path, key: str, value: str, effect:
         ('profile = "w"', 'profile = "v"', 12, "winch.A.profile", "no profile 'v'"),
         ('channel = "x"\n', "", 3, "bus.can.channel", "a can bus needs it"),
         ('host = "127.0.0.1"\n', "", 7, "bus.cells.host", "a modbus-tcp bus needs it"),
-        ("port = 502", 'port = "/dev/x"', 10, "bus.cells.port", "no TCP port"),
+        ("port = 502", 'port = "/dev/x"', 10, "bus.cells.port", "not a TCP port"),
         ("port = 502", "port = 1.5", 10, "bus.cells.port", "not 1.5"),
         ("limits = {", 'brake = "yes"\nlimits = {', 15, "winch.A.brake", "true or false"),
         (

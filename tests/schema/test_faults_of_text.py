@@ -54,7 +54,7 @@ def test_no_file_a_directory_and_an_odd_name(tmp_path: Path) -> None:
     for path, part in (
         (tmp_path / "nowhere.toml", "no such file"),
         (tmp_path, "directory"),
-        ("a\0b.toml", "no usable file name"),
+        ("a\0b.toml", "not a usable file name"),
     ):
         with pytest.raises(FileError, match=part):
             read_any(path)

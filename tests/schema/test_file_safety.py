@@ -308,7 +308,7 @@ def test_check_executes_nothing_that_a_file_names(trap: tuple[Path, Path]) -> No
     own = bench.with_name("mine.py")
     result = run("check", bench, "--effects", own)
     assert marker.exists(), "--effects is the user's own word"
-    assert "holds no winchkit.effects.effect.Effect" in result.stderr
+    assert "has no object of class winchkit.effects.effect.Effect" in result.stderr
     assert "does not execute" not in result.stderr
 
 

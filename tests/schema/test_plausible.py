@@ -72,7 +72,7 @@ def test_a_gear_ratio_without_sense_is_refused(file: Path, ratio: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('to = "2 m"', 'to = "-5 m"', "a cable length is not below 0"),
+        ('to = "2 m"', 'to = "-5 m"', "a cable length is at least 0"),
         ('speed = "0.1 m/s"', 'speed = "1e308 m/s"', "at most 50 m/s"),
         ('to = "2 m"\nspeed = "0.1 m/s"', 'hold = "1e308 s"', "at most 1e+07 s"),
         ('kind = "programme"', 'kind = "programme"\nrepeat = 100000000000', "out of range"),
@@ -101,7 +101,7 @@ def test_a_bench_without_length_or_tension_limits_is_warned_of(bench: Path) -> N
 
 def test_a_slow_heartbeat_is_warned_of(bench: Path) -> None:
     text = LIMITED.replace('channel = "x"', 'channel = "x"\nheartbeat = "800 ms"')
-    assert "go on for up to 2 s" in checked(bench, text).stderr
+    assert "run on for up to 2 s" in checked(bench, text).stderr
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def plans(motion: Programme, start: float = 4.0) -> list:
 @pytest.mark.parametrize("steps", [(Step(to=2.0),), (Step(by=0.0),), (Step(ask="hang"),)])
 def test_a_programme_that_leaves_nothing_to_record_is_told(steps: tuple[Step, ...]) -> None:
     """Its repeats end where they begin: no file would be written, and nobody would know why."""
-    with pytest.raises(FileError, match="nothing moves and nothing is held"):
+    with pytest.raises(FileError, match="neither a move nor a hold"):
         plans(programme(*steps, repeat=2))
 
 

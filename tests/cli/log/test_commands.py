@@ -154,7 +154,7 @@ def test_replay_prints_what_the_bench_would(log: Path) -> None:
         ([], "--bench"),
         (["-b", "bench.toml"], "--output"),
         (["-b", "bench.toml", "--jsonl", "--json", "-o", "a.csv"], "choose one"),
-        (["-b", "bench.toml", "-o", "a.csv", "--rotate", "7"], "no size of a part"),
+        (["-b", "bench.toml", "-o", "a.csv", "--rotate", "7"], "not a size of a part"),
         (["-b", "bench.toml", "-o", "a.csv", "--udp", "x"], "no HOST:PORT"),
         (["inof"], "did you mean 'info'"),
     ],

@@ -318,7 +318,7 @@ def test_errors_of_all_winches(both: list[Path], tmp_path: Path) -> None:
     page = tmp_path / "c.html"
     told = invoke(*asked, "--html", page)
     assert told.exit_code == 0
-    assert "what the errors of all follow" in told.stdout
+    assert "share of the errors' variance explained by" in told.stdout
     assert '<a href="c-B.html">B</a>' in page.read_text(encoding="utf-8")
     assert (tmp_path / "c-B.html").is_file()
 

@@ -39,7 +39,7 @@ def test_the_curve_is_offered_added_and_marked(cornered: list[Path], tmp_path: P
     assert torque["heldout_rms_after"] < 0.8 * torque["heldout_rms_before"]
     (table,) = read_winch(new).effect
     assert table.values["order"] == 5.0
-    assert "Not understood" in invoke("effects", table.id).stdout
+    assert "Cause unknown" in invoke("effects", table.id).stdout
 
 
 def test_a_file_begun_from_the_runs_explains_them(cornered: list[Path], tmp_path: Path) -> None:
@@ -53,7 +53,7 @@ def test_a_file_begun_from_the_runs_explains_them(cornered: list[Path], tmp_path
     assert abs(size["value"] - 0.3e-3) < 5 * size["std"]
     again = invoke("effects", "new", mine, "-p", "bench-spiral", "--fit", *cornered)
     assert again.exit_code == 3
-    assert "is there already" in again.stderr
+    assert "exists already" in again.stderr
 
 
 def test_a_curve_of_ones_choice_and_one_that_is_none(cornered: list[Path], tmp_path: Path) -> None:

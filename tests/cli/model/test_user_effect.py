@@ -66,7 +66,7 @@ def test_an_own_effect_that_cannot_be_loaded_says_where(bent: list[Path], tmp_pa
     broken = tmp_path / "broken.py"
     for text, said in (
         ("def apply(:\n", f"{broken}:1: cannot be run: SyntaxError"),
-        ("x = 1\n", f"{broken}: holds no winchkit.effects.effect.Effect"),
+        ("x = 1\n", f"{broken}: has no object of class winchkit.effects.effect.Effect"),
         ("import nothing_like_it\n", f"{broken}: cannot be run: ModuleNotFoundError"),
     ):
         broken.write_text(text)

@@ -211,7 +211,7 @@ def test_text_tells_each_winch_in_a_line_and_then_what_is_common() -> None:
 def test_nothing_is_shared_where_nothing_was_found() -> None:
     found = {name: said() for name in NAMES}
     assert shared_effects(found, CATALOGUE) == ()
-    assert "nothing above the noise" in shared_effects_text(found, (), {})
+    assert "residual at the noise floor" in shared_effects_text(found, (), {})
 
 
 def test_as_json() -> None:
@@ -231,7 +231,9 @@ def test_an_alarm_of_one_of_eight_is_eight_times_as_likely() -> None:
     noise = random.uniform(size=(20_000, len(NAMES))).min(axis=1)
     assert told == {"E": pytest.approx(np.mean(noise < 0.01), abs=0.006)}
     lines = shared_effects_text(found, (), told).splitlines()
-    assert "by chance in one of 8 winches: 7.7 % of recordings" in " ".join(" ".join(lines).split())
+    assert "false alarm of one in 8 winches: 7.7 % of recordings" in " ".join(
+        " ".join(lines).split()
+    )
     # What was named is no mere alarm, and without repeats there is no chance to tell.
     named = said(step([RUBS], torque=(0.08, 0.001)), verdict="partly")
     assert alarms({"A": named, "B": said(verdict="unknown")}, {"A": 0.01, "B": np.nan}) == {}

@@ -166,7 +166,9 @@ def test_three_ropes_to_one_point_hold_it_and_the_platform_hangs_below() -> None
 
 def test_a_free_platform_needs_its_mass() -> None:
     geometry = suspended()
-    with pytest.raises(UsageError, match=r"4 lines leave the platform 2 freedoms.*give .*mass"):
+    with pytest.raises(
+        UsageError, match=r"4 lines leave the platform 2 degrees of freedom.*give .*mass"
+    ):
         forward(geometry, np.full((1, 4), 3.0), LEVEL)
     with pytest.raises(UsageError, match="3 lengths were given for a robot of 4 lines"):
         forward(geometry, np.full((1, 3), 3.0), LEVEL, HEAVY)

@@ -127,7 +127,7 @@ def test_other_columns_are_kept_and_text_is_left_out(file: Path) -> None:
     assert set(run) == {"motor_angle", "tensoin", "wild"}
     assert run.notes == (
         "column 'tensoin' is kept and not used; did you mean 'tension'?",
-        "column 3 'state' holds text and is left out",
+        "column 3 'state' contains text and is left out",
     )
 
 
@@ -156,7 +156,7 @@ def test_whichever_program_wrote_it(file: Path, encode: object) -> None:
         ("# load_mass: 15 kg\n", None, "no header"),
         ("time [s],motor_angle [rad]\n", None, "no rows"),
         ("time [s],motor_angle [rad]\n0,0\n", None, "one row only"),
-        ("0,1,2\n1,2,3\n", 1, "the first line holds numbers"),
+        ("0,1,2\n1,2,3\n", 1, "the first line has numbers"),
         (PLAIN.replace(",", ";"), 1, "semicolons"),
         (PLAIN.replace(",", "\t"), 1, "tabs"),
         (PLAIN.replace("time [s]", "t [s]"), 1, "no column 'time [s]'"),
@@ -169,8 +169,8 @@ def test_whichever_program_wrote_it(file: Path, encode: object) -> None:
         (PLAIN.replace("tension [N]", "tension [n]"), 1, "did you mean"),
         (PLAIN.replace("tension [N]", "[N]"), 1, "column 3 is called '[N]'"),
         (PLAIN.replace("tension [N]", ""), 1, "column 3 is called ''"),
-        (PLAIN.replace(",11", ",1l"), 3, "column 'tension' holds '1l'"),
-        (PLAIN.replace(",11", ",1_1"), 3, "column 'tension' holds '1_1'"),
+        (PLAIN.replace(",11", ",1l"), 3, "column 'tension' has '1l'"),
+        (PLAIN.replace(",11", ",1_1"), 3, "column 'tension' has '1_1'"),
         (PLAIN.replace(",11", ",inf"), 3, "column 'tension' is infinite"),
         (PLAIN.replace("[N]", "[kN]").replace(",11", ",1e308"), 3, "'tension' is infinite"),
         (PLAIN.replace("0.2,", "1e400,"), 4, "column 'time' is infinite"),

@@ -46,7 +46,7 @@ def test_text_far_down_makes_an_unknown_column_text(tmp_path: Path) -> None:
     rows[20_000] = "20.000,1,1,1,begun anew"
     run = read_csv(saved(tmp_path / "text.csv", rows))
     assert "remark" not in run
-    assert any("'remark' holds text" in note for note in run.notes)
+    assert any("'remark' contains text" in note for note in run.notes)
 
 
 def test_a_file_cut_off_far_down_is_told_so(tmp_path: Path) -> None:

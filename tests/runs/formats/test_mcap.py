@@ -172,10 +172,10 @@ def test_an_mcap_of_something_else(tmp_path: Path) -> None:
         writer.start()
         writer.register_channel("/camera", "ros1", 0)
         writer.finish()  # type: ignore[no-untyped-call]
-    with pytest.raises(RunError, match=r"holds no run.*/camera"):
+    with pytest.raises(RunError, match=r"has no run.*/camera"):
         read_run(path)
     path.write_bytes(b"time [s],motor_angle [rad]\n")
-    with pytest.raises(RunError, match="no MCAP file"):
+    with pytest.raises(RunError, match="not an MCAP file"):
         read_run(path)
 
 

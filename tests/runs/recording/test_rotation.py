@@ -109,7 +109,7 @@ def test_a_part_without_rows_is_a_part(tmp_path: Path) -> None:
 def test_parts_of_different_logs_are_not_joined(tmp_path: Path) -> None:
     written(tmp_path / "a.mcap", 1.0)
     written(tmp_path / "b.csv", 1.0)
-    with pytest.raises(RunError, match="no part of the same log"):
+    with pytest.raises(RunError, match="not a part of the same log"):
         read_log([tmp_path / "a.mcap", tmp_path / "b.csv"])
     with pytest.raises(RunError, match="no such file"):
         read_run(tmp_path / "none.mcap")

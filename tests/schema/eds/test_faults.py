@@ -207,7 +207,7 @@ def test_the_node_number_counts_in_any_spelling(tmp_path: Path) -> None:
 REFUSED: list[tuple[str, str, str, str]] = [
     ("DataType=0x0004", "DataType=INT32", "DataType=INT32", "'INT32' is no number"),
     ("DataType=0x0004\n", "", "[6064]", "has no DataType"),
-    ("[1001]", "[1001", "[1001", "is no section; it should read [name]"),
+    ("[1001]", "[1001", "[1001", "is not a section; it should read [name]"),
     ("ObjectType=0x9", "ObjectType=record", "ObjectType=record", "'record' is no number"),
     ("ProductNumber=3", "ProductNumber=3\nProductNumber=8", "ProductNumber=8", "'8' here and '3'"),
     ("DataType=0x0004", "DataType=0x0004\nDataType=7", "DataType=7", "'7' here and '0x0004'"),
@@ -240,10 +240,10 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"", ":1: is no EDS: it has no sections"),
-        (b"; only a comment\n", ":1: is no EDS: it has no sections"),
-        (b"\n\nhello = 3\n", ":3: is no EDS: expected a section"),
-        (b"<?xml version='1.0'?>\n", ":1: is no EDS: expected a section"),
+        (b"", ":1: is not an EDS: it has no sections"),
+        (b"; only a comment\n", ":1: is not an EDS: it has no sections"),
+        (b"\n\nhello = 3\n", ":3: is not an EDS: expected a section"),
+        (b"<?xml version='1.0'?>\n", ":1: is not an EDS: expected a section"),
         (b"[FileInfo]\n\x00\x01\x02", ":2: is binary, not the text of an EDS"),
     ],
 )
