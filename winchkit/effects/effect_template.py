@@ -72,7 +72,7 @@ PARAMETERS = (Parameter("scale", "1", null=0.0, typical=1.0, low=-100.0, high=10
 POLAR = None
 '''
 FOOT = """
-# Stage at which it acts. Control uses effects on the cable (Stage.ROPE, FRAME, PULLEY, CELL), not
+# Stage at which it acts. Control uses effects on the cable (Stage.CABLE, FRAME, PULLEY, CELL), not
 # those on an instrument or the torque: 'winchkit effects {id} --effects {file}' prints which.
 EFFECT = Effect(
     id="{id}",

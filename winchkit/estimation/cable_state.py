@@ -110,12 +110,12 @@ class RopeNow:
         self.at_rest = Line(profile, modifiers_of(t for t in used if not t.effect.memory))
         """Without what has a memory, for planning."""
         self.yields = any(
-            _on_length(t) and (t.effect.memory or t.effect.stage >= Stage.ROPE) for t in used
+            _on_length(t) and (t.effect.memory or t.effect.stage >= Stage.CABLE) for t in used
         )
         """Whether the length depends on more than the motor angle."""
         self._carried = [_Carried(term) for term in used]
         self._line = Line(profile, tuple(item.modifier() for item in self._carried))
-        self._on_tension = any(Stage.ROPE_WEIGHT <= t.effect.stage <= Stage.CELL for t in used)
+        self._on_tension = any(Stage.CABLE_WEIGHT <= t.effect.stage <= Stage.CELL for t in used)
         self.trivial = not (self.yields or self._on_tension)
         """Whether ``at_rest`` says all that there is to say."""
         self._weight = weight or 0.0

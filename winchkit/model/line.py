@@ -183,7 +183,7 @@ class Line:
             free_length=way.free_length,
         )
         length: Array = way.free_length
-        for stage in (Stage.ROPE, Stage.FRAME, Stage.LENGTH_INSTRUMENT):
+        for stage in (Stage.CABLE, Stage.FRAME, Stage.LENGTH_INSTRUMENT):
             length = self._through(stage, length, at)
         return length
 
@@ -218,7 +218,7 @@ class Line:
 
     def _over_the_pulleys(self, load: Array, at: At) -> Array:
         """Tension at the drum from the tension at the platform, N."""
-        tension = self._through(Stage.ROPE_WEIGHT, load, at)
+        tension = self._through(Stage.CABLE_WEIGHT, load, at)
         if Stage.PULLEY in self._stages:
             for index in reversed(range(len(self.profile.pulley))):
                 here = replace(at, pulley=index, wrap=self.profile.pulley[index].wrap)

@@ -38,13 +38,13 @@ class Stage(IntEnum):
     """Value: the :class:`~winchkit.model.drum.Drum`."""
     WOUND = 3
     """Value: :class:`Path` of the wound length over the drum angle."""
-    ROPE = 4
+    CABLE = 4
     """Value: length including the cable's strain, m."""
     FRAME = 5
     """Value: length at the exit point, m."""
     LENGTH_INSTRUMENT = 6
     """Value: reading of the length instrument, m."""
-    ROPE_WEIGHT = 7
+    CABLE_WEIGHT = 7
     """Value: tension at the last pulley, N."""
     PULLEY = 8
     """Value: tension after one pulley, N; once per pulley, ``At.wrap`` and ``At.pulley`` set."""

@@ -32,7 +32,7 @@ def apply(length, at, values):
 
 KINK = Effect(
     id="kinked-rope",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(Parameter("height", "m", null=0.0, typical=1e-3),),
     apply=apply,
     outputs=("cable_length",),

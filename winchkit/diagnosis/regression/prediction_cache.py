@@ -29,9 +29,9 @@ Correction = float | None
 _KEPT = 3
 """Entries per stage: the present hypothesis, the one of a derivative, and the previous one."""
 _WAY = (Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND)
-_FORCE = (Stage.ROPE_WEIGHT, Stage.PULLEY)
+_FORCE = (Stage.CABLE_WEIGHT, Stage.PULLEY)
 _SHOWN = {
-    "cable_length": (Stage.ROPE, Stage.FRAME, Stage.LENGTH_INSTRUMENT),
+    "cable_length": (Stage.CABLE, Stage.FRAME, Stage.LENGTH_INSTRUMENT),
     "tension": (Stage.CELL,),
     "motor_torque": (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL),
 }

@@ -24,7 +24,7 @@ def carried(after: Array, before: Array, at: At, values: Values) -> float:
 
 EFFECT = Effect(
     id="cable-creep",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(
         Parameter(
             "creep_stiffness",

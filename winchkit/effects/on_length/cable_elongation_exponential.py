@@ -15,7 +15,7 @@ def apply(length: Array, at: At, values: Values) -> Array:
 
 EFFECT = Effect(
     id="cable-elongation-exponential",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(
         Parameter("strain_scale", "1", null=0.0, typical=1e-3, low=0.0, high=0.2),
         Parameter(

@@ -14,7 +14,7 @@ def apply(length: Array, at: At, values: Values) -> Array:
 
 EFFECT = Effect(
     id="cable-elongation-linear",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(
         Parameter(
             "axial_stiffness", "N", null=np.inf, typical=2e5, low=1e3, high=np.inf, reciprocal=True

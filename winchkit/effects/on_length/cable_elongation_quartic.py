@@ -63,7 +63,7 @@ def _largest(reach: Callable[[Array], tuple[Array, Array]], force: float) -> flo
 
 EFFECT = Effect(
     id="cable-elongation-quartic",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(
         Parameter("k1", "N", null=np.inf, typical=2e5, low=1e3, high=np.inf, reciprocal=True),
         Parameter("b2", "1", null=0.0, typical=100.0, low=-1e4, high=1e5, role="shape"),

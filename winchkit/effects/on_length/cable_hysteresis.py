@@ -33,7 +33,7 @@ def carried(after: Array, before: Array, at: At, values: Values) -> float:
 
 EFFECT = Effect(
     id="cable-hysteresis",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(
         Parameter("stiffness", "N", null=2e5, typical=2e5, low=1e3, high=1e9, role="shape"),
         Parameter("fraction", "1", null=0.0, typical=0.05, low=0.0, high=0.9),

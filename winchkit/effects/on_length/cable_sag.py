@@ -25,7 +25,7 @@ def apply(length: Array, at: At, values: Values) -> Array:
 
 EFFECT = Effect(
     id="cable-sag",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(Parameter("mass_per_length", "kg/m", null=0.0, typical=0.14, low=0.0, high=50.0),),
     apply=apply,
     outputs=("cable_length",),

@@ -15,7 +15,7 @@ def apply(length: Array, at: At, values: Values) -> Array:
 
 EFFECT = Effect(
     id="cable-thermal",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(Parameter("expansion", "1/K", null=0.0, typical=1.1e-5, low=-1e-4, high=1e-4),),
     apply=apply,
     outputs=("cable_length",),

@@ -62,7 +62,7 @@ def _stretches(wound: Array) -> list[tuple[int, int]]:
 
 EFFECT = Effect(
     id="drum-winding-tension",
-    stage=Stage.ROPE,
+    stage=Stage.CABLE,
     parameters=(Parameter("fraction", "1", null=0.0, typical=5e-3, low=-0.05, high=0.05),),
     apply=apply,
     outputs=("cable_length",),

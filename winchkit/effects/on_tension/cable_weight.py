@@ -16,7 +16,7 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 
 EFFECT = Effect(
     id="cable-weight",
-    stage=Stage.ROPE_WEIGHT,
+    stage=Stage.CABLE_WEIGHT,
     parameters=(Parameter("mass_per_length", "kg/m", null=0.0, typical=0.14, low=0.0, high=50.0),),
     apply=apply,
     outputs=("tension", "motor_torque"),
