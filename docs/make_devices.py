@@ -20,16 +20,16 @@ _BEGIN = """\
 # Instruments
 
 Written by `python docs/make_devices.py` from the device files; do not edit it by hand. The same
-files drive the readers and the simulated instruments. None has been tried on the device yet.
+files are used by the readers and the simulated instruments. None has been tested on the device yet.
 """
 _TABLES = {item.__name__: item for item in (ServoSpec, PdoSpec, OptionSpec, QuirkSpec)}
 _TABLES |= {item.__name__: item for item in (VendorWatchdog, VendorObject)}
 _TRUST = {
-    "manual": "read in its manual",
-    "interoperability": "tried with another program",
-    "hardware": "tried on the device",
-    "generic": "not the word of any manual",
-    "eds": "written from its EDS alone",
+    "manual": "from its manual",
+    "interoperability": "tested with another program",
+    "hardware": "tested on the device",
+    "generic": "generic, without a manual",
+    "eds": "from its EDS only",
 }
 
 
@@ -47,7 +47,7 @@ def _drives() -> Iterator[str]:
         if name == line:
             yield line
         else:
-            yield "| key | default | is |"
+            yield "| key | default | meaning |"
             yield "|---|---|---|"
             yield from _keys(_TABLES[name.removesuffix(">")])
 
@@ -78,15 +78,15 @@ def _default(value: ast.expr) -> str:
 
 def _section(device: DeviceSpec) -> Iterator[str]:
     table = device.modbus or device.stream or device.process
-    assert table is not None, "a device that is no drive is an instrument"
+    assert table is not None, "a device other than a drive is an instrument"
     yield f"## {device.name}\n"
     described = device.description.strip().replace("<", "\\<")
     yield f"{device.maker}: {device.model}. {described}\n"
-    yield f"- on a line of kind {_line(device)}, {_how(device)}"
-    yield f"- {table.rate:g} conversions a second, a value is {table.filter_delay * 1e3:g} ms old"
+    yield f"- bus of kind {_line(device)}, {_how(device)}"
+    yield f"- {table.rate:g} conversions per second, age of a value {table.filter_delay * 1e3:g} ms"
     if device.commands:
-        told = (f"{name}{' (writes its EEPROM)' * last}" for name, last in device.commands.items())
-        yield f"- commands: {', '.join(told)}"
+        names = (f"{name}{' (writes its EEPROM)' * last}" for name, last in device.commands.items())
+        yield f"- commands: {', '.join(names)}"
     yield f"- {_TRUST[device.trust]}: {device.source}"
     if device.unconfirmed:
         yield f"- without a source: {'; '.join(device.unconfirmed)}"
@@ -102,8 +102,8 @@ def _how(device: DeviceSpec) -> str:
     if device.modbus is not None:
         return "polled"
     if device.stream is not None:
-        return "polled" if device.stream.mode == "polled" else "sends by itself"
-    return "sends by itself" if device.process and device.process.tpdo else "polled"
+        return "polled" if device.stream.mode == "polled" else "continuous"
+    return "continuous" if device.process and device.process.tpdo else "polled"
 
 
 if __name__ == "__main__":

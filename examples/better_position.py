@@ -1,4 +1,4 @@
-"""What an added effect buys: where a winch really ends, before and after its profile knows it.
+"""Position error of a winch before and after an effect is added to its profile.
 
 A simulated bench has an effect that its profile lacks. Runs are recorded, the missing effect is
 identified and added, and the winch moves to the same lengths with the original profile and with the

@@ -1,6 +1,6 @@
-"""A control programme: the cable follows a heaving ship, on a simulated bench in this process.
+"""A control program: the cable follows the heave of a ship, on a simulated bench in this process.
 
-On a real bench only the first lines differ: ``with open_bench("bench.toml") as bench``.
+For a real bench only the first lines differ: ``with open_bench("bench.toml") as bench``.
 """
 
 import math
@@ -15,9 +15,9 @@ from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 
 PERIOD = 2.0
-"""Of the waves, s."""
+"""Period of the waves, s."""
 AMPLITUDE = 0.05
-"""Of the heave, m."""
+"""Amplitude of the heave, m."""
 
 
 def heave(bench: Bench, duration: float) -> None:

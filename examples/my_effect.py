@@ -1,7 +1,7 @@
-"""An effect of one's own: the drum has five corners.
+"""A user effect: the drum is a pentagon.
 
-Any command that holds a model against runs takes it with ``--effects examples/my_effect.py``.
-It is then listed, has a card, and is a candidate of the diagnosis like every other effect.
+Any command that compares a model with runs loads it by ``--effects examples/my_effect.py``. It is
+then listed, has a card, and is a candidate of the diagnosis like every other effect.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ CORNERS = 5
 
 
 def apply(path: Path, at: At, values: Values) -> Path:
-    """Wound length (m) and torque arm (m) with a wave of five periods per drum turn on them."""
+    """Wound length (m) and torque arm (m) plus a sine of five periods per drum turn."""
     size, phase = values["amplitude"], values["phase"]
     angle = CORNERS * at.drum_angle - phase
     wave = size * (np.sin(angle) + np.sin(phase))
@@ -32,8 +32,8 @@ EFFECT = Effect(
     what="The drum is built of five segments, and the cable bends over their edges.",
     formula="W + a (sin(5φ − p) + sin p)",
     source="first harmonic of a regular pentagon",
-    looks_like="Five waves per drum turn, in length, torque and the load's acceleration.",
+    looks_like="Five periods per drum turn, in length, torque and the load's acceleration.",
     confused_with=("gear-transmission-error", "motor-cogging"),
-    told_apart="Two loads: the torque's waves grow with the load; a ratio that is no multiple.",
+    told_apart="Two loads: the torque's ripple grows with the load; a ratio that is no multiple.",
     polar=("amplitude", "phase"),
 )

@@ -1,12 +1,11 @@
-"""A control loop of one's own: hold a cable's tension by jogging its winch.
+"""A user's control loop: hold the tension of a cable by jogging its winch.
 
-A chain hangs from the winch: the longer the cable, the heavier it gets. The loop pays out while
-the load cell reads too little and winds in while it reads too much, with a speed in proportion.
+The load is a chain, whose weight increases with the cable length. The loop pays out at a tension
+below the target and winds in above it, with a speed in proportion to the error.
 
     python tension_hold.py bench.toml 250 --for 10
 
-``hold`` knows nothing of where the bench comes from, so that the tests beside this file run it on
-simulated winches.
+``hold`` takes an open bench, so that the tests beside this file run it on simulated winches.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Tests of the control loop beside this file, on simulated winches: ``pytest`` needs no hardware.
 
-``sim_bench`` is a fixture that comes with winchkit.
+``sim_bench`` is a fixture of winchkit.
 """
 
 import subprocess
@@ -15,7 +15,7 @@ from winchkit.testing.opened import OpenedBench
 from winchkit.testing.plugin import SimBench
 
 CHAIN = "heavy rope, mass_per_length=10 kg/m"
-"""What truly hangs there; 10 kg at its end."""
+"""The simulated chain, with 10 kg at its end."""
 WINCH = {"limits": {"tension_high": "800 N", "speed": "0.5 m/s"}}
 
 

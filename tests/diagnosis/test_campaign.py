@@ -66,7 +66,7 @@ def test_what_no_effect_explains_gets_no_name(kind: str, seed: int, tmp_path: Pa
         ("single", ("cell-hysteresis",), 44, 12700062),
         # What an engaging tooth leaves is taken for more than the small loss beside it.
         ("pair", (), 44, 12700044),
-        # It jerks a weight by more than it explains otherwise.
+        # Its transients of a load exceed its other contribution.
         ("single", ("gear-backlash",), 44, 13100008),
     ],
     ids=[

@@ -1,6 +1,6 @@
-"""What another physics hides is found: recorded by the plant, which knows no effect.
+"""Effects of the simulator's physics are found, which is independent of the catalogue.
 
-Every case is the demo's two programmes under two loads, twice; nothing of the truth is told.
+Every case is the demo's two programmes under two loads, twice; the true values are not used.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SIZES = {
     "stretched cell": ("gain_error", 0.02, "1"),
     "motor drag": ("torque", 0.03, "N m"),
 }
-"""Numbers that the plant is told, the values that must come out, and their unit."""
+"""Parameters of the simulation, expected values, and their unit."""
 TOLD = {
     "elastic rope": "elastic rope, axial_stiffness=250 kN",
     "stretched cell": "stretched cell, gain_error=0.02",

@@ -36,7 +36,7 @@ def term_of(effect: Effect) -> Term:
     own = SIZES.get(effect.id) or {
         p.name: p.typical for p in effect.parameters if p.role == "amplitude"
     }
-    # A machine that has stood under its load: RopeNow assumes it, a run is told.
+    # A machine at rest under its load: CableState assumes it, a run declares it.
     rested = {"start": effect.rested} if effect.memory else {}
     return Term(effect, {**effect.null, **own, **rested})
 
@@ -84,7 +84,8 @@ def test_the_length_is_that_of_the_whole_run(effect: Effect) -> None:
     size = float(np.max(np.abs(whole - bare)))
     assert size > 1e-5
     length = np.array([s.length for s in followed(term, signals, load=signals.load)])
-    # The load is smoothed and held to 0.3 % before it strains the rope: that is all there is.
+    # The load is smoothed and held to 0.3 % before it strains the cable, which explains the whole
+    # difference.
     missed = np.abs(length - whole)
     assert np.max(missed[steady(signals)]) < 0.03 * size + 1e-6
     assert np.max(missed) < 0.06 * size + 1e-6

@@ -60,7 +60,7 @@ def test_a_hanging_mass_at_uneven_sampling_keeps_a_constant_acceleration() -> No
 
 
 def test_a_hanging_mass_follows_the_rope_as_it_is_really_paid_out() -> None:
-    """A drum that runs out of true shakes the load; what the length does, the load feels."""
+    """Runout of the drum accelerates the load: its tension follows the length."""
     line = line_with(
         profile_with("grooved"), {"drum-eccentricity": {"eccentricity": 0.01, "phase": 0.3}}
     )

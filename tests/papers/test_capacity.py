@@ -128,7 +128,7 @@ def test_both_ends_are_warned_of() -> None:
     ((key, said),) = drum_warnings(SPIRAL, 6.0, 8.0)
     assert key == "drum.flange_radius"
     assert "takes 6 turns" in said
-    # Nothing is said about turns that nobody told.
+    # There is no warning about turns that are not declared.
     assert list(drum_warnings(winch(GROOVED.drum, turns=0.0), 0.0, 100.0)) == []
 
 

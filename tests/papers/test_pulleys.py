@@ -120,7 +120,7 @@ def summed_friction(wraps: tuple[float, ...], friction: float, *, printed: bool)
 
 
 def test_eq_24_has_the_last_pulleys_ratio_under_every_root() -> None:
-    """What all pulleys rub adds up to what the cable loses, T_4 − T_1; not as it is printed."""
+    """The friction of all pulleys adds up to the loss of tension, T_4 − T_1; not as printed."""
     wraps = (pi / 2, pi, pi / 3)
     lost = float(over_pulleys(1.0, wraps[::-1], 1.0, Bearings(0.05))) - 1
     assert summed_friction(wraps, 0.05, printed=False) == pytest.approx(lost, rel=1e-12)

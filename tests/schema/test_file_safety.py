@@ -1,4 +1,4 @@
-"""Files of strangers: nothing in them is executed, steers the terminal, or makes a command wait."""
+"""Untrusted files: nothing in them is executed, controls the terminal, or blocks a command."""
 
 from __future__ import annotations
 

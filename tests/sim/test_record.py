@@ -1,4 +1,4 @@
-"""Programmes laid out and recorded: what runs there are, and what stands in them."""
+"""Schedules and simulated runs of programmes: number of runs, and their content."""
 
 import json
 from dataclasses import replace
@@ -34,7 +34,7 @@ def plans(motion: Programme, start: float = 4.0) -> list:
 
 @pytest.mark.parametrize("steps", [(Step(to=2.0),), (Step(by=0.0),), (Step(ask="hang"),)])
 def test_a_programme_that_leaves_nothing_to_record_is_told(steps: tuple[Step, ...]) -> None:
-    """Its repeats end where they begin: no file would be written, and nobody would know why."""
+    """Its repeats end where they start: without the error no file would be written."""
     with pytest.raises(FileError, match="neither a move nor a hold"):
         plans(programme(*steps, repeat=2))
 

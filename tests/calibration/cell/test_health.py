@@ -60,7 +60,7 @@ def test_a_drift_is_found_with_its_uncertainty() -> None:
 
 
 def test_slow_noise_is_no_drift() -> None:
-    """Noise that remembers itself for a second wanders; its slope is uncertain, not large."""
+    """Noise with a correlation time of 1 s: its slope is uncertain, not large."""
     random, found = np.random.default_rng(11), 0
     for _ in range(30):
         time = np.arange(round(10 * RATE)) / RATE

@@ -191,7 +191,7 @@ def test_outliers_cost_a_robust_fit_little() -> None:
 
 
 def test_a_hanging_platform_of_four_ropes_is_calibrated_too() -> None:
-    """Four cables leave two freedoms; with whole poses measured the rest is overdetermined."""
+    """Four cables leave two degrees of freedom; with measured poses the fit is overdetermined."""
     profile = replace(robot().profile, line=robot().profile.line[:4], prior=NO_BOUNDS)
     full = measured(csv(rows(), angles=True))
     cut = {

@@ -1,4 +1,4 @@
-"""A hanging robot of four ropes: poses where its weight is lowest, found by another program."""
+"""A hanging robot of four cables: poses of lowest potential energy, from another program."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def wound_in(line: int, shorter: float) -> float:
 
 @lru_cache(maxsize=1)
 def hanging() -> tuple[Robot, Measured]:
-    """The robot as it is believed to be, and what was measured of the true one."""
+    """The nominal robot, and measurements of the true one."""
     rng = np.random.default_rng(3)
     home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
     poses = []

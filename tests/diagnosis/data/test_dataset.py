@@ -12,7 +12,7 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.schema.profiles.winch import WinchProfile
 
 THICK = replace(SPIRAL, drum=replace(SPIRAL.drum, layer_growth=1e-3))
-"""Layers of a millimetre: the step jerks the weight."""
+"""Layers of a millimetre: the step causes a transient of the load."""
 THIN = replace(SPIRAL, drum=replace(SPIRAL.drum, layer_growth=1e-6))
 RIDE = Ride(samples=800, stroke=800.0, period=8.0)
 
@@ -32,7 +32,7 @@ def layers_begun(profile: WinchProfile) -> np.ndarray:
 
 @pytest.mark.parametrize("output", ["tension", "motor_torque"])
 def test_a_known_weight_is_not_compared_where_a_layer_begins(output: str) -> None:
-    """How hard the step jerks it depends on what gives way, which no profile says."""
+    """The size of the transient depends on compliances that the profile does not have."""
     jumps = layers_begun(THICK)
     assert len(jumps) > 5
     used = compared(THICK, output)

@@ -231,7 +231,7 @@ def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
     ids=["a noisy encoder", "an encoder that is still at rest"],
 )
 def test_chance_stays_what_chance_can_reach(encoder: float) -> None:
-    """Of 40 candidates with one to three unknowns: gains of χ² less their price."""
+    """Of 40 candidates with one to three unknowns: decreases of χ² less their penalty."""
     runs = [made(seed, ride=RIDE, encoder=encoder) for seed in range(2)]
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
     present, noise = engine.fit_with_noise(engine.initial_model)

@@ -1,4 +1,4 @@
-"""A small one of the benchmark's long recordings: thinned out, and what it hides is named."""
+"""A short version of the benchmark's long recording: decimated, with its effects named."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ import diagnosis_hour as hour  # noqa: E402
 
 @pytest.fixture(scope="module")
 def heard() -> list[tuple[str, float]]:
-    """What the progress bar is told."""
+    """Calls of the progress bar."""
     return []
 
 

@@ -234,6 +234,6 @@ def test_an_alarm_of_one_of_eight_is_eight_times_as_likely() -> None:
     assert "false alarm of one in 8 winches: 7.7 % of recordings" in " ".join(
         " ".join(lines).split()
     )
-    # What was named is no mere alarm, and without repeats there is no chance to tell.
+    # A named effect is not an alarm, and without repeats there is no probability.
     named = said(step([RUBS], torque=(0.08, 0.001)), verdict="partly")
     assert alarms({"A": named, "B": said(verdict="unknown")}, {"A": 0.01, "B": np.nan}) == {}

@@ -27,7 +27,7 @@ def white(random: np.random.Generator, count: int) -> Array:
 
 
 def coloured(random: np.random.Generator, count: int, pole: float = 0.9) -> Array:
-    """First-order noise, begun in its steady state."""
+    """First-order noise, started in its steady state."""
     out = np.empty(count)
     out[0] = random.standard_normal() / np.sqrt(1 - pole**2)
     for index, kick in enumerate(random.standard_normal(count - 1), start=1):
@@ -129,7 +129,7 @@ def test_a_sine_in_all_repeats_is_a_lack_of_fit_in_its_band(frequency: float) ->
     assert found.rejected[largest]
     for band in np.flatnonzero(found.rejected):
         _, low, high = regression.bands[band]
-        # What a run of six seconds smears a line over.
+        # Width of a spectral line in a run of six seconds.
         assert low - 0.5 <= frequency <= high + 0.5
     assert noise.rms["cable_length"] == pytest.approx(SIZE, rel=0.15)
 

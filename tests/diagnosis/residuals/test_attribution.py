@@ -1,4 +1,4 @@
-"""What an error follows: the plainest variable that tells it."""
+"""Residual attribution: the simplest variable that explains the residual."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from winchkit.schema.read import read_winch
 
 @dataclass(frozen=True)
 class Told:
-    """A variable and what it tells."""
+    """A variable and the share that it explains."""
 
     variable: str
     share: float

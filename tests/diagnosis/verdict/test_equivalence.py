@@ -1,4 +1,4 @@
-"""Which effects data cannot tell apart, and which run would."""
+"""Equivalence sets, and the runs that distinguish their members."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_laws_of_a_curved_rope_are_told_together(force_scale: float) -> None:
 
 
 def test_a_bend_that_the_data_lean_to_is_not_denied() -> None:
-    """Between a bend that is plain and one that is lost in noise, straight and curved are told."""
+    """Between a bend that is plain and one that is lost in noise, linear and curved law form a set."""
     sets = [set(rope(scale).steps[0].effects) for scale in (400.0, *BENDS, 1e6)]
     straight = "cable-elongation-linear"
     assert straight not in sets[0]

@@ -1,4 +1,4 @@
-"""Robot files: the papers' ones hold the papers' numbers; faults are told with their lines."""
+"""Robot files: the papers' ones hold the papers' numbers; faults are reported with their lines."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_the_winding_devices_robot_hangs_on_eight_ropes() -> None:
 
 
 def test_a_robot_of_ones_own_is_a_file(check: object) -> None:
-    """Four ropes: the platform hangs."""
+    """Four cables: the platform hangs."""
     result = check(FOUR)
     assert result.exit_code == 0, result.stderr
     assert result.stderr == ""

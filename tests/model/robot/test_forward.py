@@ -175,7 +175,7 @@ def test_a_free_platform_needs_its_mass() -> None:
 
 
 def test_motor_angles_of_a_hanging_robot_lead_back() -> None:
-    """A four-rope robot from a file's parts: pose at rest, motor angles, pose."""
+    """A robot of four cables from a file's parts: pose at rest, motor angles, pose."""
     winch = shipped("winding-device-8").profile
     four = replace(winch, line=winch.line[::2], platform=HEAVY)
     robot = robot_of(four)

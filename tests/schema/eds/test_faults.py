@@ -36,7 +36,7 @@ def test_the_files_that_we_ship_have_no_warnings(name: str) -> None:
 
 
 MENDED: list[tuple[str, str, str, str]] = [
-    # what is replaced, by what, the line that is told, and what is said of it
+    # replaced text, replacement, reported line, and message
     ("VendorNumber=0x12", "VendorNumber=", "VendorNumber", "is empty; taken as 0"),
     ("ProductNumber=3", "ProductNumber=three", "ProductNumber", "'three' is no number"),
     ("[DeviceInfo]", "[DeviceInformation]", "[FileInfo]", "[DeviceInfo] is missing"),

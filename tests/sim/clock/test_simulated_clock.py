@@ -67,7 +67,7 @@ def test_an_event_is_waited_for_with_a_time_out() -> None:
     assert event.wait(10.0)
     assert clock.now() == pytest.approx(start + 0.7)
     event.clear()
-    clock.sleep(20.0)  # the time-out that was left over wakes nobody
+    clock.sleep(20.0)  # the remaining time-out wakes no thread
     assert not event.is_set()
 
 
@@ -174,7 +174,7 @@ def test_a_frame_takes_its_bits(size: int) -> None:
     plain = 47 + 8 * size
     least, most = plain / 5e5, (plain + (34 + 8 * size - 1) // 4) / 5e5
     assert 10 * least <= arrived[-1] - start <= 10 * most
-    assert port.receive(0.0) is None  # nobody hears its own frames
+    assert port.receive(0.0) is None  # a port does not receive its own frames
 
 
 def test_the_lower_identifier_wins_the_bus() -> None:

@@ -185,7 +185,7 @@ def test_a_lost_host_stops_a_torque_mode_too(mode: int, permille: int, moment: f
 
 
 def test_a_flywheel_knows_nothing_of_torque_modes() -> None:
-    """What a mode of torque tells the shaft is a torque, not a speed."""
+    """A torque mode commands a torque, not a speed."""
     rig = Rig(Flywheel())
     rig.enable(CST)
     rig.write(0x6071, 0, 250)
