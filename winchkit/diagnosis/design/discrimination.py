@@ -77,7 +77,7 @@ def next_runs(
             minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
             strength = separation(programme, first, second, noise, known=known)
             offers.append((strength / minutes, power_of(strength), kind.name))
-        # Any programme sure to separate them will do: of those the quickest per minute.
+        # Of programmes with equal power the one with the largest λ per minute comes first.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
         useful = [offer for offer in offers if offer[1] >= _LEAST_POWER][:_MOST_OFFERS]
