@@ -30,8 +30,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 from soak_devices import Wire, serve
-from winchkit.bench.bench import Bench, open_bench
+from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import BenchSnapshot
+from winchkit.bench.open import open_bench
 from winchkit.drivers.clock import MonotonicClock
 
 _WINCHES = "ABCDEFGH"

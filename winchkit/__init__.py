@@ -5,18 +5,20 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from winchkit.version import __version__
+
 if TYPE_CHECKING:
-    from winchkit.bench.bench import Bench, open_bench
+    from winchkit.bench.bench import Bench
+    from winchkit.bench.open import open_bench
     from winchkit.bench.remote.session import attach
     from winchkit.runs import read_run
 
-__version__ = "0.1.0"
 __all__ = ["Bench", "__version__", "attach", "open_bench", "read_run"]
 
 _HOME = {
     "Bench": "winchkit.bench.bench",
     "attach": "winchkit.bench.remote.session",
-    "open_bench": "winchkit.bench.bench",
+    "open_bench": "winchkit.bench.open",
     "read_run": "winchkit.runs",
 }
 

@@ -18,7 +18,8 @@ from unittest.mock import patch
 import can
 
 from fault_cases.independent_drive import IndependentDrive, replace_drives
-from winchkit.bench.bench import Bench, open_bench
+from winchkit.bench.bench import Bench
+from winchkit.bench.open import open_bench
 from winchkit.drivers.modbus import client
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.drive.drive import SimDrive

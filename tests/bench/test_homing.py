@@ -9,7 +9,7 @@ import pytest
 
 from fake_axis import CYCLE, StraightLine
 from winchkit.bench.control.cable import RopeMap
-from winchkit.bench.homing import HomingMotion
+from winchkit.bench.control.homing_motion import HomingMotion
 from winchkit.drivers.can.cia402.modes import Homing
 
 ARM = 0.005

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 import winchkit
-from winchkit.bench.bench import open_bench
+from winchkit.bench.open import open_bench
 
 HEAVY = {"numpy", "scipy", "can", "canopen", "pymodbus", "pydantic", "rich"}
 

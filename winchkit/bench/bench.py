@@ -1,24 +1,26 @@
-"""``with open_bench("bench.toml") as bench``: everything wired up, supervised and stopped again."""
+"""An open bench: its winches and instruments wired up, supervised, and stopped at its close."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
 from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.commissioning.validity import require_commissioned, trust_record
 from winchkit.bench.common_move import begin_together, wait_together
 from winchkit.bench.control.dead_man import LIFE_SIGN
+from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import Callback, ControlLoop
 from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
 from winchkit.bench.control.release import NotReleased, ReleaseGuard
 from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Trip
 from winchkit.bench.hardware import Wired, wire
+from winchkit.bench.homing import homing
 from winchkit.bench.lifecycle import (
     await_cycles,
     await_feedback,
@@ -29,16 +31,15 @@ from winchkit.bench.lifecycle import (
 from winchkit.bench.ownership import Ownership
 from winchkit.bench.recording.provenance import origin
 from winchkit.bench.recording.recorder import Recorder
-from winchkit.bench.remote.commander import Client, Commanders, NotCommander, client_name
+from winchkit.bench.remote.commander import Commanders, NotCommander
 from winchkit.bench.remote.handover import own
+from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.life_sign import LifeSigns
-from winchkit.bench.remote.server import StationServer
 from winchkit.bench.winch import Winch
 from winchkit.drivers.can.bus.health import BusHealth
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.tools.scan import Found, named_after, scan
-from winchkit.drivers.clock import Clock, MonotonicClock
-from winchkit.drivers.reading import Sensor
+from winchkit.drivers.clock import Clock
 from winchkit.errors import (
     ConnectionLost,
     DriveFault,
@@ -51,10 +52,30 @@ from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
 from winchkit.units import suggest
 
-__all__ = ["Bench", "open_bench"]
+__all__ = ["Bench", "Stations"]
 
 _LISTEN = 1.1
 """For heartbeats of nodes that are no winch, s."""
+
+
+class Stations(Protocol):
+    """The server through which other processes take part in a bench."""
+
+    may_hand_over: bool
+    """Whether the owner gives the bench to a program that wants to own it, while all its clients
+    are observers."""
+    handed_to: str
+    """Name of the program to which the bench is given; empty while there is none."""
+
+    @property
+    def clients(self) -> tuple[Client, ...]:
+        """Who is connected."""
+
+    def close_door(self) -> bool:
+        """Accept no further client unless one is connected; returns whether it is so."""
+
+    def close(self) -> None:
+        """Disconnect every client."""
 
 
 class Bench:
@@ -67,11 +88,13 @@ class Bench:
         name: str = "",
         ownership: Ownership | None = None,
         *,
+        serve: Callable[[Bench], Stations],
         realtime: Request = False,
         commissioning: bool = False,
     ) -> None:
-        """Use :func:`open_bench`. Raises every error of opening, with nothing left open.
+        """Use :func:`winchkit.open_bench`. Raises every error of opening, with nothing left open.
 
+        ``serve`` starts the server through which other processes take part.
         With ``commissioning`` the opening thread, and no other, may move it without a record.
         """
         self.spec = spec
@@ -118,7 +141,7 @@ class Bench:
             await_feedback(self.loop, self.axes, clock)
             self.realtime.cover(self._urgent_threads())
             await_sensors((s for one in self.winch.values() for s in one.sensors.values()), clock)
-            self.stations = StationServer(self)
+            self.stations = serve(self)
             """Where other processes take part."""
             self._stack = stack.pop_all()
 
@@ -340,9 +363,13 @@ class Bench:
         """Return when these winches are disabled and stand still; raises MotionError if not."""
         await_rest(self.loop, names, self.clock)
 
-    def command(self, instrument: Sensor, name: str) -> None:
-        """Send a command of its device file to an instrument."""
-        self._wired.slow.command(instrument, name)
+    def homing(self, winch: str, request: HomingRequest) -> Generator[None]:
+        """Home a winch, yielding while there is something to wait for; closing it early stops it.
+
+        Raises UsageError, NotPermitted, DeviceRefused for a method that the drive lacks, DriveFault
+        where the homing fails, LimitTripped.
+        """
+        return homing(self, self.winch[winch], request)
 
     def named(self, name: str | None) -> Winch:
         """A winch by name, or the only one; raises UsageError."""
@@ -405,29 +432,3 @@ class Bench:
         except MotionError:
             self.stop_now(wait=False)
             await_cycles(self.loop, self.clock, 50)
-
-
-def open_bench(
-    bench: str | Path | BenchSpec,
-    clock: Clock | None = None,
-    effects: Iterable[str | Path] = (),
-    *,
-    name: str = "",
-    realtime: Request = False,
-) -> Bench:
-    """Open a bench by its wiring file: buses, drives commissioned and disabled, sensors polled.
-
-    ``effects``: Python files with effects of your own that its profiles have, besides those that
-    the file names. Use it in a ``with`` block: leaving it, by any exception, stops the winches.
-    Others see this program as ``name``, and as its file and process where that is empty. A bench
-    process that serves nobody but ``monitor`` and ``log`` hands the bench over.
-    ``realtime="try"`` takes what this computer permits of real-time settings for the whole
-    process until the bench is closed, ``True`` demands them; ``bench.realtime`` says what was
-    granted. Nothing of the process is changed without it.
-    Raises FileError, ConnectionLost (NoReply, DeviceRefused), NotPermitted.
-    """
-    if not isinstance(bench, BenchSpec):
-        from winchkit.schema.read import read_bench
-
-        bench = read_bench(bench)
-    return Bench(bench.with_effects(effects), clock or MonotonicClock(), name, realtime=realtime)

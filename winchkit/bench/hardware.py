@@ -11,7 +11,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from winchkit import __version__, catalog
+from winchkit import catalog
 from winchkit.bench.cells.instruments import can_buses, device_of, instruments
 from winchkit.bench.commissioning.hardware import tell_hardware
 from winchkit.bench.control.cable import RopeMap
@@ -35,6 +35,7 @@ from winchkit.model.line import GRAVITY
 from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
 from winchkit.schema.bench_warnings import bench_warnings
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.version import __version__
 
 __all__ = ["Wired", "wire"]
 

@@ -4,93 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
 
-from winchkit.bench.control.cable import RopeMap
-from winchkit.bench.control.motion import Target
+from winchkit.bench.control.homing_motion import HomingMotion, HomingRequest
 from winchkit.bench.control.snapshot import Direction
+from winchkit.bench.host import WinchHost
 from winchkit.bench.lifecycle import await_cycles
+from winchkit.bench.winch import Winch
 from winchkit.drivers.can.cia402.axis import Cia402Axis
-from winchkit.drivers.can.cia402.modes import Homing
 from winchkit.drivers.can.cia402.profile_parameters import HERE, HomingSpec, check_homing
 from winchkit.errors import DeviceRefused, DriveFault, NotPermitted, UsageError
 
-if TYPE_CHECKING:
-    from winchkit.bench.bench import Bench
-    from winchkit.bench.winch import Winch
-
-__all__ = ["HomingMotion", "HomingRequest", "homing"]
+__all__ = ["homing"]
 
 _SHARE = 0.1
 """Of the winch's speed limit, at which it searches unless told otherwise."""
 _SLOWER = 0.2
 """Of the search's speed, at which it approaches the zero."""
-_SETTLE = 0.06
-"""For which bits of an earlier homing may still stand, s."""
-_JUMP = 1.0
-"""A change of the motor angle in one cycle that is no motion but a new zero, rad."""
 _SHOWN = 3
 """Cycles until a change of mode is seen in feedback and judged."""
 _SAME = 2e-3
 """Of rope, within which a length counts as defined, m."""
 
 
-@dataclass(frozen=True)
-class HomingRequest:
-    """What is asked for."""
-
-    method: int | None = None
-    """6098h; None searches nothing."""
-    at: float | None = None
-    """Cable length (m) at the zero that is found, or at the present place where none is sought."""
-    speed: float | None = None
-    """Of the rope while searching, m/s."""
-
-
-class HomingAxis(Protocol):
-    """What tells how far a homing is; ``Cia402Axis`` is one."""
-
-    @property
-    def homing(self) -> Homing:
-        """By the drive's newest status word."""
-
-
-class HomingMotion:
-    """A motion that the drive makes itself; says how fast the rope goes, for supervision."""
-
-    holds = False
-    joins = False
-
-    def __init__(self, axis: HomingAxis, rope: RopeMap, farthest: float = math.inf) -> None:
-        """Give up once ``farthest`` (m) of rope have run in the search."""
-        self.failure = ""
-        """Why it found nothing, in words."""
-        self._axis, self._rope, self._left = axis, rope, farthest
-        self._begun = self._time = self._angle = math.nan
-
-    def start(self, time: float, angle: float, _winding_speed: float) -> None:
-        """Begin; the drive is enabled in the mode HM."""
-        self._begun = self._time = time
-        self._angle = angle
-
-    def target(self, time: float, angle: float, _now: float) -> Target:
-        """Keep bit 4 set until the drive says that it is over."""
-        step, change = time - self._time, angle - self._angle
-        self._time, self._angle = time, angle
-        moves = step > 0 and abs(change) < _JUMP
-        speed = change / step * self._rope.at(angle)[1] if moves else 0.0
-        self._left -= abs(speed) * step
-        state = self._axis.homing
-        over = time - self._begun >= _SETTLE and state.over
-        if over and state is not Homing.DONE:
-            self.failure = "the drive says that it failed"
-        elif not over and self._left < 0:
-            self.failure = "no zero was found on twice the way between limits.length"
-        return Target(0.0, None, speed, done=over or bool(self.failure), start=True)
-
-
-def homing(bench: Bench, winch: Winch, asked: HomingRequest) -> Generator[None]:
+def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[None]:
     """Home a winch, yielding while there is something to wait for; closing it early stops it.
 
     Raises UsageError, NotPermitted, DeviceRefused for a method that the drive lacks, DriveFault
@@ -137,7 +73,7 @@ def _check_drive(axis: Cia402Axis, asked: HomingRequest) -> None:
     check_homing(axis.objects, axis.servo, spec, defines=asked.at is not None)
 
 
-def _define(bench: Bench, winch: Winch, angle: float) -> Generator[None]:
+def _define(bench: WinchHost, winch: Winch, angle: float) -> Generator[None]:
     """Let the present place have a motor angle (rad).
 
     Drives differ in the sign of the home offset (607Ch): by the standard's text the zero lies
@@ -156,7 +92,7 @@ def _define(bench: Bench, winch: Winch, angle: float) -> Generator[None]:
 
 
 def _run(
-    bench: Bench, winch: Winch, method: int | None, speed: float | None, offset: float
+    bench: WinchHost, winch: Winch, method: int | None, speed: float | None, offset: float
 ) -> Generator[None]:
     """One homing of the drive, by a method or at the present place, up to the disabled drive."""
     axis, limits = bench.axes[winch.name], winch.wiring.limits

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from winchkit.bench.cells.device_tare import await_device_tare
 from winchkit.bench.cells.tares import host_tare
 from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.motion import DEAD_MAN, Jog, MotionSource, Move, StartGate, Trim
 from winchkit.bench.control.snapshot import Phase, WinchSnapshot
 from winchkit.bench.control.supervisor import direction_of
 from winchkit.bench.control.winch_state import WinchParts
 from winchkit.bench.direction import no_positional, paid_out
-from winchkit.bench.homing import HomingRequest, homing
+from winchkit.bench.host import WinchHost
 from winchkit.drivers.reading import Sensor
 from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
 from winchkit.schema.bench import WinchWiring
-
-if TYPE_CHECKING:
-    from winchkit.bench.bench import Bench
 
 __all__ = ["Winch"]
 
@@ -32,7 +29,7 @@ class Winch:
 
     def __init__(
         self,
-        bench: Bench,
+        bench: WinchHost,
         name: str,
         wiring: WinchWiring,
         parts: WinchParts,
@@ -187,7 +184,7 @@ class Winch:
         ``at`` is the cable length (m) at that zero; without a method it is the present one, and
         nothing moves. Raises UsageError, NotPermitted, DeviceRefused, DriveFault, LimitTripped.
         """
-        for _ in homing(self._bench, self, HomingRequest(method, at, speed)):
+        for _ in self._bench.homing(self.name, HomingRequest(method, at, speed)):
             self._bench.clock.sleep(_POLL)
 
     def stop(self, *, wait: bool = True) -> None:
@@ -284,7 +281,7 @@ class Winch:
         writes_eeprom = cells.device(name).commands.get("tare")
         if writes_eeprom is None or writes_eeprom:
             return float(host_tare(cells, name, _TARE_TIME)["after"])
-        self._bench.command(cell, "tare")
+        cells.command(name, "tare")
         return await_device_tare(self._bench.clock, self.name, cell)
 
     def require_rest(self) -> None:

@@ -7,9 +7,9 @@ from typing import Any, NoReturn
 
 import click
 
-from winchkit import __version__
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.outcome import finish
+from winchkit.version import __version__
 
 __all__ = ["main"]
 

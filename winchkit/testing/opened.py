@@ -8,7 +8,8 @@ from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
-from winchkit.bench.bench import Bench, open_bench
+from winchkit.bench.bench import Bench
+from winchkit.bench.open import open_bench
 from winchkit.drivers.can.cia402.state_machine import state_of
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.simbench import SimBench

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from winchkit import catalog
-from winchkit.bench.bench import open_bench
+from winchkit.bench.open import open_bench
 from winchkit.schema.read import read_simbench
 from winchkit.sim.live.bench import LiveBench
 

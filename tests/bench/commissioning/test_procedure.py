@@ -17,6 +17,7 @@ from winchkit.bench.commissioning import validity
 from winchkit.bench.commissioning.dialogue import AnswerFile
 from winchkit.bench.commissioning.procedure import commission_bench
 from winchkit.bench.commissioning.record import Record
+from winchkit.bench.remote.server import StationServer
 from winchkit.cli.bench.commission import command
 from winchkit.errors import NotPermitted, UsageError
 
@@ -147,7 +148,10 @@ class Relay:
 def test_another_thread_may_not_move_a_bench_that_is_being_commissioned(tmp_path: Path) -> None:
     path = write_bench(tmp_path)
     seen: list[NotPermitted] = []
-    with served(path) as bench, Bench(bench.spec, bench.clock, commissioning=True) as opened:
+    with (
+        served(path) as bench,
+        Bench(bench.spec, bench.clock, serve=StationServer, commissioning=True) as opened,
+    ):
 
         def jog() -> None:
             try:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from winchkit.bench.remote.commander import Client, Commanders, NotCommander, client_name
+from winchkit.bench.remote.commander import Commanders, NotCommander
+from winchkit.bench.remote.identity import Client, client_name
 from winchkit.errors import MotionError
 
 FIRST, SECOND = Client("first"), Client("second")

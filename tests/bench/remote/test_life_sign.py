@@ -12,8 +12,7 @@ import pytest
 from slave.rig import Rig
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.dead_man import LIFE_SIGN
-from winchkit.bench.remote.commander import Client
-from winchkit.bench.remote.life_sign import LifeSign
+from winchkit.bench.remote.identity import Client, LifeSign
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import MotionError
 

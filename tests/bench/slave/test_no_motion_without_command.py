@@ -23,7 +23,7 @@ from slave.oracle import ESCALATED, FIRST_STOP, Oracle
 from slave.rig import Rig
 from slave.wire import GENERIC
 from winchkit.bench.bench import Bench
-from winchkit.bench.remote.commander import Client
+from winchkit.bench.remote.identity import Client
 from winchkit.errors import WinchkitError
 
 _EXAMPLES = int(os.environ.get("WINCHKIT_SEQUENCES", "6"))

@@ -69,7 +69,7 @@ def test_a_library_installs_no_handler() -> None:
     done = run(
         "import signal, winchkit\n"
         "from winchkit.bench.remote.session import attach, at_station\n"
-        "from winchkit.bench.bench import open_bench\n"
+        "from winchkit.bench.open import open_bench\n"
         "assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL\n"
         "assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL\n"
     )

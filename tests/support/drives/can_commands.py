@@ -21,7 +21,7 @@ from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.paced_clock import PacedClock
 
 CLOCKS = (
-    "winchkit.bench.bench",
+    "winchkit.bench.open",
     "winchkit.bench.drives.node_access",
     "winchkit.bench.emergency_stop",
 )

@@ -15,7 +15,8 @@ from event_timer_eds import with_event_timer
 from slave import Slave
 from slave.rig import Rig
 from winchkit import catalog
-from winchkit.bench.bench import Bench, open_bench
+from winchkit.bench.bench import Bench
+from winchkit.bench.open import open_bench
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_bench
 from winchkit.sim.clock.simulated_clock import SimulatedClock

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from slave.power import State
 from slave.rig import Rig, Sample
 from winchkit.bench.bench import Bench
-from winchkit.bench.remote.commander import Client
+from winchkit.bench.remote.identity import Client
 from winchkit.errors import WinchkitError
 
 __all__ = ["HeldKey", "Outcome", "Record", "jogging", "observe", "since"]

@@ -13,7 +13,6 @@ from contextlib import ExitStack
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 
-from winchkit import __version__
 from winchkit.bench.bench import Bench
 from winchkit.bench.cells.instruments import device_of, eds_of
 from winchkit.bench.commissioning.dialogue import Dialogue, agreed, confirm
@@ -30,11 +29,13 @@ from winchkit.bench.commissioning.record import (
 )
 from winchkit.bench.commissioning.trial import Trial, Trials
 from winchkit.bench.commissioning.validity import drive_record
-from winchkit.bench.remote.commander import client_name
 from winchkit.bench.remote.handover import own
+from winchkit.bench.remote.identity import client_name
+from winchkit.bench.remote.server import StationServer
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NotPermitted
 from winchkit.schema.bench import BenchSpec, WinchWiring
+from winchkit.version import __version__
 
 __all__ = ["commission_bench"]
 
@@ -82,7 +83,7 @@ def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> Recor
             for step in steps.values():
                 step.trials(trials)
         stack.pop_all()
-    with Bench(spec, clock, _COMMAND, ownership, commissioning=True) as bench:
+    with Bench(spec, clock, _COMMAND, ownership, serve=StationServer, commissioning=True) as bench:
         for step in steps.values():
             step.motions(bench)
     confirm(dialogue, "sign", f"Everything above is right; sign the record as {by}?")

@@ -10,8 +10,8 @@ from typing import Any
 
 from winchkit.bench.cells.instruments import device_of, eds_of
 from winchkit.bench.remote.client import RemoteStation, attach
-from winchkit.bench.remote.commander import client_name
 from winchkit.bench.remote.handover import own
+from winchkit.bench.remote.identity import client_name
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.identity import fitting_device
 from winchkit.drivers.can.canopen.node import Objects, SdoNode, read_dictionary

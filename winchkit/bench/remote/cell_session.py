@@ -10,8 +10,8 @@ from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.cells.instruments import can_buses, instruments
 from winchkit.bench.cells.tasks import Cells, LocalCells
 from winchkit.bench.remote.client import RemoteCells, attach
-from winchkit.bench.remote.commander import client_name
 from winchkit.bench.remote.handover import own
+from winchkit.bench.remote.identity import client_name
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.slow import SlowDevices
 from winchkit.schema.bench import BenchSpec

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from winchkit import errors
 from winchkit.bench.ownership import connect_to_owner
-from winchkit.bench.remote.commander import client_name
+from winchkit.bench.remote.identity import client_name
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec
 

@@ -6,23 +6,18 @@ another client takes it over explicitly. Everybody may stop, at any time.
 
 from __future__ import annotations
 
-import getpass
-import os
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 from winchkit.bench.control.dead_man import FIRST_PRESS
-from winchkit.bench.remote.life_sign import LifeSign
+from winchkit.bench.remote.identity import Client
 from winchkit.drivers.clock import Clock
 from winchkit.errors import MotionError, NotPermitted
 
-__all__ = ["Client", "Commanded", "Commanders", "NotCommander", "client_name"]
+__all__ = ["Commanded", "Commanders", "NotCommander"]
 
 _RELEASE = FIRST_PRESS + 0.1
 """A refused client may command again once it has ordered nothing for this time, s: longer than
@@ -38,32 +33,6 @@ class Commanded(Protocol):
 
     commander: str
     """Name of the client that commands it; empty for nobody."""
-
-
-@dataclass(frozen=True, eq=False)
-class Client:
-    """Somebody who orders motion; two clients of one name are still two."""
-
-    name: str
-    observer: bool = False
-    """Whether it only looks on, as ``monitor`` and ``log`` do."""
-    life: LifeSign | None = None
-    """Of a client in another process; None in the process that owns the bench."""
-
-    def heard(self) -> None:
-        """It has sent a request, or given an order."""
-        if self.life is not None:
-            self.life.heard()
-
-
-def client_name(what: str | None = None) -> str:
-    """This process in words, e.g. ``jog (process 4711, user x)``."""
-    try:
-        user = getpass.getuser()
-    except (KeyError, OSError):
-        user = "unknown"
-    program = what or Path(sys.argv[0] or "python").name or "python"
-    return f"{program} (process {os.getpid()}, user {user})"
 
 
 class Commanders:

@@ -8,41 +8,12 @@ for :data:`~winchkit.bench.control.dead_man.LIFE_SIGN` (it was suspended, or han
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
 
 from winchkit.bench.control.dead_man import LIFE_SIGN
 from winchkit.bench.control.snapshot import BenchSnapshot
+from winchkit.bench.remote.identity import Client
 
-if TYPE_CHECKING:
-    from winchkit.bench.remote.commander import Client
-
-__all__ = ["LifeSign", "LifeSigns"]
-
-_STEP = 0.05
-"""Of silence that one cycle adds at most, s: a standstill of this process is not the client's."""
-
-
-class LifeSign:
-    """Of one client in another process; its requests are heard in one thread, counted in another.
-
-    ``heard`` is called for each request and each order of the client.
-    """
-
-    def __init__(self) -> None:
-        self.silence = 0.0
-        """Since the newest request, s."""
-        self._requests = self._counted = 0
-
-    def heard(self) -> None:
-        """The client has sent something."""
-        self._requests += 1
-
-    def pass_by(self, duration: float) -> None:
-        """A cycle has passed, of ``duration`` s."""
-        if self._requests != self._counted:
-            self._counted, self.silence = self._requests, 0.0
-        else:
-            self.silence += min(duration, _STEP)
+__all__ = ["LifeSigns"]
 
 
 class LifeSigns:

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, TextIO
 
 from winchkit import errors
 from winchkit.bench.ownership import log_path
-from winchkit.bench.remote.commander import client_name
 from winchkit.bench.remote.handover import own_or_find
+from winchkit.bench.remote.identity import client_name
 from winchkit.bench.remote.interruption import interrupted_by_signals
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec
@@ -109,6 +109,7 @@ def main() -> None:
 
 def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:
     from winchkit.bench.bench import Bench
+    from winchkit.bench.remote.server import StationServer
     from winchkit.drivers.clock import MonotonicClock
     from winchkit.schema.read import read_bench
 
@@ -118,7 +119,8 @@ def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:
         _report(report, {_OWNED: True})
         return
     clock = MonotonicClock()
-    with Bench(spec.with_effects(effects), clock, name, ownership, realtime="try") as bench:
+    spec = spec.with_effects(effects)
+    with Bench(spec, clock, name, ownership, serve=StationServer, realtime="try") as bench:
         bench.stations.may_hand_over = True
         _report(report, {"ok": True})
         _serve(bench)

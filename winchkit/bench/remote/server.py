@@ -8,16 +8,13 @@ import socket
 import threading
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from winchkit.bench.bench import Bench
 from winchkit.bench.ownership import digest_of, listen
-from winchkit.bench.remote.commander import Client
-from winchkit.bench.remote.life_sign import LifeSign
+from winchkit.bench.remote.identity import Client, LifeSign
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import ConnectionLost, FileError, NotPermitted, UsageError, WinchkitError
-
-if TYPE_CHECKING:
-    from winchkit.bench.bench import Bench
 
 __all__ = ["OPERATIONS", "StationServer"]
 

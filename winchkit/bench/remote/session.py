@@ -12,7 +12,7 @@ from winchkit.bench.commissioning.hardware import tell_hardware
 from winchkit.bench.ownership import digest_of
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.bench.remote.client import attach as attach_to_owner
-from winchkit.bench.remote.commander import Client, client_name
+from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.process import can_spawn, spawn
 from winchkit.errors import ConnectionLost, NotPermitted, UsageError, WinchkitError
 from winchkit.schema.bench import BenchSpec
@@ -73,7 +73,7 @@ def at_station(
         with remote:
             yield remote
         return
-    from winchkit.bench.bench import open_bench
+    from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
 
     with open_bench(spec, effects=effects, name=name, realtime="try") as bench:

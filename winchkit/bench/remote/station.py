@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import AbstractContextManager
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
+from winchkit.bench.bench import Bench
 from winchkit.bench.cells.tasks import do
+from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.snapshot import to_dict
-from winchkit.bench.homing import HomingRequest, homing
 from winchkit.bench.recording.recorder import Recorder, counters_of
-from winchkit.bench.remote.commander import Client, client_name
+from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.winch import Winch
 from winchkit.errors import UsageError
-
-if TYPE_CHECKING:
-    from winchkit.bench.bench import Bench
 
 __all__ = ["ALL", "LocalStation", "Station"]
 
@@ -178,7 +176,7 @@ class LocalStation:
         """Start to home a winch."""
         asked = HomingRequest(method, at, speed)
         with self._acting():
-            self._homing = homing(self._bench, self._bench.named(winch), asked)
+            self._homing = self._bench.homing(self._bench.named(winch).name, asked)
             next(self._homing, None)
 
     def homing(self) -> bool:

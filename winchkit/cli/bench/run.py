@@ -95,9 +95,9 @@ def _execute(
     replace: bool,
 ) -> list[Path]:
     """Run it as the bench's owner; other commands may attach meanwhile."""
-    from winchkit.bench.bench import open_bench
+    from winchkit.bench.open import open_bench
     from winchkit.bench.programme import run_programme
-    from winchkit.bench.remote.commander import client_name
+    from winchkit.bench.remote.identity import client_name
 
     def tell(repeat: int, number: int, step: Step) -> None:
         place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"

@@ -35,7 +35,7 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
     """
     from winchkit.bench.emergency_stop import Stopped
     from winchkit.bench.remote.client import attach
-    from winchkit.bench.remote.commander import client_name
+    from winchkit.bench.remote.identity import client_name
     from winchkit.schema.read import read_bench
 
     spec = read_bench(bench)

@@ -168,7 +168,7 @@ def _summed(items: Sequence[Decoded]) -> Iterator[str]:
 @contextmanager
 def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
     """The bench with simulated drives; what the host sends is collected."""
-    from winchkit.bench.bench import open_bench
+    from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
     from winchkit.cli.core.dry_run import FrameTap
     from winchkit.sim.live.bench import LiveBench

@@ -77,7 +77,7 @@ def record(bench: SimBench, seed: int, folder: Path, report: ProgressCallback) -
     Time is simulated: it advances as fast as this computer can. Raises MotionError where the
     control loop was late nevertheless: such runs are not valid.
     """
-    from winchkit.bench.bench import open_bench
+    from winchkit.bench.open import open_bench
     from winchkit.bench.programme import run_programme
     from winchkit.errors import MotionError
     from winchkit.sim.clock.simulated_clock import SimulatedClock

@@ -1,0 +1,72 @@
+"""The motion of a homing, made by the drive itself, as the control loop sees it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.motion import Target
+from winchkit.drivers.can.cia402.modes import Homing
+
+__all__ = ["HomingMotion", "HomingRequest"]
+
+_SETTLE = 0.06
+"""For which bits of an earlier homing may still stand, s."""
+_JUMP = 1.0
+"""A change of the motor angle in one cycle that is no motion but a new zero, rad."""
+
+
+@dataclass(frozen=True)
+class HomingRequest:
+    """What is asked for."""
+
+    method: int | None = None
+    """6098h; None searches nothing."""
+    at: float | None = None
+    """Cable length (m) at the zero that is found, or at the present place where none is sought."""
+    speed: float | None = None
+    """Of the rope while searching, m/s."""
+
+
+class HomingAxis(Protocol):
+    """What tells how far a homing is; ``Cia402Axis`` is one."""
+
+    @property
+    def homing(self) -> Homing:
+        """By the drive's newest status word."""
+
+
+class HomingMotion:
+    """A motion that the drive makes itself; says how fast the rope goes, for supervision."""
+
+    holds = False
+    joins = False
+
+    def __init__(self, axis: HomingAxis, rope: RopeMap, farthest: float = math.inf) -> None:
+        """Give up once ``farthest`` (m) of rope have run in the search."""
+        self.failure = ""
+        """Why it found nothing, in words."""
+        self._axis, self._rope, self._left = axis, rope, farthest
+        self._begun = self._time = self._angle = math.nan
+
+    def start(self, time: float, angle: float, _winding_speed: float) -> None:
+        """Begin; the drive is enabled in the mode HM."""
+        self._begun = self._time = time
+        self._angle = angle
+
+    def target(self, time: float, angle: float, _now: float) -> Target:
+        """Keep bit 4 set until the drive says that it is over."""
+        step, change = time - self._time, angle - self._angle
+        self._time, self._angle = time, angle
+        moves = step > 0 and abs(change) < _JUMP
+        speed = change / step * self._rope.at(angle)[1] if moves else 0.0
+        self._left -= abs(speed) * step
+        state = self._axis.homing
+        over = time - self._begun >= _SETTLE and state.over
+        if over and state is not Homing.DONE:
+            self.failure = "the drive says that it failed"
+        elif not over and self._left < 0:
+            self.failure = "no zero was found on twice the way between limits.length"
+        return Target(0.0, None, speed, done=over or bool(self.failure), start=True)
