@@ -83,7 +83,7 @@ def next_runs(
         useful = [offer for offer in offers if offer[1] >= _LEAST_POWER][:_MOST_OFFERS]
         out += [NextRun(names, name, power) for _, power, name in useful]
         if not useful:
-            # No motion separates them: what does is on the card, and its power is not known.
+            # No motion separates them: the advice of the catalogue, whose power is not known.
             out.append(NextRun(names, told_apart(first.effect, second.effect), float("nan")))
     return tuple(out)
 
