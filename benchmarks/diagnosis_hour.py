@@ -198,7 +198,7 @@ def main() -> int:
     }
     if args.full:
         begun = perf_counter()
-        every = diagnose(of_winch["A"], profile, load_catalogue(), thin=False).diagnosis
+        every = diagnose(of_winch["A"], profile, load_catalogue(), decimate=False).diagnosis
         result["every_sample"] = told(every, 0) | {"seconds": perf_counter() - begun}
     print(json.dumps(result, indent=1))
     return 0 if seconds <= LIMIT and peak() <= MEMORY and is_right(tellings) else 1

@@ -32,10 +32,10 @@ Written by `python docs/make_api.py` from the docstrings; do not edit it by hand
 
     from winchkit import diagnose, read_profile, read_run
 
-For effects of your own there are `winchkit.effects` and `winchkit.model.stages` besides, for control
-loops `winchkit.model.robot` and `winchkit.estimation`, for tests `winchkit.testing`. Paths of other
-modules may change with any version. `import winchkit` loads no other package: a name is imported
-when it is first used. `winchkit.__version__` is the version.
+For effects of your own there are `winchkit.effects` and `winchkit.model.stages` besides, for
+control loops `winchkit.model.robot` and `winchkit.estimation`, for tests `winchkit.testing`. Paths
+of other modules may change with any version. `import winchkit` loads no other package: a name is
+imported when it is first used. `winchkit.__version__` is the version.
 """
 
 

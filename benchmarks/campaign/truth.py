@@ -141,8 +141,8 @@ class _Line:
         if p := self.get("outside-shaken-length"):
             length = length + p["size"] * np.gradient(self.motor_rate, self.time)
         if p := self.get("outside-platform"):
-            jerked = np.gradient(self.speed, self.time)
-            length = length + p["step"] * np.tanh(lag(jerked, self.time, 0.5, 0.0) / 0.02)
+            transient_mask = np.gradient(self.speed, self.time)
+            length = length + p["step"] * np.tanh(lag(transient_mask, self.time, 0.5, 0.0) / 0.02)
         if p := self.get("length-time-offset"):
             length = np.interp(self.time - p["delay"], self.time, length)
         return length

@@ -18,7 +18,7 @@ from scipy.fft import dct
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.design.discrimination import APART, power_of
+from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of
 from winchkit.diagnosis.fleet.meta_analysis import pooled
 from winchkit.diagnosis.regression.cross_validation import signed_rank_p_value
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
@@ -28,7 +28,7 @@ from winchkit.diagnosis.regression.projection import explained_ss
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.scores import Projected, null_maxima, score
 from winchkit.diagnosis.selection.signatures import signatures
-from winchkit.diagnosis.verdict.equivalence import _flip_chance
+from winchkit.diagnosis.verdict.equivalence import _sign_flip_p_value
 from winchkit.effects import load_catalogue
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
@@ -145,11 +145,11 @@ class TestSignFlips:
             worse = random.standard_normal(10) + 0.3
             sums = [np.array(signs) @ worse for signs in product([-1.0, 1.0], repeat=10)]
             exact = float(np.mean(np.array(sums) >= worse.sum() - 1e-12))
-            assert within(round(_flip_chance(worse) * flips), flips, exact)
+            assert within(round(_sign_flip_p_value(worse) * flips), flips, exact)
 
     def test_losses_about_zero_are_significant_as_often_as_the_level(self) -> None:
         random, cases = np.random.default_rng(8), 1000
-        count = sum(_flip_chance(random.standard_t(3, 48)) <= 0.05 for _ in range(cases))
+        count = sum(_sign_flip_p_value(random.standard_t(3, 48)) <= 0.05 for _ in range(cases))
         assert within(count, cases, 0.05)
 
 
@@ -166,13 +166,13 @@ class TestChiSquare:
         assert stats.kstest(explained, stats.chi2(unknowns).cdf).pvalue > 0.001
 
     def test_the_level_of_a_separation_is_five_percent(self) -> None:
-        assert stats.chi2.sf(APART, 1) == pytest.approx(0.05, abs=1e-4)
+        assert stats.chi2.sf(SEPARATED_AT, 1) == pytest.approx(0.05, abs=1e-4)
 
     @pytest.mark.parametrize("strength", [0.0, 1.0, 6.0, 10.5])
     def test_power_is_that_of_simulated_differences(self, strength: float) -> None:
         random, cases = np.random.default_rng(10), 4000
         squares = (random.standard_normal(cases) + np.sqrt(strength)) ** 2
-        count = int(np.count_nonzero(squares > APART))
+        count = int(np.count_nonzero(squares > SEPARATED_AT))
         assert within(count, cases, power_of(strength))
 
     def test_power_of_one_degree_of_freedom_is_a_lower_bound_of_more(self) -> None:

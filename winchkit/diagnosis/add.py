@@ -164,7 +164,7 @@ def grow(
     effect = catalogue[effect_id]
     if not effect.repeatable and any(table.id == effect_id for table in profile.effect):
         raise UsageError(f"profile '{profile.name}' has the effect '{effect_id}' already")
-    dataset = prepare(runs, profile, band, thin=True)
+    dataset = prepare(runs, profile, band, decimate=True)
     candidates = Catalogue([*catalogue, _placed(effect, dataset)])
     engine = selection_engine(dataset, candidates)
     lacking = engine.regression.missing_needs(effect)
@@ -173,9 +173,9 @@ def grow(
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
     (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
-    calm = without_impacts(dataset, final.hypothesis)
-    if calm is not None:
-        engine = selection_engine(calm, candidates)
+    reduced = without_impacts(dataset, final.hypothesis)
+    if reduced is not None:
+        engine = selection_engine(reduced, candidates)
         (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
     best = reweighted(engine, final, final_noise)
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
@@ -266,7 +266,7 @@ def remove(
         With every fault of every run.
     """
     engine = selection_engine(
-        prepare(runs, profile, band, thin=True), catalogue or load_catalogue()
+        prepare(runs, profile, band, decimate=True), catalogue or load_catalogue()
     )
     initial_model, noise = engine.fit_with_noise(engine.initial_model)
     terms = initial_model.hypothesis.terms

@@ -9,11 +9,11 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.data.spectrum import WHOLE_FILTER
+from winchkit.diagnosis.data.spectrum import WHOLE_TRANSITION
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import replicate_rms
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import Followed, follows, harmonics
+from winchkit.diagnosis.residuals.attribution import Attribution, attributions, harmonics
 from winchkit.diagnosis.residuals.maps import residual_maps
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.effects.bind import terms_of
@@ -83,7 +83,7 @@ def compared(
     band: float | None = None,
 ) -> Compared:
     """The same as :func:`compare`, with the residual."""
-    regression = TimeSeriesRegression(prepare(runs, profile, band, skirt=WHOLE_FILTER))
+    regression = TimeSeriesRegression(prepare(runs, profile, band, kept_cut_offs=WHOLE_TRANSITION))
     start = initial_hypothesis(profile, catalogue, regression)
     residual = regression.residual(start)
     offset = None
@@ -91,7 +91,7 @@ def compared(
         column = regression.nuisance_columns[:, 0]
         offset = float(column @ residual / (column @ column))
         residual = residual - offset * column
-    shares, orders = follows(regression, residual), harmonics(regression, residual)
+    shares, orders = attributions(regression, residual), harmonics(regression, residual)
     noise = replicate_rms(regression, residual)
     outputs = {}
     for output in regression.dataset.outputs:
@@ -125,7 +125,7 @@ def initial_hypothesis(
     return hypothesis
 
 
-def _order(found: Followed) -> int:
+def _order(found: Attribution) -> int:
     return found.order or 1
 
 

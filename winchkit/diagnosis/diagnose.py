@@ -1,4 +1,4 @@
-"""Diagnosis of a winch: data, stepwise selection, verdict, and programmes that would tell more."""
+"""Diagnosis of a winch: data, stepwise selection, verdict and the next motion programmes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 
 from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.design.detectability import Bar, detectable
+from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
-from winchkit.diagnosis.design.excitation import what_runs_cannot_show
+from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.cross_validation import held_out
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
@@ -19,7 +19,7 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import follows, harmonics
+from winchkit.diagnosis.residuals.attribution import attributions, harmonics
 from winchkit.diagnosis.results import (
     CandidateScore,
     Diagnosis,
@@ -31,8 +31,8 @@ from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.decision import Judgement, reweighted_judgement
-from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
-from winchkit.diagnosis.verdict.specification_test import judge_and_doubt
+from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
+from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -82,7 +82,7 @@ class Answer:
         engine: SelectionEngine,
         result: SelectionResult,
         diagnosis: Diagnosis,
-        sets: Sequence[Confusion] = (),
+        sets: Sequence[EquivalenceSet] = (),
         pairs: Sequence[tuple[Term, Term]] = (),
     ) -> None:
         self.engine = engine
@@ -92,9 +92,9 @@ class Answer:
         self.pairs = tuple(pairs)
 
     @property
-    def bar(self) -> Bar:
+    def threshold(self) -> DetectionThreshold:
         """Reduction of χ² that an effect needs to be named."""
-        return Bar(self.engine.penalty_per_parameter, self.result.threshold)
+        return DetectionThreshold(self.engine.penalty_per_parameter, self.result.threshold)
 
     @property
     def file_engine(self) -> SelectionEngine:
@@ -112,7 +112,7 @@ class WinchAnswer(Answer):
         engine: TimeSeriesSelection,
         result: SelectionResult,
         diagnosis: Diagnosis,
-        sets: Sequence[Confusion] = (),
+        sets: Sequence[EquivalenceSet] = (),
         pairs: Sequence[tuple[Term, Term]] = (),
     ) -> None:
         super().__init__(engine, result, diagnosis, sets, pairs)
@@ -128,7 +128,7 @@ def diagnose(
     catalogue: Catalogue | None = None,
     band: float | None = None,
     *,
-    thin: bool = True,
+    decimate: bool = True,
     progress: ProgressCallback = no_progress,
 ) -> WinchAnswer:
     """Find the effects that a winch's profile lacks on its runs.
@@ -143,7 +143,7 @@ def diagnose(
         Effects; by default all that are installed.
     band
         Cut-off frequency of the torque's low-pass filter, Hz; by default chosen from the sampling.
-    thin
+    decimate
         Decimate long runs as far as their signals allow.
     progress
         Called with the present step and the share of the work done, 0 to 1.
@@ -162,15 +162,15 @@ def diagnose(
     """
     catalogue = catalogue or load_catalogue()
     progress("reading the signals", 0.0)
-    dataset = prepare(runs, profile, band, thin=thin)
+    dataset = prepare(runs, profile, band, decimate=decimate)
     progress("drawing the candidates", 0.2)
     engine = selection_engine(dataset, catalogue)
     progress("searching", 0.4)
     result = stepwise_selection(engine)
-    calm = without_impacts(dataset, result.last_model)
-    if calm is not None:
-        progress("searching again without the jerks", 0.6)
-        engine = selection_engine(calm, catalogue)
+    reduced = without_impacts(dataset, result.last_model)
+    if reduced is not None:
+        progress("searching again without impacts", 0.6)
+        engine = selection_engine(reduced, catalogue)
         result = stepwise_selection(engine)
     progress("naming", 0.8)
     return _answer(engine, result)
@@ -178,35 +178,37 @@ def diagnose(
 
 def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
     """Verdict, equivalence sets, intervals and next programmes of a selection."""
-    judgement = judge_and_doubt(engine, result)
-    shown = judgement.shown
-    added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
-    sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
+    judgement = judge_with_specification_test(engine, result)
+    reported = judgement.reported
+    added = range(engine.n_initial_terms, len(reported.final.hypothesis.terms))
+    sets = [equivalence_set(engine, reported.final, reported.noise, index) for index in added]
     pairs = pairs_of(sets or _closest(engine, result, judgement))
     if sets:
         judgement = reweighted_judgement(engine, judgement)
-        shown = judgement.shown
+        reported = judgement.reported
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,
-        steps=steps_of(engine, shown, sets) if sets else (),
+        steps=steps_of(engine, reported, sets) if sets else (),
         candidates=candidates_of(engine, result),
-        detectable=detectable(result.scores, Bar(engine.penalty_per_parameter, result.threshold)),
+        detectable=detectable(
+            result.scores, DetectionThreshold(engine.penalty_per_parameter, result.threshold)
+        ),
         unexplained_share=judgement.share,
         where=_where(engine.regression, result) if judgement.verdict in _LOCATED else (),
         next_runs=next_runs(engine.regression, pairs, result.noise.rms),
         notes=(
             *engine.regression.dataset.notes,
-            *what_runs_cannot_show(engine.regression),
+            *missing_excitation(engine.regression),
             *judgement.notes,
         ),
     )
-    return WinchAnswer(engine, shown, diagnosis, sets, pairs)
+    return WinchAnswer(engine, reported, diagnosis, sets, pairs)
 
 
 def _closest(
     engine: TimeSeriesSelection, result: SelectionResult, judgement: Judgement
-) -> list[Confusion]:
+) -> list[EquivalenceSet]:
     """Equivalence sets of additions that are not named, where a part of the residual is explained.
 
     None for an unknown effect: additions that imitate an effect outside the catalogue would lead to
@@ -215,7 +217,7 @@ def _closest(
     if judgement.verdict != "partly":
         return []
     added = range(engine.n_initial_terms, len(result.final.hypothesis.terms))
-    return [confusion_of(engine, result.final, result.noise, index) for index in added]
+    return [equivalence_set(engine, result.final, result.noise, index) for index in added]
 
 
 def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelection:
@@ -226,7 +228,7 @@ def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelect
 
 
 def steps_of(
-    engine: SelectionEngine, result: SelectionResult, sets: Sequence[Confusion]
+    engine: SelectionEngine, result: SelectionResult, sets: Sequence[EquivalenceSet]
 ) -> tuple[Step, ...]:
     """Every addition with its equivalence set, values and held-out gain.
 
@@ -244,22 +246,22 @@ def steps_of(
     spread = spread_of(engine.regression, final, noise, engine.regression.blocks)
     own = estimates(engine.regression, final, spread)
     out = []
-    for confusion, gain, (term, values) in zip(
+    for equivalence, gain, (term, values) in zip(
         sets, gains, own[engine.n_initial_terms :], strict=True
     ):
         parameters = {term.effect.id: values} | {
-            rival.effect.id: _values_only(rival.effect.id, confusion)
-            for rival in confusion.terms
+            rival.effect.id: _values_only(rival.effect.id, equivalence)
+            for rival in equivalence.terms
             if rival.effect.id != term.effect.id
         }
-        ordered = {effect: parameters[effect] for effect in confusion.effects}
-        out.append(Step(confusion.effects, ordered, gain, confusion.angles))
+        ordered = {effect: parameters[effect] for effect in equivalence.effects}
+        out.append(Step(equivalence.effects, ordered, gain, equivalence.angles))
     return tuple(out)
 
 
-def _values_only(effect_id: str, confusion: Confusion) -> dict[str, Estimate]:
+def _values_only(effect_id: str, equivalence: EquivalenceSet) -> dict[str, Estimate]:
     """Values of a rival, without intervals."""
-    term = next(t for t in confusion.terms if t.effect.id == effect_id)
+    term = next(t for t in equivalence.terms if t.effect.id == effect_id)
     names = {
         p.name for p in (*Coordinates(term.effect).amplitudes, *Coordinates(term.effect).shapes)
     }
@@ -304,13 +306,13 @@ def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[W
     fitted, lack_of_fit_test = result.final, result.lack_of_fit_test
     if not result.lack_of_fit:
         fitted, lack_of_fit_test = result.initial_model, result.initial_lack_of_fit_test
-    places = [*harmonics(regression, fitted.residual), *follows(regression, fitted.residual)]
+    places = [*harmonics(regression, fitted.residual), *attributions(regression, fitted.residual)]
     out = [Where(f.output, f.variable, f.share, f.order) for f in places]
     excess_power = lack_of_fit_test.excess_power
     if excess_power.size and excess_power.max() > 0:
-        loudest = int(np.argmax(excess_power))
-        output, low, high = regression.bands[loudest]
+        largest = int(np.argmax(excess_power))
+        output, low, high = regression.bands[largest]
         middle = low if not np.isfinite(high) else (low + high) / 2
-        share = float(excess_power[loudest] / np.sum(np.maximum(excess_power, 0)))
+        share = float(excess_power[largest] / np.sum(np.maximum(excess_power, 0)))
         out.append(Where(output, "time", share, frequency=middle))
     return tuple(sorted(out, key=lambda w: -w.share)[:_WHERE])

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.design.plan import Offer, hopeless, offers, programme_of
-from winchkit.diagnosis.design.programmes import Room, allowed, seen
+from winchkit.diagnosis.design.plan import Offer, inseparable, offers, programme_of
+from winchkit.diagnosis.design.programmes import OperatingRange, range_of_limits, range_of_runs
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
@@ -23,7 +23,7 @@ class Plan:
 
     dataset: Dataset
     """Runs so far."""
-    room: Room
+    operating_range: OperatingRange
     """Operating range of the programmes."""
     pairs: tuple[tuple[Term, Term], ...]
     """Effects that the runs so far cannot distinguish."""
@@ -33,11 +33,11 @@ class Plan:
     @property
     def inseparable(self) -> list[tuple[Term, Term]]:
         """Pairs that none of these programmes separates."""
-        return hopeless(self.offers, self.pairs)
+        return inseparable(self.offers, self.pairs)
 
     def programme(self, name: str) -> Programme:
         """The best motion programme, for ``winchkit run``."""
-        return programme_of(self.dataset, self.offers[0].kind, name, self.room)
+        return programme_of(self.dataset, self.offers[0].kind, name, self.operating_range)
 
     def to_json(self) -> dict[str, Any]:
         """JSON of ``winchkit plan --json``, without the file written."""
@@ -73,7 +73,14 @@ def plan(
     """
     regression, noise = answer.engine.regression, answer.result.noise.rms
     dataset = regression.dataset
-    room = seen(dataset) if limits is None else allowed(dataset, limits)
+    allowed = range_of_runs(dataset) if limits is None else range_of_limits(dataset, limits)
     effects = list(load_catalogue() if catalogue is None else catalogue)
-    found = offers(regression, answer.pairs, noise, effects, bar=answer.bar, room=room)
-    return Plan(dataset, room, answer.pairs, tuple(found))
+    found = offers(
+        regression,
+        answer.pairs,
+        noise,
+        effects,
+        threshold=answer.threshold,
+        operating_range=allowed,
+    )
+    return Plan(dataset, allowed, answer.pairs, tuple(found))

@@ -23,7 +23,7 @@ __all__ = [
     "RobotDiagnosis",
     "Step",
     "Where",
-    "apart",
+    "effect_and_line",
     "plain_step",
 ]
 
@@ -243,11 +243,11 @@ class RobotDiagnosis(Diagnosis):
         out["candidates"] = [_placed(candidate) for candidate in out["candidates"]]
         out["detectable"] = _detectable(out["detectable"])
         for run in out["next_runs"]:
-            run["separates"] = [apart(name)[0] for name in run["separates"]]
+            run["separates"] = [effect_and_line(name)[0] for name in run["separates"]]
         return out
 
 
-def apart(placed: str) -> tuple[str, str | None]:
+def effect_and_line(placed: str) -> tuple[str, str | None]:
     """Id of an effect and the line of its place, None for all lines or the platform."""
     effect, _, line = placed.partition("/")
     return effect, line or None
@@ -266,11 +266,11 @@ def _step(step: Step) -> dict[str, Any]:
     """One step; ``lines`` has, for each of ``effects``, the lines that it may be on."""
     lines: dict[str, list[str | None]] = {}
     for placed in step.effects:
-        effect, line = apart(placed)
+        effect, line = effect_and_line(placed)
         lines.setdefault(effect, []).append(line)
     parameters: dict[str, Any] = {}
     for placed, values in step.parameters.items():
-        effect, line = apart(placed)
+        effect, line = effect_and_line(placed)
         several = len(lines.get(effect, ())) > 1 and effect in parameters
         key = placed if several else effect
         parameters[key] = {name: vars(estimate) for name, estimate in values.items()}
@@ -285,7 +285,7 @@ def _step(step: Step) -> dict[str, Any]:
 
 
 def _placed(candidate: Mapping[str, Any]) -> dict[str, Any]:
-    effect, line = apart(candidate["effect"])
+    effect, line = effect_and_line(candidate["effect"])
     return {**candidate, "effect": effect, "line": line}
 
 
@@ -293,7 +293,7 @@ def _detectable(items: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Per effect and parameter the line with the largest detectable size."""
     out: dict[tuple[str, str], dict[str, Any]] = {}
     for item in items:
-        effect, line = apart(item["effect"])
+        effect, line = effect_and_line(item["effect"])
         key = effect, item["parameter"]
         worst = out.get(key)
         size = item["smallest"]

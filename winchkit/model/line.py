@@ -41,7 +41,7 @@ class Motion:
     """The cell's reading, used as the drum-side tension where no load is known, N."""
     load_mass: float | None = None
     """Mass from whose acceleration the load is computed, kg, where no instrument measures it."""
-    rounding: Array | None = None
+    discretization: Array | None = None
     """Curvature of that load over the span of its differences, N: bound of its smoothing error."""
     rounded: float = 0.0
     """Share of the line's part of that load's acceleration that is smoothed, 0 to 1."""
@@ -113,12 +113,12 @@ class Line:
         if jitter and signals.motor_velocity is not None:
             speed = speed + pace * (signals.motor_velocity - rate)
             rate = signals.motor_velocity
-        load, mass, rounding = signals.load, None, None
+        load, mass, discretization = signals.load, None, None
         if load is None and signals.load_mass is not None:
             mass = signals.load_mass
             bent = -clock.wide_gradient(speed) if jitter else clock.second_derivative(length)
             load = mass * (GRAVITY - bent)
-            rounding = clock.span**2 * clock.second_derivative(load)
+            discretization = clock.span**2 * clock.second_derivative(load)
         tension = load if load is not None else signals.tension
         missing = np.full_like(time, np.nan)
         fastest = signals.fastest or float(np.max(np.abs(rate), initial=0.0))
@@ -139,7 +139,7 @@ class Line:
             temperature=missing if signals.temperature is None else signals.temperature,
         )
         drum_tension = signals.tension if load is None else None
-        return Motion(at, clock, load, drum_tension, mass, rounding)
+        return Motion(at, clock, load, drum_tension, mass, discretization)
 
     def predict(self, motion: Motion) -> dict[str, Array]:
         """Predict the outputs of a run.

@@ -32,8 +32,8 @@ from winchkit.report.words.vocabulary import (
 __all__ = [
     "bar",
     "candidates",
-    "confusion",
     "detectable",
+    "equivalence",
     "figures",
     "named",
     "output_scale",
@@ -187,7 +187,7 @@ def _candidate(candidate: CandidateScore, scales: Mapping[str, Scale]) -> list[s
     return [name, clause(candidate.effect), grouped(candidate.score), *errors]
 
 
-def confusion(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
+def equivalence(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
     """Equivalence sets, with the angles between the signatures of their effects."""
     out: list[Markup] = []
     for step in diagnosis.steps:

@@ -13,11 +13,11 @@ from calibration_cases import csv, elastic_rows, held, measured, robot, rows
 from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Options, calibrate, equations_of
 from winchkit.calibration.robot.elongation import LAWS
-from winchkit.calibration.robot.equations import Equations, State
-from winchkit.calibration.robot.least_squares import moved
+from winchkit.calibration.robot.equations import Equations
 from winchkit.effects import load_catalogue
 from winchkit.model.drum import drum_of
 from winchkit.model.robot import Pose, rotation_of
+from winchkit.model.robot.bundle_adjustment import State, moved
 from winchkit.model.robot.constraints import winding_of
 from winchkit.model.robot.elongation import strain_of
 from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile

@@ -10,7 +10,7 @@ from model_files import answer, invoke, record_files
 from winchkit.catalog import find
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.design.plan import programme_of
-from winchkit.diagnosis.design.programmes import KINDS
+from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES
 from winchkit.runs import read_run, write_csv
 from winchkit.schema.programme import Programme
 from winchkit.schema.read import read_profile, read_programme, read_simbench
@@ -112,7 +112,7 @@ def test_with_a_bench_the_plan_uses_the_room_that_its_limits_leave(
 
 def test_a_warmed_programme_asks_for_temperatures_that_a_simulation_obeys(tmp_path: Path) -> None:
     dataset = prepare([read_run(p) for p in record_files(tmp_path)], read_profile(PROFILE))
-    warmed = next(kind for kind in KINDS if len(kind.warmed) > 1)
+    warmed = next(kind for kind in CANDIDATE_PROGRAMMES if len(kind.temperature_rises) > 1)
     programme = programme_of(dataset, warmed, "warm")
     asked = [step.temperature for step in programme.step if step.temperature is not None]
     assert len(asked) == 2

@@ -10,7 +10,7 @@ import pytest
 from diagnosis_runs import CATALOGUE, GROOVED
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Filtering, assemble, prepare
-from winchkit.diagnosis.data.decimation import Thinning, thinning_for
+from winchkit.diagnosis.data.decimation import Decimation, decimation_for
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import spread_of
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -21,7 +21,7 @@ from winchkit.model.stages import Signals
 from winchkit.runs.run import Channel, Run
 
 RATE = 1000.0
-TENTH = Thinning(10, 25.0)
+TENTH = Decimation(10, 25.0)
 NOISE = {"cable_length": 3e-4, "tension": 0.8, "motor_torque": 5e-3}
 
 
@@ -37,30 +37,32 @@ def sine(frequency: float, seconds: float = 8.0) -> tuple[Array, Array]:
 @pytest.mark.parametrize("frequency", [0.2, 3.0, 11.0, 25.0])
 def test_what_lies_below_the_cut_off_stays_as_it_is(frequency: float) -> None:
     time, values = sine(frequency)
-    thinned = TENTH.run(run_of(time, tension=values))
+    decimated = TENTH.run(run_of(time, tension=values))
     inner = slice(10, -10)
-    np.testing.assert_allclose(thinned["tension"][inner], values[::10][inner], atol=2e-3)
+    np.testing.assert_allclose(decimated["tension"][inner], values[::10][inner], atol=2e-3)
 
 
 @pytest.mark.parametrize("frequency", [75.0, 90.0, 100.0, 180.0, 333.0])
 def test_what_would_fold_back_below_it_is_gone(frequency: float) -> None:
     time, values = sine(frequency)
-    thinned = TENTH.run(run_of(time, tension=values))
-    assert np.max(np.abs(thinned["tension"][10:-10])) < 2e-3
+    decimated = TENTH.run(run_of(time, tension=values))
+    assert np.max(np.abs(decimated["tension"][10:-10])) < 2e-3
 
 
 def test_times_are_every_so_many_and_a_ramp_stays_a_ramp_to_its_ends() -> None:
     time = np.arange(5003) / RATE
-    thinned = TENTH.run(run_of(time, motor_angle=7 * time + 2))
-    np.testing.assert_array_equal(thinned.time, time[::10])
-    np.testing.assert_allclose(thinned["motor_angle"], 7 * thinned.time + 2, rtol=1e-9)
+    decimated = TENTH.run(run_of(time, motor_angle=7 * time + 2))
+    np.testing.assert_array_equal(decimated.time, time[::10])
+    np.testing.assert_allclose(decimated["motor_angle"], 7 * decimated.time + 2, rtol=1e-9)
 
 
 def test_nothing_is_smeared_over_a_gap_in_time() -> None:
     time = np.concatenate([np.arange(2005) / RATE, 5 + np.arange(2000) / RATE])
     values = np.where(time < 3, 1.0, -4.0)
-    thinned = TENTH.run(run_of(time, load=values))
-    np.testing.assert_allclose(thinned["load"], np.where(thinned.time < 3, 1.0, -4.0), rtol=1e-9)
+    decimated = TENTH.run(run_of(time, load=values))
+    np.testing.assert_allclose(
+        decimated["load"], np.where(decimated.time < 3, 1.0, -4.0), rtol=1e-9
+    )
 
 
 def test_a_sample_is_missing_where_most_of_what_it_stands_for_is() -> None:
@@ -76,8 +78,8 @@ def test_a_sample_is_missing_where_most_of_what_it_stands_for_is() -> None:
 
 def test_a_channel_without_any_value_stays_without() -> None:
     time = np.arange(3000) / RATE
-    thinned = TENTH.run(run_of(time, temperature=np.full_like(time, np.nan)))
-    assert np.isnan(thinned["temperature"]).all()
+    decimated = TENTH.run(run_of(time, temperature=np.full_like(time, np.nan)))
+    assert np.isnan(decimated["temperature"]).all()
 
 
 def test_short_runs_are_left_alone_and_quick_ones_are_not_spoilt() -> None:
@@ -85,12 +87,12 @@ def test_short_runs_are_left_alone_and_quick_ones_are_not_spoilt() -> None:
     time = np.arange(300_000) / RATE
     slow = np.sin(2 * np.pi * 0.2 * time) + 1e-3 * random.standard_normal(len(time))
     quick = slow + 0.5 * np.sin(2 * np.pi * 110.0 * time)
-    assert thinning_for([run_of(time[:100_000], motor_angle=slow[:100_000])]) is None
-    chosen = thinning_for([run_of(time, motor_angle=slow)])
+    assert decimation_for([run_of(time[:100_000], motor_angle=slow[:100_000])]) is None
+    chosen = decimation_for([run_of(time, motor_angle=slow)])
     assert chosen is not None
     assert chosen.factor == 4
     assert chosen.cut_off == pytest.approx(RATE / 16)
-    held = thinning_for([run_of(time, motor_angle=slow, motor_torque=quick)])
+    held = decimation_for([run_of(time, motor_angle=slow, motor_torque=quick)])
     assert held is not None
     assert held.factor == 2
     assert held.cut_off > 110.0
@@ -122,7 +124,7 @@ def true_terms() -> tuple[Term, ...]:
 def test_thinned_by_twenty_the_same_values_are_found() -> None:
     """The torque's sign turns within milliseconds: taken after thinning it would be off."""
     run = long_run()
-    dataset = assemble([run], GROOVED, Filtering(thinning=Thinning(20, 12.5)))
+    dataset = assemble([run], GROOVED, Filtering(decimation=Decimation(20, 12.5)))
     assert len(dataset.recordings[0].signals.time) == len(run) // 20
     regression = TimeSeriesRegression(dataset)
     candidates = [term.effect for term in true_terms()]
@@ -151,7 +153,7 @@ def test_a_short_run_is_prepared_alike_with_and_without_leave_to_thin() -> None:
         time=run.time[:5000],
         channels={n: replace(c, values=c.values[:5000]) for n, c in run.channels.items()},
     )
-    free, held = (prepare([cut], GROOVED, thin=thin) for thin in (True, False))
+    free, held = (prepare([cut], GROOVED, decimate=decimate) for decimate in (True, False))
     assert free.notes == held.notes
     for output, values in free.recordings[0].nominal.items():
         np.testing.assert_array_equal(values, held.recordings[0].nominal[output])

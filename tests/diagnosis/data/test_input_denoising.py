@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.data.input_denoising import agreed, contrasts, quiet
+from winchkit.diagnosis.data.input_denoising import contrasts, shared_by_repeats, wiener_filtered
 
 COUNT = 2000
 
@@ -29,9 +29,9 @@ def test_quiet_takes_white_noise_and_leaves_what_is_slow() -> None:
     random = np.random.default_rng(1)
     slow = 20 + 3 * np.cos(2 * np.pi * np.arange(COUNT) / 700)
     noisy = slow + 0.5 * random.standard_normal(COUNT)
-    assert rms(quiet(noisy) - slow) < 0.2 * 0.5
-    assert np.ptp(quiet(20 + 0.5 * random.standard_normal(COUNT))) < 0.2
-    assert np.allclose(quiet(slow), slow, atol=1e-3)
+    assert rms(wiener_filtered(noisy) - slow) < 0.2 * 0.5
+    assert np.ptp(wiener_filtered(20 + 0.5 * random.standard_normal(COUNT))) < 0.2
+    assert np.allclose(wiener_filtered(slow), slow, atol=1e-3)
 
 
 def test_what_repeats_agree_on_stays_and_what_they_do_not_goes() -> None:
@@ -40,18 +40,18 @@ def test_what_repeats_agree_on_stays_and_what_they_do_not_goes() -> None:
     rows = [np.arange(COUNT)] * 2
     for size in (0.2, 1.0):
         signals = [shared + size * random.standard_normal(COUNT) for _ in range(2)]
-        for left in agreed(signals, rows):
+        for left in shared_by_repeats(signals, rows):
             assert rms(left - shared) < 0.75 * size
             assert left @ shared / (shared @ shared) > 0.8
     noise = [random.standard_normal(COUNT) for _ in range(2)]
-    for left in agreed(noise, rows):
+    for left in shared_by_repeats(noise, rows):
         assert rms(left) < 0.35
 
 
 def test_what_has_no_partner_is_not_believed() -> None:
     wave = np.sin(2 * np.pi * np.arange(COUNT) / 200)
     rows = [np.arange(100, COUNT), np.arange(COUNT - 100)]
-    first, second = agreed([wave, wave[100:]], rows)
+    first, second = shared_by_repeats([wave, wave[100:]], rows)
     assert not first[:100].any()
     assert np.allclose(first[100:], wave[100:], atol=1e-6)
     assert not second[COUNT - 100 :].any()

@@ -59,7 +59,7 @@ def test_white_noise_keeps_its_variance_in_every_coefficient() -> None:
 
 def test_a_band_keeps_what_its_filter_passes() -> None:
     signal = np.random.default_rng(3).standard_normal(500)
-    whole = Band(500, 50.0, 5.0, skirt=np.inf)
+    whole = Band(500, 50.0, 5.0, kept_cut_offs=np.inf)
     assert np.allclose(to_time(to_frequency(signal, whole), whole), low_pass(signal, 50.0, 5.0))
     band = Band(500, 50.0, 5.0)
     assert band.frequency.max() <= 5.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, NOISE, Ride, made, with_channel, without
-from winchkit.diagnosis.data.validation import admit
+from winchkit.diagnosis.data.validation import validate_runs
 from winchkit.errors import FileError, RunError
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import GearboxSpec
@@ -20,7 +20,7 @@ OUTPUTS = ("cable_length", "tension", "motor_torque")
 
 def faults(*runs: Run) -> list[str]:
     with pytest.raises(RunError) as caught:
-        admit(runs, GROOVED)
+        validate_runs(runs, GROOVED)
     return [str(fault) for fault in caught.value.faults]
 
 
@@ -42,7 +42,7 @@ def cut(run: Run, samples: int) -> Run:
 
 
 def test_a_good_run_is_admitted_without_a_word() -> None:
-    assert admit([GOOD], GROOVED) == []
+    assert validate_runs([GOOD], GROOVED) == []
 
 
 @pytest.mark.parametrize(
@@ -103,8 +103,8 @@ def test_every_fault_says_where_and_what(run: Run, said: str) -> None:
 
 
 def test_fifty_samples_and_half_of_the_values_are_enough() -> None:
-    admit([cut(made(0, ride=Ride(period=1.0)), 50)], GROOVED)
-    admit([changed("cable_length", holed(0.49), "m")], GROOVED)
+    validate_runs([cut(made(0, ride=Ride(period=1.0)), 50)], GROOVED)
+    validate_runs([changed("cable_length", holed(0.49), "m")], GROOVED)
 
 
 def test_all_faults_of_all_runs_come_at_once() -> None:
@@ -124,42 +124,42 @@ def test_the_same_samples_with_other_clocks_are_the_same_run() -> None:
 
 def test_no_run_at_all() -> None:
     with pytest.raises(FileError, match="no run given"):
-        admit([], GROOVED)
+        validate_runs([], GROOVED)
 
 
 def test_a_constant_load_is_a_weight_and_no_fault() -> None:
     known_weight = with_channel(GOOD, "load", np.full(400, 98.0))
-    assert admit([known_weight], GROOVED) == []
+    assert validate_runs([known_weight], GROOVED) == []
 
 
 def test_a_small_stroke_is_not_taken_for_another_winch() -> None:
     """A stroke of millimetres under a long stretch says nothing of the ratio."""
     creeping = made(0, ride=Ride(stroke=0.05), noise={"cable_length": 3e-4})
-    assert admit([creeping], GROOVED) == []
+    assert validate_runs([creeping], GROOVED) == []
 
 
 def test_another_winch_is_told_by_its_length_and_not_by_its_name() -> None:
     renamed = replace(GOOD, metadata={**GOOD.metadata, "profile": "older-name"})
-    assert admit([renamed], GROOVED) == [
+    assert validate_runs([renamed], GROOVED) == [
         f"{GOOD.name}: recorded with profile 'older-name', compared with 'grooved'"
     ]
     other = replace(GROOVED, gearbox=GearboxSpec(10.0))
     with pytest.raises(RunError, match=r"changes by 0\.49 times what profile 'grooved' predicts"):
-        admit([GOOD], other)
+        validate_runs([GOOD], other)
 
 
 def test_notes_count_what_is_missing() -> None:
     lost = np.arange(400) % 40 == 39
     few = with_channel(GOOD, "tension", np.where(lost, np.nan, GOOD["tension"]))
-    assert admit([few], GROOVED) == [f"{GOOD.name}: NaN samples not compared: tension 10"]
+    assert validate_runs([few], GROOVED) == [f"{GOOD.name}: NaN samples not compared: tension 10"]
     kept = np.delete(np.arange(400), [50, 51, 200])
     channels = {k: replace(c, values=c.values[kept]) for k, c in GOOD.channels.items()}
     gappy = replace(GOOD, time=GOOD.time[kept], channels=channels)
-    assert admit([gappy], GROOVED) == [f"{GOOD.name}: 2 gaps in time"]
+    assert validate_runs([gappy], GROOVED) == [f"{GOOD.name}: 2 gaps in time"]
 
 
 def test_every_output_can_stand_alone() -> None:
     for output in OUTPUTS:
         alone = made(0, noise={output: NOISE[output]})
         assert list(alone) == ["motor_angle", output]
-        assert admit([alone], GROOVED) == []
+        assert validate_runs([alone], GROOVED) == []

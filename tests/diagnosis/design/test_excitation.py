@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis_runs import GROOVED, NOISE, Array, Ride, made, with_channel
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.design.excitation import what_runs_cannot_show
+from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.runs.run import Run
 
@@ -29,7 +29,7 @@ NOTES = {
 
 
 def said(runs: Sequence[Run]) -> set[str]:
-    notes = what_runs_cannot_show(TimeSeriesRegression(prepare(runs, GROOVED)))
+    notes = missing_excitation(TimeSeriesRegression(prepare(runs, GROOVED)))
     found = {key for note in notes for key, start in NOTES.items() if note.startswith(start)}
     assert len(found) == len(notes)
     return found
@@ -131,6 +131,6 @@ def test_one_speed_is_said() -> None:
 
 
 def test_a_note_tells_what_to_do() -> None:
-    (note,) = what_runs_cannot_show(TimeSeriesRegression(prepare(runs(repeats=1), GROOVED)))
+    (note,) = missing_excitation(TimeSeriesRegression(prepare(runs(repeats=1), GROOVED)))
     assert "outside the catalogue cannot be excluded" in note
     assert "record one programme twice" in note

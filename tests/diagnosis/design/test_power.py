@@ -1,4 +1,4 @@
-"""What runs could have shown, and which run would show more."""
+"""Detectable sizes, and programmes that separate effects."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from scipy.stats import norm
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Array, Ride, made, term, with_channel
 from winchkit.cli.model.plan import _silent
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.design.detectability import Bar, detectable
-from winchkit.diagnosis.design.discrimination import next_runs, power_of, separation, so_far
-from winchkit.diagnosis.design.plan import hopeless
+from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
+from winchkit.diagnosis.design.discrimination import information_of, next_runs, power_of, separation
+from winchkit.diagnosis.design.plan import inseparable
 from winchkit.diagnosis.design.plan import offers as plan_offers
-from winchkit.diagnosis.design.programmes import KINDS, seen
+from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, range_of_runs
 from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Detectable, NextRun
@@ -25,8 +25,8 @@ from winchkit.diagnosis.selection.scores import null_maxima
 RIDE = Ride(samples=400)
 ROPE = term("cable-elongation-linear", axial_stiffness=3e5)
 FRAME = term("frame-compliance", stiffness=1.2e5)
-BAR = Bar(penalty_per_parameter=9.0, threshold=3.0)
-NAMES = {kind.name for kind in KINDS}
+BAR = DetectionThreshold(penalty_per_parameter=9.0, score_threshold=3.0)
+NAMES = {kind.name for kind in CANDIDATE_PROGRAMMES}
 
 
 @cache
@@ -75,10 +75,15 @@ def test_a_plan_offers_what_a_diagnosis_could_not_name_yet() -> None:
     frame = [CATALOGUE["frame-compliance"]]
     strength = separation(regression, _usual("frame-compliance"), None, NOISE)
     noise = {output: size * np.sqrt(strength / 16) for output, size in NOISE.items()}
-    for bar, shown in ((BAR, ("frame-compliance",)), (Bar(0.0, 3.84), ())):
-        shows = {o.kind.name: o.shows for o in plan_offers(regression, [], noise, frame, bar=bar)}
+    for threshold, shown in ((BAR, ("frame-compliance",)), (DetectionThreshold(0.0, 3.84), ())):
+        shows = {
+            o.kind.name: o.shows
+            for o in plan_offers(regression, [], noise, frame, threshold=threshold)
+        }
         assert shows["full stroke, three loads"] == shown
-    assert BAR.power((np.sqrt(BAR.squares(1)) + norm.ppf(0.9)) ** 2, 1) == pytest.approx(0.9, 0.01)
+    assert BAR.power((np.sqrt(BAR.required_ss(1)) + norm.ppf(0.9)) ** 2, 1) == pytest.approx(
+        0.9, 0.01
+    )
 
 
 def test_less_noise_is_more_power() -> None:
@@ -95,7 +100,9 @@ def test_warmth_is_told_apart_by_warming_up_and_by_waiting() -> None:
     sizes = {output: 0.05 * size for output, size in NOISE.items()}
     pair = _usual("cable-thermal"), _usual("cable-creep")
     regression = TimeSeriesRegression(dataset(warm=True))
-    power = {o.kind.name: o.powers[0] for o in plan_offers(regression, [pair], sizes, [], bar=BAR)}
+    power = {
+        o.kind.name: o.powers[0] for o in plan_offers(regression, [pair], sizes, [], threshold=BAR)
+    }
     assert power["full stroke, warmed up by 15 K"] > 0.9
     assert power["one load at five lengths, with holds"] > 0.9
 
@@ -113,12 +120,12 @@ def test_runs_so_far_and_runs_to_come_say_what_both_say_at_once(first: str, seco
     past, coming, both = (
         TimeSeriesRegression(prepare(part, GROOVED)) for part in (runs[:1], runs[1:], runs)
     )
-    known = so_far(past, *pair, sizes)
+    known = information_of(past, *pair, sizes)
     assert known is not None
-    assert known.left == pytest.approx(separation(past, *pair, sizes))
+    assert known.residual_ss == pytest.approx(separation(past, *pair, sizes))
     grown = separation(coming, *pair, sizes, known=known)
-    assert known.left + grown == pytest.approx(separation(both, *pair, sizes), rel=1e-3)
-    assert known.left + grown >= known.left + separation(coming, *pair, sizes) - 1e-6
+    assert known.residual_ss + grown == pytest.approx(separation(both, *pair, sizes), rel=1e-3)
+    assert known.residual_ss + grown >= known.residual_ss + separation(coming, *pair, sizes) - 1e-6
 
 
 def test_a_run_that_shows_nothing_of_a_rival_tells_it_apart_too() -> None:
@@ -139,7 +146,7 @@ def test_a_run_that_shows_nothing_of_a_rival_tells_it_apart_too() -> None:
     steady = with_channel(made(ride=ride), "temperature", 20.0 + 0 * drift, "degC")
     past, coming = (TimeSeriesRegression(prepare([run], GROOVED)) for run in (warming, steady))
     alone = power_of(separation(coming, thermal, creep, NOISE))
-    known = so_far(past, thermal, creep, NOISE)
+    known = information_of(past, thermal, creep, NOISE)
     assert alone < 0.1
     assert power_of(separation(coming, thermal, creep, NOISE, known=known)) > 0.9
 
@@ -156,11 +163,11 @@ def test_the_plan_says_what_no_motion_separates() -> None:
     radius, ratio = _usual("drum-radius"), _usual("gear-ratio")
     regression = selection_engine(grooved, CATALOGUE).regression
     pairs = [(radius, ratio), (ROPE, FRAME)]
-    found = plan_offers(regression, pairs, NOISE, [], bar=BAR)
-    assert hopeless(found, pairs) == [(radius, ratio)]
+    found = plan_offers(regression, pairs, NOISE, [], threshold=BAR)
+    assert inseparable(found, pairs) == [(radius, ratio)]
     # The best is the one that separates the other pair.
     assert found[0].powers[1] > 0.9
-    lines = _silent(found, pairs, seen(grooved), widened=False)
+    lines = _silent(found, pairs, range_of_runs(grooved), widened=False)
     assert lines[0].startswith("drum-radius / gear-ratio: no such motion within")
     assert lines[0].endswith(CATALOGUE["drum-radius"].told_apart)
     assert "--bench" in lines[1]
@@ -179,7 +186,10 @@ def smallest(noise: float, masses: tuple[float, ...] = (10.0,)) -> dict[str, Det
     scores = tuple(engine.scores(present, known))
     chance = null_maxima(engine.projected(present, known), engine.regression.n_rows)
     threshold = float(np.quantile(chance, 0.99))
-    return {d.effect: d for d in detectable(scores, Bar(engine.penalty_per_parameter, threshold))}
+    return {
+        d.effect: d
+        for d in detectable(scores, DetectionThreshold(engine.penalty_per_parameter, threshold))
+    }
 
 
 def test_half_the_noise_shows_half_the_size() -> None:

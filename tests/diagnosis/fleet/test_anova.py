@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from winchkit.diagnosis.fleet.anova import (
-    SharedFollowed,
+    SharedAttribution,
     WinchErrors,
     shared_errors,
 )
@@ -23,7 +23,7 @@ def direction(random: np.random.Generator) -> NDArray[np.float64]:
 
 def told(
     sizes: dict[str, float], levels: dict[str, float] | None = None, noise: float = 0.1
-) -> dict[str, SharedFollowed]:
+) -> dict[str, SharedAttribution]:
     """What errors follow that are a size times the direction, a level and noise."""
     winches = {}
     for index, name in enumerate(sizes):
@@ -44,7 +44,7 @@ def test_what_all_do_is_common() -> None:
     one = told(dict.fromkeys(NAMES, 1.0))["direction"]
     assert one.share == pytest.approx(1 / 1.01, abs=0.005)
     assert one.common == pytest.approx(one.share, abs=0.005)
-    assert one.apart == ()
+    assert one.outlying == ()
 
 
 def test_what_one_of_eight_does_is_not() -> None:
@@ -53,21 +53,21 @@ def test_what_one_of_eight_does_is_not() -> None:
     assert one.share == pytest.approx(whole, abs=0.005)
     # The mean of eight has an eighth of the one's size, and eight have it.
     assert one.common == pytest.approx(whole / 8, abs=0.005)
-    assert one.apart == ("H",)
+    assert one.outlying == ("H",)
 
 
 def test_a_level_of_one_winch_follows_the_winch() -> None:
     found = told(dict.fromkeys(NAMES, 0.0), {"C": 1.0})
     assert found["winch"].share == pytest.approx(1 / 1.08, abs=0.005)
     assert found["winch"].common == pytest.approx(1 / 1.08 / 8, abs=0.005)
-    assert found["winch"].apart == ("C",)
+    assert found["winch"].outlying == ("C",)
 
 
 def test_winches_that_all_differ_name_nobody() -> None:
     found = told({name: (-1.0) ** i for i, name in enumerate(NAMES)})
     assert found["direction"].share > 0.95
     assert found["direction"].common < 0.01
-    assert found["direction"].apart == ()
+    assert found["direction"].outlying == ()
 
 
 def test_noise_follows_nothing() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from winchkit.diagnosis.data import decimation as thin
+from winchkit.diagnosis.data import decimation as decimate
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.fleet.diagnose import diagnose_each
 from winchkit.effects import load_catalogue
@@ -33,7 +33,7 @@ def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, floa
     of_winch = {"A": [run.of_winch("A") for run in runs]}
     with pytest.MonkeyPatch.context() as patched:
         # As far as the signals allow, not only as far as is needed: an hour in small.
-        patched.setattr(thin, "_WANTED", 1000)
+        patched.setattr(decimate, "_WANTED", 1000)
         each = diagnose_each(
             of_winch,
             read_profile(path),

@@ -42,7 +42,7 @@ def test_the_mean_weighs_by_uncertainty() -> None:
     assert one.std == pytest.approx(1 / np.sqrt(125))
     assert one.chi_square == pytest.approx(0.2**2 / (0.1**2 + 0.2**2))
     assert one.spread == 0.0
-    assert one.alike
+    assert one.homogeneous
 
 
 def test_stiffnesses_are_pooled_as_compliances() -> None:
@@ -70,8 +70,8 @@ def test_the_spread_between_winches_is_found() -> None:
         values = 5 + np.hypot(0.5, 0.02) * random.standard_normal(8)
         found.append(pooled(of(values, 0.02), "N", reciprocal=False))
     # Seven of eight seldom agree by chance where all differ.
-    assert np.mean([bool(one.apart) for one in found]) < 0.01
-    assert not any(one.alike for one in found)
+    assert np.mean([bool(one.outlying) for one in found]) < 0.01
+    assert not any(one.homogeneous for one in found)
     assert np.mean([one.spread**2 for one in found]) == pytest.approx(0.5**2, rel=0.1)
     # The mean is as sure as the spread lets it be; Student's seven degrees of freedom make
     # 8.6 % lie beyond two deviations.
@@ -80,7 +80,7 @@ def test_the_spread_between_winches_is_found() -> None:
 
 
 @pytest.mark.parametrize(
-    ("sizes", "apart", "alike"),
+    ("sizes", "outlying", "homogeneous"),
     [
         ((1.0, 1.01, 0.99, 1.0, 1.0, 1.01, 0.99, 1.0), (), True),
         ((1.0, 1.01, 0.99, 1.0, 1.0, 1.01, 0.99, 2.0), ("H",), False),
@@ -93,11 +93,13 @@ def test_the_spread_between_winches_is_found() -> None:
     ],
     ids=["alike", "one", "two of eight", "three of eight", "one of three", "all", "two", "single"],
 )
-def test_who_stands_apart(sizes: Sequence[float], apart: tuple[str, ...], alike: bool) -> None:
+def test_outlying_winches_are_named(
+    sizes: Sequence[float], outlying: tuple[str, ...], homogeneous: bool
+) -> None:
     one = pooled(of(sizes), "N", reciprocal=False)
-    assert one.apart == apart
-    assert one.alike is alike
-    if apart:
+    assert one.outlying == outlying
+    assert one.homogeneous is homogeneous
+    if outlying:
         assert one.value == pytest.approx(1.0, abs=0.02)
         assert one.std < 0.01
 
@@ -113,7 +115,7 @@ def test_units_change_nothing(told: list[tuple[float, float]], scale: float) -> 
     finer = {n: (v * scale, s * scale) for n, (v, s) in zip(NAMES, told, strict=False)}
     other = pooled(finer, "mm", reciprocal=False)
     assert min(v for v, _ in told) - 1e-9 <= one.value <= max(v for v, _ in told) + 1e-9
-    if one.apart == other.apart:  # but for a tie that rounding decides
+    if one.outlying == other.outlying:  # but for a tie that rounding decides
         assert other.value == pytest.approx(one.value * scale, rel=1e-6, abs=1e-6 * scale)
         assert other.chi_square == pytest.approx(one.chi_square, rel=1e-6, abs=1e-9)
 
@@ -216,7 +218,8 @@ def test_as_json() -> None:
     (one,) = shared_effects({"A": said(step([RUBS], torque=(0.08, 0.001)))}, CATALOGUE)
     told = one.to_json()
     assert set(told) == {"effects", "winches", "without", "unsure", "parameters"}
-    assert set(told["parameters"]["torque"]) == set(vars(one.parameters["torque"]))
+    keys = {"apart" if name == "outlying" else name for name in vars(one.parameters["torque"])}
+    assert set(told["parameters"]["torque"]) == keys
     assert isinstance(one.parameters["torque"], Pooled)
 
 

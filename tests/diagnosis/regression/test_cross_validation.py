@@ -1,4 +1,4 @@
-"""Whether a gain holds out of sample, against fits that really leave the data out."""
+"""Cross-validation against fits that leave the data out."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def problem_of(
 
 
 def even(regression: TimeSeriesRegression) -> Noise:
-    """The noise that is there, known exactly."""
+    """The true noise."""
     power = np.array([NOISE[output] ** 2 for output, _, _ in regression.bands])
     return Noise(power, np.full(len(power), 1e9), dict(NOISE), from_repeats=True)
 
@@ -74,7 +74,7 @@ def left_out(
 
 
 @pytest.mark.parametrize("kind", ["blocks", "groups"])
-def test_what_is_held_out_is_predicted_by_a_fit_without_it(kind: str) -> None:
+def test_held_out_predictions_are_those_of_a_fit_to_the_other_folds(kind: str) -> None:
     regression = problem_of((GAIN, DRAG))
     found = fitted(regression, GAIN, DRAG)
     folds = regression.blocks if kind == "blocks" else regression.groups
@@ -113,7 +113,7 @@ def test_held_out_errors_are_larger_than_fitted_ones() -> None:
     assert found.chi_square == pytest.approx(float(np.sum((found.residual * inverse_sigma) ** 2)))
 
 
-def test_an_effect_that_is_there_holds_and_one_that_is_not_does_not() -> None:
+def test_a_true_effect_is_accepted_and_a_false_one_is_not() -> None:
     regression = problem_of((GAIN,))
     noise, folds = even(regression), regression.blocks
     before, true, false = (
@@ -138,7 +138,7 @@ def test_folds_are_partitions() -> None:
         assert np.all(fold == segment.run // 2)
 
 
-def test_one_group_is_held_out_in_five_stretches() -> None:
+def test_a_single_group_is_split_into_five_blocks_of_time() -> None:
     regression = problem_of((), masses=(10.0,))
     folds = regression.groups
     assert folds.count == 5
@@ -147,7 +147,7 @@ def test_one_group_is_held_out_in_five_stretches() -> None:
     assert np.allclose(share, 0.2, atol=0.03)
 
 
-def test_unknowns_that_rest_on_one_fold_extrapolate() -> None:
+def test_unknowns_determined_by_one_fold_are_extrapolated() -> None:
     """An offset beside a gain of the cell needs both loads; the gain alone needs only one."""
     gentle = Ride(samples=300, stroke=40.0)  # so that its acceleration is no second load
     regression = problem_of((), (10.0, 20.0), gentle)
@@ -175,7 +175,7 @@ class TestConfidence:
         assert signed_rank_p_value(before, after) == pytest.approx(2.0**-10)
         assert signed_rank_p_value(after, before) == pytest.approx(1.0)
 
-    def test_looks_only_at_blocks_that_change(self) -> None:
+    def test_uses_only_blocks_that_change(self) -> None:
         random = np.random.default_rng(1)
         before = np.full(48, 100.0)
         after = before + 1e-3 * random.standard_normal(48)

@@ -1,4 +1,4 @@
-"""What samples round: a winch moves between them, and its values must not be told too surely."""
+"""The discretisation error of sampled motion, and intervals that cover it."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ NOISE = {"motor_torque": 2e-3, "cable_length": 3e-4, "tension": 0.2}
 def sampled(seed: int, terms: tuple[Term, ...], every: int = FINER) -> Run:
     """A fine run of which an instrument keeps every sixteenth sample."""
     run = made(seed, GROOVED, terms, NOISE, ride=FINE, encoder=0.0)
-    thin = {n: replace(c, values=c.values[::every]) for n, c in run.channels.items()}
-    return replace(run, time=run.time[::every], channels=thin)
+    decimate = {n: replace(c, values=c.values[::every]) for n, c in run.channels.items()}
+    return replace(run, time=run.time[::every], channels=decimate)
 
 
 def fitted(terms: tuple[Term, ...], every: int = FINER) -> tuple[TimeSeriesRegression, Fit, Noise]:
@@ -56,7 +56,7 @@ def fitted(terms: tuple[Term, ...], every: int = FINER) -> tuple[TimeSeriesRegre
     return regression, fit(regression, start, noise.inverse_sigma(regression)), noise
 
 
-def test_an_inertia_that_differences_round_is_held_by_its_interval() -> None:
+def test_the_interval_covers_an_inertia_with_discretisation_error() -> None:
     regression, found, noise = fitted((INERTIA,))
     ((_, values),) = estimates(
         regression, found, spread_of(regression, found, noise, regression.blocks)
@@ -74,7 +74,7 @@ def test_an_inertia_that_differences_round_is_held_by_its_interval() -> None:
     assert abs(inertia.value - 2e-3) < 2 * inertia.std
 
 
-def test_what_rounding_leaves_is_taken_out_of_the_residual() -> None:
+def test_the_discretisation_error_is_removed_from_the_residual() -> None:
     regression, found, noise = fitted((INERTIA,))
     inverse_sigma = noise.inverse_sigma(regression)
     left = without_discretization_error(regression, found, inverse_sigma)
@@ -84,7 +84,7 @@ def test_what_rounding_leaves_is_taken_out_of_the_residual() -> None:
     assert after < before - 0.5 * (before - rows)
 
 
-def test_what_is_sampled_finely_or_needs_no_derivative_is_not_rounded() -> None:
+def test_fine_sampling_or_no_derivative_gives_no_discretisation_error() -> None:
     regression, found, _ = fitted((INERTIA,), every=1)
     coarse, rough, _ = fitted((INERTIA,))
     fine_share, coarse_share = (
@@ -101,7 +101,7 @@ def test_what_is_sampled_finely_or_needs_no_derivative_is_not_rounded() -> None:
     assert all(np.allclose(column[s.rows], 0.0, atol=1e-9) for s in own)
 
 
-def test_nothing_is_rounded_without_an_effect() -> None:
+def test_no_effect_gives_no_discretisation_error() -> None:
     regression, found, noise = fitted(())
     assert not regression.discretization_error(found.hypothesis).any()
     assert without_discretization_error(

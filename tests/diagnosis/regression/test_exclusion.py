@@ -1,4 +1,4 @@
-"""Moments in which teeth part and meet are not compared once a play is found."""
+"""Samples near backlash impacts are excluded once backlash is in the model."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def with_play(dataset: Dataset) -> Hypothesis:
 
 
 @pytest.mark.parametrize("load_mass", [10.0, None], ids=["weight", "measured"])
-def test_a_weight_is_jerked_and_a_measured_force_is_known(load_mass: float | None) -> None:
+def test_impacts_exclude_torque_and_under_a_known_weight_tension(load_mass: float | None) -> None:
     dataset = dataset_of(load_mass)
     calm = without_impacts(dataset, with_play(dataset))
     assert calm is not None
@@ -45,10 +45,10 @@ def test_a_weight_is_jerked_and_a_measured_force_is_known(load_mass: float | Non
         backs = np.flatnonzero(np.diff(np.sign(np.where(np.abs(turned) > 5.0, turned, 0.0))) != 0)
         for index in np.flatnonzero(left["motor_torque"]):
             assert np.min(np.abs(backs - index)) < 60
-    assert any("gear-backlash jerks" in note for note in calm.notes)
+    assert any("impacts of gear-backlash" in note for note in calm.notes)
 
 
-def test_without_a_play_everything_stays() -> None:
+def test_without_backlash_no_sample_is_excluded() -> None:
     dataset = dataset_of(10.0)
     rubbing = Hypothesis().with_term(term("pulley-coulomb", friction=0.1), 2)
     assert without_impacts(dataset, Hypothesis()) is None
@@ -57,15 +57,15 @@ def test_without_a_play_everything_stays() -> None:
     assert without_impacts(dataset, none) is None
 
 
-def test_what_jerks_all_the_time_leaves_too_little_to_do_without() -> None:
-    """A play as small as the encoder's noise, in a winch that stands, parts and meets for ever."""
+def test_permanent_impacts_exclude_no_sample() -> None:
+    """Backlash below the encoder's noise gives impacts at standstill throughout."""
     standing = Ride(samples=600, stroke=1e-5)
     dataset = prepare([made(seed, load_mass=10.0, ride=standing) for seed in range(2)], GROOVED)
     tiny = Hypothesis().with_term(term("gear-backlash", gap=5e-6), 2)
     assert without_impacts(dataset, tiny) is None
 
 
-def test_the_play_is_found_and_fitted_without_these_moments() -> None:
+def test_backlash_is_found_and_fitted_without_its_impacts() -> None:
     runs = [
         made(int(mass) + seed, GROOVED, (PLAY,), load_mass=mass, ride=RIDE)
         for mass in (10.0, 25.0)
@@ -74,6 +74,6 @@ def test_the_play_is_found_and_fitted_without_these_moments() -> None:
     found = diagnose(runs, GROOVED).diagnosis
     assert [step.effects for step in found.steps] == [("gear-backlash",)]
     assert found.steps[0].parameters["gear-backlash"]["gap"].value == pytest.approx(0.02, rel=0.02)
-    assert any("gear-backlash jerks" in note for note in found.notes)
+    assert any("impacts of gear-backlash" in note for note in found.notes)
     added = add("gear-backlash", runs, GROOVED)
-    assert any("gear-backlash jerks" in note for note in added.notes)
+    assert any("impacts of gear-backlash" in note for note in added.notes)

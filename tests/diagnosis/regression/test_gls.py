@@ -43,7 +43,7 @@ def problem_of(terms: tuple[Term, ...]) -> tuple[TimeSeriesRegression, np.ndarra
     return regression, inverse_sigma
 
 
-def test_a_fit_walks_along_a_bent_valley() -> None:
+def test_a_fit_converges_along_a_curved_valley() -> None:
     """A guide's offset times its mismatch is seen at once, each of them only by the bend."""
     profile = replace(GROOVED, guide=GuideSpec(0.005))
     aside = term("guide-offset", offset=-0.09, mismatch=0.005)
@@ -75,7 +75,7 @@ def from_usual(terms: tuple[Term, ...], regression: TimeSeriesRegression) -> Hyp
 
 
 @pytest.mark.parametrize("name", TRUE)
-def test_a_fit_is_where_a_general_solver_ends(name: str) -> None:
+def test_a_fit_agrees_with_scipy_least_squares(name: str) -> None:
     regression, inverse_sigma = problem_of(TRUE[name])
     start = from_usual(TRUE[name], regression)
     ours = fit(regression, start, inverse_sigma)
@@ -99,7 +99,7 @@ def test_a_fit_is_where_a_general_solver_ends(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["one", "stiffness", "three", "wave"])
-def test_a_fit_finds_the_truth(name: str) -> None:
+def test_a_fit_recovers_the_true_values(name: str) -> None:
     regression, inverse_sigma = problem_of(TRUE[name])
     found = fit(regression, from_usual(TRUE[name], regression), inverse_sigma)
     for true, got in zip(TRUE[name], found.hypothesis.terms, strict=True):
@@ -132,7 +132,7 @@ def test_bounds_are_kept() -> None:
     assert found.hypothesis.terms[0].values["axial_stiffness"] > 1e9
 
 
-def test_unknowns_that_cannot_be_told_apart_stay_small() -> None:
+def test_linearly_dependent_unknowns_stay_small() -> None:
     """A radius and a ratio do the same on a grooved drum: no kilometres are invented."""
     terms = (term("drum-radius", radius_error=3e-4), term("gear-ratio", ratio_error=0.0))
     regression, inverse_sigma = problem_of((terms[0],))

@@ -1,4 +1,4 @@
-"""How sure fitted values are: intervals that hold the truth as often as they say."""
+"""Intervals of fitted values and their coverage."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def coloured(random: np.random.Generator, count: int) -> Array:
 
 
 @pytest.mark.parametrize("kind", [white, coloured])
-def test_two_deviations_hold_the_truth_in_95_of_100_cases(
+def test_intervals_cover_the_truth_in_95_of_100_cases(
     kind: Callable[[np.random.Generator, int], Array],
 ) -> None:
     """A linear toy: the gain of a cell, on repeats enough to know the noise."""
@@ -67,7 +67,7 @@ def test_two_deviations_hold_the_truth_in_95_of_100_cases(
     assert abs(np.mean(off)) < 4 * np.std(off) / np.sqrt(CASES)
 
 
-def test_estimates_have_values_units_and_deviations_in_files_terms() -> None:
+def test_estimates_have_the_units_and_parameters_of_the_files() -> None:
     terms = (term("cable-elongation-linear", axial_stiffness=2e5), GAIN)
     runs = [
         made(int(mass) + seed, GROOVED, terms, load_mass=mass, ride=RIDE)
@@ -101,7 +101,7 @@ def _settled(regression: TimeSeriesRegression, start: Hypothesis) -> tuple[Fit, 
     return fit(regression, start, noise.inverse_sigma(regression)), noise
 
 
-def test_ends_are_where_a_full_refit_rises_by_the_wanted_squares() -> None:
+def test_profile_ends_agree_with_full_refits() -> None:
     """Against scipy's own least squares with the coordinate held: a weak, crooked friction."""
     friction = term("motor-stribeck", torque=0.006, stribeck_speed=8.0)
     runs = [made(seed, GROOVED, (friction,), {"motor_torque": 6e-3}, ride=RIDE) for seed in (1, 2)]
@@ -137,7 +137,7 @@ def test_ends_are_where_a_full_refit_rises_by_the_wanted_squares() -> None:
     assert abs(below / above - 1) > 0.05
 
 
-def test_outputs_that_contradict_each_other_widen_an_interval() -> None:
+def test_contradicting_outputs_widen_an_interval() -> None:
     """The length says one radius, the torque another: the truth may be either."""
     one, other = term("drum-radius", radius_error=6e-4), term("drum-radius", radius_error=9e-4)
     runs = []
@@ -165,7 +165,7 @@ def test_outputs_that_contradict_each_other_widen_an_interval() -> None:
     assert sure["radius_error"].std < 0.5 * told["radius_error"].std
 
 
-def test_what_no_output_shows_is_unknown_and_raises_no_warning() -> None:
+def test_an_unidentifiable_parameter_is_undetermined_without_warning() -> None:
     """Which share of the torque is held within the play, where the length alone was recorded."""
     play = term("gear-backlash", gap=0.02, held=1.0)
     noise = {"cable_length": 3e-4}

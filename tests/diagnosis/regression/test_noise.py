@@ -1,4 +1,4 @@
-"""The noise from repeats, and whether anything else is there."""
+"""Noise variance from repeats, and the lack-of-fit test."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_p_values_of_noise_alone_are_uniform(colour: bool) -> None:
     assert kstest((1 - (1 - uncut) ** bands) / end, "uniform").pvalue > 0.01
 
 
-def test_noise_alone_is_refused_as_often_as_told() -> None:
+def test_lack_of_fit_test_has_its_level_for_noise_alone() -> None:
     bands = len(length_problem(NOTHING, RIDE).bands)
     refused = np.concatenate([chances(False), chances(True)]) * bands < 0.05
     # 400 cases of at most 5 %: 20, and 4.4 more or less.
@@ -118,15 +118,15 @@ def test_noise_alone_is_refused_as_often_as_told() -> None:
 
 
 @pytest.mark.parametrize("frequency", [0.4, 3.0, 17.0])
-def test_a_wave_that_repeats_is_there_and_where_it_is(frequency: float) -> None:
+def test_a_sine_in_all_repeats_is_a_lack_of_fit_in_its_band(frequency: float) -> None:
     random = np.random.default_rng(5)
     wave = 0.8 * SIZE * np.sin(2 * np.pi * frequency * RIDE.time)
     runs = [wave + white(random, RIDE.samples) for _ in range(2)]
     regression = length_problem(runs, RIDE)
     found, noise = judged(regression)
     assert found.p_value < 1e-3
-    loudest = int(np.argmax(found.excess_power))
-    assert found.rejected[loudest]
+    largest = int(np.argmax(found.excess_power))
+    assert found.rejected[largest]
     for band in np.flatnonzero(found.rejected):
         _, low, high = regression.bands[band]
         # What a run of six seconds smears a line over.
@@ -134,7 +134,7 @@ def test_a_wave_that_repeats_is_there_and_where_it_is(frequency: float) -> None:
     assert noise.rms["cable_length"] == pytest.approx(SIZE, rel=0.15)
 
 
-def test_a_wave_that_does_not_repeat_is_noise() -> None:
+def test_a_sine_of_random_phase_is_noise() -> None:
     random = np.random.default_rng(6)
     wave = 3 * SIZE * np.sin(2 * np.pi * 3.0 * RIDE.time)
     runs = [sign * wave + white(random, RIDE.samples) for sign in (1, -1)]
@@ -144,7 +144,7 @@ def test_a_wave_that_does_not_repeat_is_noise() -> None:
     assert 2 * SIZE < noise.rms["cable_length"] < 1.05 * SIZE * np.sqrt(1 + 9)
 
 
-def test_what_differs_for_a_known_reason_is_no_noise() -> None:
+def test_known_differences_between_repeats_are_not_noise() -> None:
     random = np.random.default_rng(7)
     slope = np.linspace(-1, 1, RIDE.samples)
     runs = [white(random, RIDE.samples) + sign * 5 * SIZE * slope for sign in (1, -1)]
@@ -155,8 +155,8 @@ def test_what_differs_for_a_known_reason_is_no_noise() -> None:
     assert wise.rms["cable_length"] == pytest.approx(SIZE, rel=0.1)
 
 
-def test_what_each_run_fits_for_itself_takes_no_noise_away() -> None:
-    """A level for each run takes the slowest noise; the power that is told stays as it was."""
+def test_unknowns_per_run_do_not_reduce_the_noise_variance() -> None:
+    """An offset per run absorbs the slowest noise; the estimated variance stays the same."""
     random = np.random.default_rng(5)
     whole, bare, told = [], [], []
     for _ in range(60):
@@ -178,7 +178,7 @@ def test_what_each_run_fits_for_itself_takes_no_noise_away() -> None:
     assert np.mean(told) == pytest.approx(np.mean(whole), rel=0.05)
 
 
-def test_without_repeats_noise_is_what_no_effect_explains() -> None:
+def test_without_repeats_noise_is_the_residual_of_the_saturated_model() -> None:
     random = np.random.default_rng(8)
     ride = Ride(samples=2000)
     model = Hypothesis().with_term(term("drum-radius", radius_error=1e-4), 1)
@@ -195,7 +195,7 @@ def test_without_repeats_noise_is_what_no_effect_explains() -> None:
     assert not quiet.rejected.any()
 
 
-def test_noise_free_runs_get_a_floor_and_no_division_by_zero() -> None:
+def test_noise_free_runs_get_the_variance_floor() -> None:
     regression = length_problem(NOTHING, RIDE)
     found, noise = judged(regression)
     assert np.all(noise.power > 0)

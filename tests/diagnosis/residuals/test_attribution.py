@@ -11,7 +11,7 @@ from diagnosis_runs import recorded
 from winchkit.catalog import find
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import selection_engine
-from winchkit.diagnosis.residuals.attribution import follows, ranked
+from winchkit.diagnosis.residuals.attribution import attributions, ranked
 from winchkit.effects import load_catalogue
 from winchkit.schema.read import read_profile
 
@@ -30,7 +30,7 @@ def first_followed(*physics: str) -> dict[str, str]:
     engine = selection_engine(prepare(recorded(*physics), profile), load_catalogue())
     present, _ = engine.fit_with_noise(engine.initial_model)
     out: dict[str, str] = {}
-    for found in follows(engine.regression, present.residual):
+    for found in attributions(engine.regression, present.residual):
         out.setdefault(found.output, found.variable)
     return out
 

@@ -1,4 +1,4 @@
-"""How often per turn a residual repeats: beside plain least squares of every order."""
+"""Orders of periodic residuals, against plain least squares."""
 
 from __future__ import annotations
 

@@ -63,8 +63,8 @@ def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
     found = answered("diagnose", run, "--profile", profile)
     assert found["verdict"] == "adequate"
     assert found["steps"] == []
-    seen = {row["effect"]: row["smallest"] for row in found["detectable"]}
-    assert 1e-6 < seen["home-length"] < 1e-4
+    range_of_runs = {row["effect"]: row["smallest"] for row in found["detectable"]}
+    assert 1e-6 < range_of_runs["home-length"] < 1e-4
 
 
 def test_what_no_effect_explains_is_unknown(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from robot_poses.cases import CASES
 from robot_poses.hidden import BASE, profile_text, record
 from robot_poses.truth import turn
 from winchkit.cli import main
-from winchkit.diagnosis.design.discrimination import APART, power_of, separation
+from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of, separation
 from winchkit.diagnosis.robot.diagnose import diagnose_robot
 from winchkit.diagnosis.robot.pose_design import pose_offers
 from winchkit.diagnosis.verdict.equivalence import pairs_of
@@ -102,8 +102,8 @@ def test_the_power_is_that_of_all_rows_at_once(flat: tuple[Path, Path]) -> None:
     (pair,) = pairs_of(answer.sets)
     regression, final = answer.engine.regression, answer.result.final.hypothesis
     whole = separation(regression, *pair, dict.fromkeys(regression.dataset.outputs, 1.0))
-    offers = pose_offers(regression, final, [pair], [APART], count=3)
-    assert offers[0].so_far[0] == pytest.approx(power_of(whole), abs=0.01)
+    offers = pose_offers(regression, final, [pair], [SEPARATED_AT], count=3)
+    assert offers[0].powers_so_far[0] == pytest.approx(power_of(whole), abs=0.01)
     assert all(len(offer.pose.position) == 3 for offer in offers)
     (run_offered,) = json.loads(call("diagnose", run, "-p", profile, "--json").stdout)["next_runs"]
     assert run_offered["power"] > 0.95

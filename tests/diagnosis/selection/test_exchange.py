@@ -1,4 +1,4 @@
-"""What the search fits anew once more is explained: it may have come to rest elsewhere before."""
+"""Effects fitted again, and signatures updated, after another effect was added."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from diagnosis_runs import CATALOGUE, Ride, engine_for, term
 from winchkit.diagnosis.selection.exchange import pair_exchange
 from winchkit.diagnosis.selection.signatures import Signatures, updated_signatures
 from winchkit.diagnosis.selection.stepwise import _exchanged_terms
-from winchkit.diagnosis.verdict.equivalence import confusion_of
+from winchkit.diagnosis.verdict.equivalence import equivalence_set
 from winchkit.effects.term import Term
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
 
 
-def test_a_slip_that_came_to_rest_at_another_moment_is_found_where_it_was() -> None:
+def test_a_slip_fitted_at_a_wrong_time_is_refitted_at_the_true_time() -> None:
     late = term("length-time-offset", delay=0.01)
     engine = engine_for([term("encoder-slip", step=0.01, time=14.7), late], RIDE)
     runs = engine.regression.n_runs
@@ -32,7 +32,7 @@ def test_a_slip_that_came_to_rest_at_another_moment_is_found_where_it_was() -> N
     assert slip.values["step"] == pytest.approx(0.01, rel=0.05)
 
 
-def test_what_stood_for_two_is_fitted_beside_the_second() -> None:
+def test_an_effect_that_explained_two_is_refitted_beside_the_second() -> None:
     """A slip makes a creep seem slow and soft; beside the slip it is neither."""
     hidden = (
         term("cable-creep", creep_stiffness=3e5, time_constant=6.0),
@@ -50,7 +50,7 @@ def test_what_stood_for_two_is_fitted_beside_the_second() -> None:
 
 
 @pytest.mark.parametrize(("share", "alone"), [(0.9, False), (0.2, True)])
-def test_a_stribeck_speed_that_no_run_passes_stands_beside_coulombs_friction(
+def test_stribeck_friction_outside_the_speed_range_is_equivalent_to_coulomb_friction(
     share: float, alone: bool
 ) -> None:
     fastest = max(
@@ -61,7 +61,7 @@ def test_a_stribeck_speed_that_no_run_passes_stands_beside_coulombs_friction(
     present, noise = engine.fit_with_noise(
         engine.initial_model.with_term(wide, engine.regression.n_runs)
     )
-    told = confusion_of(engine, present, noise, 0).effects
+    told = equivalence_set(engine, present, noise, 0).effects
     assert "motor-stribeck" in told
     assert ("motor-coulomb" not in told) is alone
 
@@ -75,7 +75,7 @@ def columns_of(found: Signatures) -> dict[str, np.ndarray]:
     }
 
 
-def test_signatures_beside_a_grown_model_are_those_that_are_drawn_anew() -> None:
+def test_updated_signatures_equal_newly_computed_ones() -> None:
     """A wrong ratio reaches every output, a stretching rope the length alone."""
     for grown in (
         term("gear-ratio", ratio_error=0.02),
@@ -104,9 +104,7 @@ def test_signatures_beside_a_grown_model_are_those_that_are_drawn_anew() -> None
     ],
     ids=["on its way", "elsewhere"],
 )
-def test_a_candidate_that_had_no_signature_and_has_one_now_has_all_drawn_anew(
-    grown: Term, anew: bool
-) -> None:
+def test_a_new_signature_requires_all_to_be_computed_again(grown: Term, anew: bool) -> None:
     engine = engine_for([], RIDE)
     lag = CATALOGUE["cell-lag"]
     silent = replace(engine.signatures, without_signature=((lag, {"time_constant": 0.05}),))

@@ -1,4 +1,4 @@
-"""Effects with a memory: what changes within the runs names them, not how the runs began."""
+"""Effects with memory are selected by changes within the runs, not by initial states."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def told(error: Callable[[float], Array | float]) -> Diagnosis:
     return diagnose(runs, GROOVED, CATALOGUE).diagnosis
 
 
-def test_a_reading_too_low_under_one_load_is_no_creep() -> None:
+def test_an_offset_under_one_load_is_not_creep() -> None:
     """Creep far slower than the runs could have any level in each: a ramp is mostly level."""
     found = told(lambda mass: -8.0 if mass == MASSES[-1] else 0.0)
     assert found.verdict == "unknown"
     assert found.steps == ()
 
 
-def test_creep_from_rest_is_told_though_a_ramp_is_mostly_level() -> None:
+def test_creep_from_rest_is_found_though_a_ramp_is_mostly_an_offset() -> None:
     creep = term("cell-creep", fraction=0.05, time_constant=10 * RIDE.time[-1])
     runs = [
         made(number, GROOVED, [creep], load_mass=float(mass), ride=RIDE)

@@ -1,4 +1,4 @@
-"""Two effects that hide each other, so that neither helps alone."""
+"""Pairs of effects that mask each other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HIDDEN = (term("cell-gain", gain_error=-0.05), term("cell-offset", offset=0.05 *
 """Under about 20 kg the cell reads right."""
 
 
-def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
+def test_a_gain_masked_by_an_offset_scores_jointly_with_it() -> None:
     engine = engine_for(HIDDEN, RIDE, MASSES)
     present, noise = engine.fit_with_noise(engine.initial_model)
     scores = engine.scores_at_all_points(present, noise)
@@ -31,7 +31,7 @@ def test_a_gain_that_an_offset_hides_scores_with_it() -> None:
     assert [pair.net_gain for pair in pairs] == sorted((p.net_gain for p in pairs), reverse=True)
 
 
-def test_both_are_fitted_side_by_side_and_in_exchange_for_what_is_not_there() -> None:
+def test_a_pair_is_added_and_replaces_a_false_effect() -> None:
     engine = engine_for(HIDDEN, RIDE, MASSES)
     present, noise = engine.fit_with_noise(engine.initial_model)
     grown = _best_pair(engine, present, noise)
@@ -57,7 +57,7 @@ ONE_WAY = (
 
 
 @pytest.mark.parametrize("also", [(), (term("cable-elongation-linear", axial_stiffness=2e5),)])
-def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term, ...]) -> None:
+def test_a_pair_of_effects_that_mask_each_other_is_found(also: tuple[Term, ...]) -> None:
     """Also beside an effect that acts on the length only, where these two do nothing."""
     engine = engine_for((*ONE_WAY, *also), RIDE, MASSES)
     start = engine.initial_model
@@ -71,7 +71,7 @@ def test_two_that_are_each_wrong_where_the_other_acts_are_found(also: tuple[Term
     assert values["motor-viscous"]["viscosity"] == pytest.approx(2e-4, rel=0.1)
 
 
-def test_pairs_are_not_pieced_together_upon_what_acts_on_the_same_output() -> None:
+def test_no_pair_is_added_beside_an_addition_on_the_same_output() -> None:
     engine = engine_for(ONE_WAY, RIDE, MASSES)
     start = engine.initial_model
     for own in (
@@ -83,8 +83,8 @@ def test_pairs_are_not_pieced_together_upon_what_acts_on_the_same_output() -> No
     assert _best_pair(engine, *engine.fit_with_noise(start)) is None
 
 
-def test_one_of_two_that_stands_for_a_pair_is_exchanged_for_it() -> None:
-    """Another stays beside it; what is there already need not be the first that was taken."""
+def test_an_effect_that_imitates_a_pair_is_exchanged_for_it() -> None:
+    """Another effect stays beside it; the imitating effect need not be the first addition."""
     hidden = (
         term("pulley-inertia", equivalent_mass=6.5),
         term("cell-gain", gain_error=-0.05),

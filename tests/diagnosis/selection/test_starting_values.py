@@ -1,4 +1,4 @@
-"""Shapes that a fit drives to their ends, and values that cannot be."""
+"""Shape parameters at their bounds, and starting values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from winchkit.diagnosis.selection.starting_values import (
 from winchkit.effects.reference_motion import standard_motion
 
 
-def test_coefficients_are_taken_from_the_first() -> None:
+def test_a_series_is_truncated_from_its_last_coefficient() -> None:
     fitted = []
     for law in truncated_series(CATALOGUE["cable-elongation-quartic"]):
         fitted.append([p.name for p in law.parameters if p.role != "fixed"])
@@ -21,21 +21,21 @@ def test_coefficients_are_taken_from_the_first() -> None:
     assert fitted == [["k1", "b2"], ["k1", "b2", "b3"], ["k1", "b2", "b3", "b4"]]
 
 
-def test_what_is_no_series_keeps_its_shapes() -> None:
+def test_an_effect_without_a_series_is_not_truncated() -> None:
     for effect in CATALOGUE:
         if effect.id != "cable-elongation-quartic":
             assert truncated_series(effect) == [effect], effect.id
 
 
 @pytest.mark.parametrize(("static", "disguised"), [(0.03, False), (0.01, True)])
-def test_rubbing_less_at_creep_speed_is_no_stribeck_friction(
+def test_less_friction_at_low_speed_is_not_stribeck_friction(
     static: float, disguised: bool
 ) -> None:
     curve = term("pulley-stribeck", coulomb=0.02, static=static, stribeck_speed=0.03)
     assert shape_at_bound(curve) is disguised
 
 
-def test_a_shape_at_its_end_is_another_effect() -> None:
+def test_a_shape_at_its_bound_is_rejected() -> None:
     ends = CATALOGUE["motor-stribeck"].parameter("stribeck_speed")
     inside = term("motor-stribeck", torque=0.02, stribeck_speed=ends.typical)
     assert not shape_at_bound(inside)
@@ -47,11 +47,11 @@ def test_a_stribeck_speed_is_visible_where_a_run_passes_it() -> None:
     for effect, rate in (("motor-stribeck", motion.motor_rate), ("pulley-stribeck", motion.speed)):
         visible = CATALOGUE[effect].visible
         assert visible is not None
-        for share, seen in ((0.5, True), (0.8, False)):
-            assert visible(motion, {"stribeck_speed": share * abs(rate).max()}) is seen
+        for share, range_of_runs in ((0.5, True), (0.8, False)):
+            assert visible(motion, {"stribeck_speed": share * abs(rate).max()}) is range_of_runs
 
 
-def test_a_moment_and_an_order_are_sought_elsewhere_too_and_a_time_constant_is_not() -> None:
+def test_times_and_orders_have_other_minima_and_time_constants_do_not() -> None:
     slip = term("encoder-slip", step=0.01, time=33.5)
     assert other_grid_point(slip, {"time": 30.0})
     assert other_grid_point(

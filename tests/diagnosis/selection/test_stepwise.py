@@ -1,4 +1,4 @@
-"""What a search may try at all, and what it takes for proof."""
+"""Candidates that selection may try."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from winchkit.diagnosis.diagnose import diagnose, selection_engine
 RIDE = Ride(samples=400)
 
 
-def test_what_would_help_only_with_the_wrong_sign_gains_nothing() -> None:
+def test_a_candidate_with_infeasible_sign_scores_zero() -> None:
     """A rotor of negative inertia is made; nothing that exists does that."""
     impossible = term("rotor-inertia", inertia=-2e-3)
     runs = [
@@ -33,7 +33,7 @@ def test_what_would_help_only_with_the_wrong_sign_gains_nothing() -> None:
     assert all("rotor-inertia" not in step.effects for step in found.steps)
 
 
-def test_the_right_sign_gains() -> None:
+def test_a_candidate_with_feasible_sign_scores() -> None:
     real = term("rotor-inertia", inertia=2e-3)
     runs = [
         made(int(mass) + seed, GROOVED, (real,), load_mass=mass, ride=RIDE)

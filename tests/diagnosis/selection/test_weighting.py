@@ -1,4 +1,4 @@
-"""Values of runs that nobody repeated: by the noise where that is noise, else evenly."""
+"""Weights for runs without repeats: inverse noise variance, or equal."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def with_friction(runs: list[Run]) -> tuple[TimeSeriesSelection, Fit, Noise]:
 
 
 @pytest.mark.parametrize("size", [0.0, 0.005, 0.02])
-def test_noise_however_slow_is_weighed_as_noise(size: float) -> None:
+def test_slow_noise_keeps_its_inverse_variance_weights(size: float) -> None:
     runs = rides([size * wander(seed) for seed in (1, 2)], torque=FRICTION)
     engine, present, noise = with_friction(runs)
     best = reweighted(engine, present, noise)
@@ -67,8 +67,8 @@ def warming_up() -> Array:
     return np.asarray(FRICTION * np.tanh(RATE / 5) * (1 + 0.5 * np.exp(-RIDE.time / 15)))
 
 
-def test_what_the_model_lacks_is_no_noise_and_values_are_the_mean() -> None:
-    """Quick reversals, where the friction's width is told, would have it too small."""
+def test_a_missing_effect_gets_equal_weights() -> None:
+    """Fast reversals alone would underestimate the friction."""
     engine, present, noise = with_friction(rides([warming_up(), warming_up()]))
     best = reweighted(engine, present, noise)
     sign = np.tanh(RATE / 0.5)
@@ -81,7 +81,7 @@ def test_what_the_model_lacks_is_no_noise_and_values_are_the_mean() -> None:
     assert "evenly" in note
 
 
-def test_add_tells_by_which_weights_its_values_are() -> None:
+def test_add_notes_equal_weights() -> None:
     addition = add("motor-coulomb", rides([warming_up(), warming_up()]), GROOVED, CATALOGUE)
     assert any("evenly" in note for note in addition.notes)
     estimate = addition.added[1]["torque"]
@@ -89,7 +89,7 @@ def test_add_tells_by_which_weights_its_values_are() -> None:
     assert low < 0.0556 < high
 
 
-def test_measured_noise_is_believed() -> None:
+def test_noise_from_repeats_keeps_its_weights() -> None:
     hidden = [warming_up(), warming_up()]
     again = [replace(run, name=f"{run.name}-again") for run in rides(hidden)]
     noisy = [

@@ -1,4 +1,4 @@
-"""A rival in the place of an effect: what makes up for the effect must not keep the rival out."""
+"""Exchange of an effect for a rival, whose start must not be a compensated model."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import Ride, engine_for, term
-from winchkit.diagnosis.verdict.equivalence import confusion_of
+from winchkit.diagnosis.verdict.equivalence import equivalence_set
 
 ONE_WAY = Ride(samples=1500, rate=25.0, period=100.0)
 """Wound in once and not quite out again: a creep can look like a wrong length of rope."""
 
 
 @pytest.mark.parametrize("radius_error", [-1e-3, -5e-4, 1e-3])
-def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
+def test_an_equivalent_effect_is_found_though_the_others_compensate(
     radius_error: float,
 ) -> None:
     """On a grooved drum a wrong radius and a wrong ratio do the same to the last digit."""
@@ -28,10 +28,10 @@ def test_a_set_holds_what_explains_the_same_though_the_rest_made_up_for_it(
     final, noise = engine.fit_with_noise(start)
     alone = engine.refit(final.hypothesis.without(0), noise).hypothesis.terms[0]
     assert abs(np.log(alone.values["creep_stiffness"] / 7e5)) > 1.0
-    assert set(confusion_of(engine, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
+    assert set(equivalence_set(engine, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
 
 
-def test_held_as_it_is_a_hypothesis_keeps_its_values() -> None:
+def test_a_fixed_hypothesis_keeps_its_values() -> None:
     creep = term("cable-creep", creep_stiffness=7e5, time_constant=20.0)
     engine = engine_for([creep], ONE_WAY)
     begin, noise = engine.fit_with_noise(engine.initial_model)

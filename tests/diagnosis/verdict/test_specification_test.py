@@ -17,13 +17,18 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.specification_test import (
-    Beside,
-    Doubt,
-    _Hats,
+    PartialRegression,
+    SpecificationTest,
+    _BasisProducts,
     best_curve,
-    judge_and_doubt,
+    judge_with_specification_test,
 )
-from winchkit.diagnosis.verdict.spline_alternatives import PLACES, columns_of, hats_over, laws_over
+from winchkit.diagnosis.verdict.spline_alternatives import (
+    PLACES,
+    columns_of,
+    laws_over,
+    linear_splines,
+)
 from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 
@@ -51,41 +56,46 @@ def driven(hidden: tuple[Term, ...] = (), drag: float = 0.0) -> list[Run]:
 @given(seed=st.integers(0, 999), free=st.integers(0, 4), width=st.integers(1, 5))
 def test_a_gain_is_what_least_squares_takes(seed: int, free: int, width: int) -> None:
     random = np.random.default_rng(seed)
-    jacobian, hats = random.standard_normal((60, free)), random.standard_normal((20, 60))
+    jacobian, basis = random.standard_normal((60, free)), random.standard_normal((20, 60))
     residual, inverse_sigma = random.standard_normal(60), np.exp(random.standard_normal(60))
     law = random.standard_normal((20, width))
-    beside = Beside(residual, jacobian, inverse_sigma)
-    whitened = hats * inverse_sigma
-    left = whitened - (whitened @ beside.explained) @ beside.explained.T
-    gain = _Hats(whitened @ whitened.T, left @ left.T, left @ beside.residual).explained_ss(law)
+    partial = PartialRegression(residual, jacobian, inverse_sigma)
+    whitened = basis * inverse_sigma
+    left = whitened - (whitened @ partial.explained) @ partial.explained.T
+    gain = _BasisProducts(
+        whitened @ whitened.T, left @ left.T, left @ partial.residual
+    ).explained_ss(law)
 
     def squares(columns: Array) -> float:
         columns = columns * inverse_sigma[:, None]
         result = np.linalg.lstsq(columns, residual * inverse_sigma, rcond=None)[0]
         return float(np.sum((residual * inverse_sigma - columns @ result) ** 2))
 
-    assert beside.chi_square == pytest.approx(squares(jacobian))
-    together = squares(np.hstack([jacobian, hats.T @ law]))
+    assert partial.chi_square == pytest.approx(squares(jacobian))
+    together = squares(np.hstack([jacobian, basis.T @ law]))
     assert gain == pytest.approx(squares(jacobian) - together, rel=1e-6, abs=1e-9)
 
 
 def test_what_the_model_explains_whole_leaves_curves_nothing() -> None:
     """Rounding of a column that is there already must not be blown up into evidence."""
     random = np.random.default_rng(1)
-    hats, inverse_sigma = random.standard_normal((20, 80)), np.ones(80)
+    basis, inverse_sigma = random.standard_normal((20, 80)), np.ones(80)
     residual = random.standard_normal(80)
-    beside = Beside(residual, hats[:1].T, inverse_sigma)
-    left = hats - (hats @ beside.explained) @ beside.explained.T
+    partial = PartialRegression(residual, basis[:1].T, inverse_sigma)
+    left = basis - (basis @ partial.explained) @ partial.explained.T
     only = np.eye(20)[:, :1]
-    assert _Hats(hats @ hats.T, left @ left.T, left @ beside.residual).explained_ss(only) == 0.0
+    assert (
+        _BasisProducts(basis @ basis.T, left @ left.T, left @ partial.residual).explained_ss(only)
+        == 0.0
+    )
 
 
-def test_hats_add_up_to_one_and_draw_straight_lines() -> None:
+def test_linear_splines_add_up_to_one_and_reproduce_straight_lines() -> None:
     knots = np.linspace(-2.0, 5.0, 20)
     values = np.linspace(-2.0, 5.0, 101)
-    hats = hats_over(values, knots)
-    assert hats.sum(axis=0) == pytest.approx(np.ones(101))
-    assert knots @ hats == pytest.approx(values)
+    basis = linear_splines(values, knots)
+    assert basis.sum(axis=0) == pytest.approx(np.ones(101))
+    assert knots @ basis == pytest.approx(values)
     laws = laws_over(knots, "speed", level=False)
     assert all(law.shape[0] == 20 and n_parameters >= 1 for law, n_parameters in laws)
 
@@ -101,9 +111,9 @@ def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
     wrong = regression.change(Hypothesis().with_term(radius, regression.n_runs))
     lengths = [r.smooth.at.free_length for r in regression.dataset.recordings]
     knots = np.linspace(min(map(np.min, lengths)), max(map(np.max, lengths)), 20)
-    hats = [hats_over(length, knots) for length in lengths]
+    basis = [linear_splines(length, knots) for length in lengths]
     curve = np.zeros(regression.n_rows)
-    for own, columns in columns_of(regression, PLACES["winding"], hats, knots):
+    for own, columns in columns_of(regression, PLACES["winding"], basis, knots):
         curve[own] = (share * (knots - 4.0)) @ columns
     for output, close in (("cable_length", 0.02), ("motor_torque", 0.02)):
         rows = np.concatenate([np.r_[s.rows] for s in regression.segments if s.output == output])
@@ -155,9 +165,9 @@ def test_an_addition_that_a_curve_beats_is_dropped_and_the_rest_keeps_its_name()
         (),
         0.0,
     )
-    judged = judge_and_doubt(engine, result)
+    judged = judge_with_specification_test(engine, result)
     assert judged.verdict == "explained"
-    assert judged.shown.final.labels == ("motor-coulomb",)
+    assert judged.reported.final.labels == ("motor-coulomb",)
     (note,) = judged.notes
     assert note.startswith("closest, but not named: gear-ratio; an unknown curve of the ")
     assert "over the cable length explains more" in note
@@ -174,10 +184,10 @@ def rubbed() -> tuple[TimeSeriesSelection, SelectionResult]:
 
 def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
     engine, result = rubbed()
-    doubt = Doubt(engine, result)
-    whole = doubt.beside(())
+    test = SpecificationTest(engine, result)
+    whole = test.partial(())
     assert 0.99 * result.final.chi_square < whole.chi_square <= result.final.chi_square * (1 + 1e-9)
-    without = doubt.beside([0])
+    without = test.partial([0])
     refitted = engine.refit(result.final.hypothesis.without(0), result.noise)
     # What sampling may have rounded is taken out of the one and not of the other.
     assert 0.95 * refitted.chi_square < without.chi_square <= refitted.chi_square * (1 + 1e-9)
@@ -185,8 +195,8 @@ def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
 
 def test_curves_are_sought_only_where_the_names_act() -> None:
     engine, result = rubbed()
-    beside = Doubt(engine, result).beside([0])
-    curve = best_curve(engine.regression, beside, ["motor_torque"], engine.penalty_per_parameter)
+    partial = SpecificationTest(engine, result).partial([0])
+    curve = best_curve(engine.regression, partial, ["motor_torque"], engine.penalty_per_parameter)
     assert curve is not None
-    assert curve.place in {"motor_torque", "rope force"}
-    assert best_curve(engine.regression, beside, [], engine.penalty_per_parameter) is None
+    assert curve.place in {"motor_torque", "cable_force"}
+    assert best_curve(engine.regression, partial, [], engine.penalty_per_parameter) is None

@@ -14,7 +14,7 @@ from report_answers import recorded
 from report_parsed import Page
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import Compared, compared
-from winchkit.diagnosis.residuals.attribution import follows
+from winchkit.diagnosis.residuals.attribution import attributions
 from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
 from winchkit.report.figures.maps import map_text
 from winchkit.report.html.chart import Axis, Chart, axis_over, reading
@@ -58,7 +58,7 @@ def test_noise_follows_no_pair() -> None:
     known = held("demo-elastic-rope")
     noise = np.random.default_rng(7).standard_normal(known.regression.n_rows)
     assert residual_maps(known.regression, noise) == []
-    assert follows(known.regression, noise) == []
+    assert attributions(known.regression, noise) == []
 
 
 def test_the_largest_cell_is_told() -> None:

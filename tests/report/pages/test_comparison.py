@@ -13,7 +13,7 @@ from report_answers import recorded
 from report_parsed import HOSTILE, Page
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import Compared, compare, compared
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import OutputError
 from winchkit.report.figures.plots import Residuals, plots_of
 from winchkit.report.pages.comparison import distance_text
@@ -108,19 +108,19 @@ def test_without_repeats_the_noise_is_not_invented() -> None:
     [
         (
             STRETCHED,
-            Followed("cable_length", "load", 0.82),
+            Attribution("cable_length", "load", 0.82),
             "The cable length is off by 1.60 mm rms, 4.0 times its noise of 0.400 mm; "
             "it follows the load (82 % of the error).",
         ),
         (
             STRETCHED,
-            Followed("cable_length", "drum_angle", 0.5, order=5),
+            Attribution("cable_length", "drum_angle", 0.5, order=5),
             "The cable length is off by 1.60 mm rms, 4.0 times its noise of 0.400 mm; "
             "it repeats 5 times per drum turn (50 % of the error).",
         ),
         (
             replace(STRETCHED, noise_rms=1.5e-3),
-            Followed("cable_length", "load", 0.82),
+            Attribution("cable_length", "load", 0.82),
             "The cable length is off by 1.60 mm rms, about its noise of 1.50 mm.",
         ),
         (
@@ -137,7 +137,7 @@ def test_without_repeats_the_noise_is_not_invented() -> None:
         ),
     ],
 )
-def test_the_distance_in_words(error: OutputError, over: Followed | None, text: str) -> None:
+def test_the_distance_in_words(error: OutputError, over: Attribution | None, text: str) -> None:
     assert distance_text("cable_length", error, over) == text
 
 

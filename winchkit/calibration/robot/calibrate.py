@@ -25,14 +25,13 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.calibration.robot.cable_forces import CableForces
 from winchkit.calibration.robot.candidate_effects import Candidate, candidates
-from winchkit.calibration.robot.equations import Equations, State
+from winchkit.calibration.robot.equations import Equations
 from winchkit.calibration.robot.identifiability import (
     Observability,
     observability,
     outside_bounds,
     refuse_unfit,
 )
-from winchkit.calibration.robot.least_squares import Loss, Solution, Weights, place, solve
 from winchkit.calibration.robot.outliers import gross_errors
 from winchkit.calibration.robot.parameters import (
     EFFECTS,
@@ -45,6 +44,7 @@ from winchkit.calibration.robot.prediction import PoseErrors, errors_at, start_o
 from winchkit.calibration.robot.variance_components import NOISE, re_estimated_weights
 from winchkit.errors import UsageError
 from winchkit.model.robot import Robot
+from winchkit.model.robot.bundle_adjustment import Loss, Solution, State, Weights, place, solve
 from winchkit.runs.poses import Measured
 
 __all__ = ["Calibrated", "Estimated", "Options", "calibrate", "equations_of", "split"]

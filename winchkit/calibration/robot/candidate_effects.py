@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.calibration.robot.elongation import LAWS
-from winchkit.calibration.robot.equations import Equations, State
-from winchkit.calibration.robot.least_squares import Solution, Weights, linearise
+from winchkit.calibration.robot.equations import Equations
 from winchkit.calibration.robot.parameters import EFFECTS, Parameters, parameters_of
+from winchkit.model.robot.bundle_adjustment import Solution, State, Weights, linearise
 
 __all__ = ["Candidate", "candidates"]
 

@@ -19,6 +19,7 @@ from winchkit.arrays import Array
 from winchkit.calibration.robot.cable_forces import CableForces
 from winchkit.calibration.robot.parameters import Parameters
 from winchkit.model.robot import Geometry, Pose, Robot, lengths
+from winchkit.model.robot.bundle_adjustment import Rows, State
 from winchkit.model.robot.constraints import (
     Constraint,
     Strain,
@@ -36,34 +37,16 @@ from winchkit.model.robot.elongation import strain_of
 from winchkit.runs.poses import Measured
 from winchkit.schema.profiles.robot import PlatformSpec
 
-__all__ = ["Equations", "Rows", "State"]
-
-
-@dataclass(frozen=True)
-class State:
-    """Point at which the equations are evaluated: parameters (q,), and p poses."""
-
-    values: Array
-    pose: Pose
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Equations of one kind at p poses, NaN in the residual where nothing was measured."""
-
-    kind: str
-    """``rope`` (closure), ``position``, ``rotation``, ``swivel``, ``cable_length``, ``balance``."""
-    residual: Array
-    """Model less measurement, (p, k)."""
-    by_pose: Array
-    """Derivative by position and rotation vector, (p, k, 6)."""
-    by_values: Array | None
-    """Derivative by the parameters, (p, k, q); None where it is zero."""
+__all__ = ["Equations"]
 
 
 @dataclass(frozen=True)
 class Equations:
-    """Constraint equations of a robot at measured poses."""
+    """Constraint equations of a robot at measured poses.
+
+    Kinds are ``rope`` (closure), ``position``, ``rotation``, ``swivel``, ``cable_length`` and
+    ``balance``.
+    """
 
     robot: Robot
     parameters: Parameters

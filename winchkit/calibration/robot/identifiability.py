@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.calibration.robot.equations import Equations, State
-from winchkit.calibration.robot.least_squares import Linear, Solution, Weights, linearise
+from winchkit.calibration.robot.equations import Equations
 from winchkit.calibration.robot.parameters import Parameters
 from winchkit.errors import UsageError
 from winchkit.model.robot import Pose
+from winchkit.model.robot.bundle_adjustment import Linear, Solution, State, Weights, linearise
 from winchkit.model.robot.rotation import rotation_by, rotation_vector, skew
 
 __all__ = [

@@ -14,14 +14,14 @@ from winchkit.calibration.robot.elongation import LAWS, LawParameter
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.drum import drum_of
 from winchkit.model.robot import Robot
-from winchkit.schema.profiles.robot import PriorName, PriorSpec, RobotProfile
+from winchkit.model.robot.constraints import ZERO_STD
+from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse
 
 __all__ = [
     "EFFECTS",
     "GEOMETRY",
-    "PRIORS",
     "Parameter",
     "Parameters",
     "own_effects",
@@ -87,16 +87,6 @@ def _fault(table: EffectTable, message: str) -> Fault:
 
 Indices = NDArray[np.intp]
 
-PRIORS: dict[PriorName, float] = {
-    "exit_point": 5e-3,
-    "anchor_point": 5e-3,
-    "winding_radius": 0.5e-3,
-    "swivel_radius": 0.4e-3,
-    "layer_growth": 0.04e-3,
-}
-"""Standard deviations where a robot's file has none, m: half of the bounds of CABTIVE paper,
-Table 4."""
-
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius")
 """Effects of the catalogue that every calibration fits."""
 EFFECTS = (*LAWS, "home-length", "payload-mass", "payload-centre")
@@ -105,7 +95,6 @@ EFFECTS = (*LAWS, "home-length", "payload-mass", "payload-centre")
 _HOME_LENGTH = 1e-3
 _MASS_SHARE, _MASS_LEAST = 0.2, 0.1
 _CENTRE = 20e-3
-_ZERO, _OFFSET = 0.2, 0.05
 
 
 @dataclass(frozen=True)
@@ -271,9 +260,9 @@ def parameters_of(
         build.add("law", [_of_law(law, p, own.get(law, {})) for p in LAWS[law]])
     _payload(build, effects)
     if swivel:
-        build.zeros("swivel_zero", "rad", _ZERO, zero=True)
+        build.zeros("swivel_zero", "rad", ZERO_STD["swivel"], zero=True)
     if length_offset:
-        build.zeros("length_offset", "m", _OFFSET, zero=True)
+        build.zeros("length_offset", "m", ZERO_STD["cable_length"], zero=True)
     found = Parameters(tuple(build.all), build.block, law)
     if offsets := own.get("home-length"):
         found = found.starting("home_length", np.array([offsets[n] for n in robot.names]))

@@ -8,9 +8,8 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Calibrated
-from winchkit.calibration.robot.equations import State
-from winchkit.calibration.robot.least_squares import linearise
 from winchkit.model.robot import Pose, Robot, angles_of, lengths, robot_of
+from winchkit.model.robot.bundle_adjustment import State, linearise
 from winchkit.model.robot.forward import forward
 from winchkit.model.robot.pose_design import (
     FREEDOMS,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from winchkit.calibration.robot.least_squares import Solution, Weights, leverage
+from winchkit.model.robot.bundle_adjustment import Solution, Weights, leverage
 from winchkit.model.robot.variance_components import START, re_estimated
 
 __all__ = ["NOISE", "KindNoise", "re_estimated_weights"]

@@ -75,7 +75,7 @@ def _tell_one(
 
     with progress_bar() as progress:
         own, catalogue = asked.runs(runs), asked.catalogue
-        answer = diagnose(own, declared, catalogue, asked.band, thin=thin, progress=progress)
+        answer = diagnose(own, declared, catalogue, asked.band, decimate=thin, progress=progress)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         write_page(html, _page(answer, page_title(declared.name, runs), asked))
@@ -101,7 +101,9 @@ def _tell_each(
     with threads_abandoned(), progress_bar() as progress:
         winches = read_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
-        each = diagnose_each(winches, declared, catalogue, asked.band, thin=thin, progress=progress)
+        each = diagnose_each(
+            winches, declared, catalogue, asked.band, decimate=thin, progress=progress
+        )
         for name, answer in each:
             found[name], said[name] = answer.diagnosis, _said(answer, as_json)
             present[name] = answer.result.lack_of_fit_test.p_value

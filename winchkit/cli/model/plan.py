@@ -99,13 +99,13 @@ def _poses_text(plan: PosePlan) -> str:
 
 def _indistinguishable(plan: PosePlan) -> list[str]:
     """What no poses tell apart, and what does."""
-    from winchkit.diagnosis.robot.pose_design import WORTHWHILE
+    from winchkit.diagnosis.robot.pose_design import LEAST_POWER
     from winchkit.effects.effect import told_apart
     from winchkit.report.words.columns import paragraph
 
     lines = []
     for index, (first, second) in enumerate(plan.pairs):
-        if max(offer.powers[index] for offer in plan.offers) < WORTHWHILE:
+        if max(offer.powers[index] for offer in plan.offers) < LEAST_POWER:
             names = f"{first.effect.id} / {second.effect.id}"
             what = told_apart(first.effect, second.effect)
             lines += paragraph(f"{names}: no such poses tell them apart. What does: {what}")
@@ -223,12 +223,13 @@ def _silent(found: Plan, *, widened: bool) -> list[str]:
     """What none of these programmes tells apart, and what does."""
     from winchkit.effects.effect import told_apart
 
-    lines, room = [], found.room
+    lines, operating_range = [], found.operating_range
     for first, second in found.inseparable:
         names = f"{first.effect.id} / {second.effect.id}"
         lines.append(
-            f"{names}: no such motion within {room.low:.2f} m to {room.high:.2f} m tells them "
-            f"apart. What does: {told_apart(first.effect, second.effect)}"
+            f"{names}: no such motion within {operating_range.low:.2f} m to "
+            f"{operating_range.high:.2f} m tells them apart. What does: "
+            f"{told_apart(first.effect, second.effect)}"
         )
     if lines and not widened:
         lines.append("With --bench BENCH.toml the plan goes as far as that bench may.")

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.decimation import Thinning, thinning_for
-from winchkit.diagnosis.data.input_denoising import calm_motions
+from winchkit.diagnosis.data.decimation import Decimation, decimation_for
+from winchkit.diagnosis.data.input_denoising import denoised_motions
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import bridged, gaps
 from winchkit.diagnosis.data.spectrum import Band, torque_band
-from winchkit.diagnosis.data.transients import jerked
-from winchkit.diagnosis.data.validation import admit
+from winchkit.diagnosis.data.transients import transient_mask
+from winchkit.diagnosis.data.validation import validate_runs
 from winchkit.errors import UsageError
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUTS, At, Signals
@@ -37,13 +37,13 @@ class Filtering:
 
     band: float | None = None
     """Cut-off of the torque's low-pass, Hz; None for the default."""
-    skirt: float = 1.0
+    kept_cut_offs: float = 1.0
     """Coefficients are kept up to this many cut-offs."""
-    thinning: Thinning | None = None
+    decimation: Decimation | None = None
     """Decimation of long runs; None for none."""
 
 
-_SHAKEN = 0.25
+_GAP_MARGIN = 0.25
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Recording:
     programme: str = ""
     path: str = ""
     """File that it was read from."""
-    thinned: bool = False
+    decimated: bool = False
     """Whether the run was decimated, so that its derivatives were taken at a higher rate."""
 
 
@@ -101,9 +101,9 @@ def prepare(
     runs: Sequence[Run],
     profile: WinchProfile,
     band: float | None = None,
-    skirt: float = 1.0,
+    kept_cut_offs: float = 1.0,
     *,
-    thin: bool = False,
+    decimate: bool = False,
 ) -> Dataset:
     """Validate runs and build their data set.
 
@@ -115,10 +115,10 @@ def prepare(
         Winch profile.
     band
         Cut-off of the torque's low-pass, Hz; None for 20 Hz or a tenth of the sampling rate.
-    skirt
+    kept_cut_offs
         Coefficients are kept up to this many cut-offs: 1 for fits, more for the rms of a filtered
         signal, to which the transition band contributes.
-    thin
+    decimate
         Whether long runs are decimated as far as their signals allow.
 
     Raises
@@ -130,11 +130,11 @@ def prepare(
     """
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
-    notes = admit(runs, profile)
-    thinning = thinning_for(runs) if thin else None
-    if thinning is not None:
-        notes.append(thinning.words)
-    filtering = Filtering(band, skirt, thinning)
+    notes = validate_runs(runs, profile)
+    decimation = decimation_for(runs) if decimate else None
+    if decimation is not None:
+        notes.append(decimation.words)
+    filtering = Filtering(band, kept_cut_offs, decimation)
     return replace(assemble(runs, profile, filtering), notes=tuple(notes))
 
 
@@ -145,16 +145,16 @@ def assemble(
     line, filtering = Line(profile), filtering or Filtering()
     fastest = max((_fastest(run) for run in runs), default=0.0)
     raw = [line.motion(_signals(run, fastest)) for run in runs]
-    thinning = filtering.thinning
-    if thinning is not None:
-        raw = [thinning.motion(motion) for motion in raw]
-        runs = [thinning.run(run) for run in runs]
+    decimation = filtering.decimation
+    if decimation is not None:
+        raw = [decimation.motion(motion) for motion in raw]
+        runs = [decimation.run(run) for run in runs]
     signals = [_signals(run, fastest) for run in runs]
     repeats = find_repeats(signals)
-    smooth = calm_motions(line, signals, raw, repeats)
+    smooth = denoised_motions(line, signals, raw, repeats)
     recordings = tuple(
-        _recording(run, own, (motion, calm), line, filtering)
-        for run, own, motion, calm in zip(runs, signals, raw, smooth, strict=True)
+        _recording(run, own, (motion, denoised), line, filtering)
+        for run, own, motion, denoised in zip(runs, signals, raw, smooth, strict=True)
     )
     return Dataset(profile, recordings, tuple(repeats))
 
@@ -201,48 +201,48 @@ def _recording(
         nominal_smooth=line.predict(smooth),
         programme=run.metadata.get("programme", ""),
         path=run.path,
-        thinned=filtering.thinning is not None,
+        decimated=filtering.decimation is not None,
     )
 
 
 def _band(run: Run, output: str, filtering: Filtering) -> Band:
-    rate, thinning, cut_off = 1 / run.interval, filtering.thinning, None
+    rate, decimation, cut_off = 1 / run.interval, filtering.decimation, None
     if output == "motor_torque":
-        full = rate if thinning is None else rate * thinning.factor
+        full = rate if decimation is None else rate * decimation.factor
         cut_off = filtering.band or torque_band(full)
-    if thinning is not None:
-        cut_off = min(cut_off or np.inf, thinning.cut_off)
-    return Band(len(run), rate, cut_off, filtering.skirt)
+    if decimation is not None:
+        cut_off = min(cut_off or np.inf, decimation.cut_off)
+    return Band(len(run), rate, cut_off, filtering.kept_cut_offs)
 
 
 def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
     """Samples of an output that are compared: measured, with known inputs, away from transients."""
-    good = np.isfinite(run[output]) & np.isfinite(run["motor_angle"])
-    good &= _away_from_time_gaps(run.time)
+    compared = np.isfinite(run[output]) & np.isfinite(run["motor_angle"])
+    compared &= _away_from_time_gaps(run.time)
     if motion.load is not None and "load" in run:
-        good &= np.isfinite(run["load"])
+        compared &= np.isfinite(run["load"])
     if output != "cable_length":
         # No acceleration at the ends of a run: finite differences reach beyond them.
         edge = 1 + motion.clock.reach
-        good[:edge] = good[-edge:] = False
-    good = _away_from_gaps(good, band.rate, band.cut_off)
+        compared[:edge] = compared[-edge:] = False
+    compared = _away_from_gaps(compared, band.rate, band.cut_off)
     if output != "cable_length":
-        good &= ~jerked(run.time, bridged(run[output]), output, motion)
-    return good
+        compared &= ~transient_mask(run.time, bridged(run[output]), output, motion)
+    return compared
 
 
 def _away_from_time_gaps(time: Array) -> Mask:
     """Samples away from gaps in time, within which the motion is not known."""
     out = np.ones(len(time), dtype=bool)
     for index in gaps(time):
-        out &= (time < time[index] - _SHAKEN) | (time > time[index + 1] + _SHAKEN)
+        out &= (time < time[index] - _GAP_MARGIN) | (time > time[index + 1] + _GAP_MARGIN)
     return out
 
 
-def _away_from_gaps(good: Mask, rate: float, cut_off: float | None) -> Mask:
+def _away_from_gaps(compared: Mask, rate: float, cut_off: float | None) -> Mask:
     """Samples away from interpolated ones, by the length of the low-pass's response."""
     reach = 1 if cut_off is None else max(1, round(rate / cut_off))
-    if good.all():
-        return good
-    smeared = np.convolve(~good, np.ones(2 * reach + 1), mode="same") > 0
-    return ~smeared
+    if compared.all():
+        return compared
+    affected = np.convolve(~compared, np.ones(2 * reach + 1), mode="same") > 0
+    return ~affected

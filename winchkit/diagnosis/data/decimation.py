@@ -27,23 +27,23 @@ from winchkit.model.line import Motion
 from winchkit.model.stages import At
 from winchkit.runs.run import Run
 
-__all__ = ["Thinning", "thinning_for"]
+__all__ = ["Decimation", "decimation_for"]
 
-_MANY = 200_000
+_LEAST_SAMPLES = 200_000
 """Samples of all runs from which decimation begins."""
-_WANTED = 90_000
+_TARGET_SAMPLES = 90_000
 """Samples that decimation aims at."""
-_PASSED = 0.25
+_RELATIVE_CUT_OFF = 0.25
 """Cut-off over the new sampling rate: below it aliases come from three times the cut-off."""
-_SLOWEST = 20.0
+_LEAST_RATE = 20.0
 """Least sampling rate that is left, Hz: reversals and lags last about a tenth of a second."""
-_LOST = 0.01
+_LOST_POWER = 0.01
 """Share of a channel's power beyond its noise that may lie above the cut-off."""
 _BLOCK = 16.0
 """Longest block of a Welch spectrum, s."""
 _BLOCKS = 8
 """Least number of blocks of a Welch spectrum, overlapping by half."""
-_CLEAR = 2.0
+_SIGNAL_TO_NOISE = 2.0
 """Ratio to the noise power from which a frequency holds signal."""
 _TAPS = 10
 _BETA = 7.857
@@ -52,7 +52,7 @@ _CHANNELS = ("motor_angle", "motor_torque", "tension", "load", "cable_length")
 
 
 @dataclass(frozen=True)
-class Thinning:
+class Decimation:
     """Low-pass and decimation by one factor."""
 
     factor: int
@@ -64,8 +64,8 @@ class Thinning:
         """Sentence for the notes of a diagnosis."""
         return (
             f"every {_ordinal(self.factor)} sample of the runs, whole up to {self.cut_off:.3g} Hz "
-            f"and low-passed beyond, is compared: beyond lies less than {_LOST:.0%} of what any "
-            "channel does"
+            f"and low-passed above, is compared; less than {_LOST_POWER:.0%} of the power of any "
+            "channel is above"
         )
 
     def run(self, run: Run) -> Run:
@@ -79,47 +79,47 @@ class Thinning:
         """
         pieces = _pieces(run.time)
         channels = {
-            name: replace(channel, values=self._measured(channel.values, pieces))
+            name: replace(channel, values=self._decimated_channel(channel.values, pieces))
             for name, channel in run.channels.items()
             if name.rpartition(".")[2] in (*_CHANNELS, "motor_velocity", "temperature")
         }
-        return replace(run, time=self._every(run.time, pieces), channels=channels)
+        return replace(run, time=self._every_kth(run.time, pieces), channels=channels)
 
     def motion(self, motion: Motion) -> Motion:
         """Decimate a motion, each of its signals low-passed by itself."""
         pieces = _pieces(motion.at.time)
         at: dict[str, Any] = {
-            field.name: self._passed(value, pieces)
+            field.name: self._low_passed(value, pieces)
             for field in fields(At)
             if isinstance(value := getattr(motion.at, field.name), np.ndarray)
         }
-        at["time"] = self._every(motion.at.time, pieces)
+        at["time"] = self._every_kth(motion.at.time, pieces)
 
-        def thinned(values: Array | None) -> Array | None:
-            return None if values is None else self._passed(values, pieces)
+        def decimated(values: Array | None) -> Array | None:
+            return None if values is None else self._low_passed(values, pieces)
 
         return replace(
             motion,
             at=replace(motion.at, **at),
             clock=Clock(at["time"]),
-            load=thinned(motion.load),
-            drum_tension=thinned(motion.drum_tension),
-            rounding=thinned(motion.rounding),
+            load=decimated(motion.load),
+            drum_tension=decimated(motion.drum_tension),
+            discretization=decimated(motion.discretization),
         )
 
-    def _every(self, time: Array, pieces: Sequence[slice]) -> Array:
+    def _every_kth(self, time: Array, pieces: Sequence[slice]) -> Array:
         return np.concatenate([time[piece][:: self.factor] for piece in pieces])
 
-    def _measured(self, values: Array, pieces: Sequence[slice]) -> Array:
-        known = np.isfinite(values)
-        if known.all():
-            return self._passed(values, pieces)
-        if not known.any():
-            return self._every(values, pieces)
-        share = self._passed(known.astype(float), pieces)
-        return np.where(share > 0.5, self._passed(bridged(values), pieces), np.nan)
+    def _decimated_channel(self, values: Array, pieces: Sequence[slice]) -> Array:
+        finite = np.isfinite(values)
+        if finite.all():
+            return self._low_passed(values, pieces)
+        if not finite.any():
+            return self._every_kth(values, pieces)
+        share = self._low_passed(finite.astype(float), pieces)
+        return np.where(share > 0.5, self._low_passed(bridged(values), pieces), np.nan)
 
-    def _passed(self, values: Array, pieces: Sequence[slice]) -> Array:
+    def _low_passed(self, values: Array, pieces: Sequence[slice]) -> Array:
         """Zero-phase low-pass and decimation, each piece between gaps by itself."""
         reach = _TAPS // 2 * self.factor
         taps = firwin(2 * reach + 1, 1.0 / self.factor, window=("kaiser", _BETA))
@@ -142,7 +142,7 @@ def _ordinal(number: int) -> str:
     return f"{number}{'th' if number % 100 in (11, 12, 13) else ends.get(number % 10, 'th')}"
 
 
-def thinning_for(runs: Sequence[Run]) -> Thinning | None:
+def decimation_for(runs: Sequence[Run]) -> Decimation | None:
     """Decimation that the signals of all runs allow, by one factor.
 
     Parameters
@@ -152,7 +152,7 @@ def thinning_for(runs: Sequence[Run]) -> Thinning | None:
 
     Returns
     -------
-    Thinning or None
+    Decimation or None
         None where the runs together are short enough, or the signals too fast.
 
     Notes
@@ -161,36 +161,40 @@ def thinning_for(runs: Sequence[Run]) -> Thinning | None:
     every channel's power above its white noise below the cut-off, and what leaves 20 Hz.
     """
     total, rate = sum(map(len, runs)), 1 / max(run.interval for run in runs)
-    if total < _MANY:
+    if total < _LEAST_SAMPLES:
         return None
-    wanted = -(-total // _WANTED)
-    quickest = max(
-        (_quickest(run[name], rate) for run in runs for name in _CHANNELS if name in run),
+    target_factor = -(-total // _TARGET_SAMPLES)
+    highest = max(
+        (_highest_frequency(run[name], rate) for run in runs for name in _CHANNELS if name in run),
         default=0.0,
     )
-    allowed = rate * _PASSED / quickest if quickest else np.inf
-    factor = int(min(wanted, allowed, rate / _SLOWEST))
-    return Thinning(factor, _PASSED * rate / factor) if factor > 1 else None
+    allowed = rate * _RELATIVE_CUT_OFF / highest if highest else np.inf
+    factor = int(min(target_factor, allowed, rate / _LEAST_RATE))
+    return Decimation(factor, _RELATIVE_CUT_OFF * rate / factor) if factor > 1 else None
 
 
-def _quickest(values: Array, rate: float) -> float:
+def _highest_frequency(values: Array, rate: float) -> float:
     """Frequency above which less than 1 % of a signal's power beyond its white noise lies, Hz."""
-    known = np.isfinite(values)
+    finite = np.isfinite(values)
     length = min(len(values) // _BLOCKS, round(_BLOCK * rate))
-    if not known.any() or length < 2:
+    if not finite.any() or length < 2:
         return 0.0
     # A ramp over many turns leaks over all frequencies through a Hann window.
     window = ("general_cosine", (3 / 8, 1 / 2, 1 / 8))
     frequency, power = welch(
-        bridged(values), fs=rate, window=window, nperseg=length, detrend=_levelled
+        bridged(values), fs=rate, window=window, nperseg=length, detrend=_without_jumps
     )
     noise = float(np.median(power[frequency > rate / 4]))
-    clear = np.where(power > _CLEAR * noise, power - noise, 0.0)
-    beyond = np.cumsum(clear[::-1])[::-1]
-    return float(frequency[np.flatnonzero(beyond >= _LOST * beyond[0])[-1]]) if beyond[0] else 0.0
+    has_signal = np.where(power > _SIGNAL_TO_NOISE * noise, power - noise, 0.0)
+    power_above = np.cumsum(has_signal[::-1])[::-1]
+    return (
+        float(frequency[np.flatnonzero(power_above >= _LOST_POWER * power_above[0])[-1]])
+        if power_above[0]
+        else 0.0
+    )
 
 
-def _levelled(values: Array) -> Array:
+def _without_jumps(values: Array) -> Array:
     """Remove mean and slope along the last axis."""
     x = np.arange(values.shape[-1]) - (values.shape[-1] - 1) / 2
     slope = (values @ x / (x @ x))[..., None]

@@ -26,10 +26,10 @@ from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 
 __all__ = [
-    "agreed",
-    "calm_motions",
     "contrasts",
-    "quiet",
+    "denoised_motions",
+    "shared_by_repeats",
+    "wiener_filtered",
 ]
 
 _FLOOR_SHARE = 1 / 3
@@ -58,16 +58,16 @@ def contrasts(aligned: Array) -> tuple[Array, Array]:
     return mean, np.array(differences).reshape(m - 1, *aligned.shape[1:])
 
 
-def quiet(signal: Array) -> Array:
+def wiener_filtered(signal: Array) -> Array:
     """Remove white noise by a Wiener gain per band, the noise floor from the highest third."""
     full = np.asarray(dct(signal, type=2, norm="ortho"))
     power = full**2
-    top = power[int(len(power) * (1 - _FLOOR_SHARE)) :]
-    floor = float(np.mean(top)) if len(top) else 0.0
-    return _gained(full, power, np.full_like(power, floor))
+    highest_third = power[int(len(power) * (1 - _FLOOR_SHARE)) :]
+    floor = float(np.mean(highest_third)) if len(highest_third) else 0.0
+    return _band_filtered(full, power, np.full_like(power, floor))
 
 
-def agreed(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
+def shared_by_repeats(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
     """Part of each signal that its repeats share, on its own samples.
 
     Parameters
@@ -88,7 +88,7 @@ def agreed(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[A
     is in the prediction, and a remainder of it would be taken for a lag or a hysteresis.
     """
     if len(signals) < 2:
-        return [quiet(signal) for signal in signals]
+        return [wiener_filtered(signal) for signal in signals]
     aligned = np.array([signal[index] for signal, index in zip(signals, rows, strict=True)])
     _, differences = contrasts(aligned)
     noise = np.mean(np.asarray(dct(differences, type=2, norm="ortho", axis=1)) ** 2, axis=0)
@@ -96,13 +96,13 @@ def agreed(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[A
     for own, (signal, index) in enumerate(zip(signals, rows, strict=True)):
         others, _ = contrasts(np.delete(aligned, own, axis=0))
         full = np.asarray(dct(others, type=2, norm="ortho"))
-        shared = np.zeros_like(signal)
-        shared[index] = _gained(full, full**2, noise) / np.sqrt(len(signals) - 1)
-        out.append(shared)
+        denoised = np.zeros_like(signal)
+        denoised[index] = _band_filtered(full, full**2, noise) / np.sqrt(len(signals) - 1)
+        out.append(denoised)
     return out
 
 
-def _gained(full: Array, power: Array, noise: Array) -> Array:
+def _band_filtered(full: Array, power: Array, noise: Array) -> Array:
     """Inverse transform with each band scaled by the share of its power that is not noise."""
     edges = band_edges(np.arange(len(full), dtype=float), 1)
     gain = np.ones_like(full)
@@ -120,7 +120,7 @@ def _gained(full: Array, power: Array, noise: Array) -> Array:
     return np.asarray(idct(full * gain, type=2, norm="ortho"))
 
 
-def calm_motions(
+def denoised_motions(
     line: Line, signals: Sequence[Signals], motions: Sequence[Motion], repeats: Sequence[Repeats]
 ) -> list[Motion]:
     """Motions with denoised cable force and temperature, one per run.
@@ -145,10 +145,14 @@ def calm_motions(
     for group in repeats:
         own = [signals[index] for index in group.runs]
         units = [_unit_weight(line, s) for s in own]
-        follow = _shared([load for load, _ in units], group)
-        rounding = _shared([rounding for _, rounding in units], group)
-        moved = [np.column_stack(pair) for pair in zip(follow, rounding, strict=True)]
-        for index, force, r in zip(group.runs, _forces(own, moved, group), rounding, strict=True):
+        unit_force = _denoised([load for load, _ in units], group)
+        discretization = _denoised([discretization for _, discretization in units], group)
+        regressors = [
+            np.column_stack(pair) for pair in zip(unit_force, discretization, strict=True)
+        ]
+        for index, force, r in zip(
+            group.runs, _forces(own, regressors, group), discretization, strict=True
+        ):
             out[index] = _with(out[index], force, r, signals[index].temperature)
     return out
 
@@ -157,27 +161,27 @@ def _unit_weight(line: Line, signals: Signals) -> tuple[Array, Array]:
     """Force of one kilogram, m/s², and its correction for finite differences."""
     motion = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
     assert motion.load is not None
-    assert motion.rounding is not None
-    return motion.load, motion.rounding
+    assert motion.discretization is not None
+    return motion.load, motion.discretization
 
 
-def _shared(values: Sequence[Array], group: Repeats) -> list[Array]:
+def _denoised(values: Sequence[Array], group: Repeats) -> list[Array]:
     """Part that repeats share plus the mean; outside of the overlap the run's own, denoised."""
-    about = [value - value.mean() for value in values]
+    centred = [value - value.mean() for value in values]
     out = []
-    for value, own, shared, rows in zip(
-        values, about, agreed(about, group.rows), group.rows, strict=True
+    for value, own, denoised, rows in zip(
+        values, centred, shared_by_repeats(centred, group.rows), group.rows, strict=True
     ):
-        alone = np.ones(len(own), dtype=bool)
-        alone[rows] = False
-        if alone.any():
-            shared[alone] = quiet(own)[alone]
-        out.append(shared + value.mean())
+        without_repeats = np.ones(len(own), dtype=bool)
+        without_repeats[rows] = False
+        if without_repeats.any():
+            denoised[without_repeats] = wiener_filtered(own)[without_repeats]
+        out.append(denoised + value.mean())
     return out
 
 
 def _forces(
-    signals: Sequence[Signals], moved: Sequence[Array], group: Repeats
+    signals: Sequence[Signals], regressors: Sequence[Array], group: Repeats
 ) -> list[Array | None]:
     """Denoised cable force of every run of a group; None where it is not known.
 
@@ -186,29 +190,31 @@ def _forces(
     measured = [s.load if s.load is not None else s.tension for s in signals]
     known = [s.load_mass if s.load is None else None for s in signals]
     if all(mass is not None for mass in known):
-        pairs = zip(known, moved, strict=True)
+        pairs = zip(known, regressors, strict=True)
         return [mass * pulled[:, 0] for mass, pulled in pairs if mass is not None]
     values = [value for value in measured if value is not None]
     if len(values) < len(signals):
         return [None] * len(signals)
-    followed = [_followed(v, f) for v, f in zip(values, moved, strict=True)]
-    rest = agreed([v - f for v, f in zip(values, followed, strict=True)], group.rows)
-    return [f + r for f, r in zip(followed, rest, strict=True)]
+    regressed = [_regressed_force(v, f) for v, f in zip(values, regressors, strict=True)]
+    remainders = shared_by_repeats(
+        [v - f for v, f in zip(values, regressed, strict=True)], group.rows
+    )
+    return [f + r for f, r in zip(regressed, remainders, strict=True)]
 
 
-def _followed(force: Array, moved: Array) -> Array:
+def _regressed_force(force: Array, regressors: Array) -> Array:
     """Regression of a force on a constant and on the acceleration of the cable."""
-    columns = np.column_stack([np.ones_like(force), moved - moved.mean(axis=0)])
+    columns = np.column_stack([np.ones_like(force), regressors - regressors.mean(axis=0)])
     return np.asarray(columns @ np.linalg.lstsq(columns, force, rcond=None)[0])
 
 
 def _with(
-    motion: Motion, force: Array | None, rounding: Array, temperature: Array | None
+    motion: Motion, force: Array | None, discretization: Array, temperature: Array | None
 ) -> Motion:
-    """A motion with denoised cable force and temperature; ``rounding`` is that of a unit weight."""
+    """A motion with denoised inputs; ``discretization`` is the correction of a unit weight."""
     at = motion.at
     if temperature is not None:
-        at = replace(at, temperature=quiet(temperature))
+        at = replace(at, temperature=wiener_filtered(temperature))
     if force is None:
         return replace(motion, at=at)
     return replace(
@@ -216,5 +222,5 @@ def _with(
         at=replace(at, tension=force),
         load=None if motion.load is None else force,
         drum_tension=None if motion.drum_tension is None else force,
-        rounding=None if motion.load_mass is None else motion.load_mass * rounding,
+        discretization=None if motion.load_mass is None else motion.load_mass * discretization,
     )

@@ -18,11 +18,11 @@ from winchkit.model.stages import Signals
 
 __all__ = ["Repeats", "find_repeats"]
 
-_ANGLE_AGREES = 0.02
-_LOAD_AGREES = 0.02
-_OVERLAP = 0.8
-_AS_GOOD = 1e-6
-_SAME_RATE = 0.05
+_ANGLE_TOLERANCE = 0.02
+_LOAD_TOLERANCE = 0.02
+_LEAST_OVERLAP = 0.8
+_TIE = 1e-6
+_RATE_TOLERANCE = 0.05
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def find_repeats(signals: list[Signals]) -> list[Repeats]:
                 break
         else:
             sets.append(([index], [0.0]))
-    return [_lined_up(members, shifts, signals) for members, shifts in sets]
+    return [_aligned(members, shifts, signals) for members, shifts in sets]
 
 
 def mean_load(run: Signals) -> float | None:
@@ -71,22 +71,22 @@ def mean_load(run: Signals) -> float | None:
 
 def _shift(first: Signals, other: Signals) -> float | None:
     """Time by which the clock of ``other`` is ahead, s; None where it is not a repeat."""
-    if not _equally_loaded(first, other):
+    if not _same_load(first, other):
         return None
     step = float(np.median(np.diff(first.time)))
-    if abs(float(np.median(np.diff(other.time))) - step) > _SAME_RATE * step:
+    if abs(float(np.median(np.diff(other.time))) - step) > _RATE_TOLERANCE * step:
         return None
-    begun = first.time[0], other.time[0]
-    a, b = (_evenly(run, step) for run in (first, other))
+    starts = first.time[0], other.time[0]
+    a, b = (_resampled(run, step) for run in (first, other))
     if not np.ptp(a) or not np.ptp(b):
         return None
     lag = _best_lag(a, b)
     start, stop = max(0, -lag), min(len(a), len(b) - lag)
-    apart = a[start:stop] - b[start + lag : stop + lag]
+    differences = a[start:stop] - b[start + lag : stop + lag]
     spread = float(np.std(a[start:stop]))
-    if float(np.sqrt(np.mean(apart**2))) > _ANGLE_AGREES * spread:
+    if float(np.sqrt(np.mean(differences**2))) > _ANGLE_TOLERANCE * spread:
         return None
-    return lag * step + float(begun[1] - begun[0])
+    return lag * step + float(starts[1] - starts[0])
 
 
 def _best_lag(a: Array, b: Array) -> int:
@@ -100,28 +100,28 @@ def _best_lag(a: Array, b: Array) -> int:
     a, b = a - mean, b - mean
     within_a, within_b = (np.concatenate([[0.0], np.cumsum(x**2)]) for x in (a, b))
     squares = within_a[stop] - within_a[start] + within_b[stop + lags] - within_b[start + lags]
-    apart = (squares - 2 * correlate(b, a, mode="full")) / (stop - start)
-    enough = stop - start >= _OVERLAP * min(len(a), len(b))
-    apart = np.where(enough, apart, np.inf)
+    differences = (squares - 2 * correlate(b, a, mode="full")) / (stop - start)
+    overlapping = stop - start >= _LEAST_OVERLAP * min(len(a), len(b))
+    differences = np.where(overlapping, differences, np.inf)
     # A periodic motion fits at several lags: take the one of largest overlap.
-    fits = apart <= apart.min() + _AS_GOOD * float(np.mean(a**2))
-    return int(lags[fits][np.argmax((stop - start)[fits])])
+    best = differences <= differences.min() + _TIE * float(np.mean(a**2))
+    return int(lags[best][np.argmax((stop - start)[best])])
 
 
-def _equally_loaded(first: Signals, other: Signals) -> bool:
+def _same_load(first: Signals, other: Signals) -> bool:
     loads = mean_load(first), mean_load(other)
     if loads[0] is None or loads[1] is None:
         return loads[0] is loads[1]
-    return abs(loads[0] - loads[1]) <= _LOAD_AGREES * max(abs(loads[0]), abs(loads[1]))
+    return abs(loads[0] - loads[1]) <= _LOAD_TOLERANCE * max(abs(loads[0]), abs(loads[1]))
 
 
-def _evenly(run: Signals, step: float) -> Array:
+def _resampled(run: Signals, step: float) -> Array:
     """Motor angle on an even grid: logs of a real bench have gaps and jitter."""
     grid = np.arange(run.time[0], run.time[-1], step)
     return np.interp(grid, run.time, run.motor_angle)
 
 
-def _lined_up(members: list[int], shifts: list[float], signals: list[Signals]) -> Repeats:
+def _aligned(members: list[int], shifts: list[float], signals: list[Signals]) -> Repeats:
     """Nearest samples of all members on the clock of the first, over their common time."""
     clocks = [signals[m].time - shift for m, shift in zip(members, shifts, strict=True)]
     low, high = max(c[0] for c in clocks), min(c[-1] for c in clocks)

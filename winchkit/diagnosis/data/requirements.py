@@ -13,7 +13,7 @@ __all__ = ["excites", "missing_needs"]
 
 _PERIODS = 2
 _NEEDED = {
-    "cable": "a rope in the profile ([cable], [[pulley]] or reference.cable_length)",
+    "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
     "layers": "a drum that winds in layers (spiral or archimedean)",
     "guide": "a [guide] in the profile",
     "pulley": "a [[pulley]] in the profile",

@@ -16,7 +16,7 @@ from scipy.fft import dct, idct
 from winchkit.arrays import Array
 
 __all__ = [
-    "WHOLE_FILTER",
+    "WHOLE_TRANSITION",
     "Band",
     "band_edges",
     "low_pass",
@@ -31,10 +31,10 @@ _BUTTERWORTH_ORDER = 4
 _TORQUE_BAND = 20.0
 _BANDS = 14
 _NARROW = 24
-_BEND = 0.25
+_CURVATURE_STD = 0.25
 _ITERATIONS = 25
-_FEWEST = 8
-WHOLE_FILTER = 3.0
+_LEAST_COEFFICIENTS = 8
+WHOLE_TRANSITION = 3.0
 """In units of the cut-off: beyond it the low-pass passes about 10⁻⁴ of the amplitude."""
 
 
@@ -53,7 +53,7 @@ class Band:
     """Samples per second."""
     cut_off: float | None = None
     """Low-pass, Hz; None keeps all."""
-    skirt: float = 1.0
+    kept_cut_offs: float = 1.0
     """Coefficients are kept up to this many cut-offs."""
 
     @cached_property
@@ -62,7 +62,7 @@ class Band:
         frequency = np.arange(self.count) * self.rate / (2 * self.count)
         if self.cut_off is None:
             return frequency
-        return frequency[frequency <= self.skirt * self.cut_off]
+        return frequency[frequency <= self.kept_cut_offs * self.cut_off]
 
     @cached_property
     def gain(self) -> Array:
@@ -177,16 +177,16 @@ def smoothed(power: Array, dof: Array) -> tuple[Array, Array]:
     count = len(power)
     if count < 3:
         return power, dof
-    bend = np.diff(np.eye(count), 2, axis=0)
-    stiff = bend.T @ bend / _BEND**2
+    second_differences = np.diff(np.eye(count), 2, axis=0)
+    penalty = second_differences.T @ second_differences / _CURVATURE_STD**2
     weight = np.diag(np.maximum(dof, 1e-6) / 2)
     level = np.log(power)
-    eta = np.linalg.solve(weight + stiff, weight @ level)
+    eta = np.linalg.solve(weight + penalty, weight @ level)
     for _ in range(_ITERATIONS):
         # A band far below its neighbours may pull the logarithm down by one step only.
         working = eta + np.clip(power / np.exp(eta) - 1, -1.0, 3.0)
-        eta = np.linalg.solve(weight + stiff, weight @ working)
-    covariance = np.linalg.inv(weight + stiff)
+        eta = np.linalg.solve(weight + penalty, weight @ working)
+    covariance = np.linalg.inv(weight + penalty)
     return np.exp(eta), 2 / np.diag(covariance)
 
 
@@ -206,13 +206,13 @@ def band_edges(frequency: Array, copies: int) -> Array:
         From minus to plus infinity.
     """
     positive = frequency[frequency > 0]
-    if len(positive) < 2 * _FEWEST:
+    if len(positive) < 2 * _LEAST_COEFFICIENTS:
         return np.array([-np.inf, np.inf])
     wanted = np.geomspace(positive[0], positive[-1], _BANDS + 1)[1:-1]
     edges = [-np.inf]
     for edge in wanted:
         inside = np.count_nonzero((frequency >= edges[-1]) & (frequency < edge)) * copies
         beyond = np.count_nonzero(frequency >= edge) * copies
-        if inside >= _FEWEST and beyond >= _FEWEST:
+        if inside >= _LEAST_COEFFICIENTS and beyond >= _LEAST_COEFFICIENTS:
             edges.append(float(edge))
     return np.array([*edges, np.inf])

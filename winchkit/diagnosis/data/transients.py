@@ -15,19 +15,19 @@ from winchkit.model.derivatives import Clock
 from winchkit.model.drum import Spiral, drum_of
 from winchkit.model.line import Motion
 
-__all__ = ["around", "jerked"]
+__all__ = ["transient_mask", "with_neighbours"]
 
 Mask = NDArray[np.bool_]
-_BESIDE = 2
+_NEIGHBOURS = 2
 """Samples to either side of a transient, besides the reach of the finite differences."""
 _MOVING = 0.9
-_HEARD = 2.0
+_LEAST_TRANSIENT = 2.0
 """In units of the white noise; a smaller transient only marks where a layer begins."""
 _NORMAL = 1.4826
 """Standard deviation of normal noise over its median absolute deviation."""
 
 
-def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
+def transient_mask(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
     """Samples of an output near a change of layer whose transient exceeds the noise.
 
     Parameters
@@ -52,22 +52,24 @@ def jerked(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
     at, speed = motion.at, np.abs(motion.at.speed)
     steps = np.diff(np.floor(at.wound_angle / (2 * np.pi)), prepend=np.nan) != 0
     steps[0] = False
-    pull = motion.load_mass * speed * (drum.growth / drum.winding_radius) / Clock(time).span
+    force = motion.load_mass * speed * (drum.growth / drum.winding_radius) / Clock(time).span
     if output == "motor_torque":
-        pull = pull * speed / np.maximum(np.abs(at.motor_rate), 1e-12)
-    shaken = steps & (np.abs(at.direction) > _MOVING) & (pull > _HEARD * _white(measured))
-    if not shaken.any():
+        force = force * speed / np.maximum(np.abs(at.motor_rate), 1e-12)
+    transients = (
+        steps & (np.abs(at.direction) > _MOVING) & (force > _LEAST_TRANSIENT * _white(measured))
+    )
+    if not transients.any():
         return none
-    return around(shaken, time)
+    return with_neighbours(transients, time)
 
 
-def around(jerked: Mask, time: Array) -> Mask:
+def with_neighbours(marked: Mask, time: Array) -> Mask:
     """Extend a mask by the samples whose finite differences reach across a marked one."""
-    reach = _BESIDE + Clock(time).reach
-    return np.asarray(np.convolve(jerked, np.ones(2 * reach + 1), mode="same") > 0)
+    reach = _NEIGHBOURS + Clock(time).reach
+    return np.asarray(np.convolve(marked, np.ones(2 * reach + 1), mode="same") > 0)
 
 
 def _white(measured: Array) -> float:
     """Standard deviation of white noise, from second differences by their median absolute value."""
-    bends = np.diff(measured, 2)
-    return float(_NORMAL * np.median(np.abs(bends)) / np.sqrt(6))
+    second_differences = np.diff(measured, 2)
+    return float(_NORMAL * np.median(np.abs(second_differences)) / np.sqrt(6))

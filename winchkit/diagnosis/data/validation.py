@@ -15,16 +15,16 @@ from winchkit.model.stages import OUTPUTS, Signals
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["admit"]
+__all__ = ["validate_runs"]
 
-_FEWEST = 50
-_SLOPE = 0.75, 1.3333
-_PARTIAL = 0.5
-_ENOUGH = 20_000
+_LEAST_SAMPLES = 50
+_SLOPE_RANGE = 0.75, 1.3333
+_LEAST_FINITE_SHARE = 0.5
+_MOST_SAMPLES = 20_000
 """Samples on which the slope of the measured over the predicted length is fitted."""
 
 
-def admit(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
+def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     """Validate runs against a profile.
 
     Parameters
@@ -47,7 +47,7 @@ def admit(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     """
     if not runs:
         raise RunError("no run given")
-    faults = [fault for run in runs for fault in _faults(run)] + _twice(runs)
+    faults = [fault for run in runs for fault in _faults(run)] + _duplicates(runs)
     if not faults:
         faults = [fault for run in runs for fault in _other_winch(run, profile)]
     if faults:
@@ -61,8 +61,10 @@ def _faults(run: Run) -> list[Fault]:
     if "motor_angle" not in run:
         known = ", ".join(["time", *run])
         return [Fault(f"no column 'motor_angle [rad]'; it has {known}", where)]
-    if len(run) < _FEWEST:
-        faults.append(Fault(f"only {len(run)} samples; at least {_FEWEST} are needed", where))
+    if len(run) < _LEAST_SAMPLES:
+        faults.append(
+            Fault(f"only {len(run)} samples; at least {_LEAST_SAMPLES} are needed", where)
+        )
         return faults
     if not any(output in run for output in OUTPUTS):
         message = f"no column to compare; it needs at least one of {', '.join(OUTPUTS)}"
@@ -73,7 +75,7 @@ def _faults(run: Run) -> list[Fault]:
         values = run[name]
         finite = values[np.isfinite(values)]
         key = f"column '{name}'"
-        if len(finite) < _PARTIAL * len(values):
+        if len(finite) < _LEAST_FINITE_SHARE * len(values):
             message = f"{len(values) - len(finite)} of {len(values)} samples are NaN; remove it"
             faults.append(Fault(message, where, key=key))
         elif np.ptp(finite) == 0:
@@ -90,7 +92,7 @@ def _faults(run: Run) -> list[Fault]:
     return faults
 
 
-def _twice(runs: Sequence[Run]) -> list[Fault]:
+def _duplicates(runs: Sequence[Run]) -> list[Fault]:
     """Faults of runs that were given twice: as repeats of themselves they would have no noise."""
     faults = []
     for index, run in enumerate(runs):
@@ -113,7 +115,7 @@ def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
         message = f"recorded with profile '{named}', compared with '{profile.name}'"
         return [Fault(message + "; give the profile of this winch", where, key="metadata profile")]
     good = np.isfinite(run["motor_angle"]) & np.isfinite(run["cable_length"])
-    few = np.flatnonzero(good)[:: max(1, len(run) // _ENOUGH)]
+    few = np.flatnonzero(good)[:: max(1, len(run) // _MOST_SAMPLES)]
     line = Line(profile)
     signals = Signals(run.time[few], run["motor_angle"][few])
     predicted = line.predict(line.motion(signals))["cable_length"]
@@ -121,7 +123,7 @@ def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
     if np.ptp(predicted) < 0.01 * max(profile.drum.winding_radius, np.ptp(measured)):
         return []
     slope = float(np.polyfit(predicted - predicted.mean(), measured, 1)[0])
-    if _SLOPE[0] < slope < _SLOPE[1]:
+    if _SLOPE_RANGE[0] < slope < _SLOPE_RANGE[1]:
         return []
     message = (
         f"changes by {slope:.3g} times what profile '{profile.name}' predicts; this is another "

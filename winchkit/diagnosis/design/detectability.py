@@ -11,37 +11,37 @@ from winchkit.diagnosis.results import Detectable
 from winchkit.diagnosis.selection.scores import Score
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["Bar", "detectable"]
+__all__ = ["DetectionThreshold", "detectable"]
 
 _POWER_QUANTILE = 1.2816
 
 
 @dataclass(frozen=True)
-class Bar:
+class DetectionThreshold:
     """Detection threshold of a candidate effect, in decrease of χ²."""
 
     penalty_per_parameter: float
     """Penalty per parameter, ln n."""
-    threshold: float
+    score_threshold: float
     """1 % level of the largest score under noise alone."""
 
-    def squares(self, n_parameters: int) -> float:
+    def required_ss(self, n_parameters: int) -> float:
         """Decrease of χ² that an effect of ``freedom`` parameters must reach."""
-        return max(self.threshold, 0.0) + self.penalty_per_parameter * n_parameters
+        return max(self.score_threshold, 0.0) + self.penalty_per_parameter * n_parameters
 
     def power(self, strength: float, n_parameters: int) -> float:
         """Probability that an effect of noncentrality λ reaches it."""
-        return power_of(strength, self.squares(n_parameters))
+        return power_of(strength, self.required_ss(n_parameters))
 
 
-def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
+def detectable(scores: tuple[Score, ...], threshold: DetectionThreshold) -> tuple[Detectable, ...]:
     """Smallest size of the main parameter of every effect that is detected with 90 % power.
 
     Parameters
     ----------
     scores
         Of all candidates beside the initial model.
-    bar
+    threshold
         Detection threshold.
 
     Returns
@@ -60,9 +60,9 @@ def detectable(scores: tuple[Score, ...], bar: Bar) -> tuple[Detectable, ...]:
         effect = item.candidate.effect
         if item.noncentrality <= 0:
             continue
-        size = (np.sqrt(bar.squares(item.candidate.n_parameters)) + _POWER_QUANTILE) / np.sqrt(
-            item.noncentrality
-        )
+        size = (
+            np.sqrt(threshold.required_ss(item.candidate.n_parameters)) + _POWER_QUANTILE
+        ) / np.sqrt(item.noncentrality)
         usual_step = item.candidate.usual_steps[0]
         name = next(iter(usual_step))
         parameter = effect.parameter(name)

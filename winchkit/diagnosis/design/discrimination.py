@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import ncx2
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.design.programmes import KINDS, imagined
+from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, simulated
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -25,23 +25,23 @@ from winchkit.diagnosis.results import NextRun
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 
-__all__ = ["APART", "SoFar", "next_runs", "power_of", "separation", "so_far"]
+__all__ = ["SEPARATED_AT", "Information", "information_of", "next_runs", "power_of", "separation"]
 
-APART = 3.841
+SEPARATED_AT = 3.841
 """95 % quantile of χ² with one degree of freedom."""
-_OFFERED = 2
-_WORTHWHILE = 0.2
+_MOST_OFFERS = 2
+_LEAST_POWER = 0.2
 
 
 @dataclass(frozen=True)
-class SoFar:
+class Information:
     """Information of the runs so far on two effects, as a triangular factor."""
 
-    shared: Array
+    shared_columns: Array
     """Columns that later runs share: offset and parameters of the second effect."""
-    shown: Array
+    signature: Array
     """Column of the first effect."""
-    left: float
+    residual_ss: float
     """λ of the runs so far alone."""
 
 
@@ -68,17 +68,19 @@ def next_runs(
     if not pairs:
         return ()
     out: list[NextRun] = []
-    tried = [(kind, imagined(regression.dataset, kind)) for kind in KINDS]
+    simulated_programmes = [
+        (kind, simulated(regression.dataset, kind)) for kind in CANDIDATE_PROGRAMMES
+    ]
     for first, second in pairs:
-        offers, known = [], so_far(regression, first, second, noise)
-        for kind, programme in tried:
+        offers, known = [], information_of(regression, first, second, noise)
+        for kind, programme in simulated_programmes:
             minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
             strength = separation(programme, first, second, noise, known=known)
             offers.append((strength / minutes, power_of(strength), kind.name))
         # Any programme sure to separate them will do: of those the quickest per minute.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
-        useful = [offer for offer in offers if offer[1] >= _WORTHWHILE][:_OFFERED]
+        useful = [offer for offer in offers if offer[1] >= _LEAST_POWER][:_MOST_OFFERS]
         out += [NextRun(names, name, power) for _, power, name in useful]
         if not useful:
             # No motion separates them: what does is on the card, and its power is not known.
@@ -86,14 +88,14 @@ def next_runs(
     return tuple(out)
 
 
-def power_of(strength: float, needed: float = APART) -> float:
+def power_of(strength: float, required: float = SEPARATED_AT) -> float:
     """Power of a χ² test with one degree of freedom.
 
     Parameters
     ----------
     strength
         Noncentrality λ.
-    needed
+    required
         χ² that is required.
 
     Returns
@@ -101,7 +103,7 @@ def power_of(strength: float, needed: float = APART) -> float:
     float
         P(χ²'(1, λ) > needed).
     """
-    return float(ncx2.sf(needed, 1, max(strength, 0.0)))
+    return float(ncx2.sf(required, 1, max(strength, 0.0)))
 
 
 def separation(
@@ -110,7 +112,7 @@ def separation(
     second: Term | None,
     noise: Mapping[str, float],
     *,
-    known: SoFar | None = None,
+    known: Information | None = None,
     repeats: int = 1,
 ) -> float:
     """Noncentrality λ of the first effect where the second may have any size.
@@ -132,25 +134,27 @@ def separation(
     rows = _rows(regression, first, second, noise)
     if rows is None:
         return 0.0
-    own, shared, shown = (np.asarray(np.sqrt(repeats) * part) for part in rows)
+    own, shared_columns, signature = (np.asarray(np.sqrt(repeats) * part) for part in rows)
     if known is None:
-        return _left(np.column_stack([own, shared]), shown)
-    above = np.zeros((len(known.shown), own.shape[1]))
-    columns = np.block([[above, known.shared], [own, shared]])
-    return max(0.0, _left(columns, np.concatenate([known.shown, shown])) - known.left)
+        return _residual_ss(np.column_stack([own, shared_columns]), signature)
+    above = np.zeros((len(known.signature), own.shape[1]))
+    columns = np.block([[above, known.shared_columns], [own, shared_columns]])
+    return max(
+        0.0, _residual_ss(columns, np.concatenate([known.signature, signature])) - known.residual_ss
+    )
 
 
-def so_far(
+def information_of(
     regression: Regression, first: Term, second: Term | None, noise: Mapping[str, float]
-) -> SoFar | None:
+) -> Information | None:
     """Information of a problem's runs on two effects; None where a prediction is not finite."""
     rows = _rows(regression, first, second, noise)
     if rows is None:
         return None
-    own, shared, shown = rows
-    triangle = np.asarray(np.linalg.qr(np.column_stack([own, shared, shown]), mode="r"))
+    own, shared_columns, signature = rows
+    triangle = np.asarray(np.linalg.qr(np.column_stack([own, shared_columns, signature]), mode="r"))
     kept = triangle[own.shape[1] :, own.shape[1] :]
-    return SoFar(kept[:, :-1], kept[:, -1], _left(kept[:, :-1], kept[:, -1]))
+    return Information(kept[:, :-1], kept[:, -1], _residual_ss(kept[:, :-1], kept[:, -1]))
 
 
 def _rows(
@@ -163,23 +167,26 @@ def _rows(
     weight = np.empty(regression.n_rows)
     for segment in regression.segments:
         weight[segment.rows] = 1 / max(noise.get(segment.output, np.inf), 1e-300)
-    shown = regression.change(Hypothesis().with_term(first, regression.n_runs)) * weight
+    signature = regression.change(Hypothesis().with_term(first, regression.n_runs)) * weight
     rival = Hypothesis()
     if second is not None:
         rival = rival.with_term(second, regression.n_runs)
-    imitation = regression.jacobian(regression.vector(rival), rival) * weight[:, None]
-    if not (np.isfinite(imitation).all() and np.isfinite(shown).all()):
+    rival_columns = regression.jacobian(regression.vector(rival), rival) * weight[:, None]
+    if not (np.isfinite(rival_columns).all() and np.isfinite(signature).all()):
         return None
     states = sum(len(start) for start in rival.starts)
     nuisances, offset = regression.nuisance_columns.shape[1], int(regression.fits_offset)
-    own = [*range(offset, nuisances), *range(imitation.shape[1] - states, imitation.shape[1])]
-    numbers = imitation[:, nuisances : imitation.shape[1] - states]
-    level = imitation[:, :1] if offset else np.zeros((regression.n_rows, 1))
-    shared = np.column_stack([level, numbers, regression.change(rival) * weight])
-    return imitation[:, own], shared, shown
+    own = [
+        *range(offset, nuisances),
+        *range(rival_columns.shape[1] - states, rival_columns.shape[1]),
+    ]
+    parameter_columns = rival_columns[:, nuisances : rival_columns.shape[1] - states]
+    level = rival_columns[:, :1] if offset else np.zeros((regression.n_rows, 1))
+    shared_columns = np.column_stack([level, parameter_columns, regression.change(rival) * weight])
+    return rival_columns[:, own], shared_columns, signature
 
 
-def _left(columns: Array, shown: Array) -> float:
+def _residual_ss(columns: Array, signature: Array) -> float:
     """Sum of squares of ``shown`` after regression on ``columns``."""
-    left = shown - columns @ np.linalg.lstsq(columns, shown, rcond=1e-10)[0]
-    return float(left @ left)
+    residual_ss = signature - columns @ np.linalg.lstsq(columns, signature, rcond=1e-10)[0]
+    return float(residual_ss @ residual_ss)

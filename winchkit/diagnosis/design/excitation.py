@@ -10,17 +10,17 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.repeats import mean_load
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 
-__all__ = ["what_runs_cannot_show"]
+__all__ = ["missing_excitation"]
 
-_DIFFERENT_LOADS = 0.05
-_ONE_WAY = 0.02
-_WARMED = 1.0
-_MOVES = 1e-3
-_ONE_SPEED = 0.1
-_PLATEAU = 0.75
+_LEAST_LOAD_RANGE = 0.05
+_LEAST_SHARE_OF_DIRECTION = 0.02
+_LEAST_TEMPERATURE_RANGE = 1.0
+_LEAST_SPEED = 1e-3
+_SPEED_TOLERANCE = 0.1
+_SHARE_AT_ONE_SPEED = 0.75
 
 
-def what_runs_cannot_show(regression: TimeSeriesRegression) -> list[str]:
+def missing_excitation(regression: TimeSeriesRegression) -> list[str]:
     """Notes on missing repeats, loads, directions, reversals, speeds and temperatures.
 
     Parameters
@@ -42,22 +42,25 @@ def what_runs_cannot_show(regression: TimeSeriesRegression) -> list[str]:
         )
     loads = [m for m in (mean_load(r.signals) for r in dataset.recordings) if m is not None]
     if not loads:
-        notes.append("no load and no tension: what depends on the rope's force cannot be seen")
-    elif max(loads) - min(loads) < _DIFFERENT_LOADS * max(abs(x) for x in loads):
+        notes.append("no load and no tension: effects of the cable force cannot be detected")
+    elif max(loads) - min(loads) < _LEAST_LOAD_RANGE * max(abs(x) for x in loads):
         notes.append(
-            "one load only: rope elasticity and frame compliance, cell gain and offset are hard "
-            "to tell apart; repeat a run under another load"
+            "one load only: cable elasticity and frame compliance, cell gain and offset are hard "
+            "to distinguish; repeat a run under another load"
         )
     if loads and all(r.raw.load is None for r in dataset.recordings):
         notes.append(
-            "no load known: pulley friction and cell errors cannot be seen; give load_mass or "
+            "no load known: pulley friction and cell errors cannot be detected; give load_mass or "
             "a second cell"
         )
     notes += _motions([r.raw.at.speed for r in dataset.recordings])
-    warmth = [r.signals.temperature for r in dataset.recordings]
-    if any(t is None for t in warmth):
-        notes.append("no temperature measured: thermal effects cannot be seen")
-    elif np.ptp(np.concatenate([t for t in warmth if t is not None])) < _WARMED:
+    temperatures = [r.signals.temperature for r in dataset.recordings]
+    if any(t is None for t in temperatures):
+        notes.append("no temperature measured: thermal effects cannot be detected")
+    elif (
+        np.ptp(np.concatenate([t for t in temperatures if t is not None]))
+        < _LEAST_TEMPERATURE_RANGE
+    ):
         notes.append(
             "temperature nearly constant: a thermal effect looks like an offset or a wrong radius, "
             "if it shows at all; record one run cold and one warm"
@@ -67,22 +70,26 @@ def what_runs_cannot_show(regression: TimeSeriesRegression) -> list[str]:
 
 def _motions(speeds: Sequence[Array]) -> list[str]:
     """Notes on directions, reversals and speeds; ``speeds`` in m/s, one array per run."""
-    moving = [speed[np.abs(speed) > _MOVES] for speed in speeds]
-    every = np.concatenate(moving)
+    moving = [speed[np.abs(speed) > _LEAST_SPEED] for speed in speeds]
+    all_speeds = np.concatenate(moving)
     notes = []
-    inwards = float(np.mean(every > 0)) if len(every) else 0.0
-    if not _ONE_WAY < inwards < 1 - _ONE_WAY:
+    share_winding_in = float(np.mean(all_speeds > 0)) if len(all_speeds) else 0.0
+    if not _LEAST_SHARE_OF_DIRECTION < share_winding_in < 1 - _LEAST_SHARE_OF_DIRECTION:
         notes.append(
-            "one direction only: friction and backlash cannot be told from gains and offsets; "
-            "run back as well"
+            "one direction only: friction and backlash cannot be distinguished from gains and "
+            "offsets; run back as well"
         )
     elif not any(np.any(np.diff(np.sign(run))) for run in moving):
         notes.append(
             "no reversals: each run goes one way, so that play, Dahl friction and hysteresis show "
             "at most in how a run begins; turn back within a run"
         )
-    pace = np.abs(every)
-    if len(pace) and np.mean(np.abs(pace / np.median(pace) - 1) < _ONE_SPEED) > _PLATEAU:
+    magnitude = np.abs(all_speeds)
+    if (
+        len(magnitude)
+        and np.mean(np.abs(magnitude / np.median(magnitude) - 1) < _SPEED_TOLERANCE)
+        > _SHARE_AT_ONE_SPEED
+    ):
         notes.append(
             "one speed only: dry and viscous friction, play and a late instrument differ in the "
             "ramps alone; run at several speeds"

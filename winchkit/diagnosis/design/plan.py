@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.design.detectability import Bar
-from winchkit.diagnosis.design.discrimination import power_of, separation, so_far
+from winchkit.diagnosis.design.detectability import DetectionThreshold
+from winchkit.diagnosis.design.discrimination import information_of, power_of, separation
 from winchkit.diagnosis.design.programmes import (
-    KINDS,
-    Kind,
-    Room,
-    imagined,
-    seen,
+    CANDIDATE_PROGRAMMES,
+    CandidateProgramme,
+    OperatingRange,
+    range_of_runs,
+    simulated,
     usual_temperature,
 )
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -23,22 +23,22 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.schema.programme import Programme, Step
 
-__all__ = ["Offer", "hopeless", "offers", "programme_of"]
+__all__ = ["Offer", "inseparable", "offers", "programme_of"]
 
-_SURE = 0.9
-_FAINT = 0.2
+_HIGH_POWER = 0.9
+_LEAST_POWER = 0.2
 """Power below which a programme is not worth a run."""
-_HANGING, _WARMING = 1 / 3, 20.0
+_LOADING_MINUTES, _WARMING_MINUTES = 1 / 3, 20.0
 """Time of an operator to change a load, and to warm the machine, minutes."""
 _REPEATS = 2
-_HANGS = 0.5
+_WEIGHT_STEP = 0.5
 
 
 @dataclass(frozen=True)
 class Offer:
     """A candidate programme with its time and power."""
 
-    kind: Kind
+    kind: CandidateProgramme
     minutes: float
     """Motion and the operator's work, both repeats."""
     powers: tuple[float, ...]
@@ -53,10 +53,14 @@ class Offer:
         Pairs separated with at least 90 % power, then the sum of powers, then per minute; where
         nothing is to be separated, effects that become detectable per minute.
         """
-        sure = sum(power >= _SURE for power in self.powers)
-        told = round(sum(power for power in self.powers if power >= _FAINT), 1)
-        quick, shown = 1 / self.minutes, len(self.shows) / self.minutes
-        return (sure, told, quick, shown) if told else (0.0, 0.0, shown, quick)
+        separated = sum(power >= _HIGH_POWER for power in self.powers)
+        summed = round(sum(power for power in self.powers if power >= _LEAST_POWER), 1)
+        per_minute, detected_per_minute = 1 / self.minutes, len(self.shows) / self.minutes
+        return (
+            (separated, summed, per_minute, detected_per_minute)
+            if summed
+            else (0.0, 0.0, detected_per_minute, per_minute)
+        )
 
     def to_json(self, pairs: Sequence[tuple[Term, Term]]) -> dict[str, Any]:
         """Dictionary that ``winchkit plan --json`` prints."""
@@ -78,8 +82,8 @@ def offers(
     noise: Mapping[str, float],
     effects: Sequence[Effect],
     *,
-    bar: Bar,
-    room: Room | None = None,
+    threshold: DetectionThreshold,
+    operating_range: OperatingRange | None = None,
 ) -> list[Offer]:
     """Candidate programmes within an operating range, best first.
 
@@ -93,53 +97,68 @@ def offers(
         Rms per output, SI.
     effects
         Effects whose detection is of interest.
-    bar
+    threshold
         Detection threshold.
-    room
+    operating_range
         Operating range; None for that of the runs so far.
     """
     dataset = regression.dataset
-    room = room or seen(dataset)
-    usual = [(term, so_far(regression, term, None, noise)) for term in _usual(effects, regression)]
-    hidden = [(t, known) for t, known in usual if known and not _sees(bar, t, known.left)]
-    known_pairs = [(a, b, so_far(regression, a, b, noise)) for a, b in pairs]
+    operating_range = operating_range or range_of_runs(dataset)
+    usual = [
+        (term, information_of(regression, term, None, noise))
+        for term in _usual(effects, regression)
+    ]
+    hidden = [
+        (t, known)
+        for t, known in usual
+        if known and not _is_detected(threshold, t, known.residual_ss)
+    ]
+    known_pairs = [(a, b, information_of(regression, a, b, noise)) for a, b in pairs]
     out = []
-    for kind in KINDS:
-        tried = imagined(dataset, kind, room)
-        motion = sum(r.signals.time[-1] for r in tried.dataset.recordings) / 60
-        minutes = _REPEATS * (motion + _work(kind, dataset))
+    for kind in CANDIDATE_PROGRAMMES:
+        simulated_runs = simulated(dataset, kind, operating_range)
+        motion = sum(r.signals.time[-1] for r in simulated_runs.dataset.recordings) / 60
+        minutes = _REPEATS * (motion + _operator_minutes(kind, dataset))
         powers = tuple(
-            power_of(separation(tried, a, b, noise, known=known, repeats=_REPEATS))
+            power_of(separation(simulated_runs, a, b, noise, known=known, repeats=_REPEATS))
             for a, b, known in known_pairs
         )
         shows = tuple(
             term.effect.id
             for term, known in hidden
-            if _sees(
-                bar,
+            if _is_detected(
+                threshold,
                 term,
-                known.left + separation(tried, term, None, noise, known=known, repeats=_REPEATS),
+                known.residual_ss
+                + separation(simulated_runs, term, None, noise, known=known, repeats=_REPEATS),
             )
         )
         out.append(Offer(kind, minutes, powers, shows))
     return sorted(out, key=lambda offer: offer.worth, reverse=True)
 
 
-def _sees(bar: Bar, term: Term, strength: float) -> bool:
+def _is_detected(threshold: DetectionThreshold, term: Term, strength: float) -> bool:
     """Whether an effect of noncentrality λ is detected with at least 90 % power."""
-    return bar.power(strength, Coordinates(term.effect).n_parameters) >= _SURE
+    return threshold.power(strength, Coordinates(term.effect).n_parameters) >= _HIGH_POWER
 
 
-def hopeless(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> list[tuple[Term, Term]]:
+def inseparable(
+    found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]
+) -> list[tuple[Term, Term]]:
     """Pairs that none of these programmes separates."""
     return [
         pair
         for index, pair in enumerate(pairs)
-        if max(offer.powers[index] for offer in found) < _FAINT
+        if max(offer.powers[index] for offer in found) < _LEAST_POWER
     ]
 
 
-def programme_of(dataset: Dataset, kind: Kind, name: str, room: Room | None = None) -> Programme:
+def programme_of(
+    dataset: Dataset,
+    kind: CandidateProgramme,
+    name: str,
+    operating_range: OperatingRange | None = None,
+) -> Programme:
     """Motion programme of a kind for ``winchkit run``, repeated twice.
 
     Parameters
@@ -150,7 +169,7 @@ def programme_of(dataset: Dataset, kind: Kind, name: str, room: Room | None = No
         Candidate programme.
     name
         Of the motion programme.
-    room
+    operating_range
         Operating range; None for that of the runs so far.
 
     Returns
@@ -158,50 +177,53 @@ def programme_of(dataset: Dataset, kind: Kind, name: str, room: Room | None = No
     Programme
         It begins and ends at the shortest length, so that its repeats are equal.
     """
-    room = room or seen(dataset)
+    operating_range = operating_range or range_of_runs(dataset)
     steps: list[Step] = []
-    for warmed in kind.warmed if _warm(dataset) else (0.0,):
-        if len(kind.warmed) > 1:
-            steps += _bring(dataset, warmed)
+    for rise in kind.temperature_rises if _has_temperature(dataset) else (0.0,):
+        if len(kind.temperature_rises) > 1:
+            steps += _temperature_step(dataset, rise)
         for load in kind.loads:
-            steps += _hang(room.load(load))
-            steps.append(_move(room.low, room.fastest))
+            steps += _load_step(operating_range.load(load))
+            steps.append(_move_step(operating_range.low, operating_range.fastest))
             for share, speed in kind.moves:
-                steps += [_move(room.at(share), speed * room.fastest), Step(hold=kind.hold)]
+                steps += [
+                    _move_step(operating_range.at(share), speed * operating_range.fastest),
+                    Step(hold=kind.hold),
+                ]
     about = f"{kind.name}; proposed from {len(dataset.recordings)} runs of {dataset.profile.name}"
     return Programme(name, tuple(steps), repeat=_REPEATS, description=about)
 
 
-def _bring(dataset: Dataset, warmed: float) -> list[Step]:
+def _temperature_step(dataset: Dataset, rise: float) -> list[Step]:
     """Step that asks for a temperature, in whole degrees Celsius."""
     usual = usual_temperature(dataset)
     if usual is None:
         return []
-    wanted = float(round(usual + warmed))
-    ask = f"bring rope and machine to {wanted:g} degC"
-    return [Step(ask=ask, temperature=wanted)]
+    target = float(round(usual + rise))
+    ask = f"bring cable and machine to {target:g} degC"
+    return [Step(ask=ask, temperature=target)]
 
 
-def _hang(mass: float | None) -> list[Step]:
+def _load_step(mass: float | None) -> list[Step]:
     """Step that asks for a load, rounded to usual weights."""
     if mass is None:
         return []
-    wanted = max(_HANGS, round(mass / _HANGS) * _HANGS)
-    return [Step(ask=f"hang the {wanted:g} kg load", load_mass=wanted)]
+    target = max(_WEIGHT_STEP, round(mass / _WEIGHT_STEP) * _WEIGHT_STEP)
+    return [Step(ask=f"hang the {target:g} kg load", load_mass=target)]
 
 
-def _work(kind: Kind, dataset: Dataset) -> float:
+def _operator_minutes(kind: CandidateProgramme, dataset: Dataset) -> float:
     """Time of the operator's work in one repeat, minutes."""
-    warmings = len(kind.warmed) - 1 if _warm(dataset) else 0
+    warmings = len(kind.temperature_rises) - 1 if _has_temperature(dataset) else 0
     hangs = len(kind.loads) if len(kind.loads) > 1 else 0
-    return warmings * _WARMING + hangs * _HANGING
+    return warmings * _WARMING_MINUTES + hangs * _LOADING_MINUTES
 
 
-def _move(length: float, speed: float) -> Step:
+def _move_step(length: float, speed: float) -> Step:
     return Step(to=round(length, 3), speed=float(f"{max(speed, 1e-3):.2g}"))
 
 
-def _warm(dataset: Dataset) -> bool:
+def _has_temperature(dataset: Dataset) -> bool:
     return usual_temperature(dataset) is not None
 
 

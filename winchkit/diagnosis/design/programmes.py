@@ -16,7 +16,15 @@ from winchkit.model.trajectory import plan
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.bench import LimitSpec
 
-__all__ = ["KINDS", "Kind", "Room", "allowed", "imagined", "seen", "usual_temperature"]
+__all__ = [
+    "CANDIDATE_PROGRAMMES",
+    "CandidateProgramme",
+    "OperatingRange",
+    "range_of_limits",
+    "range_of_runs",
+    "simulated",
+    "usual_temperature",
+]
 
 _RATE = 20.0
 _MARGIN = 0.05
@@ -26,7 +34,7 @@ _RESERVE = 1.5
 
 
 @dataclass(frozen=True)
-class Kind:
+class CandidateProgramme:
     """A candidate programme: moves within the stroke, loads, temperatures."""
 
     name: str
@@ -34,35 +42,37 @@ class Kind:
     """Target (share of the stroke) and speed (share of the highest speed) of each move."""
     loads: tuple[float, ...] = (1.0,)
     """In units of the mean load so far; one run each."""
-    warmed: tuple[float, ...] = (0.0,)
+    temperature_rises: tuple[float, ...] = (0.0,)
     """Above the mean temperature so far, K; one run each."""
     hold: float = 0.5
     """Rest after each move, s."""
 
 
 _THERE_AND_BACK = ((1.0, 1.0), (0.0, 1.0))
-KINDS = (
-    Kind("full stroke, one load", _THERE_AND_BACK),
-    Kind("full stroke, three loads", _THERE_AND_BACK, loads=(0.5, 1.0, 2.0)),
-    Kind(
+CANDIDATE_PROGRAMMES = (
+    CandidateProgramme("full stroke, one load", _THERE_AND_BACK),
+    CandidateProgramme("full stroke, three loads", _THERE_AND_BACK, loads=(0.5, 1.0, 2.0)),
+    CandidateProgramme(
         "one load at five lengths, with holds",
         tuple((x, 0.5) for x in (1, 0.75, 0.5, 0.25, 0)),
         hold=5.0,
     ),
-    Kind(
+    CandidateProgramme(
         "speed ladder, both directions",
         tuple((x, s) for s in (0.05, 0.2, 0.5, 1.0) for x in (0.6, 0.4)),
     ),
-    Kind(
+    CandidateProgramme(
         "short reversals, slow and fast",
         tuple((0.5 + 0.01 * k * (-1) ** k, s) for s in (0.02, 0.3) for k in range(1, 6)),
     ),
-    Kind("full stroke, warmed up by 15 K", _THERE_AND_BACK, warmed=(0.0, 15.0)),
+    CandidateProgramme(
+        "full stroke, warmed up by 15 K", _THERE_AND_BACK, temperature_rises=(0.0, 15.0)
+    ),
 )
 
 
 @dataclass(frozen=True)
-class Room:
+class OperatingRange:
     """Operating range of a programme."""
 
     low: float
@@ -88,27 +98,33 @@ class Room:
         return max(self.lightest, min(self.heaviest, self.mass * share))
 
 
-def seen(dataset: Dataset) -> Room:
+def range_of_runs(dataset: Dataset) -> OperatingRange:
     """Operating range of the runs so far: stroke, speed and load."""
     recordings = dataset.recordings
     lengths = np.concatenate([r.raw.at.free_length for r in recordings])
     fastest = max(float(np.max(np.abs(r.raw.at.speed))) for r in recordings)
     usual = [m for m in (mean_load(r.signals) for r in recordings) if m is not None]
     mass = float(np.mean(usual)) / GRAVITY if usual else None
-    return Room(float(lengths.min()), float(lengths.max()), fastest, mass)
+    return OperatingRange(float(lengths.min()), float(lengths.max()), fastest, mass)
 
 
-def allowed(dataset: Dataset, limits: LimitSpec) -> Room:
+def range_of_limits(dataset: Dataset, limits: LimitSpec) -> OperatingRange:
     """Operating range within a bench's limits, with a margin; else that of the runs."""
-    room = seen(dataset)
+    operating_range = range_of_runs(dataset)
     if limits.length is not None:
         margin = _MARGIN * (limits.length[1] - limits.length[0])
-        room = replace(room, low=limits.length[0] + margin, high=limits.length[1] - margin)
+        operating_range = replace(
+            operating_range, low=limits.length[0] + margin, high=limits.length[1] - margin
+        )
     if limits.tension_slack is not None:
-        room = replace(room, lightest=limits.tension_slack * _RESERVE / GRAVITY)
+        operating_range = replace(
+            operating_range, lightest=limits.tension_slack * _RESERVE / GRAVITY
+        )
     if limits.tension_high is not None:
-        room = replace(room, heaviest=limits.tension_high / _RESERVE / GRAVITY)
-    return replace(room, fastest=limits.speed / _RESERVE)
+        operating_range = replace(
+            operating_range, heaviest=limits.tension_high / _RESERVE / GRAVITY
+        )
+    return replace(operating_range, fastest=limits.speed / _RESERVE)
 
 
 def usual_temperature(dataset: Dataset) -> float | None:
@@ -119,23 +135,33 @@ def usual_temperature(dataset: Dataset) -> float | None:
     return float(np.mean([np.mean(t) for t in known if t is not None]))
 
 
-def imagined(dataset: Dataset, kind: Kind, room: Room | None = None) -> TimeSeriesRegression:
+def simulated(
+    dataset: Dataset, kind: CandidateProgramme, operating_range: OperatingRange | None = None
+) -> TimeSeriesRegression:
     """Regression problem of simulated runs of a kind of programme, on the nominal model."""
     usual = usual_temperature(dataset)
-    room = room or seen(dataset)
+    operating_range = operating_range or range_of_runs(dataset)
     runs = []
     for load in kind.loads:
-        for warmed in kind.warmed if usual is not None else (0.0,):
-            warm = None if usual is None else usual + warmed
-            runs.append(_run(dataset, kind, room, room.load(load), warm))
+        for rise in kind.temperature_rises if usual is not None else (0.0,):
+            temperature = None if usual is None else usual + rise
+            runs.append(
+                _run(dataset, kind, operating_range, operating_range.load(load), temperature)
+            )
     return TimeSeriesRegression(assemble(runs, dataset.profile))
 
 
-def _run(dataset: Dataset, kind: Kind, room: Room, mass: float | None, warm: float | None) -> Run:
-    at = room.low
+def _run(
+    dataset: Dataset,
+    kind: CandidateProgramme,
+    operating_range: OperatingRange,
+    mass: float | None,
+    temperature: float | None,
+) -> Run:
+    at = operating_range.low
     pieces = [np.full(round(kind.hold * _RATE), at)]
     for share, speed in kind.moves:
-        target, fastest = room.at(share), room.fastest
+        target, fastest = operating_range.at(share), operating_range.fastest
         move = plan(target - at, max(speed * fastest, 1e-4), 4 * fastest, 40 * fastest)
         time = np.arange(0.0, move.duration, 1 / _RATE)
         pieces += [at + np.asarray(move.at(time)[0]), np.full(round(kind.hold * _RATE), target)]
@@ -144,8 +170,8 @@ def _run(dataset: Dataset, kind: Kind, room: Room, mass: float | None, warm: flo
     time = np.arange(len(length)) / _RATE
     line = Line(dataset.profile)
     angle = np.array([line.motor_angle(float(x)) for x in length])
-    temperature = None if warm is None else warm * np.ones_like(time)
-    return _as_run(dataset, time, angle, mass, temperature)
+    temperatures = None if temperature is None else np.full_like(time, temperature)
+    return _as_run(dataset, time, angle, mass, temperatures)
 
 
 def _as_run(
@@ -161,4 +187,4 @@ def _as_run(
         if output in predicted:
             channels[output] = Channel(predicted[output], "")
     metadata = {} if mass is None else {"load_mass": f"{mass!r} kg"}
-    return Run("imagined", time, channels, metadata)
+    return Run("simulated", time, channels, metadata)

@@ -22,18 +22,18 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.compare import Compared
 from winchkit.diagnosis.residuals.attribution import (
     BINS,
-    by_chance,
+    chance_share,
     kept_rows,
     quantile_bins,
     ranked,
     variables_of,
 )
 
-__all__ = ["SharedError", "SharedFollowed", "WinchErrors", "errors_of", "shared_errors"]
+__all__ = ["SharedAttribution", "SharedError", "WinchErrors", "errors_of", "shared_errors"]
 
-_MOST = 50_000
+_MOST_SAMPLES = 50_000
 """Samples per winch; shares do not become more exact with more."""
-_APART = 0.5
+_OUTLYING_SHARE = 0.5
 """Share of the difference between winches above which one winch is named."""
 
 
@@ -52,7 +52,7 @@ class WinchErrors:
 
 
 @dataclass(frozen=True)
-class SharedFollowed:
+class SharedAttribution:
     """A variable and the shares of the error variance that its bins explain."""
 
     variable: str
@@ -60,8 +60,13 @@ class SharedFollowed:
     """With means of its own for each winch."""
     common: float
     """With the same means for all winches."""
-    apart: tuple[str, ...]
+    outlying: tuple[str, ...]
     """Outlying winch, which contributes most of the difference; empty where there is none."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Dictionary that the command prints; the outlying winch is its ``apart``."""
+        values = {key: value for key, value in vars(self).items() if key != "outlying"}
+        return {**values, "apart": list(self.outlying)}
 
 
 @dataclass(frozen=True)
@@ -72,12 +77,12 @@ class SharedError:
     rms: float
     winches: Mapping[str, float]
     """Share of the squared error per winch."""
-    follows: tuple[SharedFollowed, ...]
+    follows: tuple[SharedAttribution, ...]
     """Largest share first."""
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""
-        follows = [{**vars(f), "apart": list(f.apart)} for f in self.follows]
+        follows = [attribution.to_json() for attribution in self.follows]
         return {**vars(self), "winches": dict(self.winches), "follows": follows}
 
 
@@ -85,13 +90,13 @@ def errors_of(compared: Compared) -> dict[str, WinchErrors]:
     """Errors per output of one winch, decimated to at most about 50,000 samples."""
     regression, out = compared.regression, {}
     times = regression.in_time(compared.residual)
-    for output, told in compared.comparison.outputs.items():
+    for output, compared_output in compared.comparison.outputs.items():
         own = [
             (s, t) for s, t in zip(regression.segments, times, strict=True) if s.output == output
         ]
         recordings = [regression.dataset.recordings[s.run] for s, _ in own]
         valid = [recording.valid[output] for recording in recordings]
-        step = max(1, told.samples // _MOST)
+        step = max(1, compared_output.samples // _MOST_SAMPLES)
         known = [variables_of(recording) for recording in recordings]
         variables = {
             name: np.concatenate([run[name][v] for run, v in zip(known, valid, strict=True)])[
@@ -102,13 +107,10 @@ def errors_of(compared: Compared) -> dict[str, WinchErrors]:
         }
         error = np.concatenate([t[v] for (_, t), v in zip(own, valid, strict=True)])[::step]
         kept = min(len(error), kept_rows(regression, output))
-        out[output] = WinchErrors(told.unit, told.rms**2, error, variables, kept)
+        out[output] = WinchErrors(
+            compared_output.unit, compared_output.rms**2, error, variables, kept
+        )
     return out
-
-
-def _few(runs: list[Array], valid: list[NDArray[np.bool_]], step: int) -> Array:
-    """Every ``step``-th compared sample of all runs."""
-    return np.concatenate([run[v] for run, v in zip(runs, valid, strict=True)])[::step]
 
 
 def shared_errors(winches: Mapping[str, Mapping[str, WinchErrors]]) -> dict[str, SharedError]:
@@ -131,7 +133,7 @@ def shared_errors(winches: Mapping[str, Mapping[str, WinchErrors]]) -> dict[str,
     return out
 
 
-def _follows(own: Mapping[str, WinchErrors]) -> tuple[SharedFollowed, ...]:
+def _follows(own: Mapping[str, WinchErrors]) -> tuple[SharedAttribution, ...]:
     """Every variable that explains more than chance, and the winch itself."""
     errors = np.concatenate([e.error for e in own.values()])
     if len(own) < 2 or not np.any(errors):
@@ -143,14 +145,14 @@ def _follows(own: Mapping[str, WinchErrors]) -> tuple[SharedFollowed, ...]:
             values = np.concatenate([e.variables[name] for e in own.values()])
             if np.ptp(values) > 0:
                 over[name] = quantile_bins(values)
-    found = [_followed(name, bins, errors, own) for name, bins in over.items()]
-    worth = by_chance(BINS * len(own), _kept(own))
+    found = [_attribution(name, bins, errors, own) for name, bins in over.items()]
+    worth = chance_share(BINS * len(own), _kept(own))
     return tuple(ranked([f for f in found if f.share > worth]))
 
 
-def _followed(
+def _attribution(
     variable: str, bins: NDArray[np.intp], errors: Array, own: Mapping[str, WinchErrors]
-) -> SharedFollowed:
+) -> SharedAttribution:
     """Shares that bins explain, less their expectation under independence."""
     winch = np.repeat(np.arange(len(own)), [len(e.error) for e in own.values()])
     shape = len(own), int(bins.max()) + 1
@@ -159,16 +161,16 @@ def _followed(
     sums = np.bincount(cells, weights=errors, minlength=shape[0] * shape[1]).reshape(shape)
     level = sums.sum(axis=0) / np.maximum(number.sum(axis=0), 1)
     common = float(np.sum(number * level**2)) / total
-    beyond = np.sum(number * (sums / np.maximum(number, 1) - level) ** 2, axis=1) / total
-    chance = np.count_nonzero(number, axis=1) / kept
-    clear = np.maximum(beyond - chance, 0.0)
-    apart = clear > max(_APART * float(clear.sum()), by_chance(shape[1], kept))
+    individual = np.sum(number * (sums / np.maximum(number, 1) - level) ** 2, axis=1) / total
+    expected = np.count_nonzero(number, axis=1) / kept
+    excess = np.maximum(individual - expected, 0.0)
+    outlying = excess > max(_OUTLYING_SHARE * float(excess.sum()), chance_share(shape[1], kept))
     alike = max(0.0, common - np.count_nonzero(number.any(axis=0)) / kept)
-    return SharedFollowed(
+    return SharedAttribution(
         variable,
-        max(alike, common + float((beyond - chance).sum())),
+        max(alike, common + float((individual - expected).sum())),
         alike,
-        tuple(name for name, one in zip(own, apart, strict=True) if one),
+        tuple(name for name, one in zip(own, outlying, strict=True) if one),
     )
 
 

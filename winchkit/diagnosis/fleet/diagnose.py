@@ -14,7 +14,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["diagnose_each"]
 
-_AT_A_TIME = 2
+_CONCURRENT = 2
 
 
 def diagnose_each(
@@ -23,7 +23,7 @@ def diagnose_each(
     catalogue: Catalogue | None = None,
     band: float | None = None,
     *,
-    thin: bool = True,
+    decimate: bool = True,
     progress: ProgressCallback = no_progress,
 ) -> Iterator[tuple[str, WinchAnswer]]:
     """Name and answer of every winch, in order, all compared with one profile.
@@ -38,7 +38,7 @@ def diagnose_each(
         Effects; None for the shipped ones.
     band
         Cut-off of the torque's low-pass, Hz; None for the default.
-    thin
+    decimate
         Whether long runs are decimated.
     progress
         Progress callback: text and share of the work done.
@@ -52,30 +52,32 @@ def diagnose_each(
     shares = dict.fromkeys(winches, 0.0)
 
     def one(name: str) -> WinchAnswer:
-        def heard(what: str, share: float) -> None:
+        def report_progress(what: str, share: float) -> None:
             shares[name] = share
             progress(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
 
-        answer = diagnose(winches[name], profile, catalogue, band, thin=thin, progress=heard)
-        heard("done", 1.0)
+        answer = diagnose(
+            winches[name], profile, catalogue, band, decimate=decimate, progress=report_progress
+        )
+        report_progress("done", 1.0)
         return answer
 
-    begun: deque[tuple[str, Future[WinchAnswer]]] = deque()
+    running: deque[tuple[str, Future[WinchAnswer]]] = deque()
     for name in winches:
-        begun.append((name, _begun(one, name)))
-        if len(begun) == _AT_A_TIME:
-            yield _taken(begun)
-    while begun:
-        yield _taken(begun)
+        running.append((name, _started(one, name)))
+        if len(running) == _CONCURRENT:
+            yield _oldest_answer(running)
+    while running:
+        yield _oldest_answer(running)
 
 
-def _taken(begun: deque[tuple[str, Future[WinchAnswer]]]) -> tuple[str, WinchAnswer]:
+def _oldest_answer(running: deque[tuple[str, Future[WinchAnswer]]]) -> tuple[str, WinchAnswer]:
     """Wait for the oldest answer; no reference to it is kept here."""
-    name, future = begun.popleft()
+    name, future = running.popleft()
     return name, future.result()
 
 
-def _begun(work: Callable[[str], WinchAnswer], name: str) -> Future[WinchAnswer]:
+def _started(work: Callable[[str], WinchAnswer], name: str) -> Future[WinchAnswer]:
     """Start the computation of an answer in a thread.
 
     A thread pool would wait for its threads, for seconds, when the caller is interrupted.

@@ -27,11 +27,11 @@ from winchkit.effects.effect import Effect, Parameter
 
 __all__ = ["Pooled", "SharedEffect", "alarms", "pooled", "shared_effects"]
 
-_ALIKE = 0.01
+_HOMOGENEITY_LEVEL = 0.01
 """Level of the homogeneity test."""
-_FEWEST = 3
+_LEAST_WINCHES = 3
 """Winches from which one may be outlying: of two that differ neither is."""
-_PART = 4
+_WINCHES_PER_OUTLYING = 4
 """At most one in this many winches may be outlying: of more, a few agree by chance."""
 Member = tuple[str, tuple[float, ...]]
 """An effect with its orders: cogging of two orders counts as two effects."""
@@ -53,13 +53,18 @@ class Pooled:
     degrees_of_freedom: int
     p_value: float
     """P-value of homogeneity; NaN with fewer than two winches."""
-    apart: tuple[str, ...] = ()
+    outlying: tuple[str, ...] = ()
     """Outlying winches, without which the others are homogeneous."""
 
     @property
-    def alike(self) -> bool:
+    def homogeneous(self) -> bool:
         """Whether homogeneity is not rejected at 1 %."""
-        return not self.p_value < _ALIKE
+        return not self.p_value < _HOMOGENEITY_LEVEL
+
+    def to_json(self) -> dict[str, Any]:
+        """Dictionary that the command prints; the outlying winches are its ``apart``."""
+        values = {key: value for key, value in vars(self).items() if key != "outlying"}
+        return {**values, "apart": list(self.outlying)}
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,7 @@ class SharedEffect:
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""
         parameters = {
-            name: {**vars(p), "apart": list(p.apart)} for name, p in self.parameters.items()
+            name: pooled_parameter.to_json() for name, pooled_parameter in self.parameters.items()
         }
         return {
             "effects": list(self.effects),
@@ -97,7 +102,7 @@ def shared_effects(
     """Effects over winches (name to diagnosis), those of most winches first."""
     named = [(winch, step) for winch, answer in found.items() for step in answer.steps]
     out = [_shared(members, steps, found, catalogue) for members, steps in _together(named)]
-    return tuple(sorted(out, key=lambda shared: -len(shared.winches)))
+    return tuple(sorted(out, key=lambda effect: -len(effect.winches)))
 
 
 def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict[str, float]:
@@ -138,13 +143,13 @@ def pooled(values: Mapping[str, tuple[float, float]], unit: str, *, reciprocal: 
     x, s = np.array(list(values.values())).T
     if reciprocal:
         x, s = 1 / x, s / x**2
-    square, p_value = _cochran(x, s)
-    rest = _majority(x, s)
+    q, p_value = _cochran(x, s)
+    rest = _homogeneous_subset(x, s)
     mean, std, spread = _mean(x[rest], s[rest])
     if reciprocal:
         mean, std, spread = 1 / mean, std / mean**2, spread / mean**2
-    apart = tuple(name for name, kept in zip(names, rest, strict=True) if not kept)
-    return Pooled(mean, std, unit, spread, square, len(x) - 1, p_value, apart)
+    outlying = tuple(name for name, kept in zip(names, rest, strict=True) if not kept)
+    return Pooled(mean, std, unit, spread, q, len(x) - 1, p_value, outlying)
 
 
 def _together(named: list[tuple[str, Step]]) -> Iterator[tuple[list[Member], dict[str, Step]]]:
@@ -188,29 +193,31 @@ def _shared(
     for parameter in effect.parameters:
         # A phase refers to the zero of each winch and is not pooled.
         if not effect.polar or parameter.name != effect.polar[1]:
-            told = _told(steps, effect.id, parameter.name)
-            if told:
+            known = _known_values(steps, effect.id, parameter.name)
+            if known:
                 unit, reciprocal = parameter.unit, parameter.reciprocal
-                parameters[parameter.name] = pooled(told, unit, reciprocal=reciprocal)
+                parameters[parameter.name] = pooled(known, unit, reciprocal=reciprocal)
     without: list[str] = []
     unsure: list[str] = []
     for winch, diagnosis in found.items():
         if winch not in steps:
-            lacks = _would_show(diagnosis, effect, parameters) and not _kin(
+            absent = _would_detect(diagnosis, effect, parameters) and not _named_as_confusable(
                 diagnosis, effect, catalogue
             )
-            (without if lacks else unsure).append(winch)
+            (without if absent else unsure).append(winch)
     ids = tuple(name for name, _ in members)
     return SharedEffect(ids, tuple(steps), tuple(without), tuple(unsure), parameters)
 
 
-def _told(steps: Mapping[str, Step], effect: str, name: str) -> dict[str, tuple[float, float]]:
+def _known_values(
+    steps: Mapping[str, Step], effect: str, name: str
+) -> dict[str, tuple[float, float]]:
     """Winches with a known value: name to value and standard deviation."""
     known = {w: s.parameters.get(effect, {}).get(name) for w, s in steps.items()}
     return {w: (e.value, e.std) for w, e in known.items() if e is not None and np.isfinite(e.std)}
 
 
-def _would_show(diagnosis: Diagnosis, effect: Effect, size: Mapping[str, Pooled]) -> bool:
+def _would_detect(diagnosis: Diagnosis, effect: Effect, size: Mapping[str, Pooled]) -> bool:
     """Whether the runs of a winch would have detected an effect of this size."""
     if diagnosis.verdict in {"partly", "unknown"}:
         return False
@@ -222,7 +229,7 @@ def _would_show(diagnosis: Diagnosis, effect: Effect, size: Mapping[str, Pooled]
     return False
 
 
-def _kin(diagnosis: Diagnosis, effect: Effect, catalogue: Catalogue) -> bool:
+def _named_as_confusable(diagnosis: Diagnosis, effect: Effect, catalogue: Catalogue) -> bool:
     """Whether a found effect may be this one under another law or name."""
     named = [catalogue[name] for step in diagnosis.steps for name in step.effects]
     return any(
@@ -242,28 +249,28 @@ def _cochran(x: Array, s: Array) -> tuple[float, float]:
     if len(x) < 2 or not np.all(s > 0):
         return 0.0, float("nan")
     weight = 1 / s**2
-    square = float(np.sum(weight * (x - np.average(x, weights=weight)) ** 2))
-    return square, float(chi2.sf(square, len(x) - 1))
+    q = float(np.sum(weight * (x - np.average(x, weights=weight)) ** 2))
+    return q, float(chi2.sf(q, len(x) - 1))
 
 
-def _majority(x: Array, s: Array) -> NDArray[np.bool_]:
+def _homogeneous_subset(x: Array, s: Array) -> NDArray[np.bool_]:
     """Homogeneous winches after removal of one, or a quarter; all where that fails."""
     kept = np.ones(len(x), dtype=bool)
-    while _cochran(x[kept], s[kept])[1] < _ALIKE:
-        if len(x) < _FEWEST or (~kept).sum() >= max(1, len(x) // _PART):
+    while _cochran(x[kept], s[kept])[1] < _HOMOGENEITY_LEVEL:
+        if len(x) < _LEAST_WINCHES or (~kept).sum() >= max(1, len(x) // _WINCHES_PER_OUTLYING):
             return np.ones(len(x), dtype=bool)
-        kept[_worst(x, s, kept)] = False
+        kept[_most_outlying(x, s, kept)] = False
     return kept
 
 
-def _worst(x: Array, s: Array, kept: NDArray[np.bool_]) -> int:
+def _most_outlying(x: Array, s: Array, kept: NDArray[np.bool_]) -> int:
     """Winch whose removal decreases Q most."""
-    squares = {}
+    q_without = {}
     for index in np.flatnonzero(kept):
         without = kept.copy()
         without[index] = False
-        squares[int(index)] = _cochran(x[without], s[without])[0]
-    return min(squares, key=lambda index: squares[index])
+        q_without[int(index)] = _cochran(x[without], s[without])[0]
+    return min(q_without, key=lambda index: q_without[index])
 
 
 def _mean(x: Array, s: Array) -> tuple[float, float, float]:
@@ -271,9 +278,9 @@ def _mean(x: Array, s: Array) -> tuple[float, float, float]:
     if len(x) == 1 or not np.all(s > 0):
         return float(x[0]), float(s[0]), 0.0
     weight = 1 / s**2
-    square, _ = _cochran(x, s)
+    q, _ = _cochran(x, s)
     common = weight.sum() - np.sum(weight**2) / weight.sum()
-    between = max(0.0, (square - (len(x) - 1)) / float(common))
+    between = max(0.0, (q - (len(x) - 1)) / float(common))
     weight = 1 / (s**2 + between)
     mean = float(np.average(x, weights=weight))
     return mean, float(1 / np.sqrt(weight.sum())), float(np.sqrt(between))

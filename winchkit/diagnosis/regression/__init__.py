@@ -1,5 +1,7 @@
-"""The regression problem: generalised least squares, noise, cross-validation, intervals.
+"""Regression: generalised least squares, noise, lack of fit, cross-validation, intervals.
 
-A hypothesis (effects with values) predicts the outputs of every run; the whitened residual is
-fitted by Levenberg–Marquardt and judged by held-out error.
+A :class:`~winchkit.diagnosis.regression.base.Regression` predicts its rows from a hypothesis
+(effects with values) and is implemented by the spectral coefficients of a winch's runs and by the
+poses of a robot. The whitened residual is fitted by Levenberg-Marquardt, tested against the pure
+error of repeats, and compared with other models by held-out error.
 """

@@ -118,7 +118,7 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     run was decimated, or the drive's own velocity has less noise than the differences.
     """
     signals, smooth = recording.signals, recording.smooth
-    if recording.thinned:
+    if recording.decimated:
         return None
     velocity = signals.motor_velocity
     if velocity is not None and is_smoother(
@@ -153,8 +153,8 @@ def _force_correction(recording: Recording, line: Line) -> Array:
     signals, tension = recording.signals, recording.smooth.at.tension
     hanging = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
     assert hanging.load is not None
-    assert hanging.rounding is not None
+    assert hanging.discretization is not None
     inverse_sigma = hanging.load - hanging.load.mean()
     size = float(inverse_sigma @ inverse_sigma)
     mass = float(inverse_sigma @ tension) / size if size else 0.0
-    return -mass * hanging.rounding / 12
+    return -mass * hanging.discretization / 12

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset, Recording
-from winchkit.diagnosis.data.transients import around
+from winchkit.diagnosis.data.transients import with_neighbours
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.effects.term import Term
 
@@ -24,14 +24,14 @@ _FORCES = ("tension", "motor_torque")
 _MOST = 0.25
 
 
-def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
+def without_impacts(dataset: Dataset, hypothesis: Hypothesis) -> Dataset | None:
     """Data set without force and torque near impacts of the fitted effects.
 
     Parameters
     ----------
     dataset
         Runs of one winch.
-    found
+    hypothesis
         Fitted hypothesis.
 
     Returns
@@ -40,18 +40,18 @@ def without_impacts(dataset: Dataset, found: Hypothesis) -> Dataset | None:
         None where no sample is affected, or more than a quarter of all are.
     """
     recordings = tuple(
-        _without_impacts(recording, started(found, run))
+        _without_impacts(recording, started(hypothesis, run))
         for run, recording in enumerate(dataset.recordings)
     )
     if all(a is b for a, b in zip(recordings, dataset.recordings, strict=True)):
         return None
-    names = ", ".join(t.label for t in found.terms if t.effect.impacts is not None)
+    names = ", ".join(t.label for t in hypothesis.terms if t.effect.impacts is not None)
     share = 1 - _compared(recordings) / max(1, _compared(dataset.recordings))
     if share > _MOST:
         return None  # The remaining samples would not determine the effects.
     note = (
-        f"force and torque are not compared in the moments in which {names} jerks them "
-        f"({share:.1%} of the samples): how hard depends on what gives way"
+        f"force and torque are not compared at the impacts of {names} ({share:.1%} of the "
+        "samples): their size depends on compliances that the model does not have"
     )
     return replace(dataset, recordings=recordings, notes=(*dataset.notes, note))
 
@@ -65,15 +65,15 @@ def _compared(recordings: Sequence[Recording]) -> int:
 def _without_impacts(recording: Recording, terms: Sequence[Term]) -> Recording:
     """Run without torque near impacts and, under a known weight, without tension."""
     at = recording.raw.at
-    shaken = np.zeros(len(at.time), dtype=bool)
+    impacts = np.zeros(len(at.time), dtype=bool)
     for term in terms:
         if term.effect.impacts is not None:
-            shaken |= term.effect.impacts(at, term.values)
+            impacts |= term.effect.impacts(at, term.values)
     known_weight = recording.raw.load_mass is not None
     left = set(_FORCES if known_weight else _FORCES[1:]) & recording.valid.keys()
-    if not shaken.any() or not left:
+    if not impacts.any() or not left:
         return recording
-    near = around(shaken, at.time)
+    near = with_neighbours(impacts, at.time)
     valid = {
         output: good & ~near if output in left else good for output, good in recording.valid.items()
     }

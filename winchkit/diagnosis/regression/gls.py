@@ -27,11 +27,11 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 __all__ = ["Fit", "fit", "fit_from"]
 
 _ITERATIONS = 15
-_PATIENT = 40
-_ENOUGH = 0.02
-_FORGET = 1e-9
-_LOOK = 8
-_PROMISING = 2
+_ITERATIONS_OF_PRODUCTS = 40
+_LEAST_DECREASE = 0.02
+_LEAST_EIGENVALUE = 1e-9
+_FIRST_ITERATIONS = 8
+_KEPT_STARTS = 2
 
 
 @dataclass(frozen=True)
@@ -97,19 +97,19 @@ def fit(
     damping = 1e-6
     jacobian = regression.jacobian(x, start)
     for _ in range((_iterations(start) if most is None else most) if len(x) else 0):
-        step, promised = _step(
+        step, expected_decrease = _step(
             jacobian * inverse_sigma[:, None], residual * inverse_sigma, damping, x, (low, high)
         )
-        if promised < _ENOUGH:
+        if expected_decrease < _LEAST_DECREASE:
             break
         trial = np.clip(x + step, low, high)
-        there = regression.residual(regression.hypothesis(trial, start))
-        new = _chi_square(there, inverse_sigma)
+        residual_there = regression.residual(regression.hypothesis(trial, start))
+        new = _chi_square(residual_there, inverse_sigma)
         if new < chi_square:
-            gained = chi_square - new
-            x, residual, chi_square, damping = trial, there, new, damping / 10
+            decrease = chi_square - new
+            x, residual, chi_square, damping = trial, residual_there, new, damping / 10
             jacobian = regression.jacobian(x, start)
-            if gained < _ENOUGH:
+            if decrease < _LEAST_DECREASE:
                 break
         else:
             damping = max(damping * 100, 1e-4)
@@ -133,10 +133,10 @@ def fit_from(regression: Regression, starts: Sequence[Hypothesis], inverse_sigma
     inverse_sigma
         1/σ of every row, shape (n_rows,).
     """
-    if len(starts) > _PROMISING:
-        looked = [fit(regression, start, inverse_sigma, _LOOK) for start in starts]
-        looked.sort(key=lambda fitted: fitted.chi_square)
-        starts = [fitted.hypothesis for fitted in looked[:_PROMISING]]
+    if len(starts) > _KEPT_STARTS:
+        first_fits = [fit(regression, start, inverse_sigma, _FIRST_ITERATIONS) for start in starts]
+        first_fits.sort(key=lambda fitted: fitted.chi_square)
+        starts = [fitted.hypothesis for fitted in first_fits[:_KEPT_STARTS]]
     return min(
         (fit(regression, start, inverse_sigma) for start in starts),
         key=lambda fitted: fitted.chi_square,
@@ -149,7 +149,7 @@ def _iterations(start: Hypothesis) -> int:
     Such an effect has probes, since none of its parameters changes the prediction alone; χ² then
     has a curved valley along which the iteration is slow.
     """
-    return _PATIENT if start.terms and start.terms[-1].effect.probes else _ITERATIONS
+    return _ITERATIONS_OF_PRODUCTS if start.terms and start.terms[-1].effect.probes else _ITERATIONS
 
 
 def _chi_square(residual: Array, inverse_sigma: Array) -> float:
@@ -164,8 +164,8 @@ def _step(
     low, high = bounds
     gradient = whitened.T @ residual
     normal = whitened.T @ whitened
-    stuck = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0))
-    free = ~stuck & (np.diag(normal) > 0)
+    at_bound = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0))
+    free = ~at_bound & (np.diag(normal) > 0)
     step = np.zeros_like(x)
     if not free.any():
         return step, 0.0
@@ -174,7 +174,7 @@ def _step(
     scaled = inner / np.outer(scale, scale)
     # Linearly dependent unknowns stay where they are: truncated eigenvalues.
     values, vectors = np.linalg.eigh(scaled)
-    kept = values > _FORGET * values[-1]
+    kept = values > _LEAST_EIGENVALUE * values[-1]
     along = vectors[:, kept].T @ (gradient[free] / scale)
     step[free] = (vectors[:, kept] @ (along / (values[kept] + damping))) / scale
     return step, float(np.sum(along**2 / (values[kept] + damping)))

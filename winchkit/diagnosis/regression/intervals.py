@@ -44,7 +44,7 @@ __all__ = [
 
 _LINEAR = 0.15
 _SEARCHES = 4
-_FARTHEST = 4.0
+_MOST_STRETCHED = 4.0
 
 
 def profile_ends(
@@ -77,13 +77,13 @@ def profile_ends(
     states = sum(len(start) for start in fit.hypothesis.starts)
     for index in range(first, len(fit.vector) - states):
         if deviation[index] > 0.0:
-            walk = _Walk(regression, fit, inverse_sigma, covariance, index)
-            low[index] = fit.vector[index] - walk.length(-1.0, reach[index])
-            high[index] = fit.vector[index] + walk.length(1.0, reach[index])
+            profile = _Profile(regression, fit, inverse_sigma, covariance, index)
+            low[index] = fit.vector[index] - profile.length(-1.0, reach[index])
+            high[index] = fit.vector[index] + profile.length(1.0, reach[index])
     return np.clip(low, *bounds), np.clip(high, *bounds)
 
 
-class _Walk:
+class _Profile:
     """Profile of χ² along one unknown, the others refitted by one linear step."""
 
     def __init__(
@@ -105,30 +105,30 @@ class _Walk:
 
     def length(self, side: float, reach: float) -> float:
         """Distance from the fit at which χ² has risen by ``reach``²."""
-        usual = reach * self._deviation
-        wanted, far = reach**2, usual
+        linear_distance = reach * self._deviation
+        target, distance = reach**2, linear_distance
         for _ in range(_SEARCHES):
-            risen = self._risen(side * far, wanted)
-            if abs(risen / wanted - 1) < _LINEAR:
+            rise = self._rise(side * distance, target)
+            if abs(rise / target - 1) < _LINEAR:
                 break
             # χ² rises approximately with the square of the distance.
-            far *= float(np.clip(np.sqrt(wanted / max(risen, 1e-9)), 0.3, 2.0))
-            if far > _FARTHEST * usual:
-                return _FARTHEST * usual
-        return far
+            distance *= float(np.clip(np.sqrt(target / max(rise, 1e-9)), 0.3, 2.0))
+            if distance > _MOST_STRETCHED * linear_distance:
+                return _MOST_STRETCHED * linear_distance
+        return distance
 
-    def _risen(self, moved: float, wanted: float) -> float:
+    def _rise(self, displacement: float, target: float) -> float:
         """Rise of χ², the other unknowns corrected once where it exceeds the target."""
         low, high = self._bounds
-        vector = np.clip(self._fit.vector + moved * self._along, low, high)
+        vector = np.clip(self._fit.vector + displacement * self._along, low, high)
         residual = self._residual(vector)
-        risen = float(residual @ residual) - self._fit.chi_square
-        if risen < (1 + _LINEAR) * wanted:
-            return risen
+        rise = float(residual @ residual) - self._fit.chi_square
+        if rise < (1 + _LINEAR) * target:
+            return rise
         step = np.zeros_like(vector)
         step[self._others] = self._normal @ (self._whitened.T @ residual)
         corrected = self._residual(np.clip(vector + step, low, high))
-        return min(risen, float(corrected @ corrected) - self._fit.chi_square)
+        return min(rise, float(corrected @ corrected) - self._fit.chi_square)
 
     def _residual(self, vector: Array) -> Array:
         like = self._fit.hypothesis
@@ -139,9 +139,9 @@ class _Walk:
 
 
 _95 = 1.959964
-_CONTRADICTS = 3.5
-_LEAST_SAY = 1e-3
-_NOTHING = 1e6
+_CONTRADICTION = 3.5
+_LEAST_WEIGHT = 1e-3
+_UNDETERMINED = 1e6
 """In units of the usual size: an unknown with a larger standard deviation is undetermined."""
 
 
@@ -182,20 +182,20 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
     covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     statistical = np.maximum(likelihood, _jackknife(regression, fit, noise, blocks))
-    unknown = (statistical > _NOTHING) | (np.diag(normal) == 0.0)
+    unknown = (statistical > _UNDETERMINED) | (np.diag(normal) == 0.0)
     covariance[unknown] = covariance[:, unknown] = likelihood[unknown] = 0.0
-    statistical[unknown] = _NOTHING
-    shift = covariance @ (
+    statistical[unknown] = _UNDETERMINED
+    shift_by_discretization = covariance @ (
         whitened.T @ (regression.discretization_error(fit.hypothesis) * inverse_sigma)
     )
     contradiction = _contradiction(regression, whitened, fit.residual * inverse_sigma, covariance)
-    systematic = np.hypot(shift, contradiction)
+    systematic = np.hypot(shift_by_discretization, contradiction)
     wider = np.divide(
         statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
     )
     low, high = profile_ends(regression, fit, inverse_sigma, covariance, _95 * wider)
     below, above = (
-        np.where(unknown, _NOTHING, way) for way in (fit.vector - low, high - fit.vector)
+        np.where(unknown, _UNDETERMINED, way) for way in (fit.vector - low, high - fit.vector)
     )
     return Spread(
         np.hypot(statistical, systematic),
@@ -225,14 +225,18 @@ def _contradiction(
     for part in _parts(regression):
         own = whitened[part]
         normal = own.T @ own
-        pull = covariance @ (own.T @ residual[part])
+        shift_by_part = covariance @ (own.T @ residual[part])
         through = covariance @ normal @ covariance
-        say = np.clip(np.diag(through) / variance, 0.0, 1.0)
-        left = np.diag(through - through @ normal @ covariance)
-        both = (say > _LEAST_SAY) & (say < 1 - _LEAST_SAY) & (left > 0)
-        sure = both & (pull**2 > _CONTRADICTS**2 * np.where(both, left, 1.0))
-        apart = np.abs(pull) / np.where(sure, say * (1 - say), 1.0) / 2
-        out = np.maximum(out, np.where(sure, apart, 0.0))
+        weight = np.clip(np.diag(through) / variance, 0.0, 1.0)
+        variance_of_part = np.diag(through - through @ normal @ covariance)
+        comparable = (
+            (weight > _LEAST_WEIGHT) & (weight < 1 - _LEAST_WEIGHT) & (variance_of_part > 0)
+        )
+        significant = comparable & (
+            shift_by_part**2 > _CONTRADICTION**2 * np.where(comparable, variance_of_part, 1.0)
+        )
+        differences = np.abs(shift_by_part) / np.where(significant, weight * (1 - weight), 1.0) / 2
+        out = np.maximum(out, np.where(significant, differences, 0.0))
     return out
 
 
@@ -295,12 +299,12 @@ def _ends(
     for index, name in enumerate(coordinates.names):
         if name in (coordinates.effect.polar or ()):
             continue
-        told = []
+        at_ends = []
         for end in ends:
-            moved = vector.copy()
-            moved[index] = end[index]
-            told.append(coordinates.values(moved, base)[name])
-        out[name] = min(told), max(told)
+            at_end = vector.copy()
+            at_end[index] = end[index]
+            at_ends.append(coordinates.values(at_end, base)[name])
+        out[name] = min(at_ends), max(at_ends)
     return out
 
 

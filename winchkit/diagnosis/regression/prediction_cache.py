@@ -122,8 +122,8 @@ class Predictor:
             if len(kept) > _KEPT:
                 kept.popitem(last=False)
         kept.move_to_end(key)
-        found: Part = kept[key]
-        return found
+        value: Part = kept[key]
+        return value
 
 
 def masked(recording: Recording, output: str, signal: Array) -> Array:
@@ -136,9 +136,9 @@ def _corrected(motion: Motion, correction: float) -> Motion:
 
     Hysteresis effects depend on it: the branch changes where the tension has its extremum.
     """
-    if motion.load is None or motion.rounding is None:
+    if motion.load is None or motion.discretization is None:
         return motion
-    load = motion.load + correction * motion.rounding
+    load = motion.load + correction * motion.discretization
     # The error of a second difference over a span is span²/12 of the fourth derivative; that of a
     # simulation that differentiates twice over steps h is h²/3, the most that the line adds.
     twice = 1 / (3 * motion.clock.reach**2)

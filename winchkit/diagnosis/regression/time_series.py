@@ -20,7 +20,7 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.requirements import excites, missing_needs
 from winchkit.diagnosis.data.spectrum import (
-    WHOLE_FILTER,
+    WHOLE_TRANSITION,
     band_edges,
     low_pass,
     narrow_edges,
@@ -140,7 +140,9 @@ class TimeSeriesRegression(Regression):
     def unfiltered(self) -> TimeSeriesRegression:
         """The same regression with the rows above the low-pass filter's cut-off."""
         recordings = tuple(
-            replace(r, bands={o: replace(b, skirt=WHOLE_FILTER) for o, b in r.bands.items()})
+            replace(
+                r, bands={o: replace(b, kept_cut_offs=WHOLE_TRANSITION) for o, b in r.bands.items()}
+            )
             for r in self.dataset.recordings
         )
         return TimeSeriesRegression(replace(self.dataset, recordings=recordings))
@@ -213,7 +215,7 @@ class TimeSeriesRegression(Regression):
         """
         out = np.zeros(self.n_rows)
         for run, recording in enumerate(self.dataset.recordings):
-            curvature = recording.raw.rounding
+            curvature = recording.raw.discretization
             if curvature is None or recording.raw.load is None:
                 continue
             line = Line(self.dataset.profile)

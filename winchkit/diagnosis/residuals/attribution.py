@@ -24,10 +24,10 @@ from winchkit.model.variables import ANGLES, COMPOUND, VARIABLES
 
 __all__ = [
     "BINS",
-    "Followed",
+    "Attribution",
+    "attributions",
     "binned_share",
-    "by_chance",
-    "follows",
+    "chance_share",
     "harmonics",
     "kept_rows",
     "quantile_bins",
@@ -38,13 +38,13 @@ __all__ = [
 BINS = 16
 """Bins per variable."""
 _ORDERS = 40
-_WORTH = 0.02
-_CLEARLY = 0.05
+_LEAST_SHARE = 0.02
+_LEAST_JOINT_GAIN = 0.05
 """Share that two variables together must explain beyond either of them."""
 
 
 @dataclass(frozen=True)
-class Followed:
+class Attribution:
     """A variable and the share of an output's residual variance that it explains."""
 
     output: str
@@ -57,14 +57,14 @@ class Followed:
     """Line of a robot, or axis of its platform, that has most of the share."""
 
 
-class _Shared(Protocol):
+class _HasShare(Protocol):
     @property
     def variable(self) -> str: ...
     @property
     def share(self) -> float: ...
 
 
-_S = TypeVar("_S", bound=_Shared)
+_S = TypeVar("_S", bound=_HasShare)
 
 
 def variables_of(recording: Recording) -> dict[str, Array]:
@@ -80,7 +80,7 @@ def variables_of(recording: Recording) -> dict[str, Array]:
     return out
 
 
-def follows(regression: TimeSeriesRegression, residual: Array) -> list[Followed]:
+def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attribution]:
     """Per output the variables that explain its residual, largest share first.
 
     Parameters
@@ -92,11 +92,11 @@ def follows(regression: TimeSeriesRegression, residual: Array) -> list[Followed]
 
     Returns
     -------
-    list of Followed
+    list of Attribution
         Those whose share exceeds 2 % and three standard deviations of its null distribution.
     """
     times = regression.in_time(residual)
-    out: list[Followed] = []
+    out: list[Attribution] = []
     known = [variables_of(recording) for recording in regression.dataset.recordings]
     for output in regression.dataset.outputs:
         own = [
@@ -110,8 +110,8 @@ def follows(regression: TimeSeriesRegression, residual: Array) -> list[Followed]
                 continue
             values = [known[s.run][name][v] for (s, _), v in zip(own, valid, strict=True)]
             share = binned_share(np.concatenate(values), error, kept)
-            if share > by_chance(BINS, kept):
-                found.append(Followed(output, name, share))
+            if share > chance_share(BINS, kept):
+                found.append(Attribution(output, name, share))
         out += ranked(found)
     return out
 
@@ -120,14 +120,14 @@ def ranked(found: Iterable[_S]) -> list[_S]:
     """Largest share first; products of two variables only where they explain clearly more."""
     shares = {item.variable: item.share for item in found}
 
-    def needless(item: _S) -> bool:
+    def redundant(item: _S) -> bool:
         parts = COMPOUND.get(item.variable, ())
-        return any(item.share < shares.get(part, 0.0) + _CLEARLY for part in parts)
+        return any(item.share < shares.get(part, 0.0) + _LEAST_JOINT_GAIN for part in parts)
 
-    return sorted((item for item in found if not needless(item)), key=lambda item: -item.share)
+    return sorted((item for item in found if not redundant(item)), key=lambda item: -item.share)
 
 
-def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Followed]:
+def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribution]:
     """Per output and angle the order whose sine explains most of the residual variance.
 
     Parameters
@@ -139,7 +139,7 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Followe
 
     Returns
     -------
-    list of Followed
+    list of Attribution
         Orders 1 to 40 with a share above 2 %, largest share first.
     """
     times = regression.in_time(residual)
@@ -155,8 +155,8 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Followe
             )
             shares = _harmonic_shares(angle, error)
             best = int(np.argmax(shares))
-            if shares[best] > _WORTH:
-                out.append(Followed(output, name, float(shares[best]), order=best + 1))
+            if shares[best] > _LEAST_SHARE:
+                out.append(Attribution(output, name, float(shares[best]), order=best + 1))
     return sorted(out, key=lambda f: -f.share)
 
 
@@ -165,9 +165,9 @@ def kept_rows(regression: TimeSeriesRegression, output: str) -> int:
     return sum(s.rows.stop - s.rows.start for s in regression.segments if s.output == output)
 
 
-def by_chance(bins: int, kept: int) -> float:
+def chance_share(bins: int, kept: int) -> float:
     """Share that independent residuals hardly reach: 3 √(2 bins) / rows, at least 2 %."""
-    return max(_WORTH, 3 * float(np.sqrt(2 * bins)) / kept)
+    return max(_LEAST_SHARE, 3 * float(np.sqrt(2 * bins)) / kept)
 
 
 def binned_share(variable: Array, error: Array, kept: int) -> float:
@@ -222,9 +222,9 @@ def _harmonic_shares(angle: Array, error: Array) -> Array:
     normal[:, 0, 0], normal[:, 1, 1] = (count + twice.real) / 2, (count - twice.real) / 2
     normal[:, 0, 1] = normal[:, 1, 0] = twice.imag / 2
     # An angle that hardly moves has no orders.
-    turned = np.linalg.cond(normal) <= 1e6
-    toward = np.stack([gradient.real, gradient.imag], axis=1)[turned]
+    identifiable = np.linalg.cond(normal) <= 1e6
+    toward = np.stack([gradient.real, gradient.imag], axis=1)[identifiable]
     out = np.zeros(_ORDERS)
-    solved = np.linalg.solve(normal[turned], toward[:, :, None])[:, :, 0]
-    out[turned] = np.sum(toward * solved, axis=1) / total
+    solved = np.linalg.solve(normal[identifiable], toward[:, :, None])[:, :, 0]
+    out[identifiable] = np.sum(toward * solved, axis=1) / total
     return out

@@ -15,10 +15,10 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import replicate_rms
 
-__all__ = ["Skirt"]
+__all__ = ["StopBandLeakage"]
 
 
-class Skirt:
+class StopBandLeakage:
     """Mean squares above the cut-off, per output, SI."""
 
     def __init__(self, regression: Regression) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import by_chance, kept_rows, variables_of
+from winchkit.diagnosis.residuals.attribution import chance_share, kept_rows, variables_of
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 from winchkit.plain_json import significant
 
@@ -31,8 +31,8 @@ PAIRS = (
     ("motor_angle", "load"),
 )
 """First and second variable; ``load`` is the tension where no load is known."""
-_ACROSS, _UP = 16, 10
-_FEWEST = 3
+_FIRST_CELLS, _SECOND_CELLS = 16, 10
+_LEAST_SAMPLES = 3
 _TAILS = 0.002
 _DIGITS = 5
 _LEAST_CHANGE = {"temperature": 1.0}
@@ -92,7 +92,7 @@ def residual_maps(regression: TimeSeriesRegression, residual: Array) -> list[Res
             for pair in PAIRS
             if (places := _places(regression, known, output, pair)) is not None
             and (drawn := _map_of(output, places, error, kept)) is not None
-            and drawn.share > by_chance(int(np.isfinite(drawn.mean).sum()), kept)
+            and drawn.share > chance_share(int(np.isfinite(drawn.mean).sum()), kept)
         ]
         out += sorted(found, key=lambda m: -m.share)
     return out
@@ -161,15 +161,15 @@ def _errors(regression: TimeSeriesRegression, residual: Array, output: str) -> A
 def _map_of(output: str, places: _Places, error: Array, kept: int) -> ResidualMap | None:
     """A map; None where a variable hardly changes or the residual is zero."""
     names, (x, y) = places
-    edges = (_edges(names[0], x, _ACROSS), _edges(names[1], y, _UP))
+    edges = (_edges(names[0], x, _FIRST_CELLS), _edges(names[1], y, _SECOND_CELLS))
     total = float(error @ error)
     still = (np.ptp(e) <= _LEAST_CHANGE.get(n, 0.0) for n, e in zip(names, edges, strict=True))
     if total == 0.0 or any(still):
         return None
-    cell = _index(x, edges[0]) * _UP + _index(y, edges[1])
-    count = np.bincount(cell, minlength=_ACROSS * _UP)
-    sums = np.bincount(cell, weights=error, minlength=_ACROSS * _UP)
-    used = count >= _FEWEST
+    cell = _index(x, edges[0]) * _SECOND_CELLS + _index(y, edges[1])
+    count = np.bincount(cell, minlength=_FIRST_CELLS * _SECOND_CELLS)
+    sums = np.bincount(cell, weights=error, minlength=_FIRST_CELLS * _SECOND_CELLS)
+    used = count >= _LEAST_SAMPLES
     if not used.any():
         return None
     mean = np.full(len(count), np.nan)
@@ -177,7 +177,7 @@ def _map_of(output: str, places: _Places, error: Array, kept: int) -> ResidualMa
     taken = float(np.sum(sums[used] ** 2 / count[used]))
     chance = total * np.count_nonzero(used) / kept
     share = max(0.0, float((taken - chance) / total))
-    shape = (_ACROSS, _UP)
+    shape = (_FIRST_CELLS, _SECOND_CELLS)
     return ResidualMap(output, names, edges, mean.reshape(shape), count.reshape(shape), share)
 
 

@@ -9,7 +9,7 @@ from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.robot.candidates import lacking, with_needs_met
-from winchkit.diagnosis.robot.errors import Errors, FittedModel, errors_of, figures
+from winchkit.diagnosis.robot.errors import Errors, FittedModel, errors_of, output_fits_of
 from winchkit.diagnosis.robot.preparation import Preparation, prepare_selection
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.effects.bind_robot import declared_terms, robot_terms
@@ -140,7 +140,9 @@ def _added(preparation: Preparation, effect: Effect) -> RobotGrown:
     was, now = (
         errors_of(regression, regression.at(fit.hypothesis)) for fit in (initial_model, final)
     )
-    addition = Addition(figures(before, after, preparation.noise), terms, preparation.dataset.notes)
+    addition = Addition(
+        output_fits_of(before, after, preparation.noise), terms, preparation.dataset.notes
+    )
     return RobotGrown(regression, (was, now), addition)
 
 
@@ -187,5 +189,5 @@ def remove_from_robot(
     )
     # Effects of a line's winch are refitted too and stay in the winch's own profile.
     left = tuple(item for item in found if item[0].effect.id in own)
-    outputs = figures(before, after, preparation.noise)
+    outputs = output_fits_of(before, after, preparation.noise)
     return Removal(effect_id, outputs, left, preparation.dataset.notes)

@@ -13,25 +13,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.robot.errors import Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.robot import angles_of
 
-__all__ = ["AXES", "ON_PLATFORM", "follows_of", "most_telling", "on_cables", "variables_of_poses"]
+__all__ = [
+    "AXES",
+    "ON_PLATFORM",
+    "most_significant",
+    "on_cables",
+    "pose_attributions",
+    "variables_of_poses",
+]
 
 AXES = ("x", "y", "z")
 """Columns of a position's error."""
 ON_PLATFORM = tuple(f"platform_{name}" for name in (*AXES, "roll", "pitch", "yaw"))
 """Variables of the pose itself."""
 _BINS = 8
-_WORTH = 0.02
+_LEAST_SHARE = 0.02
 """Least share that is reported (rule of thumb)."""
-_SURE = 3.0
+_LEAST_DEVIATIONS = 3.0
 """Standard deviations by chance that a share must exceed."""
-_MOSTLY = 0.5
+_LINE_SHARE = 0.5
 """Share of one line above which the line is named."""
-_FEWEST = 20
+_LEAST_POSES = 20
 """Least number of samples of a line (rule of thumb)."""
 
 
@@ -41,15 +48,15 @@ class _Share:
 
     share: float
     """η² less its expectation by chance."""
-    by_chance: float
+    chance_share: float
     """Three standard deviations of the share by chance."""
     column: int
     """Line or axis with the largest part of it."""
-    alone: bool
+    own_share: bool
     """Whether that line has more than half of it."""
 
 
-def follows_of(regression: PoseRegression, errors: Errors) -> list[Followed]:
+def pose_attributions(regression: PoseRegression, errors: Errors) -> list[Attribution]:
     """Variables that explain the errors of each output, the largest share first.
 
     Parameters
@@ -61,7 +68,7 @@ def follows_of(regression: PoseRegression, errors: Errors) -> list[Followed]:
 
     Returns
     -------
-    list of Followed
+    list of Attribution
         ``winch`` is the share of a constant per line, ``pose`` that of a constant per pose.
     """
     variables, out = variables_of_poses(regression), []
@@ -72,16 +79,16 @@ def follows_of(regression: PoseRegression, errors: Errors) -> list[Followed]:
             if values.shape[1] not in (1, error.shape[1]):
                 continue
             taken = _taken(np.broadcast_to(values, error.shape), error)
-            if taken.share > max(_WORTH, taken.by_chance):
-                line = lines[taken.column] if taken.alone else None
-                found.append(Followed(output, name, taken.share, line=line))
+            if taken.share > max(_LEAST_SHARE, taken.chance_share):
+                line = lines[taken.column] if taken.own_share else None
+                found.append(Attribution(output, name, taken.share, line=line))
         if output != "platform_position":
             found += _constants(regression, output, error)
         out += sorted(found, key=lambda f: -f.share)
     return out
 
 
-def most_telling(values: Array, error: Array) -> int:
+def most_significant(values: Array, error: Array) -> int:
     """Column (line or axis) whose error a variable explains most."""
     return _taken(np.broadcast_to(values, error.shape), error).column
 
@@ -128,7 +135,7 @@ def _taken(values: Array, error: Array) -> _Share:
         there = known[:, k]
         x, e = values[there, k], error[there, k]
         total, count = total + float(e @ e), count + len(e)
-        if len(e) < _FEWEST or np.ptp(x) <= 1e-9 * max(1.0, float(np.abs(x).max())):
+        if len(e) < _LEAST_POSES or np.ptp(x) <= 1e-9 * max(1.0, float(np.abs(x).max())):
             continue
         edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)[1:-1]))
         number = np.searchsorted(edges, x, side="right")
@@ -138,24 +145,26 @@ def _taken(values: Array, error: Array) -> _Share:
         between[k] = float(np.sum(sums[used] ** 2 / many[used]))
         bins += int(np.count_nonzero(used)) - 1
     if not total or not bins:
-        return _Share(0.0, 1.0, 0, alone=False)
+        return _Share(0.0, 1.0, 0, own_share=False)
     most = int(np.argmax(between))
     share = float(between.sum()) / total - bins / count
-    alone = bool(between[most] > _MOSTLY * between.sum())
-    return _Share(max(0.0, share), _SURE * float(np.sqrt(2 * bins)) / count, most, alone)
+    own_share = bool(between[most] > _LINE_SHARE * between.sum())
+    return _Share(
+        max(0.0, share), _LEAST_DEVIATIONS * float(np.sqrt(2 * bins)) / count, most, own_share
+    )
 
 
-def _constants(regression: PoseRegression, output: str, error: Array) -> list[Followed]:
+def _constants(regression: PoseRegression, output: str, error: Array) -> list[Attribution]:
     """Shares of a constant per line and of a constant per pose."""
     known, out = np.isfinite(error), []
     winch = np.broadcast_to(np.arange(error.shape[1]), error.shape)
     pose = np.broadcast_to(regression.dataset.pose[:, None], error.shape)
     for name, values in (("winch", winch), ("pose", pose)):
         taken = _category_share(values[known], error[known])
-        if taken.share > max(_WORTH, taken.by_chance):
-            own = name == "winch" and taken.alone
+        if taken.share > max(_LEAST_SHARE, taken.chance_share):
+            own = name == "winch" and taken.own_share
             line = regression.dataset.names[taken.column] if own else None
-            out.append(Followed(output, name, taken.share, line=line))
+            out.append(Attribution(output, name, taken.share, line=line))
     return out
 
 
@@ -163,14 +172,14 @@ def _category_share(category: NDArray[np.intp], error: Array) -> _Share:
     """η² over categories less its expectation by chance."""
     total = float(error @ error)
     if total == 0.0:
-        return _Share(0.0, 1.0, 0, alone=False)
+        return _Share(0.0, 1.0, 0, own_share=False)
     count = np.bincount(category)
     used = count > 0
     means = np.zeros(len(count))
     means[used] = np.bincount(category, weights=error)[used] ** 2 / count[used]
     many = int(np.count_nonzero(used))
     share = float(means.sum()) / total - many / len(error)
-    chance = _SURE * float(np.sqrt(2 * many)) / len(error)
+    chance = _LEAST_DEVIATIONS * float(np.sqrt(2 * many)) / len(error)
     most = int(np.argmax(means))
-    alone = bool(means[most] > _MOSTLY * means.sum())
-    return _Share(max(0.0, share), chance, most, alone)
+    own_share = bool(means[most] > _LINE_SHARE * means.sum())
+    return _Share(max(0.0, share), chance, most, own_share)

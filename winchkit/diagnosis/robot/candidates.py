@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.diagnosis.robot.dataset import RobotDataset
-from winchkit.diagnosis.robot.prior import GeometryPrior
+from winchkit.diagnosis.robot.prior import FIELDS, GeometryPrior
 from winchkit.effects.bind_robot import lines_with_home_length
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
@@ -20,6 +20,7 @@ from winchkit.effects.placement import (
     with_home_lengths,
 )
 from winchkit.effects.term import Term
+from winchkit.schema.profiles.robot import PRIORS
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
 __all__ = [
@@ -33,17 +34,6 @@ __all__ = [
 
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius", "drum-radius", "layer-thickness")
 """Effects that are the geometry which a calibration fits."""
-_PRIORS = {
-    "exit-point": ("exit_point", 5e-3),
-    "anchor-point": ("anchor_point", 5e-3),
-    "swivel-radius": ("swivel_radius", 0.4e-3),
-    "drum-radius": ("winding_radius", 0.5e-3),
-    "layer-thickness": ("layer_growth", 0.04e-3),
-}
-"""Keys in ``[prior]`` and standard deviations without an entry, m.
-
-CABTIVE paper, Table 4: half the width of its bounds is two standard deviations.
-"""
 _PARTS = {
     "swivel-radius": "a line with a swivel_radius",
     "layer-thickness": "a drum that winds in layers",
@@ -121,11 +111,10 @@ def _each(effect: Effect, dataset: RobotDataset) -> Iterable[Effect]:
 
 def _std(dataset: RobotDataset, effect: Effect, parameter: str, fitted: bool) -> float:
     """Standard deviation of one number of the geometry, m."""
-    key, default = _PRIORS[base_of(effect)]
+    key = FIELDS[base_of(effect)]
     profile = dataset.robot
     if not fitted:
-        prior = {str(name): spec.std for name, spec in profile.prior.items()}
-        return prior.get(key, default)
+        return profile.prior[key].std if key in profile.prior else PRIORS[key]
     from winchkit.units import parse
 
     line = line_of_effect(effect)

@@ -9,15 +9,15 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
-from winchkit.diagnosis.robot.attribution import follows_of
+from winchkit.diagnosis.robot.adjustment import placed
+from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
-from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
 from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.variance_components import START
-from winchkit.effects.bind_robot import robot_terms, robot_with_effects
+from winchkit.effects.bind_robot import robot_terms
 from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
@@ -32,7 +32,7 @@ class RobotCompared:
     comparison: Comparison
     regression: PoseRegression
     errors: Errors
-    followed: Mapping[str, Followed]
+    followed: Mapping[str, Attribution]
     """By output the variable with the largest share of its error."""
 
 
@@ -70,13 +70,12 @@ def compared_robot(
 ) -> RobotCompared:
     """As :func:`compare_robot`, with regression and errors."""
     dataset = prepare_poses(runs, profile)
-    robot = robot_with_effects(profile, catalogue)
-    equations = Equations(dataset, start_pose(dataset), robot)
-    pose = placed_by(equations, robot, START)
+    terms = robot_terms(profile, catalogue)
+    pose = placed(dataset, terms, START)
     regression = PoseRegression(LinearizationPoint(dataset, pose, START))
-    errors = errors_of(regression, regression.residuals(robot_terms(profile, catalogue)))
+    errors = errors_of(regression, regression.residuals(terms))
     noise = _noise(errors, dataset)
-    follows = follows_of(regression, errors)
+    follows = pose_attributions(regression, errors)
     size = signals(regression)
     outputs = {
         name: OutputError(
@@ -92,7 +91,7 @@ def compared_robot(
         )
         for name, error in errors.items()
     }
-    most: dict[str, Followed] = {}
+    most: dict[str, Attribution] = {}
     for followed in follows:
         most.setdefault(followed.output, followed)
     return RobotCompared(Comparison(outputs, None, dataset.notes), regression, errors, most)
@@ -110,8 +109,8 @@ def _noise(errors: Errors, dataset: RobotDataset) -> dict[str, float]:
     many = [group for group in groups if len(group) > 1]
     if not many:
         return {}
-    apart = {
+    differences = {
         name: np.concatenate([contrasts(error[group])[1] for group in many])
         for name, error in errors.items()
     }
-    return {name: rms(name, values) for name, values in apart.items()}
+    return {name: rms(name, values) for name, values in differences.items()}

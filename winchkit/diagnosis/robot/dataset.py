@@ -19,13 +19,13 @@ from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["RobotDataset", "prepare_poses"]
 
-_FEWEST = 10
+_LEAST_POSES = 10
 """Least number of poses (rule of thumb)."""
-_ANGLES_AGREE = 0.02
+_ANGLE_TOLERANCE = 0.02
 """Rms difference of motor angles within which rows repeat a pose, in their standard deviation."""
-_TENSIONS_AGREE = 0.03
+_TENSION_TOLERANCE = 0.03
 """Relative difference of the mean tension within which rows repeat a pose (rule of thumb)."""
-_MOSTLY = 0.5
+_LEAST_KNOWN_SHARE = 0.5
 """Share of finite tensions above which tensions are used."""
 
 
@@ -55,7 +55,7 @@ class RobotDataset(Dataset):
     @property
     def has_tension(self) -> bool:
         """Whether most tensions were measured."""
-        return bool(np.mean(np.isfinite(self.measured.tension)) > _MOSTLY)
+        return bool(np.mean(np.isfinite(self.measured.tension)) > _LEAST_KNOWN_SHARE)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,9 +76,9 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
         raise RunError("no run given")
     measured = read_poses(runs, robot)
     place = ", ".join(run.path or run.name for run in runs)
-    if len(measured) < _FEWEST:
+    if len(measured) < _LEAST_POSES:
         raise RunError(
-            Fault(f"only {len(measured)} poses; at least {_FEWEST} are needed to judge", place)
+            Fault(f"only {len(measured)} poses; at least {_LEAST_POSES} are needed to judge", place)
         )
     known = np.isfinite(measured.position).sum() + np.isfinite(measured.angles).sum()
     spare = np.isfinite(measured.motor_angle).sum() + known - 6 * len(measured)
@@ -113,7 +113,7 @@ def _distinct(measured: Measured) -> NDArray[np.intp]:
     first: list[int] = []
     out = np.empty(len(angle), dtype=np.intp)
     for row in range(len(angle)):
-        same = [n for n, other in enumerate(first) if _alike(row, other, scaled, pull)]
+        same = [n for n, other in enumerate(first) if _is_repeat(row, other, scaled, pull)]
         out[row] = same[0] if same else len(first)
         if not same:
             first.append(row)
@@ -126,9 +126,9 @@ def _mean_pull(tension: Array) -> Array:
     return np.asarray(np.where(known, tension, 0.0).sum(axis=1) / count)
 
 
-def _alike(row: int, other: int, scaled: Array, pull: Array) -> bool:
+def _is_repeat(row: int, other: int, scaled: Array, pull: Array) -> bool:
     with np.errstate(invalid="ignore"):
-        apart = scaled[row] - scaled[other]
-    if not np.sqrt(np.mean(apart**2)) < _ANGLES_AGREE:
+        difference = scaled[row] - scaled[other]
+    if not np.sqrt(np.mean(difference**2)) < _ANGLE_TOLERANCE:
         return False
-    return bool(abs(pull[row] - pull[other]) <= _TENSIONS_AGREE * max(abs(pull[row]), 1e-9))
+    return bool(abs(pull[row] - pull[other]) <= _TENSION_TOLERANCE * max(abs(pull[row]), 1e-9))

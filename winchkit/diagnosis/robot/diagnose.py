@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from winchkit.diagnosis.design.detectability import Bar, detectable
+from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.diagnose import (
     Answer,
     ProgressCallback,
@@ -27,18 +27,18 @@ from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import spread_of
 from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, Where, plain_step
-from winchkit.diagnosis.robot.attribution import follows_of
+from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.candidates import GEOMETRY
 from winchkit.diagnosis.robot.engine import PoseSelection
-from winchkit.diagnosis.robot.errors import Errors, FittedModel, errors_of, figures, rms
-from winchkit.diagnosis.robot.excitation import what_poses_cannot_show
+from winchkit.diagnosis.robot.errors import Errors, FittedModel, errors_of, output_fits_of, rms
+from winchkit.diagnosis.robot.excitation import missing_pose_excitation
 from winchkit.diagnosis.robot.pose_design import next_pose_runs
 from winchkit.diagnosis.robot.preparation import Preparation, calibrated_on, prepare_selection
 from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.verdict.decision import Judgement, judge
-from winchkit.diagnosis.verdict.equivalence import Confusion, confusion_of, pairs_of
+from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
@@ -50,8 +50,8 @@ __all__ = [
     "diagnose_robot",
 ]
 
-_WHERE = 6
-_FAR_OFF, _NO_WORSE = 0.7, 1.1
+_MOST_PLACES = 6
+_LEAST_FALL, _LARGEST_RATIO = 0.7, 1.1
 """Residuals beside a free geometry are shown where some error falls below the first ratio and none
 rises above the second one."""
 
@@ -72,9 +72,9 @@ class RobotAnswer(Answer):
     engine: PoseSelection
 
     def __init__(
-        self, selection: RobotSelection, sets: Sequence[Confusion], diagnosis: RobotDiagnosis
+        self, selection: RobotSelection, sets: Sequence[EquivalenceSet], diagnosis: RobotDiagnosis
     ) -> None:
-        super().__init__(selection.engine, selection.judgement.shown, diagnosis, sets)
+        super().__init__(selection.engine, selection.judgement.reported, diagnosis, sets)
         self.selection = selection
 
     @property
@@ -123,8 +123,10 @@ class RobotSelection:
     @cached_property
     def final(self) -> FittedModel:
         """The model with all named effects."""
-        shown, engine = self.judgement.shown, self.engine
-        return FittedModel(engine.regression, shown.final, shown.noise, engine.regression.groups)
+        reported, engine = self.judgement.reported, self.engine
+        return FittedModel(
+            engine.regression, reported.final, reported.noise, engine.regression.groups
+        )
 
     @cached_property
     def errors(self) -> tuple[Errors, Errors]:
@@ -143,8 +145,8 @@ class RobotSelection:
         has been fitted to the missing effect.
         """
         before, after = self.errors
-        falls = [rms(name, after[name]) / rms(name, before[name]) for name in after]
-        if self.geometry_is_free and (min(falls) > _FAR_OFF or max(falls) > _NO_WORSE):
+        ratios = [rms(name, after[name]) / rms(name, before[name]) for name in after]
+        if self.geometry_is_free and (min(ratios) > _LEAST_FALL or max(ratios) > _LARGEST_RATIO):
             return self.initial_model.regression, before
         return self.final.regression, after
 
@@ -160,26 +162,27 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
         How the geometry was taken: ``file`` or ``refitted``.
     """
     engine, judgement, preparation = selection.engine, selection.judgement, selection.preparation
-    shown, verdict = judgement.shown, judgement.verdict
-    added = range(engine.n_initial_terms, len(shown.final.hypothesis.terms))
-    sets = [confusion_of(engine, shown.final, shown.noise, index) for index in added]
-    steps = tuple(map(plain_step, steps_of(engine, shown, sets))) if sets else ()
-    outputs = figures(selection.initial_model, selection.final, preparation.noise)
+    reported, verdict = judgement.reported, judgement.verdict
+    added = range(engine.n_initial_terms, len(reported.final.hypothesis.terms))
+    sets = [equivalence_set(engine, reported.final, reported.noise, index) for index in added]
+    steps = tuple(map(plain_step, steps_of(engine, reported, sets))) if sets else ()
+    outputs = output_fits_of(selection.initial_model, selection.final, preparation.noise)
     if selection.geometry_is_free and verdict in ("adequate", "explained"):
         verdict = "explained"
-        steps = (_geometry_step(engine, shown, outputs["cable_length"]), *steps)
+        steps = (_geometry_step(engine, reported, outputs["cable_length"]), *steps)
     diagnosis = RobotDiagnosis(
         verdict=verdict,
         outputs=outputs,
         steps=steps,
         candidates=candidates_of(engine, selection.result),
         detectable=detectable(
-            selection.result.scores, Bar(engine.penalty_per_parameter, selection.result.threshold)
+            selection.result.scores,
+            DetectionThreshold(engine.penalty_per_parameter, selection.result.threshold),
         ),
         unexplained_share=judgement.share,
         where=_places(selection) if selection.result.lack_of_fit else (),
-        next_runs=next_pose_runs(engine.regression, shown.final.hypothesis, pairs_of(sets)),
-        notes=(*preparation.dataset.notes, *what_poses_cannot_show(preparation), *judgement.notes),
+        next_runs=next_pose_runs(engine.regression, reported.final.hypothesis, pairs_of(sets)),
+        notes=(*preparation.dataset.notes, *missing_pose_excitation(preparation), *judgement.notes),
         geometry=geometry,
     )
     return RobotAnswer(selection, sets, diagnosis)
@@ -187,20 +190,20 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
 
 def _places(selection: RobotSelection) -> tuple[Where, ...]:
     """Variables that explain the unexplained residual, the largest share first."""
-    result = follows_of(*selection.rest)
+    result = pose_attributions(*selection.rest)
     places = [Where(f.output, f.variable, f.share, line=f.line) for f in result]
-    return tuple(sorted(places, key=lambda w: -w.share)[:_WHERE])
+    return tuple(sorted(places, key=lambda w: -w.share)[:_MOST_PLACES])
 
 
-def _geometry_step(engine: PoseSelection, shown: SelectionResult, output: OutputFit) -> Step:
+def _geometry_step(engine: PoseSelection, reported: SelectionResult, output: OutputFit) -> Step:
     """The whole geometry as one addition."""
     regression = engine.regression
     geometry = regression.point.geometry
-    std = spread_of(regression, shown.final, shown.noise, engine.regression.blocks).std
+    std = spread_of(regression, reported.final, reported.noise, engine.regression.blocks).std
     first = regression.nuisance_columns.shape[1] - len(geometry)
     values: dict[str, dict[str, Estimate]] = {}
     for index, item in enumerate(geometry):
-        by = shown.final.vector[first + index]
+        by = reported.final.vector[first + index]
         unit = item.term.effect.parameter(item.parameter).unit
         values.setdefault(item.term.effect.id, {})[item.parameter] = Estimate(
             item.value + float(by) * item.std, float(std[first + index]) * item.std, unit
@@ -212,7 +215,7 @@ def _geometry_step(engine: PoseSelection, shown: SelectionResult, output: Output
 
 
 _GEOMETRY_LEVEL = 1e-3
-_ONE_OF_FEW = 0.4
+_SINGLE_EFFECT_SHARE = 0.4
 
 
 def diagnose_robot(
@@ -248,7 +251,7 @@ def diagnose_robot(
         engine = preparation.free_geometry()
         return _concluded(preparation, engine, engine)
     file_engine = preparation.file_geometry()
-    if _beyond_few(preparation, file_engine):
+    if _geometry_explains_far_more(preparation, file_engine):
         return _concluded(preparation, preparation.free_geometry(), file_engine)
     result = stepwise_selection(file_engine)
     if added := result.final.hypothesis.terms[file_engine.n_initial_terms :]:
@@ -265,14 +268,14 @@ def diagnose_robot(
     return _concluded(preparation, preparation.free_geometry(), file_engine)
 
 
-def _beyond_few(preparation: Preparation, file_engine: PoseSelection) -> bool:
+def _geometry_explains_far_more(preparation: Preparation, file_engine: PoseSelection) -> bool:
     """Whether the whole geometry explains far more χ² than any single effect."""
     gain = _gain_of_geometry(preparation, file_engine, file_engine.initial_model)
-    if not _is_real(preparation, gain):
+    if not _is_significant(preparation, gain):
         return False
     present, noise = file_engine.fit_with_noise(file_engine.initial_model)
     best = max((s.explained_ss for s in file_engine.scores(present, noise)), default=0.0)
-    return best < _ONE_OF_FEW * gain
+    return best < _SINGLE_EFFECT_SHARE * gain
 
 
 def _gain_of_geometry(
@@ -280,11 +283,13 @@ def _gain_of_geometry(
 ) -> float:
     """Decrease of χ² by a free geometry, beyond its calibration's uncertainty."""
     point = file_engine.regression.point
-    wide = PoseRegression(replace(point, geometry=_from(preparation.prior, point.geometry)))
+    free_regression = PoseRegression(
+        replace(point, geometry=_from(preparation.prior, point.geometry))
+    )
     hypothesis = replace(model, nuisances=())
     before = file_engine.regression
     chi_square = fit(before, hypothesis, np.ones(before.n_rows)).chi_square
-    return chi_square - fit(wide, hypothesis, np.ones(wide.n_rows)).chi_square
+    return chi_square - fit(free_regression, hypothesis, np.ones(free_regression.n_rows)).chi_square
 
 
 def _concluded(
@@ -301,12 +306,12 @@ def _geometry_is_off(
     preparation: Preparation, file_engine: PoseSelection, result: SelectionResult
 ) -> bool:
     """Whether the whole geometry explains a significant part of the remaining residual."""
-    return _is_real(
+    return _is_significant(
         preparation, _gain_of_geometry(preparation, file_engine, result.final.hypothesis)
     )
 
 
-def _is_real(preparation: Preparation, gain: float) -> bool:
+def _is_significant(preparation: Preparation, gain: float) -> bool:
     """F test of the decrease of χ² by the geometry.
 
     F = (Δχ²/k)/1 with k numbers of the geometry and the degrees of freedom of the noise; level 0.1

@@ -10,21 +10,22 @@ residuals are model less measurement by kind, in SI. Here
   effects they are those of :class:`winchkit.model.robot.constraints.Winding` up to rounding;
 * ``gauge`` are the rows ``cable_length`` and ``tension`` the rows ``balance`` of that module;
 * ``tension`` rows are whitened at the pose and geometry of one robot (``basis``), so that they
-  stay comparable between hypotheses, and forces are what stands behind the cells' readings;
+  stay comparable between hypotheses, and cable forces are computed from the cells' readings;
 * zeros of swivel angles and offsets of length instruments are no part of the residuals; the
   regression has them as nuisance parameters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.model.line import Line
 from winchkit.model.robot import (
     Pose,
@@ -37,29 +38,27 @@ from winchkit.model.robot import (
     swivel_sensitivities,
 )
 from winchkit.model.robot.constraints import (
+    by_geometry,
     by_pose,
+    closure_by_geometry,
     closure_residual,
     force_basis,
     position,
     rotation_by_pose,
     rotation_residual,
     swivel_residual,
+    winding_of,
     wrench_residual,
 )
-from winchkit.model.robot.pose_estimation import Iteration, estimated_pose
 from winchkit.model.robot.pose_estimation import start_pose as completed
 from winchkit.model.robot.robot import standing
 from winchkit.model.stages import At, Stage
 
-__all__ = ["POSED", "Equations", "placed_by", "start_pose"]
+__all__ = ["POSED", "Equations", "start_pose"]
 
-Sigma = Mapping[str, float]
 POSED = ("rope", "position", "rotation", "swivel", "gauge")
 """Kinds that depend on the pose, in their order."""
-_PLACING = Iteration(damping=0.0, relative_damping=1e-9, tolerance=1e-9, steps=25)
-_PLACED_BY = ("rope", "position", "rotation")
-"""Kinds by which poses are estimated: the zeros of the other instruments are unknown."""
-_INVERTING, _SMALL_FORCE, _FLATTEST, _INVERTED = 8, 1e-4, 0.05, 1e-9
+_NEWTON_STEPS, _FORCE_STEP, _LEAST_SLOPE, _FORCE_TOLERANCE = 8, 1e-4, 0.05, 1e-9
 
 
 @dataclass(frozen=True)
@@ -154,6 +153,33 @@ class Equations:
             "gauge": length,
         }
 
+    def by_geometry(self, robot: Robot, geometry: Sequence[GeometryPrior]) -> dict[str, Array]:
+        """Derivatives of the residuals by numbers of the geometry, (p, k, g), by kind.
+
+        They are those of the robot without effects in the length by the drum, and cable forces are
+        constant: relative errors of the order of the cables' strain.
+        """
+        pose, home, angle = self.pose, robot.home, self.dataset.measured.motor_angle
+        length = sensitivities(robot.geometry, pose.position, pose.rotation)
+        at_home = sensitivities(robot.geometry, home.position, home.rotation)
+        winding = winding_of(robot.winches, angle)
+        radius = np.array([winch.drum.winding_radius for winch in robot.winches])
+        of_line, of_all = closure_by_geometry(length, at_home, winding, radius, np.ones_like(angle))
+        swivel = swivel_sensitivities(robot.geometry, pose.position, pose.rotation)
+        by_kind = {
+            "rope": {**of_line, "layer_growth": of_all["layer_growth"][..., 0]},
+            "swivel": by_geometry(swivel),
+            "gauge": by_geometry(length),
+        }
+        out = {kind: np.zeros((*angle.shape, len(geometry))) for kind in by_kind}
+        for index, item in enumerate(geometry):
+            lines = [robot.names.index(item.line)] if item.line else slice(None)
+            for kind, fields in by_kind.items():
+                if (part := fields.get(item.field)) is not None:
+                    own = part[..., "xyz".index(item.parameter)] if part.ndim == 3 else part
+                    out[kind][:, lines, index] = own[:, lines]
+        return out
+
     @cached_property
     def _rotation(self) -> Array:
         return rotation_residual(self.pose.rotation, self.dataset.measured.angles)
@@ -189,37 +215,6 @@ def start_pose(dataset: RobotDataset) -> Pose:
     return completed(measured.position, measured.angles, home_of(dataset.robot))
 
 
-def placed_by(equations: Equations, robot: Robot, sigma: Sigma) -> Pose:
-    """Least-squares estimate of the poses with the robot given.
-
-    Parameters
-    ----------
-    equations : Equations
-        At the poses where the iteration starts.
-    robot : Robot
-        With its effects.
-    sigma : mapping
-        Standard deviation by kind, SI.
-
-    Returns
-    -------
-    Pose
-        The p estimated poses.
-    """
-
-    def whitened(pose: Pose) -> tuple[Array, Array]:
-        here = replace(equations, pose=pose)
-        values, by = here.residuals(robot), here.by_pose(robot)
-        rows, slope = [], []
-        for kind in _PLACED_BY:
-            known = np.isfinite(values[kind])
-            rows.append(np.where(known, values[kind], 0.0) / sigma[kind])
-            slope.append(np.where(known[..., None], by[kind], 0.0) / sigma[kind])
-        return np.concatenate(rows, axis=1), np.concatenate(slope, axis=1)
-
-    return estimated_pose(whitened, equations.pose, _PLACING)
-
-
 def _force_behind(line: Line, at: At, shown: Array) -> Array:
     """Cable force at which a cell shows ``shown``, N, by Newton's method; exact for a gain.
 
@@ -227,12 +222,12 @@ def _force_behind(line: Line, at: At, shown: Array) -> Array:
     derivatives.
     """
     force, size = shown.copy(), max(float(np.nanmax(np.abs(shown), initial=0.0)), 1.0)
-    step = _SMALL_FORCE * size
-    for _ in range(_INVERTING):
+    step = _FORCE_STEP * size
+    for _ in range(_NEWTON_STEPS):
         here = line.shown_tension(at, force)
         missing = shown - here
-        if np.nanmax(np.abs(missing), initial=0.0) < _INVERTED * size:
+        if np.nanmax(np.abs(missing), initial=0.0) < _FORCE_TOLERANCE * size:
             break
         slope = (line.shown_tension(at, force + step) - here) / step
-        force = force + missing / np.maximum(slope, _FLATTEST)
+        force = force + missing / np.maximum(slope, _LEAST_SLOPE)
     return force

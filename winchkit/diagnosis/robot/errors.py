@@ -28,15 +28,15 @@ __all__ = [
     "Errors",
     "FittedModel",
     "errors_of",
-    "figures",
     "held_out_rms",
     "noise_rms",
+    "output_fits_of",
     "rms",
 ]
 
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
-_HELD = 6
+_DEGREES_OF_FREEDOM = 6
 
 
 @dataclass(frozen=True)
@@ -65,17 +65,17 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
         By output (p, n), (p, 3) or (p, k), SI; NaN where something was not measured.
     """
     at_pose, to_place = _maps(regression)
-    known = _seen(residuals)
+    known = _measured_coordinates(residuals)
     moved = np.where(known, np.concatenate([residuals["position"], residuals["rotation"]], 1), 0.0)
     by = regression.slope()["rope"]
     closure = residuals["rope"] - (by @ moved[..., None])[..., 0]
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
     out = {"cable_length": np.where(np.isfinite(closure), -length, np.nan)}
-    if regression.dataset.measured.motor_angle.shape[1] >= _HELD:
+    if regression.dataset.measured.motor_angle.shape[1] >= _DEGREES_OF_FREEDOM:
         whole = np.isfinite(residuals["rope"]).all(axis=1, keepdims=True)
-        stray = np.where(whole, np.nan_to_num(residuals["rope"]), np.nan)
-        found = residuals["position"] - (to_place @ stray[..., None])[..., 0]
+        known_closure = np.where(whole, np.nan_to_num(residuals["rope"]), np.nan)
+        found = residuals["position"] - (to_place @ known_closure[..., None])[..., 0]
         if np.isfinite(found).any():
             out["platform_position"] = found
     if "tension" in residuals:
@@ -88,7 +88,9 @@ def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     at_pose, to_place = _maps(regression)
     sigma, by = noise.sigma, regression.slope()["rope"]
     here = regression.residuals(())
-    pose = np.repeat([sigma["position"] ** 2, sigma["rotation"] ** 2], 3) * _seen(here)
+    pose = np.repeat([sigma["position"] ** 2, sigma["rotation"] ** 2], 3) * _measured_coordinates(
+        here
+    )
     spread = by * np.sqrt(pose)[:, None, :]
     whole = spread @ np.swapaxes(spread, 1, 2) + sigma["rope"] ** 2 * np.eye(by.shape[1])
     length = np.trace(at_pose @ whole @ np.swapaxes(at_pose, 1, 2), axis1=1, axis2=2)
@@ -99,7 +101,9 @@ def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     return out
 
 
-def figures(begin: FittedModel, final: FittedModel, noise: PoseNoise) -> dict[str, OutputFit]:
+def output_fits_of(
+    begin: FittedModel, final: FittedModel, noise: PoseNoise
+) -> dict[str, OutputFit]:
     """Error statistics of every output before and after; of positions those of the distance."""
     before, after = (
         errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (begin, final)
@@ -149,8 +153,8 @@ def signals(regression: PoseRegression) -> dict[str, float]:
     out = {}
     for name, array in values.items():
         known = np.isfinite(array).all(axis=1)
-        apart = array[known] - array[known].mean(axis=0) if known.any() else array[known]
-        out[name] = rms(name, apart) if known.any() else float("nan")
+        centred = array[known] - array[known].mean(axis=0) if known.any() else array[known]
+        out[name] = rms(name, centred) if known.any() else float("nan")
     return out
 
 
@@ -179,7 +183,7 @@ def _held_out(model: FittedModel) -> Errors:
     return errors_of(regression, out)
 
 
-def _seen(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
+def _measured_coordinates(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
     """Which of the six coordinates of each pose were measured, (p, 6)."""
     both = np.concatenate([residuals["position"], residuals["rotation"]], axis=1)
     return np.asarray(np.isfinite(both))
@@ -190,7 +194,7 @@ def _maps(regression: PoseRegression) -> tuple[Array, Array]:
     from closures to positions (p, 3, n)."""
     by = regression.slope()["rope"]
     by = np.where(np.isfinite(by), by, 0.0)
-    free = by * ~_seen(regression.residuals(()))[:, None, :]
+    free = by * ~_measured_coordinates(regression.residuals(()))[:, None, :]
     undone = free @ np.linalg.pinv(free, rcond=1e-9)
     back = np.asarray(np.linalg.pinv(by, rcond=1e-9), dtype=float)
     return np.eye(by.shape[1]) - undone, back[:, :3]

@@ -11,13 +11,13 @@ from winchkit.model.robot.rotation import rotation_of, rotation_vector
 if TYPE_CHECKING:
     from winchkit.diagnosis.robot.preparation import Preparation
 
-__all__ = ["what_poses_cannot_show"]
+__all__ = ["missing_pose_excitation"]
 
-_TURNED = np.radians(1.0)
-_FEW = 40
+_LEAST_ROTATION = np.radians(1.0)
+_LEAST_POSES = 40
 
 
-def what_poses_cannot_show(preparation: Preparation) -> list[str]:
+def missing_pose_excitation(preparation: Preparation) -> list[str]:
     """Sentences on missing repeats, tensions, temperatures, rotations, and on few poses."""
     dataset, measured = preparation.dataset, preparation.dataset.measured
     notes = []
@@ -44,13 +44,13 @@ def what_poses_cannot_show(preparation: Preparation) -> list[str]:
     whole = measured.angles[np.isfinite(measured.angles).all(axis=1)]
     if len(whole):
         turned = rotation_vector(rotation_of(*whole.T) @ rotation_of(*whole[0]).T)
-        if float(np.max(np.linalg.norm(turned, axis=1))) < _TURNED:
+        if float(np.max(np.linalg.norm(turned, axis=1))) < _LEAST_ROTATION:
             notes.append(
                 "the platform never turned: exit and anchor points cannot be distinguished; "
                 "turn it between poses"
             )
     distinct = int(dataset.pose.max()) + 1
-    if distinct < _FEW:
+    if distinct < _LEAST_POSES:
         notes.append(
             f"{distinct} distinct poses only; ninety, widely spread, are much more informative"
         )

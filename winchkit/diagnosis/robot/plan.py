@@ -8,9 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.diagnosis.design.discrimination import APART
+from winchkit.diagnosis.design.discrimination import SEPARATED_AT
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
-from winchkit.diagnosis.robot.pose_design import POSES, WORTHWHILE, PoseOffer, Question, pose_offers
+from winchkit.diagnosis.robot.pose_design import (
+    LEAST_POWER,
+    POSES,
+    PoseOffer,
+    Question,
+    pose_offers,
+)
 from winchkit.diagnosis.verdict.equivalence import pairs_of
 from winchkit.effects.card import usual_values
 from winchkit.effects.parametrization import Coordinates
@@ -21,7 +27,7 @@ from winchkit.runs.run import Channel, Run
 
 __all__ = ["PosePlan", "plan_poses"]
 
-_SURE = 0.9
+_HIGH_POWER = 0.9
 """Power from which on a question counts as answered."""
 _MOST = 6
 """Most effects whose detectability is asked for."""
@@ -41,14 +47,14 @@ class PosePlan:
     def shows(self, offer: PoseOffer) -> list[str]:
         """Effects that become detectable with an offer."""
         powers = offer.powers[len(self.pairs) :]
-        shown = zip(self.hidden, powers, strict=True)
-        return [term.effect.id for term, power in shown if power >= _SURE]
+        detectable = zip(self.hidden, powers, strict=True)
+        return [term.effect.id for term, power in detectable if power >= _HIGH_POWER]
 
     @property
     def best(self) -> PoseOffer | None:
         """First offer; None where it separates no pair and makes no effect detectable."""
         for offer in self.offers[:1]:
-            if self.shows(offer) or max(self.of_pairs(offer), default=0.0) >= WORTHWHILE:
+            if self.shows(offer) or max(self.of_pairs(offer), default=0.0) >= LEAST_POWER:
                 return offer
         return None
 
@@ -61,13 +67,13 @@ class PosePlan:
         return {"schema": 1, "offers": [self._offer(offer) for offer in self.offers]}
 
     def _offer(self, offer: PoseOffer) -> Mapping[str, Any]:
-        asked = zip(self.pairs, offer.powers, offer.so_far, strict=False)
+        separated = zip(self.pairs, offer.powers, offer.powers_so_far, strict=False)
         angles = angles_of(offer.pose.rotation)
         return {
             "kind": offer.kind.name,
             "separates": [
                 {"effects": [a.effect.id, b.effect.id], "power": power, "power_so_far": before}
-                for (a, b), power, before in asked
+                for (a, b), power, before in separated
             ],
             "shows": self.shows(offer),
             "poses": [
@@ -98,8 +104,8 @@ class PosePlan:
             if np.isfinite(offer.tension[:, k]).all():
                 channels[f"{line}.tension"] = Channel(offer.tension[:, k], "N")
         time = np.arange(len(angles), dtype=float)
-        told = {"programme": f"proposed: {offer.kind.words}"}
-        return Run("proposed", time, channels, told)
+        metadata = {"programme": f"proposed: {offer.kind.words}"}
+        return Run("proposed", time, channels, metadata)
 
 
 def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
@@ -122,15 +128,17 @@ def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
     pairs = tuple(pairs_of(answer.sets))
     hidden = _hidden(answer)
     questions: list[Question] = [*pairs, *((term, None) for term in hidden)]
-    many, bar = len(pairs), answer.bar
-    needed = [APART] * many + [bar.squares(Coordinates(t.effect).n_parameters) for t in hidden]
-    offers = pose_offers(regression, final, questions, needed, count) if questions else []
+    n_pairs, threshold = len(pairs), answer.threshold
+    required = [SEPARATED_AT] * n_pairs + [
+        threshold.required_ss(Coordinates(t.effect).n_parameters) for t in hidden
+    ]
+    offers = pose_offers(regression, final, questions, required, count) if questions else []
 
     def worth(offer: PoseOffer) -> tuple[float, ...]:
-        sure = sum(power >= _SURE for power in offer.powers[:many])
-        told = round(sum(offer.powers[:many]), 1)
-        shown = sum(power >= _SURE for power in offer.powers[many:])
-        return sure, told, shown, round(sum(offer.powers[many:]), 1)
+        separated = sum(power >= _HIGH_POWER for power in offer.powers[:n_pairs])
+        summed = round(sum(offer.powers[:n_pairs]), 1)
+        detectable = sum(power >= _HIGH_POWER for power in offer.powers[n_pairs:])
+        return separated, summed, detectable, round(sum(offer.powers[n_pairs:]), 1)
 
     return PosePlan(
         pairs, hidden, tuple(sorted(offers, key=worth, reverse=True)), regression.dataset.names
@@ -142,16 +150,18 @@ def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
 
     Of effects on one line each, the line with the least power.
     """
-    faint: dict[str, tuple[float, Term]] = {}
+    undetectable: dict[str, tuple[float, Term]] = {}
     there = {term.effect.id for term in answer.result.final.hypothesis.terms}
     for score in answer.result.scores:
         effect = score.candidate.effect
-        seen = answer.bar.power(score.noncentrality, score.candidate.n_parameters) >= _SURE
-        if not score.noncentrality > 0 or seen or effect.id in there:
+        detected = (
+            answer.threshold.power(score.noncentrality, score.candidate.n_parameters) >= _HIGH_POWER
+        )
+        if not score.noncentrality > 0 or detected or effect.id in there:
             continue
-        known = faint.get(base_of(effect))
+        known = undetectable.get(base_of(effect))
         if known is None or score.noncentrality < known[0]:
             values = {**usual_values(effect), **score.candidate.shape}
-            faint[base_of(effect)] = score.noncentrality, Term(effect, values)
-    ranked = sorted(faint.values(), key=lambda item: -item[0])[:_MOST]
+            undetectable[base_of(effect)] = score.noncentrality, Term(effect, values)
+    ranked = sorted(undetectable.values(), key=lambda item: -item[0])[:_MOST]
     return tuple(term for _, term in ranked)

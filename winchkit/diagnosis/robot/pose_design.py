@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.design.discrimination import APART, power_of
+from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.results import NextRun
 from winchkit.diagnosis.robot.dataset import RobotDataset
@@ -40,29 +40,29 @@ from winchkit.model.robot.pose_design import (
 from winchkit.runs.poses import Measured, joined
 
 __all__ = [
-    "KINDS",
+    "LEAST_POWER",
     "POSES",
-    "WORTHWHILE",
-    "PoseKind",
+    "POSE_CANDIDATES",
+    "PoseCandidates",
     "PoseOffer",
     "Question",
-    "imagined",
     "next_pose_runs",
     "pose_offers",
     "reach",
+    "simulated_poses",
     "usable",
 ]
 
 _CANDIDATES = 60
 _SEED = 20
-_WIDER, _INSIDE = 2.0, 0.85
-_TURNED, _MORE = np.radians(12.0), 2.0
-_LEAST_BOX = 0.02
-_STRONGER, _WARMER = 2.0, 15.0
+_WIDTH_RATIO, _SHARE_OF_FRAME = 2.0, 0.85
+_LEAST_ROTATION, _ROTATION_RATIO = np.radians(12.0), 2.0
+_LEAST_HALF_WIDTH = 0.02
+_FORCE_RATIO, _TEMPERATURE_STEP = 2.0, 15.0
 
 
 @dataclass(frozen=True)
-class PoseKind:
+class PoseCandidates:
     """Kind of poses: its difference from the poses so far."""
 
     name: str
@@ -75,25 +75,27 @@ class PoseKind:
     warmer: bool = False
 
 
-KINDS = (
-    PoseKind("more", "as widely as so far"),
-    PoseKind("turned", "turned more", turned=True),
-    PoseKind("farther", "farther out", out=True),
-    PoseKind("farther-turned", "farther out and turned more", out=True, turned=True),
-    PoseKind("tensions", "under cable forces from half to twice those so far", stronger=True),
-    PoseKind("warmth", "with the cables 15 K colder and warmer", warmer=True),
+POSE_CANDIDATES = (
+    PoseCandidates("more", "as widely as so far"),
+    PoseCandidates("turned", "turned more", turned=True),
+    PoseCandidates("farther", "farther out", out=True),
+    PoseCandidates("farther-turned", "farther out and turned more", out=True, turned=True),
+    PoseCandidates("tensions", "under cable forces from half to twice those so far", stronger=True),
+    PoseCandidates("warmth", "with the cables 15 K colder and warmer", warmer=True),
 )
 """In ascending order of effort for the user."""
 
 
-def usable(kind: PoseKind, dataset: RobotDataset) -> bool:
+def usable(kind: PoseCandidates, dataset: RobotDataset) -> bool:
     """Whether the difference of a kind is measured on this robot."""
     if kind.stronger and not dataset.has_tension:
         return False
     return bool(np.isfinite(dataset.measured.temperature).all()) or not kind.warmer
 
 
-def imagined(regression: PoseRegression, robot: Robot, kind: PoseKind) -> tuple[Measured, Pose]:
+def simulated_poses(
+    regression: PoseRegression, robot: Robot, kind: PoseCandidates
+) -> tuple[Measured, Pose]:
     """Simulate measurements at random poses of a kind, without noise.
 
     Parameters
@@ -102,7 +104,7 @@ def imagined(regression: PoseRegression, robot: Robot, kind: PoseKind) -> tuple[
         With the poses so far.
     robot : Robot
         With the effects of the final model.
-    kind : PoseKind
+    kind : PoseCandidates
         Of the poses.
 
     Returns
@@ -123,25 +125,29 @@ def imagined(regression: PoseRegression, robot: Robot, kind: PoseKind) -> tuple[
 
 
 def _placed(
-    regression: PoseRegression, robot: Robot, kind: PoseKind, rng: np.random.Generator
+    regression: PoseRegression, robot: Robot, kind: PoseCandidates, rng: np.random.Generator
 ) -> Pose:
     """Random poses of a kind."""
-    seen = regression.point.pose
+    so_far = regression.point.pose
     corners = robot.geometry.exit_point
-    middle, half = middle_and_half(seen.position)
+    middle, half = middle_and_half(so_far.position)
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    room = _INSIDE * np.ptp(corners, axis=0) / 2
-    wide = np.maximum(_WIDER * half, _LEAST_BOX) if kind.out else half
-    place = in_box((middle, wide), _CANDIDATES, rng)
-    if np.all(room > 0):
-        place = centre + np.clip(place - centre, -room, room)
-    level, tilt = middle_and_half(angles_of(seen.rotation))
-    more = np.maximum(_MORE * tilt, _TURNED) if kind.turned else tilt
+    allowed = _SHARE_OF_FRAME * np.ptp(corners, axis=0) / 2
+    half_width = np.maximum(_WIDTH_RATIO * half, _LEAST_HALF_WIDTH) if kind.out else half
+    place = in_box((middle, half_width), _CANDIDATES, rng)
+    if np.all(allowed > 0):
+        place = centre + np.clip(place - centre, -allowed, allowed)
+    level, tilt = middle_and_half(angles_of(so_far.rotation))
+    more = np.maximum(_ROTATION_RATIO * tilt, _LEAST_ROTATION) if kind.turned else tilt
     return random_poses(robot.geometry, place, in_box((level, more), _CANDIDATES, rng))
 
 
 def _forces(
-    regression: PoseRegression, robot: Robot, kind: PoseKind, pose: Pose, rng: np.random.Generator
+    regression: PoseRegression,
+    robot: Robot,
+    kind: PoseCandidates,
+    pose: Pose,
+    rng: np.random.Generator,
 ) -> Array:
     """Cable forces that balance the weight, spread as those measured so far; zero without cells."""
     measured, many = regression.dataset.measured.tension, len(pose.position)
@@ -150,34 +156,34 @@ def _forces(
     known = measured[np.isfinite(measured).all(axis=1)]
     start = known[rng.integers(len(known), size=many)]
     if kind.stronger:
-        start = start * np.exp(rng.uniform(-1, 1, (many, 1)) * np.log(_STRONGER))
+        start = start * np.exp(rng.uniform(-1, 1, (many, 1)) * np.log(_FORCE_RATIO))
     return approximate_forces(robot.structure(pose), robot.weight(pose), start)
 
 
 def _measured(
-    dataset: RobotDataset, robot: Robot, kind: PoseKind, pose: Pose, force: Array
+    dataset: RobotDataset, robot: Robot, kind: PoseCandidates, pose: Pose, force: Array
 ) -> Measured:
-    so_far, many = dataset.measured, len(pose.position)
+    measured, many = dataset.measured, len(pose.position)
 
     def where_known(values: Array, there: Array) -> Array:
         return np.where(np.isfinite(values).any(axis=0), there, np.nan)
 
-    warm = np.nanmean(np.where(np.isfinite(so_far.temperature), so_far.temperature, 20.0))
+    warm = np.nanmean(np.where(np.isfinite(measured.temperature), measured.temperature, 20.0))
     warmth = np.full((many, len(dataset.names)), warm)
     if kind.warmer:
-        warmth += np.where(np.arange(many) % 2, _WARMER, -_WARMER)[:, None]
+        warmth += np.where(np.arange(many) % 2, _TEMPERATURE_STEP, -_TEMPERATURE_STEP)[:, None]
     length = lengths(robot.geometry, pose.position, pose.rotation)
     return replace(
-        so_far,
+        measured,
         motor_angle=robot.motor_angles(pose, tension=force),
-        position=where_known(so_far.position, pose.position),
-        angles=where_known(so_far.angles, angles_of(pose.rotation)),
+        position=where_known(measured.position, pose.position),
+        angles=where_known(measured.angles, angles_of(pose.rotation)),
         swivel=where_known(
-            so_far.swivel, swivel_angle(robot.geometry, pose.position, pose.rotation)
+            measured.swivel, swivel_angle(robot.geometry, pose.position, pose.rotation)
         ),
-        cable_length=where_known(so_far.cable_length, length),
-        tension=where_known(so_far.tension, force),
-        temperature=where_known(so_far.temperature, warmth),
+        cable_length=where_known(measured.cable_length, length),
+        tension=where_known(measured.tension, force),
+        temperature=where_known(measured.temperature, warmth),
         run=np.zeros(many, dtype=np.intp),
         place=np.full(many, "proposed"),
     )
@@ -187,9 +193,9 @@ Question = tuple[Term, Term | None]
 """An effect and the rival from which it is to be separated; None asks for its detection."""
 POSES = 12
 """Poses per offer."""
-_SURE, WORTHWHILE = 0.9, 0.2
+_HIGH_POWER, LEAST_POWER = 0.9, 0.2
 _OFFERED = 2
-_ENOUGH = 3.04
+_SUFFICIENT_MARGIN = 3.04
 """Standard deviations above the threshold beyond which more information is not counted: a power of
 99.9 %."""
 
@@ -198,7 +204,7 @@ _ENOUGH = 3.04
 class PoseOffer:
     """Poses of one kind, the most informative first."""
 
-    kind: PoseKind
+    kind: PoseCandidates
     pose: Pose
     motor_angle: Array
     """At these poses, (k, n), rad."""
@@ -206,7 +212,7 @@ class PoseOffer:
     """Cable forces at these poses, (k, n), N; NaN where none is measured."""
     powers: tuple[float, ...]
     """Power of these poses and all so far, by question."""
-    so_far: tuple[float, ...]
+    powers_so_far: tuple[float, ...]
     """Power of the poses so far, by question."""
 
 
@@ -232,15 +238,15 @@ def next_pose_runs(
     """
     out: list[NextRun] = []
     for first, second in pairs:
-        offers = pose_offers(regression, final, [(first, second)], [APART])
+        offers = pose_offers(regression, final, [(first, second)], [SEPARATED_AT])
         names = (first.effect.id, second.effect.id)
-        sure = [o for o in offers if o.powers[0] >= _SURE][:1]
+        sure = [o for o in offers if o.powers[0] >= _HIGH_POWER][:1]
         fair = sorted(offers, key=lambda o: -o.powers[0])
-        useful = sure or [o for o in fair if o.powers[0] >= WORTHWHILE][:_OFFERED]
+        useful = sure or [o for o in fair if o.powers[0] >= LEAST_POWER][:_OFFERED]
         out += [NextRun(names, _words(o), o.powers[0]) for o in useful]
         if not useful:
-            apart = told_apart(first.effect, second.effect)
-            out.append(NextRun(names, apart, float("nan")))
+            advice = told_apart(first.effect, second.effect)
+            out.append(NextRun(names, advice, float("nan")))
     return tuple(out)
 
 
@@ -248,7 +254,7 @@ def pose_offers(
     regression: PoseRegression,
     final: Hypothesis,
     questions: Sequence[Question],
-    needed: Sequence[float],
+    required: Sequence[float],
     count: int = POSES,
 ) -> list[PoseOffer]:
     """Choose poses of every kind for a set of questions.
@@ -261,8 +267,8 @@ def pose_offers(
         The final model of the diagnosis.
     questions : sequence of Question
         To be answered.
-    needed : sequence of float
-        Whitened squares (χ²) at which each question counts as answered.
+    required : sequence of float
+        χ² at which each question counts as answered.
     count : int
         Poses per offer.
 
@@ -272,61 +278,68 @@ def pose_offers(
         In ascending order of effort.
     """
     robot = regression.point.robot(final.terms)
-    kinds = [kind for kind in KINDS if usable(kind, regression.dataset)]
-    tried = [(kind, *imagined(regression, robot, kind)) for kind in kinds]
-    tried = [(kind, seen, pose) for kind, seen, pose in tried if len(seen)]
-    wide = _with_all(regression, tried)
-    parts = [_information(wide, final, question) for question in questions]
+    kinds = [kind for kind in POSE_CANDIDATES if usable(kind, regression.dataset)]
+    simulated = [(kind, *simulated_poses(regression, robot, kind)) for kind in kinds]
+    simulated = [(kind, measured, pose) for kind, measured, pose in simulated if len(measured)]
+    extended = _with_all(regression, simulated)
+    parts = [_information(extended, final, question) for question in questions]
     begin = len(regression.dataset.measured)
     base = [part[-1] + part[:begin].sum(axis=0) for part in parts]
-    so_far = _powers([float(noncentrality(own)) for own in base], needed)
+    powers_so_far = _powers([float(noncentrality(own)) for own in base], required)
     out = []
-    for kind, seen, pose in tried:
-        own = slice(begin, begin + len(seen))
+    for kind, measured, pose in simulated:
+        own = slice(begin, begin + len(measured))
         begin = own.stop
-        chosen, strength = _chosen([part[own] for part in parts], base, needed, count)
+        chosen, strength = _chosen([part[own] for part in parts], base, required, count)
         at = Pose(pose.position[chosen], pose.rotation[chosen])
-        powers = _powers(strength, needed)
+        powers = _powers(strength, required)
         out.append(
-            PoseOffer(kind, at, seen.motor_angle[chosen], seen.tension[chosen], powers, so_far)
+            PoseOffer(
+                kind,
+                at,
+                measured.motor_angle[chosen],
+                measured.tension[chosen],
+                powers,
+                powers_so_far,
+            )
         )
     return out
 
 
-def _powers(strength: Sequence[float], needed: Sequence[float]) -> tuple[float, ...]:
+def _powers(strength: Sequence[float], required: Sequence[float]) -> tuple[float, ...]:
     """Power for each question."""
-    return tuple(power_of(*both) for both in zip(strength, needed, strict=True))
+    return tuple(power_of(*both) for both in zip(strength, required, strict=True))
 
 
 def reach(offer: PoseOffer) -> tuple[float, float]:
     """Largest distance of an offer's poses from their middle, m, and largest angle, rad."""
     place, turned = offer.pose.position, angles_of(offer.pose.rotation)
-    away = np.linalg.norm(place - (place.min(axis=0) + place.max(axis=0)) / 2, axis=1)
-    return float(away.max()), float(np.abs(turned).max())
+    distance = np.linalg.norm(place - (place.min(axis=0) + place.max(axis=0)) / 2, axis=1)
+    return float(distance.max()), float(np.abs(turned).max())
 
 
 def _words(offer: PoseOffer) -> str:
-    away, turned = reach(offer)
+    distance, turned = reach(offer)
     return (
-        f"{len(offer.pose.position)} poses more, {offer.kind.words} (up to {away * 1e3:.0f} mm "
+        f"{len(offer.pose.position)} poses more, {offer.kind.words} (up to {distance * 1e3:.0f} mm "
         f"from their middle, turned by up to {np.degrees(turned):.0f}°); "
         "'winchkit plan' lists them"
     )
 
 
 def _with_all(
-    regression: PoseRegression, tried: Sequence[tuple[PoseKind, Measured, Pose]]
+    regression: PoseRegression, simulated: Sequence[tuple[PoseCandidates, Measured, Pose]]
 ) -> PoseRegression:
     """Regression of the poses so far and all simulated ones."""
     point, dataset = regression.point, regression.dataset
-    poses = [point.pose, *(pose for _, _, pose in tried)]
-    measured = joined([dataset.measured, *(seen for _, seen, _ in tried)])
+    poses = [point.pose, *(pose for _, _, pose in simulated)]
+    measured = joined([dataset.measured, *(own for _, own, _ in simulated)])
     pose = Pose(
         np.concatenate([p.position for p in poses]), np.concatenate([p.rotation for p in poses])
     )
     distinct = np.arange(len(measured), dtype=np.intp)
-    wide = replace(dataset, measured=measured, pose=distinct)
-    return PoseRegression(replace(point, dataset=wide, pose=pose))
+    extended = replace(dataset, measured=measured, pose=distinct)
+    return PoseRegression(replace(point, dataset=extended, pose=pose))
 
 
 def _information(regression: PoseRegression, final: Hypothesis, question: Question) -> Array:
@@ -335,16 +348,16 @@ def _information(regression: PoseRegression, final: Hypothesis, question: Questi
     The effect's column is the first; the last matrix is that of the prior.
     """
     first, second = question
-    asked = {term.effect.id for term in question if term is not None}
+    in_question = {term.effect.id for term in question if term is not None}
     others = Hypothesis()
     for term in final.terms:
-        if term.effect.id not in asked:
+        if term.effect.id not in in_question:
             others = others.with_term(term, regression.n_runs)
     here = regression.change(others)
-    shown = regression.change(others.with_term(first, regression.n_runs)) - here
+    signature = regression.change(others.with_term(first, regression.n_runs)) - here
     rival = others if second is None else others.with_term(second, regression.n_runs)
-    imitation = regression.jacobian(regression.vector(rival), rival)
-    columns = np.column_stack([shown, imitation, regression.change(rival) - here])
+    rival_columns = regression.jacobian(regression.vector(rival), rival)
+    columns = np.column_stack([signature, rival_columns, regression.change(rival) - here])
     columns = np.where(np.isfinite(columns), columns, 0.0)
     size = np.sqrt(np.sum(columns[:, 1:] ** 2, axis=0))
     kept = np.concatenate([[True], size > 0])
@@ -354,17 +367,17 @@ def _information(regression: PoseRegression, final: Hypothesis, question: Questi
 
 
 def _chosen(
-    parts: Sequence[Array], base: Sequence[Array], needed: Sequence[float], count: int
+    parts: Sequence[Array], base: Sequence[Array], required: Sequence[float], count: int
 ) -> tuple[list[int], list[float]]:
     """Poses chosen in turn for the noncentrality λ of all questions, and λ with them."""
     sums = list(base)
-    enough = (np.sqrt(needed) + _ENOUGH) ** 2
+    sufficient = (np.sqrt(required) + _SUFFICIENT_MARGIN) ** 2
     chosen: list[int] = []
 
     def gains() -> Array:
         each = (
             np.minimum(noncentrality(total + part), most)
-            for total, part, most in zip(sums, parts, enough, strict=True)
+            for total, part, most in zip(sums, parts, sufficient, strict=True)
         )
         return np.asarray(np.sum(list(each), axis=0))
 

@@ -1,7 +1,7 @@
 """Linearisation point of a robot's identification: geometry, poses and noise before the selection.
 
-Geometry and poses are fitted jointly by the Gauss-Newton method, so that the model is linearised at
-its best fit. The noise is estimated by variance components.
+Geometry, poses and a profile's own effects are estimated jointly by the solver of the calibration,
+so that the model is linearised at its best fit. The noise is estimated by variance components.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.robot.adjustment import adjusted
 from winchkit.diagnosis.robot.candidates import candidates_at, priors_of_geometry
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.engine import PoseSelection
-from winchkit.diagnosis.robot.equations import Equations, placed_by, start_pose
 from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.variance_components import (
@@ -48,9 +47,7 @@ __all__ = [
     "prepare_selection",
 ]
 
-_STEPS = 8
-_STILL = 0.02
-_UNBALANCED = 0.2
+_MOST_IMBALANCE = 0.2
 _BALANCING = frozenset({"payload-mass", "payload-centre", "cell-offset", "cell-thermal"})
 """Effects that may explain an imbalance of tensions while its noise is estimated.
 
@@ -87,26 +84,8 @@ def fitted_point(
     point, terms
         The linearisation point and the fitted effects.
     """
-    point = LinearizationPoint(dataset, start_pose(dataset), sigma, tuple(geometry))
-    terms = tuple(terms)
-    for _ in range(_STEPS):
-        point = _placed(point, terms)
-        regression = PoseRegression(point)
-        found = fit(regression, own_effects(terms), np.ones(regression.n_rows))
-        terms = found.hypothesis.terms
-        steps = found.vector[: regression.nuisance_columns.shape[1]]
-        moves = steps[len(steps) - len(geometry) :].tolist()
-        moved = tuple(b.moved(by) for b, by in zip(point.geometry, moves, strict=True))
-        point = replace(point, geometry=moved)
-        if not moves or max(map(abs, moves)) < _STILL:
-            break
-    return _placed(point, terms), terms
-
-
-def _placed(point: LinearizationPoint, terms: Sequence[Term]) -> LinearizationPoint:
-    robot = point.robot(terms)
-    equations = Equations(point.dataset, point.pose, robot)
-    return replace(point, pose=placed_by(equations, robot, point.sigma))
+    found = adjusted(dataset, terms, sigma, geometry)
+    return LinearizationPoint(dataset, found.pose, sigma, found.geometry), found.terms
 
 
 def estimated_noise(
@@ -153,7 +132,7 @@ def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
     if not dataset.has_tension:
         return True
     spread = float(np.nanstd(dataset.measured.tension))
-    return noise.unexplained.get("tension", 0.0) <= _UNBALANCED * spread
+    return noise.unexplained.get("tension", 0.0) <= _MOST_IMBALANCE * spread
 
 
 def _columns(
@@ -173,12 +152,8 @@ def _columns(
             if base_of(effect) not in _BALANCING and "tension" in there:
                 there["tension"] = here["tension"]
             moved.append(there)
-    start = regression.residuals(()) if own else here
-    moved += [
-        {k: here[k] + there[k] - start[k] for k in here}
-        for there in regression.residuals_by_geometry()
-    ]
-    out = {k: [m[k] - values for m in moved] for k, values in here.items()}
+    geometry = regression.change_by_geometry()
+    out = {k: [m[k] - v for m in moved] + [m[k] for m in geometry] for k, v in here.items()}
     for kind in ("swivel", "gauge"):
         for i in range(len(regression.dataset.names)):
             column = np.zeros_like(here[kind])

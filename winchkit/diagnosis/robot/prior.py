@@ -7,12 +7,20 @@ from dataclasses import dataclass, replace
 
 from winchkit.effects.placement import base_of, line_of_effect
 from winchkit.effects.term import Term
-from winchkit.schema.profiles.robot import LineSpec, RobotProfile
+from winchkit.schema.profiles.robot import LineSpec, PriorName, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
-__all__ = ["GeometryPrior", "profile_with_geometry"]
+__all__ = ["FIELDS", "GeometryPrior", "profile_with_geometry"]
 
 Point = tuple[float, float, float]
+FIELDS: dict[str, PriorName] = {
+    "exit-point": "exit_point",
+    "anchor-point": "anchor_point",
+    "swivel-radius": "swivel_radius",
+    "drum-radius": "winding_radius",
+    "layer-thickness": "layer_growth",
+}
+"""Field of a robot's geometry that each effect of the catalogue changes."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +43,16 @@ class GeometryPrior:
     parameter: str
     std: float
     at: float = 0.0
+
+    @property
+    def field(self) -> PriorName:
+        """Field of the geometry: ``exit_point``, ``winding_radius`` ..."""
+        return FIELDS[base_of(self.term.effect)]
+
+    @property
+    def line(self) -> str:
+        """Line of the number; empty for one of all lines."""
+        return line_of_effect(self.term.effect)
 
     @property
     def value(self) -> float:

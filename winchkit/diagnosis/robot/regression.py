@@ -20,12 +20,12 @@ from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.spectrum import Band
 from winchkit.diagnosis.regression.base import Folds, Regression, Segment
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.robot.adjustment import STD_OF_ZERO, instrument_zeros
 from winchkit.diagnosis.robot.candidates import lacking, lacking_parts
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.equations import POSED, Equations
 from winchkit.diagnosis.robot.prior import GeometryPrior, profile_with_geometry
 from winchkit.effects.effect import Effect
-from winchkit.effects.placement import base_of, line_of_effect
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot
 from winchkit.model.stages import At, Stage
@@ -36,9 +36,8 @@ __all__ = ["LinearizationPoint", "PoseRegression"]
 _COPIES = 5
 _GROUPS = 5
 _BLOCKS = 24
-_RUN_LEAST = 10
-_SEEN = 1e-9
-_ZERO, _OFFSET = 0.2, 0.05
+_LEAST_POSES_OF_RUN = 10
+_LEAST_SINGULAR_VALUE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ class PoseRegression(Regression):
         self.robot = point.robot()
         self.equations = Equations(point.dataset, point.pose, self.robot)
         self._start = self.equations.residuals(self.robot)
-        self._zeros = _zeros(self._start, self.dataset)
+        self._zeros = instrument_zeros(self._start, self.dataset)
         self._posed = [k for k in POSED if np.isfinite(self._start[k]).any()]
         self._project()
         prior = [-(b.value - b.at) / b.std for b in point.geometry]
@@ -182,8 +181,8 @@ class PoseRegression(Regression):
         dataset = self.dataset
         sizes = np.bincount(dataset.measured.run)
         together = [set(dataset.pose[dataset.measured.run == n]) for n in range(len(sizes))]
-        apart = sum(map(len, together)) == len(set().union(*together))
-        if len(sizes) > 1 and sizes.min() >= _RUN_LEAST and apart:
+        disjoint = sum(map(len, together)) == len(set().union(*together))
+        if len(sizes) > 1 and sizes.min() >= _LEAST_POSES_OF_RUN and disjoint:
             return self._folded(dataset.measured.run, len(sizes))
         return self._folded(dataset.pose % _GROUPS, _GROUPS)
 
@@ -251,7 +250,7 @@ class PoseRegression(Regression):
         slope = np.where(known[..., None], slope, 0.0)
         # Unmeasured coordinates get directions of their own, which are left out.
         left, size, _ = np.linalg.svd(slope, full_matrices=True)
-        rank = np.sum(size > _SEEN * np.maximum(size[:, :1], 1e-300), axis=1)
+        rank = np.sum(size > _LEAST_SINGULAR_VALUE * np.maximum(size[:, :1], 1e-300), axis=1)
         index = np.arange(slope.shape[1])
         self._basis = left
         keep = index >= rank[:, None]
@@ -296,56 +295,29 @@ class PoseRegression(Regression):
         The unit of a geometry column is one standard deviation of its prior.
         """
         columns = []
-        for kind, std in (("swivel", _ZERO), ("gauge", _OFFSET)):
-            if kind not in self._zeros or (kind == "gauge" and self.dataset.measured.length_zeroed):
-                continue
+        for kind in self._zeros:
             for i in range(len(self.dataset.names)):
                 moved = {k: np.zeros_like(v) for k, v in self._start.items()}
-                moved[kind][:, i] = std
+                moved[kind][:, i] = STD_OF_ZERO[kind]
                 column = -self._rows_of(moved)
                 if np.any(column):
                     columns.append(self._beside(column, np.zeros_like(self._prior)))
-        for index, moved in enumerate(self.residuals_by_geometry()):
-            column = self._here - self._rows_of(moved)
+        for index, change in enumerate(self.change_by_geometry()):
+            column = -self._rows_of(change)
             held = np.zeros((_COPIES, len(self.point.geometry)))
             held[:, index] = 1 / np.sqrt(_COPIES)
             columns.append(self._beside(column, held.ravel()))
         return np.array(columns).reshape(len(columns), self.n_rows).T
 
-    def residuals_by_geometry(self) -> list[dict[str, Array]]:
-        """Residuals with each number of the geometry moved by one standard deviation of its prior.
+    def change_by_geometry(self) -> list[dict[str, Array]]:
+        """Change of the residuals by one standard deviation of each number of the geometry.
 
-        The equations of a line contain no number of another line, so that numbers of one type are
-        moved together. Their influence on the forces is neglected: it is updated with the
+        Linear in the number; its influence on the forces is neglected and updated with the
         linearisation point.
         """
-        geometry = self.point.geometry
-        here = self.residuals(())
-        out = [dict(here) for _ in geometry]
-        kinds = {(base_of(b.term.effect), b.parameter) for b in geometry}
-        for kind in sorted(kinds):
-            own = [(base_of(b.term.effect), b.parameter) == kind for b in geometry]
-            moved = [b.moved(1.0) if mine else b for b, mine in zip(geometry, own, strict=True)]
-            there = self.residuals_at(replace(self.point, geometry=tuple(moved)), ())
-            for index in np.flatnonzero(own).tolist():
-                line = line_of_effect(geometry[index].term.effect)
-                place = [self.dataset.names.index(line)] if line else slice(None)
-                for name in ("rope", "swivel", "gauge"):
-                    out[index][name] = here[name].copy()
-                    out[index][name][:, place] = there[name][:, place]
-        return out
-
-
-def _zeros(start: Mapping[str, Array], dataset: RobotDataset) -> dict[str, Array]:
-    """First estimate of the zero offsets of swivel angles and length instruments, per line."""
-    out: dict[str, Array] = {}
-    for kind in ("swivel", "gauge"):
-        known = np.isfinite(start[kind])
-        if not known.any() or (kind == "gauge" and dataset.measured.length_zeroed):
-            continue
-        values = np.where(known, start[kind], 0.0)
-        if kind == "swivel":
-            out[kind] = -np.angle(np.where(known, np.exp(1j * values), 0.0).sum(axis=0))
-        else:
-            out[kind] = -values.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return out
+        by = self.equations.by_geometry(self.robot, self.point.geometry)
+        nothing = {kind: np.zeros_like(values) for kind, values in self._start.items()}
+        return [
+            nothing | {kind: part[..., index] * item.std for kind, part in by.items()}
+            for index, item in enumerate(self.point.geometry)
+        ]

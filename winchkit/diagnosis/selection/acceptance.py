@@ -41,7 +41,11 @@ def best_accepted(
 
 
 def is_accepted(
-    engine: SelectionEngine, present: Fit, grown: Fit, noise: Noise, matters: float = RELEVANT_RATIO
+    engine: SelectionEngine,
+    present: Fit,
+    grown: Fit,
+    noise: Noise,
+    largest_ratio: float = RELEVANT_RATIO,
 ) -> bool:
     """Whether a larger model predicts held-out data better.
 
@@ -53,7 +57,7 @@ def is_accepted(
         Fits of the smaller and the larger model.
     noise
         Noise variance.
-    matters
+    largest_ratio
         Largest ratio of held-out errors, after to before, of at least one output.
 
     Notes
@@ -69,16 +73,18 @@ def is_accepted(
     after = held_out(regression, grown, noise, blocks)
     groups = engine.folds(grown, noise)
     gain = held_out(regression, present, noise, groups) - held_out(regression, grown, noise, groups)
-    pays = engine.grouped(groups) and bool(
+    gains_in_every_group = engine.grouped(groups) and bool(
         np.min(gain) > engine.penalty_per_parameter * _added(present, grown)
     )
-    if np.sum(before - after) <= 0 or (signed_rank_p_value(before, after) > _LEVEL and not pays):
+    if np.sum(before - after) <= 0 or (
+        signed_rank_p_value(before, after) > _LEVEL and not gains_in_every_group
+    ):
         return False
     was = held_out_rms(regression, present, noise, groups)
     now = held_out_rms(regression, grown, noise, groups)
     ratios = [now[output] / was[output] for output in regression.outputs]
     # A significant but irrelevant effect, such as a clock offset of 1 ms, is not added.
-    return bool(np.sum(gain) > 0 and min(ratios) < matters and max(ratios) < _NO_WORSE)
+    return bool(np.sum(gain) > 0 and min(ratios) < largest_ratio and max(ratios) < _NO_WORSE)
 
 
 def _added(present: Fit, grown: Fit) -> int:

@@ -84,8 +84,8 @@ def _is_feasible(item: Score) -> bool:
         return True
     base = {**item.candidate.effect.null, **item.candidate.shape}
     amplitudes = slice(len(coordinates.amplitudes))
-    begun = coordinates.vector(starting_values(item)[0])[amplitudes]
-    return bool(np.any(begun != coordinates.vector(base)[amplitudes]))
+    start_values = coordinates.vector(starting_values(item)[0])[amplitudes]
+    return bool(np.any(start_values != coordinates.vector(base)[amplitudes]))
 
 
 Answer = TypeVar("Answer")
@@ -229,7 +229,7 @@ class SelectionEngine(ABC):
         fit, noise
             The fit under the second noise estimate, and that estimate.
         """
-        states = sum(len(begun) for begun in start.starts)
+        states = sum(len(own) for own in start.starts)
         if noise is None:
             vector = self.regression.vector(start)
             jacobian = self.regression.jacobian(vector, start)

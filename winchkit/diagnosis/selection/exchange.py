@@ -77,16 +77,18 @@ class Exchange:
         It is fitted again from the others' present values where its χ² is above ``enough`` and
         would nearly reach that value by linear prediction.
         """
-        found = self._engine.trial(self.base, rival, self._noise)
-        if found.fit.chi_square < enough or not self._others.terms:
-            return found
+        first_trial = self._engine.trial(self.base, rival, self._noise)
+        if first_trial.fit.chi_square < enough or not self._others.terms:
+            return first_trial
         held, least, scores = self._held
-        beside = scores.get(rival.candidate.effect.id)
+        rival_beside = scores.get(rival.candidate.effect.id)
         nearly = enough + _NEARLY * (self.base.chi_square - enough)
-        if beside is None or least - beside.explained_ss > nearly:
-            return found
-        again = self._engine.trial(held, beside, self._noise)
-        return min(found, again, key=lambda trial: (trial.criterion, trial.fit.chi_square))
+        if rival_beside is None or least - rival_beside.explained_ss > nearly:
+            return first_trial
+        second_trial = self._engine.trial(held, rival_beside, self._noise)
+        return min(
+            first_trial, second_trial, key=lambda trial: (trial.criterion, trial.fit.chi_square)
+        )
 
 
 _TRIED = 2
@@ -127,10 +129,10 @@ def _better(
     for index in reversed(indices):
         hypothesis = hypothesis.without(index)
     base = engine.refit(hypothesis, noise)
-    pays = engine.criterion(base) - engine.criterion(present) + MIN_GAIN
+    needed = engine.criterion(base) - engine.criterion(present) + MIN_GAIN
     leave = {present.hypothesis.terms[index].effect.id for index in indices}
     promising = [
-        pair for pair in engine.pairs(base, noise) if pair.net_gain > pays and pair.ids != leave
+        pair for pair in engine.pairs(base, noise) if pair.net_gain > needed and pair.ids != leave
     ]
     for pair in promising[:tried]:
         # New effects first: one that explained both would keep its old values.

@@ -20,7 +20,7 @@ from winchkit.effects.term import Term
 
 __all__ = ["explained_by_initial_states"]
 
-_BY_ITSELF = 0.5
+_LEAST_SHARE_FROM_REST = 0.5
 
 
 def explained_by_initial_states(
@@ -51,26 +51,28 @@ def explained_by_initial_states(
     least as much as one offset per run; also where its χ² beyond offsets per run exceeds the
     penalty of all its parameters and states, as under a load that is constant for long.
     """
-    known, left = base.jacobian * inverse_sigma[:, None], base.residual * inverse_sigma
+    known, residual = base.jacobian * inverse_sigma[:, None], base.residual * inverse_sigma
     gain = base.chi_square - fitted.chi_square
     column = partialled_out(known, _from_rest(regression, fitted.hypothesis) * inverse_sigma)
-    alone = (column @ left) ** 2 / max(float(column @ column), 1e-300)
-    by_itself = bool(alone >= _BY_ITSELF * gain)
-    levels = _levels(regression, fitted.hypothesis)
-    if levels is None:
-        return not by_itself
-    flat = partialled_out(np.column_stack([known, levels * inverse_sigma[:, None]]), left)
-    if by_itself and alone >= left @ left - flat @ flat:
+    from_rest_ss = (column @ residual) ** 2 / max(float(column @ column), 1e-300)
+    mainly_from_rest = bool(from_rest_ss >= _LEAST_SHARE_FROM_REST * gain)
+    level_columns = _levels(regression, fitted.hypothesis)
+    if level_columns is None:
+        return not mainly_from_rest
+    remainder = partialled_out(
+        np.column_stack([known, level_columns * inverse_sigma[:, None]]), residual
+    )
+    if mainly_from_rest and from_rest_ss >= residual @ residual - remainder @ remainder:
         return False
     hypothesis = fitted.hypothesis
-    owed = Coordinates(hypothesis.terms[-1].effect).n_parameters + len(hypothesis.starts[-1])
-    return float(flat @ flat) - fitted.chi_square < penalty_per_parameter * owed
+    n_unknowns = Coordinates(hypothesis.terms[-1].effect).n_parameters + len(hypothesis.starts[-1])
+    return float(remainder @ remainder) - fitted.chi_square < penalty_per_parameter * n_unknowns
 
 
 def _from_rest(regression: Regression, hypothesis: Hypothesis) -> Array:
     """Change of the prediction by the last effect with zero initial states, shape (n_rows,)."""
-    rested = replace(hypothesis, starts=(*hypothesis.starts[:-1], ()))
-    return regression.change(rested) - regression.change(
+    from_rest = replace(hypothesis, starts=(*hypothesis.starts[:-1], ()))
+    return regression.change(from_rest) - regression.change(
         hypothesis.without(len(hypothesis.terms) - 1)
     )
 
@@ -81,9 +83,13 @@ def _levels(regression: Regression, hypothesis: Hypothesis) -> Array | None:
     None for an effect without a time constant.
     """
     term, start = hypothesis.terms[-1], hypothesis.starts[-1]
-    slow = {p.name: p.high for p in term.effect.parameters if p.role == "shape" and p.unit == "s"}
-    if not slow:
+    largest = {
+        p.name: p.high for p in term.effect.parameters if p.role == "shape" and p.unit == "s"
+    }
+    if not largest:
         return None
-    still = Term(term.effect, {**term.values, **slow})
-    frozen = replace(hypothesis, terms=(*hypothesis.terms[:-1], still))
-    return regression.jacobian(regression.vector(frozen), frozen)[:, -len(start) :]
+    slow_term = Term(term.effect, {**term.values, **largest})
+    slow_hypothesis = replace(hypothesis, terms=(*hypothesis.terms[:-1], slow_term))
+    return regression.jacobian(regression.vector(slow_hypothesis), slow_hypothesis)[
+        :, -len(start) :
+    ]

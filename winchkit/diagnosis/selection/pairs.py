@@ -76,7 +76,7 @@ def screened_pairs(
         single_gain[item.candidate.effect.id] = max(
             item.explained_ss, single_gain.get(item.candidate.effect.id, 0.0)
         )
-    found: dict[frozenset[str], Pair] = {}
+    best: dict[frozenset[str], Pair] = {}
     pairs = _pairs(scores)
     for pair, explained_ss in zip(
         pairs, _joint_explained_ss(projected, residual, pairs), strict=True
@@ -86,11 +86,9 @@ def screened_pairs(
             item.candidate.n_parameters for item in pair
         )
         ids = frozenset((first, second))
-        if net_gain > 0 and (ids not in found or net_gain > found[ids].net_gain):
-            found[ids] = Pair(
-                pair, explained_ss, net_gain, single_gain[first] + single_gain[second]
-            )
-    return sorted(found.values(), key=lambda couple: -couple.net_gain)
+        if net_gain > 0 and (ids not in best or net_gain > best[ids].net_gain):
+            best[ids] = Pair(pair, explained_ss, net_gain, single_gain[first] + single_gain[second])
+    return sorted(best.values(), key=lambda item: -item.net_gain)
 
 
 def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:

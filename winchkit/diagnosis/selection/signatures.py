@@ -152,30 +152,30 @@ def signatures(
 
 
 def updated_signatures(
-    regression: Regression, present: Hypothesis, found: Signatures
+    regression: Regression, present: Hypothesis, previous: Signatures
 ) -> Signatures | None:
-    """Signatures beside another model, computed in the memory of ``found``.
+    """Signatures beside another model, computed in the memory of ``previous``.
 
     Only outputs that changed effects act on are computed again. None where an effect that had no
     column has one now.
     """
-    changed = [t for t in present.terms if t not in found.model.terms]
-    changed += [t for t in found.model.terms if t not in present.terms]
+    changed = [t for t in present.terms if t not in previous.model.terms]
+    changed += [t for t in previous.model.terms if t not in present.terms]
     touched = {output for term in changed for output in regression.outputs_of(term.effect.stage)}
     canvas, spare = _Canvas(regression, present, touched), np.empty(regression.n_rows)
-    for effect, values in found.without_signature:
+    for effect, values in previous.without_signature:
         reached = touched & regression.outputs_of(effect.stage)
         if canvas.draw(spare, Term(effect, values), reached):
             return None
-    for candidate in found.candidates:
+    for candidate in previous.candidates:
         reached = touched & regression.outputs_of(candidate.effect.stage)
         for index, usual_step in enumerate(candidate.usual_steps, candidate.columns.start):
             term = Term(
                 candidate.effect, {**candidate.effect.null, **candidate.shape, **usual_step}
             )
-            canvas.draw(found.columns[:, index], term, reached)
-    _multiply(found.gram, regression, found.columns, touched)
-    return replace(found, model=present)
+            canvas.draw(previous.columns[:, index], term, reached)
+    _multiply(previous.gram, regression, previous.columns, touched)
+    return replace(previous, model=present)
 
 
 def _multiply(

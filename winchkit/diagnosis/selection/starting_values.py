@@ -114,11 +114,11 @@ def starting_points(
     inverse_sigma
         1/σ of every row, shape (n_rows,).
     """
-    begun = starting_values(item)
+    starts = starting_values(item)
     places = [p for p in Coordinates(item.candidate.effect).shapes if p.grid and p.low == 0.0]
-    if not places or len(begun) > 1:
-        return begun
-    place, values = places[0], begun[0]
+    if not places or len(starts) > 1:
+        return starts
+    place, values = places[0], starts[0]
     here = regression.change(hypothesis)
     residual, jacobian = present.residual * inverse_sigma, present.jacobian * inverse_sigma[:, None]
 

@@ -243,7 +243,7 @@ def _accepted_pair_exchange(
     two.
     """
     better = pair_exchange(engine, present, noise, 1)
-    if better is present or not is_accepted(engine, against, better, noise, matters=1.0):
+    if better is present or not is_accepted(engine, against, better, noise, largest_ratio=1.0):
         return None
     return better
 

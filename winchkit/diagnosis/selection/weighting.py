@@ -76,9 +76,9 @@ def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted
     gained = 1 - max(ratios[output] for output in better)
     if gained < 1 - RELEVANT_RATIO or max(ratios.values()) > _NO_WORSE:
         return own
-    told = " and ".join(output.replace("_", " ") for output in better)
+    names = " and ".join(output.replace("_", " ") for output in better)
     note = (
-        f"in the {told} all frequencies are weighed evenly, which predicts what was left out "
+        f"in the {names} all frequencies are weighed evenly, which predicts what was left out "
         f"{gained:.0%} better than weights by the noise: something is missing there too"
     )
     return Reweighted(refitted, even, (note,))

@@ -11,7 +11,7 @@ from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.residuals.error_statistics import Skirt
+from winchkit.diagnosis.residuals.error_statistics import StopBandLeakage
 from winchkit.diagnosis.results import OutputFit, Verdict
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
@@ -20,12 +20,12 @@ from winchkit.model.stages import OUTPUT_UNITS
 
 __all__ = ["Judgement", "judge", "output_fits", "reweighted_judgement", "withheld"]
 
-_HALF = 0.5
-_GENERALISES = 0.15
-_TRACE = 0.025
-_DOUBTFUL_TRACE = 0.25
-_DOUBTFUL = 1e-3
-_NEGLIGIBLE = 0.02
+_UNKNOWN_SHARE = 0.5
+_HELD_OUT_SHARE = 0.15
+_EXPLAINED_SHARE = 0.025
+_EXPLAINED_SHARE_UNCERTAIN = 0.25
+_UNCERTAIN_P_VALUE = 1e-3
+_EXPLAINED_SHARE_NEAR_NOISE = 0.02
 _AT_NOISE = 1.1
 _NEAR_NOISE = 1.25
 
@@ -38,7 +38,7 @@ class Judgement:
     share: float
     """Share of the excess over the noise that the final model leaves unexplained."""
     outputs: Mapping[str, OutputFit]
-    shown: SelectionResult
+    reported: SelectionResult
     """Result of the search, without the effects that are not named."""
     notes: tuple[str, ...]
 
@@ -74,8 +74,8 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     verdict = _verdict(result, outputs, share)
     added = result.final.labels[engine.n_initial_terms :]
     # Nothing but the effect itself explains nearly all of what is far above the noise.
-    nearly = share < _TRACE and result.noise.from_repeats
-    if verdict == "explained" or nearly or not added:
+    explained_but_detectable = share < _EXPLAINED_SHARE and result.noise.from_repeats
+    if verdict == "explained" or explained_but_detectable or not added:
         return Judgement(verdict, share, outputs, result, ())
     note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
     return withheld(engine, result, share, note)
@@ -85,24 +85,24 @@ def withheld(
     engine: SelectionEngine, result: SelectionResult, share: float, note: str
 ) -> Judgement:
     """Verdict that names no effect, with the reason as a note."""
-    verdict: Verdict = "unknown" if share > _HALF else "partly"
-    shown = replace(result, final=result.initial_model, noise=result.initial_noise)
+    verdict: Verdict = "unknown" if share > _UNKNOWN_SHARE else "partly"
+    reported = replace(result, final=result.initial_model, noise=result.initial_noise)
     before = (result.initial_model, result.initial_noise)
-    return Judgement(verdict, share, output_fits(engine, before, before), shown, (note,))
+    return Judgement(verdict, share, output_fits(engine, before, before), reported, (note,))
 
 
 def reweighted_judgement(engine: SelectionEngine, judgement: Judgement) -> Judgement:
     """The same verdict with parameters from the weights of least held-out error."""
-    shown = judgement.shown
-    best = reweighted(engine, shown.final, shown.noise)
-    if best.fit is shown.final:
+    reported = judgement.reported
+    best = reweighted(engine, reported.final, reported.noise)
+    if best.fit is reported.final:
         return judgement
-    before, after = (shown.initial_model, shown.initial_noise), (best.fit, best.noise)
-    outputs = output_fits(engine, before, after, _folds(engine, shown))
+    before, after = (reported.initial_model, reported.initial_noise), (best.fit, best.noise)
+    outputs = output_fits(engine, before, after, _folds(engine, reported))
     return replace(
         judgement,
         outputs=outputs,
-        shown=replace(shown, final=best.fit, noise=best.noise),
+        reported=replace(reported, final=best.fit, noise=best.noise),
         notes=(*judgement.notes, *best.notes),
     )
 
@@ -112,20 +112,20 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     if not result.lack_of_fit_at_start:
         return 0.0
     folds = _folds(engine, result)
-    held = [
+    held_out_errors = [
         held_out_rms(engine.regression, fitted, result.noise, folds)
         for fitted in (result.initial_model, result.final)
     ]
     # Where the bands hold nothing more, what an output is over its noise may be chance.
-    chance = {} if result.lack_of_fit else result.noise.uncertainty(engine.regression)
-    squares = [
+    expected_excess = {} if result.lack_of_fit else result.noise.uncertainty(engine.regression)
+    excess = [
         sum(
-            max(0.0, (rms[o] / noise) ** 2 - 1 - chance.get(o, 0.0))
+            max(0.0, (rms[o] / noise) ** 2 - 1 - expected_excess.get(o, 0.0))
             for o, noise in result.noise.rms.items()
         )
-        for rms in held
+        for rms in held_out_errors
     ]
-    left = squares[1] / squares[0] if squares[0] > 0 else 0.0
+    share = excess[1] / excess[0] if excess[0] > 0 else 0.0
     if result.noise.from_repeats:
         # Both in units of the final noise, so that a re-estimated noise does not shift the share.
         scale = result.initial_noise.power / result.noise.power
@@ -139,8 +139,10 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
                 ]
             )
         )
-        left = max(left if left > _GENERALISES else 0.0, after / before if before > 0 else 0.0)
-    return min(1.0, left)
+        share = max(
+            share if share > _HELD_OUT_SHARE else 0.0, after / before if before > 0 else 0.0
+        )
+    return min(1.0, share)
 
 
 def _folds(engine: SelectionEngine, result: SelectionResult) -> Folds:
@@ -153,19 +155,29 @@ def _folds(engine: SelectionEngine, result: SelectionResult) -> Folds:
 def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
     if not result.lack_of_fit_at_start:
         return "adequate"
-    grown = len(result.final.hypothesis.terms) > len(result.initial_model.hypothesis.terms)
-    if not grown or share > _HALF:
+    has_additions = len(result.final.hypothesis.terms) > len(result.initial_model.hypothesis.terms)
+    if not has_additions or share > _UNKNOWN_SHARE:
         return "unknown"
     if not result.lack_of_fit or not result.noise.from_repeats:
-        return "explained" if share < _GENERALISES else "partly"
+        return "explained" if share < _HELD_OUT_SHARE else "partly"
     # A trace below the noise, e.g. a load that bounces on its cable, is reported and has no effect.
-    over = max(
+    error_ratio = max(
         fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
         for fitted in outputs.values()
     )
     # What imitates something unknown leaves as much; where the trace is certain it must be small.
-    trace = _DOUBTFUL_TRACE if result.lack_of_fit_test.p_value > _DOUBTFUL else _TRACE
-    allowed = trace if over < _AT_NOISE else _NEGLIGIBLE if over < _NEAR_NOISE else 0.0
+    share_limit = (
+        _EXPLAINED_SHARE_UNCERTAIN
+        if result.lack_of_fit_test.p_value > _UNCERTAIN_P_VALUE
+        else _EXPLAINED_SHARE
+    )
+    allowed = (
+        share_limit
+        if error_ratio < _AT_NOISE
+        else _EXPLAINED_SHARE_NEAR_NOISE
+        if error_ratio < _NEAR_NOISE
+        else 0.0
+    )
     return "explained" if share < allowed else "partly"
 
 
@@ -195,29 +207,32 @@ def output_fits(
     before, after = _rms(regression, initial_model[0]), _rms(regression, final[0])
     held_before = held_out_rms(regression, *initial_model, folds)
     held_after = held_out_rms(regression, *final, folds)
-    noise, skirt = final[1], Skirt(regression)
-    beyond = skirt.residual(initial_model[0].hypothesis), skirt.residual(final[0].hypothesis)
-    noise_beyond = skirt.noise(final[0].hypothesis)
+    noise, leakage = final[1], StopBandLeakage(regression)
+    leakage_power = (
+        leakage.residual(initial_model[0].hypothesis),
+        leakage.residual(final[0].hypothesis),
+    )
+    noise_leakage = leakage.noise(final[0].hypothesis)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         output: OutputFit(
             unit=OUTPUT_UNITS[output],
             band=next(s.band.cut_off for s in regression.segments if s.output == output),
             signal_rms=regression.signal_rms(output),
-            rms_before=_with(before[output], beyond[0].get(output)),
-            rms_after=_with(after[output], beyond[1].get(output)),
-            heldout_rms_before=_with(held_before[output], beyond[0].get(output)),
-            heldout_rms_after=_with(held_after[output], beyond[1].get(output)),
-            noise_rms=_with(noise.rms[output], noise_beyond.get(output)),
+            rms_before=_with(before[output], leakage_power[0].get(output)),
+            rms_after=_with(after[output], leakage_power[1].get(output)),
+            heldout_rms_before=_with(held_before[output], leakage_power[0].get(output)),
+            heldout_rms_after=_with(held_after[output], leakage_power[1].get(output)),
+            noise_rms=_with(noise.rms[output], noise_leakage.get(output)),
             noise_source=source,
         )
         for output in regression.outputs
     }
 
 
-def _with(rms: float, beyond: float | None) -> float:
+def _with(rms: float, leakage_power: float | None) -> float:
     """An rms with the mean square above the low-pass's cut-off added."""
-    return float(np.hypot(rms, np.sqrt(beyond or 0.0)))
+    return float(np.hypot(rms, np.sqrt(leakage_power or 0.0)))
 
 
 def _rms(regression: Regression, fitted: Fit) -> dict[str, float]:

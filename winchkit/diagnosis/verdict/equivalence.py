@@ -34,19 +34,21 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
-    "Confusion",
-    "confusion_of",
-    "is_unseen",
+    "EquivalenceSet",
+    "equivalence_set",
+    "is_below_noise",
     "pairs_of",
 ]
 
-_VISIBLE = 1.0
+_LEAST_NONCENTRALITY = 1.0
 """Noncentrality below which a difference is significant at 5 % in at most one case of six."""
-_MATTERS = 0.02
+_LEAST_DIFFERENCE = 0.02
 """Rms difference over the effect below which it is negligible."""
 
 
-def is_unseen(engine: SelectionEngine, final: Fit, noise: Noise, index: int, rival: Effect) -> bool:
+def is_below_noise(
+    engine: SelectionEngine, final: Fit, noise: Noise, index: int, rival: Effect
+) -> bool:
     """Whether a richer ``rival`` differs from the term at ``index``, though not detectably.
 
     The rival has its usual shape and the size of the term. It differs by more than 2 % rms, and the
@@ -58,21 +60,26 @@ def is_unseen(engine: SelectionEngine, final: Fit, noise: Noise, index: int, riv
     regression, inverse_sigma = engine.regression, noise.inverse_sigma(engine.regression)
     hypothesis = final.hypothesis
     without = hypothesis.without(index)
-    here = regression.change(without)
-    own = (regression.change(hypothesis) - here) * inverse_sigma
+    base_change = regression.change(without)
+    own = (regression.change(hypothesis) - base_change) * inverse_sigma
     explained = orthonormal(final.jacobian * inverse_sigma[:, None])
     differs = False
     for usual_step in candidate.usual_steps:
         values = {**rival.null, **candidate.shape, **usual_step}
-        column = regression.change(without.with_term(Term(rival, values), regression.n_runs)) - here
+        column = (
+            regression.change(without.with_term(Term(rival, values), regression.n_runs))
+            - base_change
+        )
         column = column * inverse_sigma
         size = float(column @ column)
         column = column * (float(column @ own) / size) if size else column
-        left = column - explained @ (explained.T @ column)
-        if float(left @ left) > _VISIBLE:
+        remaining = column - explained @ (explained.T @ column)
+        if float(remaining @ remaining) > _LEAST_NONCENTRALITY:
             return False
-        bend = column - own
-        differs = differs or float(bend @ bend) > _MATTERS**2 * float(own @ own)
+        difference = column - own
+        differs = differs or float(difference @ difference) > _LEAST_DIFFERENCE**2 * float(
+            own @ own
+        )
     return differs
 
 
@@ -81,25 +88,25 @@ def _usual(engine: SelectionEngine, effect: Effect) -> Candidate | None:
     candidates = [a for a in engine.signatures.candidates if a.effect.id == effect.id]
     usual = {p.name: p.typical for p in Coordinates(effect).shapes}
 
-    def away(candidate: Candidate) -> float:
-        places = [(x, usual[name]) for name, x in candidate.shape.items() if usual.get(name)]
-        return float(sum(abs(np.log(x / typical)) for x, typical in places))
+    def distance(candidate: Candidate) -> float:
+        ratios = [(x, usual[name]) for name, x in candidate.shape.items() if usual.get(name)]
+        return float(sum(abs(np.log(x / typical)) for x, typical in ratios))
 
-    return min(candidates, key=away, default=None)
+    return min(candidates, key=distance, default=None)
 
 
-_RIVALS = 6
-_NEAR = 40.0
-_ALIKE = 9.0
+_MOST_RIVALS = 6
+_SCORE_MARGIN = 40.0
+_DELTA_CHI_SQUARE = 9.0
 """Δχ² = 9: the true effect fits worse by this much with probability at most 1/740."""
-_SHARE = 0.5
-_NEARLY = 0.75
+_LEAST_SHARE = 0.5
+_SHARE_OF_SIMPLER_LAW = 0.75
 _LEVEL = 0.05
-_FLIPS = 2000
+_SIGN_FLIPS = 2000
 
 
 @dataclass(frozen=True)
-class Confusion:
+class EquivalenceSet:
     """Equivalence set of one addition, the effect with the fewest parameters first."""
 
     term: Term
@@ -110,7 +117,9 @@ class Confusion:
     """Angle between its signature and each rival's, rad."""
 
 
-def confusion_of(engine: SelectionEngine, final: Fit, noise: Noise, index: int) -> Confusion:
+def equivalence_set(
+    engine: SelectionEngine, final: Fit, noise: Noise, index: int
+) -> EquivalenceSet:
     """Equivalence set of one term of the final model.
 
     Parameters
@@ -132,37 +141,44 @@ def confusion_of(engine: SelectionEngine, final: Fit, noise: Noise, index: int) 
     Every rival is compared with the named effect at 5 % by itself; there is no correction for the
     number of rivals. A rival must reach half of the named effect's decrease of χ².
     """
-    place = Exchange(engine, final, noise, index)
-    own, base, scores = place.own, place.base, place.scores
-    mine = next((s.explained_ss for s in scores if s.candidate.effect.id == own.effect.id), 0.0)
+    exchange = Exchange(engine, final, noise, index)
+    own, base, scores = exchange.own, exchange.base, exchange.scores
+    own_explained_ss = next(
+        (s.explained_ss for s in scores if s.candidate.effect.id == own.effect.id), 0.0
+    )
     n_parameters = Coordinates(own.effect).n_parameters
     rivals = [
         s
         for s in scores
-        if s.candidate.effect.id != own.effect.id and s.explained_ss > mine - max(_NEAR, 0.1 * mine)
-    ][:_RIVALS]
+        if s.candidate.effect.id != own.effect.id
+        and s.explained_ss > own_explained_ss - max(_SCORE_MARGIN, 0.1 * own_explained_ss)
+    ][:_MOST_RIVALS]
     rivals += [
-        s for s in scores if _drifts_alike(s.candidate.effect, own.effect) and s not in rivals
+        s
+        for s in scores
+        if _confusable_by_drift(s.candidate.effect, own.effect) and s not in rivals
     ]
     blocks = engine.regression.blocks
-    ours = held_out(engine.regression, final, noise, blocks)
+    own_losses = held_out(engine.regression, final, noise, blocks)
     members: list[tuple[int, float, Term]] = [(n_parameters, final.chi_square, own)]
     for rival in rivals:
-        trial = place.trial(rival, final.chi_square + _ALIKE)
+        trial = exchange.trial(rival, final.chi_square + _DELTA_CHI_SQUARE)
         fitted = trial.fit
         if not np.isfinite(trial.criterion):
             continue
-        if base.chi_square - fitted.chi_square < _SHARE * (base.chi_square - final.chi_square):
+        if base.chi_square - fitted.chi_square < _LEAST_SHARE * (
+            base.chi_square - final.chi_square
+        ):
             continue
         term = fitted.hypothesis.terms[-1]
-        size = Coordinates(term.effect).n_parameters
-        counted = _richer(engine, final, noise, index, fitted)
-        if counted is None:
-            theirs = held_out(engine.regression, fitted, noise, blocks)
-            alike = fitted.chi_square < final.chi_square + _ALIKE
-            counted = alike or _flip_chance(theirs - ours) > _LEVEL
-        if counted or _stands_for(engine, fitted, final, base, index):
-            members.append((size, fitted.chi_square, term))
+        n_rival_parameters = Coordinates(term.effect).n_parameters
+        joins = _richer_law_joins(engine, final, noise, index, fitted)
+        if joins is None:
+            rival_losses = held_out(engine.regression, fitted, noise, blocks)
+            within_delta = fitted.chi_square < final.chi_square + _DELTA_CHI_SQUARE
+            joins = within_delta or _sign_flip_p_value(rival_losses - own_losses) > _LEVEL
+        if joins or _reduces_to(engine, fitted, final, base, index):
+            members.append((n_rival_parameters, fitted.chi_square, term))
     ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
     projected = engine.projected(base, noise)
     angles = {
@@ -170,10 +186,10 @@ def confusion_of(engine: SelectionEngine, final: Fit, noise: Noise, index: int) 
         for term in ordered
         if term.effect.id != own.effect.id
     }
-    return Confusion(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
+    return EquivalenceSet(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
 
 
-def _richer(
+def _richer_law_joins(
     engine: SelectionEngine, final: Fit, noise: Noise, index: int, fitted: Fit
 ) -> bool | None:
     """Whether a rival with more parameters joins the set; None where other rules apply.
@@ -183,64 +199,65 @@ def _richer(
     """
     own, rival = final.hypothesis.terms[index].effect, fitted.hypothesis.terms[-1].effect
     more = Coordinates(rival).n_parameters - Coordinates(own).n_parameters
-    if more > 0 and _carded(rival, own) and not rival.nested_with(own):
-        return fitted.chi_square < final.chi_square + _ALIKE
-    if more > 0 and not _kindred(rival, own):
-        bent = engine.regression.has_known_loads and own.id in rival.contains
-        return _leant_to(final, fitted, more) or (
-            bent and is_unseen(engine, final, noise, index, rival)
+    if more > 0 and _listed_as_confusable(rival, own) and not rival.nested_with(own):
+        return fitted.chi_square < final.chi_square + _DELTA_CHI_SQUARE
+    if more > 0 and not _same_family(rival, own):
+        nearly_linear = engine.regression.has_known_loads and own.id in rival.contains
+        return _weakly_preferred(final, fitted, more) or (
+            nearly_linear and is_below_noise(engine, final, noise, index, rival)
         )
     return None
 
 
-def _stands_for(engine: SelectionEngine, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:
+def _reduces_to(engine: SelectionEngine, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:
     """Whether a simpler law of the family explains the same within the range of these runs.
 
     Within the speeds of a run that never reach the falling part of a Stribeck curve, it is a
     Coulomb friction that is not quite constant.
     """
     own, rival = final.hypothesis.terms[index], fitted.hypothesis.terms[-1].effect
-    shown = own.effect.visible
-    if shown is None or any(shown(at, own.values) for at in engine.regression.motions):
+    visible = own.effect.visible
+    if visible is None or any(visible(at, own.values) for at in engine.regression.motions):
         return False
     simpler = Coordinates(rival).n_parameters < Coordinates(own.effect).n_parameters
     related = bool(own.effect.family) and rival.family == own.effect.family
     return (
         simpler
         and related
-        and base.chi_square - fitted.chi_square > _NEARLY * (base.chi_square - final.chi_square)
+        and base.chi_square - fitted.chi_square
+        > _SHARE_OF_SIMPLER_LAW * (base.chi_square - final.chi_square)
     )
 
 
-def _kindred(rival: Effect, own: Effect) -> bool:
+def _same_family(rival: Effect, own: Effect) -> bool:
     """Whether two laws are of one family, neither containing the other."""
     return bool(own.family) and rival.family == own.family and not rival.nested_with(own)
 
 
-def _carded(rival: Effect, own: Effect) -> bool:
+def _listed_as_confusable(rival: Effect, own: Effect) -> bool:
     """Whether the catalogue lists the two as confusable."""
     return rival.id in own.confused_with or own.id in rival.confused_with
 
 
-def _leant_to(simple: Fit, rich: Fit, more: int) -> bool:
+def _weakly_preferred(simple: Fit, rich: Fit, more: int) -> bool:
     """Likelihood-ratio test significant at 5 %, for a law that BIC does not prefer."""
     states = [sum(len(start) for start in f.hypothesis.starts) for f in (simple, rich)]
     unknowns = max(1, more + states[1] - states[0])
     return bool(chi2.sf(simple.chi_square - rich.chi_square, unknowns) < _LEVEL)
 
 
-def _drifts_alike(rival: Effect, own: Effect) -> bool:
+def _confusable_by_drift(rival: Effect, own: Effect) -> bool:
     """Whether a rival with a time constant is listed as confusable with this effect."""
     creeps = rival.memory and any(p.role == "shape" and p.unit == "s" for p in rival.parameters)
-    return creeps and _carded(rival, own)
+    return creeps and _listed_as_confusable(rival, own)
 
 
-def _flip_chance(worse: Array) -> float:
+def _sign_flip_p_value(excess_losses: Array) -> float:
     """P-value of larger losses per block by random signs, one-sided.
 
     Parameters
     ----------
-    worse : (blocks,) array
+    excess_losses : (blocks,) array
         Held-out χ² of the rival less that of the named effect.
 
     Notes
@@ -249,8 +266,8 @@ def _flip_chance(worse: Array) -> float:
     differences that are symmetric about zero and independent.
     """
     random = np.random.default_rng(1)
-    signs = random.choice([-1.0, 1.0], size=(_FLIPS, len(worse)))
-    return float(np.mean(signs @ worse >= worse.sum()))
+    signs = random.choice([-1.0, 1.0], size=(_SIGN_FLIPS, len(excess_losses)))
+    return float(np.mean(signs @ excess_losses >= excess_losses.sum()))
 
 
 def _angle(projected: Projected, first: str, second: str) -> float:
@@ -274,6 +291,6 @@ def _cosine(inner: Array, a: slice, b: slice) -> float:
     return float(np.linalg.svd(across, compute_uv=False)[0]) if across.size else 0.0
 
 
-def pairs_of(sets: Sequence[Confusion]) -> list[tuple[Term, Term]]:
+def pairs_of(sets: Sequence[EquivalenceSet]) -> list[tuple[Term, Term]]:
     """Pairs of effects that these runs cannot distinguish."""
     return [(c.term, rival) for c in sets for rival in c.terms if rival is not c.term]

@@ -28,15 +28,15 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
-    "Beside",
     "Curve",
-    "Doubt",
+    "PartialRegression",
+    "SpecificationTest",
     "best_curve",
-    "judge_and_doubt",
+    "judge_with_specification_test",
 ]
 
 _UNIDENTIFIABLE = 1e-7
-_NOTHING = 1e-300
+_LEAST_SQUARED_LENGTH = 1e-300
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,13 @@ class Curve:
     """A curve over one variable and the net decrease of χ² by it."""
 
     place: str
-    """Output that it is added to, or ``rope force`` or ``winding``, which act on several."""
+    """Output that it is added to, or ``cable_force`` or ``winding``, which act on several."""
     variable: str
     net_gain: float
     """Decrease of χ² less the penalty of its parameters."""
 
 
-class Beside:
+class PartialRegression:
     """Whitened residual with the fitted unknowns projected out, to which curves are fitted."""
 
     def __init__(self, residual: Array, jacobian: Array, inverse_sigma: Array) -> None:
@@ -68,7 +68,7 @@ class Beside:
 
 def best_curve(
     regression: TimeSeriesRegression,
-    beside: Beside,
+    partial: PartialRegression,
     outputs: Sequence[str],
     penalty_per_parameter: float,
 ) -> Curve | None:
@@ -78,7 +78,7 @@ def best_curve(
     ----------
     regression
         Regression problem.
-    beside
+    partial
         Residual to which curves are fitted.
     outputs
         Outputs of which a curve must change one.
@@ -92,10 +92,10 @@ def best_curve(
     """
     best: Curve | None = None
     for place, variable, laws, columns in curves(regression, outputs):
-        hats = _inner_products(beside, columns, len(laws[0][0]))
+        basis = _inner_products(partial, columns, len(laws[0][0]))
         net_gain = max(
-            hats.explained_ss(law) - penalty_per_parameter * n_parameters
-            for law, n_parameters in laws
+            basis.explained_ss(coefficients) - penalty_per_parameter * n_parameters
+            for coefficients, n_parameters in laws
         )
         if best is None or net_gain > best.net_gain:
             best = Curve(place, variable, net_gain)
@@ -103,43 +103,49 @@ def best_curve(
 
 
 @dataclass(frozen=True)
-class _Hats:
+class _BasisProducts:
     """Gram matrices of whitened basis functions, before and after projection."""
 
-    plain: Array
+    before: Array
     """Before projection, (knots, knots)."""
-    inner: Array
+    after: Array
     """After projection, (knots, knots)."""
-    products: Array
+    inner_products: Array
     """Inner products with the residual, (knots,)."""
 
-    def explained_ss(self, law: Array) -> float:
-        """Decrease of χ² by the curves ``law`` (knots, k)."""
-        size = np.sqrt(np.maximum(np.diag(law.T @ self.plain @ law), _NOTHING))
-        inner = law.T @ self.inner @ law / np.outer(size, size)
+    def explained_ss(self, coefficients: Array) -> float:
+        """Decrease of χ² by the curves of ``coefficients`` (knots, k)."""
+        size = np.sqrt(
+            np.maximum(np.diag(coefficients.T @ self.before @ coefficients), _LEAST_SQUARED_LENGTH)
+        )
+        after = coefficients.T @ self.after @ coefficients / np.outer(size, size)
         # Measured by what they were: of what a fit explains whole only rounding is left.
-        return explained_ss(inner, (law.T @ self.products) / size, _UNIDENTIFIABLE)
+        return explained_ss(after, (coefficients.T @ self.inner_products) / size, _UNIDENTIFIABLE)
 
 
-def _inner_products(beside: Beside, columns: Columns, count: int) -> _Hats:
+def _inner_products(partial: PartialRegression, columns: Columns, count: int) -> _BasisProducts:
     """Gram matrices of ``count`` basis functions, summed over segments."""
-    plain, products = np.zeros((count, count)), np.zeros(count)
-    through = np.zeros((count, beside.explained.shape[1]))
+    before, inner_products = np.zeros((count, count)), np.zeros(count)
+    explained_products = np.zeros((count, partial.explained.shape[1]))
     for rows, signal in columns:
-        whitened = signal * beside.inverse_sigma[rows]
-        plain += whitened @ whitened.T
-        through += whitened @ beside.explained[rows]
-        products += whitened @ beside.residual[rows]
-    return _Hats(plain, plain - through @ through.T, products)
+        whitened = signal * partial.inverse_sigma[rows]
+        before += whitened @ whitened.T
+        explained_products += whitened @ partial.explained[rows]
+        inner_products += whitened @ partial.residual[rows]
+    return _BasisProducts(
+        before, before - explained_products @ explained_products.T, inner_products
+    )
 
 
-_SLIGHT = 1e-3
+_MARGIN = 1e-3
 """Margin, share of the named effects' decrease of χ²: physics may differ from a formula."""
-_SLIGHT_OF_MORE = 2e-4
+_MARGIN_WITH_LACK_OF_FIT = 2e-4
 """The same where lack of fit remains."""
 
 
-def judge_and_doubt(engine: TimeSeriesSelection, result: SelectionResult) -> Judgement:
+def judge_with_specification_test(
+    engine: TimeSeriesSelection, result: SelectionResult
+) -> Judgement:
     """Verdict after the specification test.
 
     Notes
@@ -149,38 +155,42 @@ def judge_and_doubt(engine: TimeSeriesSelection, result: SelectionResult) -> Jud
     repeats an outperformed single effect only gets a note.
     """
     judgement = judge(engine, result)
-    doubt = Doubt(engine, result)
-    if judgement.shown is not result or not doubt.added:
+    test = SpecificationTest(engine, result)
+    if judgement.reported is not result or not test.added:
         return judgement
-    terms = doubt.terms
-    if curve := doubt.beaten(doubt.added):
+    terms = test.terms
+    if curve := test.outperforming_curve(test.added):
         pair = with_pair(engine, result)
         if pair is not None:
-            return judge_and_doubt(engine, pair)
-        return withheld(engine, result, 1.0, _words(terms, terms, curve))
-    for index in reversed(doubt.added) if len(terms) > 1 else ():
-        curve = doubt.beaten([index])
+            return judge_with_specification_test(engine, pair)
+        return withheld(engine, result, 1.0, _withheld_note(terms, terms, curve))
+    for index in reversed(test.added) if len(terms) > 1 else ():
+        curve = test.outperforming_curve([index])
         if curve and result.noise.from_repeats:
-            return _less(doubt, index, curve)
+            return _without_outperformed(test, index, curve)
         if curve:
             label = terms[index - engine.n_initial_terms].label
-            note = f"{_over(curve)} would explain more than {label}"
+            note = f"{_curve_name(curve)} would explain more than {label}"
             judgement = replace(judgement, notes=(*judgement.notes, note))
     return judgement
 
 
-def _less(doubt: Doubt, index: int, curve: Curve) -> Judgement:
+def _without_outperformed(test: SpecificationTest, index: int, curve: Curve) -> Judgement:
     """Verdict without an outperformed effect, or without any name where that effect is needed."""
-    engine, result = doubt.engine, doubt.result
-    doubted = result.final.hypothesis.terms[index : index + 1]
-    without = judge_and_doubt(engine, without_term(engine, result, index))
-    if without.shown.final.labels[engine.n_initial_terms :]:
-        return replace(without, notes=(*without.notes, _words(doubted, doubted, curve)))
-    share = doubt.explained_ss([index]) / doubt.explained_ss(doubt.added)
-    return withheld(engine, result, min(1.0, share), _words(doubt.terms, doubted, curve))
+    engine, result = test.engine, test.result
+    outperformed = result.final.hypothesis.terms[index : index + 1]
+    without = judge_with_specification_test(engine, without_term(engine, result, index))
+    if without.reported.final.labels[engine.n_initial_terms :]:
+        return replace(
+            without, notes=(*without.notes, _withheld_note(outperformed, outperformed, curve))
+        )
+    share = test.explained_ss([index]) / test.explained_ss(test.added)
+    return withheld(
+        engine, result, min(1.0, share), _withheld_note(test.terms, outperformed, curve)
+    )
 
 
-class Doubt:
+class SpecificationTest:
     """Residuals of a search's result without some of its effects."""
 
     def __init__(self, engine: TimeSeriesSelection, result: SelectionResult) -> None:
@@ -190,14 +200,14 @@ class Doubt:
         self.terms = result.final.hypothesis.terms[engine.n_initial_terms :]
 
     @cached_property
-    def _rounding(self) -> Array:
+    def _discretization_column(self) -> Array:
         return self.engine.regression.discretization_error(self.result.final.hypothesis)[:, None]
 
-    def beside(self, indices: Sequence[int], *, rounding: bool = True) -> Beside:
+    def partial(self, indices: Sequence[int], *, discretization: bool = True) -> PartialRegression:
         """Residual without some terms, all other unknowns free in linear approximation.
 
         The others are not refitted: a lag that replaces a removed friction lies far from where both
-        are right. With ``rounding`` the discretisation error is a free column as well.
+        are right. With ``discretization`` the discretisation error is a free column as well.
         """
         regression, final = self.engine.regression, self.result.final
         hypothesis = final.hypothesis
@@ -205,46 +215,50 @@ class Doubt:
         for index in sorted(indices, reverse=True):
             own |= regression.unknowns_of(index, hypothesis)
             others = others.without(index)
-        lost = regression.change(hypothesis) - regression.change(others) if indices else 0.0
+        removed = regression.change(hypothesis) - regression.change(others) if indices else 0.0
         free = final.jacobian[:, ~own]
-        free = np.hstack([free, self._rounding]) if rounding else free
-        return Beside(final.residual + lost, free, self.result.noise.inverse_sigma(regression))
+        free = np.hstack([free, self._discretization_column]) if discretization else free
+        return PartialRegression(
+            final.residual + removed, free, self.result.noise.inverse_sigma(regression)
+        )
 
     def explained_ss(self, indices: Sequence[int]) -> float:
         """Decrease of χ² by terms, given the others."""
-        return self.beside(indices).chi_square - self.beside(()).chi_square
+        return self.partial(indices).chi_square - self.partial(()).chi_square
 
-    def beaten(self, indices: Sequence[int]) -> Curve | None:
+    def outperforming_curve(self, indices: Sequence[int]) -> Curve | None:
         """A curve that outperforms terms by the margin; None where there is none."""
-        if not self._beaten(indices, rounding=False):
+        if not self._outperforming_curve(indices, discretization=False):
             return None
         # What sampling may have rounded is not held against a name; it takes a while to know.
-        return self._beaten(indices, rounding=True)
+        return self._outperforming_curve(indices, discretization=True)
 
-    def _beaten(self, indices: Sequence[int], *, rounding: bool) -> Curve | None:
+    def _outperforming_curve(self, indices: Sequence[int], *, discretization: bool) -> Curve | None:
         engine, hypothesis = self.engine, self.result.final.hypothesis
         effects = [hypothesis.terms[index].effect for index in indices]
-        beside = self.beside(indices, rounding=rounding)
-        explained_ss = beside.chi_square - self.beside((), rounding=rounding).chi_square
+        partial = self.partial(indices, discretization=discretization)
+        explained_ss = (
+            partial.chi_square - self.partial((), discretization=discretization).chi_square
+        )
         # Initial states of runs are not parameters of the law; they carry no penalty here.
         net_gain = explained_ss - engine.penalty_per_parameter * sum(
             Coordinates(effect).n_parameters for effect in effects
         )
         outputs = sorted({output for effect in effects for output in effect.outputs})
-        curve = best_curve(engine.regression, beside, outputs, engine.penalty_per_parameter)
+        curve = best_curve(engine.regression, partial, outputs, engine.penalty_per_parameter)
         # What is certainly there is no chance deviation of the right formula.
-        slight = _SLIGHT_OF_MORE if self.result.lack_of_fit else _SLIGHT
-        margin = engine.penalty_per_parameter + slight * explained_ss
+        relative_margin = _MARGIN_WITH_LACK_OF_FIT if self.result.lack_of_fit else _MARGIN
+        margin = engine.penalty_per_parameter + relative_margin * explained_ss
         return curve if curve and curve.net_gain > net_gain + margin else None
 
 
-def _words(terms: Sequence[Term], doubted: Sequence[Term], curve: Curve) -> str:
+def _withheld_note(terms: Sequence[Term], outperformed: Sequence[Term], curve: Curve) -> str:
     """Note with the reason for withheld names."""
-    than = "" if len(doubted) == len(terms) else f" than {_names(doubted)}"
-    return f"closest, but not named: {_names(terms)}; {_over(curve)} explains more{than}"
+    than = "" if len(outperformed) == len(terms) else f" than {_names(outperformed)}"
+    return f"closest, but not named: {_names(terms)}; {_curve_name(curve)} explains more{than}"
 
 
-def _over(curve: Curve) -> str:
+def _curve_name(curve: Curve) -> str:
     place, variable = curve.place.replace("_", " "), curve.variable.replace("_", " ")
     return f"an unknown curve of the {place} over the {variable}"
 

@@ -21,16 +21,16 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.model.variables import ANGLES, COMPOUND
 
-__all__ = ["PLACES", "Columns", "Law", "columns_of", "curves", "hats_over", "laws_over"]
+__all__ = ["PLACES", "Columns", "Law", "columns_of", "curves", "laws_over", "linear_splines"]
 
-_HATS = 20
+_KNOTS = 20
 _TAILS = 0.001
 _DEGREES = (1, 2, 3, 4)
-_COARSE = (6, 12)
+_COARSE_KNOTS = (6, 12)
 _POWERS = (1.5, 2.0, 3.0)
-_TAKEN = (*ANGLES, *COMPOUND, "direction")
+_EXCLUDED_VARIABLES = (*ANGLES, *COMPOUND, "direction")
 """Variables over which the catalogue has every curve already, or that are tried in a product."""
-_WARMER = 1.0
+_LEAST_TEMPERATURE_RANGE = 1.0
 """A smaller range is noise of the thermometer, K."""
 Law = tuple[Array, int]
 """Values of a curve at the knots, (knots, k) for k parameters, and the number that is penalised."""
@@ -47,21 +47,26 @@ def curves(
         variables_of(recording) | {"direction": recording.smooth.at.direction}
         for recording in recordings
     ]
-    names = [n for n in known[0] if n not in _TAKEN and all(n in other for other in known)]
+    names = [
+        n for n in known[0] if n not in _EXCLUDED_VARIABLES and all(n in other for other in known)
+    ]
     for factor, name in (*((None, n) for n in names), *_products(names)):
-        ends = _ends(name, [k[name] for k in known])
+        ends = _ends(name, [own_variables[name] for own_variables in known])
         if ends is None:
             continue
-        knots = np.linspace(*ends, _HATS)
-        hats = [hats_over(k[name], knots) for k in known]
+        knots = np.linspace(*ends, _KNOTS)
+        basis = [linear_splines(own_variables[name], knots) for own_variables in known]
         if factor is not None:
-            hats = [h * k[factor] for h, k in zip(hats, known, strict=True)]
+            basis = [
+                columns * own_variables[factor]
+                for columns, own_variables in zip(basis, known, strict=True)
+            ]
         laws = laws_over(knots, name, level=factor is not None)
-        for place, shown in PLACES.items():
-            seen = set(shown) & set(outputs) & set(regression.dataset.outputs)
-            if seen and (place != "winding" or (name, factor) == ("cable_length", None)):
+        for place, changes in PLACES.items():
+            changed_outputs = set(changes) & set(outputs) & set(regression.dataset.outputs)
+            if changed_outputs and (place != "winding" or (name, factor) == ("cable_length", None)):
                 variable = name if factor is None else f"{factor} times {name}"
-                yield place, variable, laws, columns_of(regression, shown, hats, knots)
+                yield place, variable, laws, columns_of(regression, changes, basis, knots)
 
 
 def _products(names: Sequence[str]) -> list[tuple[str, str]]:
@@ -82,11 +87,11 @@ def _products(names: Sequence[str]) -> list[tuple[str, str]]:
 
 def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
     low, high = np.quantile(np.concatenate(values), [_TAILS, 1 - _TAILS])
-    least = _WARMER if name == "temperature" else 1e-9 * max(abs(low), abs(high))
+    least = _LEAST_TEMPERATURE_RANGE if name == "temperature" else 1e-9 * max(abs(low), abs(high))
     return (float(low), float(high)) if high - low > least else None
 
 
-def hats_over(values: Array, knots: Array) -> Array:
+def linear_splines(values: Array, knots: Array) -> Array:
     """Linear B-splines over equidistant knots, which add up to one.
 
     Parameters
@@ -117,8 +122,8 @@ def laws_over(knots: Array, name: str, *, level: bool) -> list[Law]:
     for degree in _DEGREES:
         powers = np.asarray(np.polynomial.legendre.legvander(z, degree), dtype=np.float64)
         out.append((powers, degree + 1) if level else (powers[:, 1:], degree))
-    for count in _COARSE:
-        out.append((hats_over(z, np.linspace(-1.0, 1.0, count)).T, count))
+    for count in _COARSE_KNOTS:
+        out.append((linear_splines(z, np.linspace(-1.0, 1.0, count)).T, count))
     for at in z[1:-1]:
         sides = [np.maximum(z - at, 0.0), np.maximum(at - z, 0.0), np.ones_like(z)]
         out.append((np.column_stack(sides[: 2 + level]), 3 + level))
@@ -127,36 +132,36 @@ def laws_over(knots: Array, name: str, *, level: bool) -> list[Law]:
     return out
 
 
-_Shown = Callable[[Recording, Array, Array], Array]
+_ChangeByCurve = Callable[[Recording, Array, Array], Array]
 
 
 def columns_of(
     regression: TimeSeriesRegression,
-    shown: Mapping[str, _Shown],
-    hats: Sequence[Array],
+    changes: Mapping[str, _ChangeByCurve],
+    basis: Sequence[Array],
     knots: Array,
 ) -> Columns:
     """Change of every output of every run by the basis functions."""
     for segment in regression.segments:
-        if segment.output in shown:
+        if segment.output in changes:
             recording = regression.dataset.recordings[segment.run]
-            signal = shown[segment.output](recording, hats[segment.run], knots)
+            signal = changes[segment.output](recording, basis[segment.run], knots)
             yield segment.rows, masked(recording, segment.output, signal)
 
 
-def _plainly(recording: Recording, hats: Array, knots: Array) -> Array:
+def _direct_change(recording: Recording, basis: Array, knots: Array) -> Array:
     """A curve of the instrument itself."""
-    return hats
+    return basis
 
 
-def _by_the_arm(recording: Recording, hats: Array, knots: Array) -> Array:
+def _torque_by_cable_force(recording: Recording, basis: Array, knots: Array) -> Array:
     """Change of the motor torque by a curve of the cable force."""
     force = recording.smooth.at.tension
-    heavy = np.maximum(np.abs(force), 1e-9)
-    return np.asarray(hats * recording.nominal_smooth["motor_torque"] * np.sign(force) / heavy)
+    magnitude = np.maximum(np.abs(force), 1e-9)
+    return np.asarray(basis * recording.nominal_smooth["motor_torque"] * np.sign(force) / magnitude)
 
 
-def _by_virtual_work(recording: Recording, hats: Array, knots: Array) -> Array:
+def _torque_by_winding(recording: Recording, basis: Array, knots: Array) -> Array:
     """Change of the motor torque by a curve of the winding, by the principle of virtual work."""
     step = knots[1] - knots[0]
     cell = np.floor((recording.smooth.at.free_length - knots[0]) / step)
@@ -166,11 +171,11 @@ def _by_virtual_work(recording: Recording, hats: Array, knots: Array) -> Array:
     return np.asarray(recording.nominal_smooth["motor_torque"] * slopes)
 
 
-PLACES: Mapping[str, Mapping[str, _Shown]] = {
-    "cable_length": {"cable_length": _plainly},
-    "tension": {"tension": _plainly},
-    "motor_torque": {"motor_torque": _plainly},
-    "rope force": {"tension": _plainly, "motor_torque": _by_the_arm},
-    "winding": {"cable_length": _plainly, "motor_torque": _by_virtual_work},
+PLACES: Mapping[str, Mapping[str, _ChangeByCurve]] = {
+    "cable_length": {"cable_length": _direct_change},
+    "tension": {"tension": _direct_change},
+    "motor_torque": {"motor_torque": _direct_change},
+    "cable_force": {"tension": _direct_change, "motor_torque": _torque_by_cable_force},
+    "winding": {"cable_length": _direct_change, "motor_torque": _torque_by_winding},
 }
 """Where a curve may act, and the change of each output by it."""

@@ -72,13 +72,16 @@ from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = [
+    "ZERO_STD",
     "Constraint",
     "Strain",
     "Winding",
     "balance",
+    "by_geometry",
     "by_pose",
     "cable_length",
     "closure",
+    "closure_by_geometry",
     "closure_residual",
     "force_basis",
     "mean_offset",
@@ -97,6 +100,11 @@ _TURN = 2 * np.pi
 _SEEN = 1e-6
 """Singular values of a structure matrix below this share of the largest count as zero: rule of
 thumb, far above rounding and far below a robot that can be controlled."""
+
+
+ZERO_STD = {"swivel": 0.2, "cable_length": 0.05}
+"""Standard deviation of the prior of an instrument's zero about its mean reading, rad and m (rule
+of thumb: wider than any zero that is left after the mean)."""
 
 
 @dataclass(frozen=True)
@@ -259,19 +267,38 @@ def closure(
     at_home = sensitivities(geometry, home.position, home.rotation)
     taken = 0.0 if strain is None else strain.value
     slack = np.asarray(1 - taken + np.zeros_like(length))
-    by_line = {
-        "exit_point": by.exit_point * slack[..., None] - at_home.exit_point,
-        "anchor_point": by.anchor_point * slack[..., None] - at_home.anchor_point,
-        "swivel_radius": by.swivel_radius * slack - at_home.swivel_radius,
-        "winding_radius": winding.by_radius(radius),
-        "home_length": np.full_like(length, -1.0),
-    }
-    by_robot = {"layer_growth": winding.gain[..., None]}
+    by_line, by_robot = closure_by_geometry(by, at_home, winding, radius, slack)
     if strain is not None:
         stressed = (length + dead_length)[..., None]
         by_robot |= {name: -part * stressed for name, part in strain.by_robot.items()}
     residual = closure_residual(length, by_drum, taken, dead_length)
     return Constraint(residual, by_pose(by) * slack[..., None], by_line, by_robot)
+
+
+def closure_by_geometry(
+    by: Sensitivities, at_home: Sensitivities, winding: Winding, radius: Array, slack: Array
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Derivatives of the closure equations by the numbers of each line and by those of all lines.
+
+    Parameters
+    ----------
+    by, at_home : Sensitivities
+        Of the geometric lengths at the p poses and at the home pose.
+    winding : Winding
+        Of the motor angles at the poses.
+    radius : (n,) array
+        Winding radii, m.
+    slack : (p, n) array
+        One less the strains.
+    """
+    by_line = {
+        "exit_point": by.exit_point * slack[..., None] - at_home.exit_point,
+        "anchor_point": by.anchor_point * slack[..., None] - at_home.anchor_point,
+        "swivel_radius": by.swivel_radius * slack - at_home.swivel_radius,
+        "winding_radius": winding.by_radius(radius),
+        "home_length": np.full_like(slack, -1.0),
+    }
+    return by_line, {"layer_growth": winding.gain[..., None]}
 
 
 def position(pose: Pose, measured: Array) -> Constraint:
@@ -325,7 +352,7 @@ def swivel(
 ) -> Constraint:
     """:func:`swivel_residual` with derivatives by pose, geometry and ``swivel_zero``."""
     by = swivel_sensitivities(geometry, pose.position, pose.rotation)
-    by_line = {**_by_geometry(by), "swivel_zero": np.ones_like(measured)}
+    by_line = {**by_geometry(by), "swivel_zero": np.ones_like(measured)}
     return Constraint(swivel_residual(geometry, pose, measured, zero), by_pose(by), by_line)
 
 
@@ -337,7 +364,7 @@ def cable_length(
     ``by_line`` has the geometry and ``length_offset``.
     """
     length, by = linearised(geometry, pose.position, pose.rotation)
-    by_line = {**_by_geometry(by), "length_offset": np.ones_like(measured)}
+    by_line = {**by_geometry(by), "length_offset": np.ones_like(measured)}
     return Constraint(length + offset - measured, by_pose(by), by_line)
 
 
@@ -422,7 +449,8 @@ def wrapped(angle: Array) -> Array:
     return np.asarray(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
 
 
-def _by_geometry(by: Sensitivities) -> dict[str, Array]:
+def by_geometry(by: Sensitivities) -> dict[str, Array]:
+    """Derivatives by each line's own points and swivel radius, by name."""
     return {
         "exit_point": by.exit_point,
         "anchor_point": by.anchor_point,

@@ -11,7 +11,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import Followed, variables_of
+from winchkit.diagnosis.residuals.attribution import Attribution, variables_of
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.plain_json import significant
 from winchkit.report.figures.reduction import (
@@ -68,7 +68,7 @@ class OutputPlots:
     scale: Scale
     over_time: Plot
     over_variable: Plot | None
-    followed: Followed | None
+    followed: Attribution | None
     """Residual over its main variable; None where no measured variable explains it."""
 
 
@@ -174,7 +174,9 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves) -> Plot:
     )
 
 
-def _over_variable(regression: TimeSeriesRegression, curves: _Curves, followed: Followed) -> Plot:
+def _over_variable(
+    regression: TimeSeriesRegression, curves: _Curves, followed: Attribution
+) -> Plot:
     """Samples as dots and means over bins as lines."""
     variable, label, logarithmic = _axis(regression, curves, followed)
     before = np.concatenate(curves.before)
@@ -220,7 +222,7 @@ def _spread(values: Array) -> Array:
 
 
 def _axis(
-    regression: TimeSeriesRegression, curves: _Curves, followed: Followed
+    regression: TimeSeriesRegression, curves: _Curves, followed: Attribution
 ) -> tuple[Array, str, bool]:
     """Values of a variable in the unit of its axis, its label, and whether it is a logarithm."""
     recordings = regression.dataset.recordings

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.robot.attribution import (
     AXES,
-    follows_of,
-    most_telling,
+    most_significant,
     on_cables,
+    pose_attributions,
     variables_of_poses,
 )
 from winchkit.diagnosis.robot.errors import UNITS, Errors
@@ -35,7 +35,7 @@ _POOLED = ("winch", "pose", NUMBER)
 class Trace:
     """Errors of one output along one variable, SI; a value per pose and line, or axis."""
 
-    over: Followed
+    over: Attribution
     x: Array
     """(k,), finite."""
     before: Array
@@ -75,19 +75,21 @@ def unit_of(variable: str) -> str:
 
 def traces(regression: PoseRegression, before: Errors, after: Errors | None = None) -> list[Trace]:
     """Per output its errors over the variable with the largest share before the change."""
-    found: dict[str, Followed] = {}
-    for followed in follows_of(regression, before):
+    found: dict[str, Attribution] = {}
+    for followed in pose_attributions(regression, before):
         if followed.variable != "pose":
             found.setdefault(followed.output, followed)
     return [
-        trace_over(regression, found.get(name, Followed(name, NUMBER, float("nan"))), before, after)
+        trace_over(
+            regression, found.get(name, Attribution(name, NUMBER, float("nan"))), before, after
+        )
         for name in UNITS
         if name in before
     ]
 
 
 def trace_over(
-    regression: PoseRegression, over: Followed, before: Errors, after: Errors | None = None
+    regression: PoseRegression, over: Attribution, before: Errors, after: Errors | None = None
 ) -> Trace:
     """Errors of one output over one variable, of the line with the largest share."""
     name = over.output
@@ -97,7 +99,7 @@ def trace_over(
     line = None
     if over.variable not in _POOLED:
         lines = list(AXES if name == "platform_position" else regression.dataset.names)
-        column = lines.index(over.line) if over.line else most_telling(x, error)
+        column = lines.index(over.line) if over.line else most_significant(x, error)
         line = lines[column]
         x, error = x[:, [column]], error[:, [column]]
         then = None if then is None else then[:, [column]]
@@ -107,7 +109,7 @@ def trace_over(
     return Trace(over, x[known], error[known], None if then is None else then[known], line)
 
 
-def _values(regression: PoseRegression, over: Followed, error: Array) -> Array:
+def _values(regression: PoseRegression, over: Attribution, error: Array) -> Array:
     count, lines = error.shape
     if over.variable == "winch":
         return np.arange(1.0, lines + 1)[None, :]

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import Followed, follows, harmonics, variables_of
+from winchkit.diagnosis.residuals.attribution import (
+    Attribution,
+    attributions,
+    harmonics,
+    variables_of,
+)
 from winchkit.model.variables import VARIABLE_UNITS
 from winchkit.report.words.sentence import CLEAR_ORDER
 
@@ -106,7 +111,7 @@ _DIGITS = 5
 class Curve:
     """Mean residual of one output along one variable, SI."""
 
-    over: Followed
+    over: Attribution
     x: Array
     """Mean of the variable in every bin, (bins,); an angle with an order within its turn, rad."""
     mean: Array
@@ -125,11 +130,11 @@ class Curve:
         }
 
 
-def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, Followed]:
+def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, Attribution]:
     """Main variable of each output's residual: a clear order, else the largest share."""
     orders = [f for f in harmonics(regression, residual) if f.share > CLEAR_ORDER]
-    trends = [f for f in follows(regression, residual) if f.share > _WORTH_DRAWING]
-    out: dict[str, Followed] = {}
+    trends = [f for f in attributions(regression, residual) if f.share > _WORTH_DRAWING]
+    out: dict[str, Attribution] = {}
     for found in (*sorted(orders, key=lambda f: -f.share), *sorted(trends, key=lambda f: -f.share)):
         known = out.get(found.output)
         if known is None or (known.order is not None and found.share > 2 * known.share):
@@ -137,7 +142,7 @@ def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, Fo
     return out
 
 
-def curve_of(regression: TimeSeriesRegression, residual: Array, over: Followed) -> Curve:
+def curve_of(regression: TimeSeriesRegression, residual: Array, over: Attribution) -> Curve:
     """The curve of a residual, (rows,), over a variable."""
     x, error = [], []
     for segment, time in zip(regression.segments, regression.in_time(residual), strict=True):
@@ -154,7 +159,7 @@ def curve_of(regression: TimeSeriesRegression, residual: Array, over: Followed) 
     return Curve(over, centres, mean)
 
 
-def bin_edges(values: Array, over: Followed, turn: float) -> Array:
+def bin_edges(values: Array, over: Attribution, turn: float) -> Array:
     """Inner edges of bins: equal within a turn, fine enough for the order; else equally filled."""
     if over.order is None:
         return filled_edges(values, _BINS)

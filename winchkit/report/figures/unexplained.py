@@ -6,7 +6,7 @@ from math import isfinite
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Where
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.profile_edit.history import LADDER_UNITS
@@ -25,7 +25,7 @@ __all__ = [
 
 def unexplained_curve(answer: Answer, where: Where) -> tuple[Array, Array]:
     """Mean of the variable and of the residual in every bin, (bins,) each, SI."""
-    over = Followed(where.output, where.variable, where.share, where.order, line=where.line)
+    over = Attribution(where.output, where.variable, where.share, where.order, line=where.line)
     if isinstance(answer, RobotAnswer):
         regression, errors = answer.selection.rest
         trace = trace_over(regression, over, errors)

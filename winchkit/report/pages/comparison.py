@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.diagnosis.residuals.attribution import Followed
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.report.comparison_rows import HEAD, followed, offset_text, size_rows
 from winchkit.report.figures.plots import AT_NOISE
@@ -25,7 +25,7 @@ _NEXT = (
 
 def comparison_sections(
     comparison: Comparison,
-    over: Mapping[str, Followed],
+    over: Mapping[str, Attribution],
     figures: Sequence[Markup],
     command: Command,
 ) -> Markup:
@@ -46,7 +46,7 @@ def comparison_sections(
     )
 
 
-def distance_text(name: str, error: OutputError, over: Followed | None) -> str:
+def distance_text(name: str, error: OutputError, over: Attribution | None) -> str:
     """Error of one output, its ratio to the noise, and its attribution."""
     size = f"{quantity(error.rms, error.unit)} rms"
     off = f"The error of the {OUTPUT_NAMES.get(name, name)} is {size}"
@@ -60,7 +60,7 @@ def distance_text(name: str, error: OutputError, over: Followed | None) -> str:
     return f"{off}, {beside} {noise}; {_attributed(over)}."
 
 
-def _attributed(over: Followed | None) -> str:
+def _attributed(over: Attribution | None) -> str:
     if over is None:
         return "no measured variable explains it"
     share = f"({percent(over.share)} of its variance)"
@@ -69,7 +69,7 @@ def _attributed(over: Followed | None) -> str:
     return f"it depends on {VARIABLE_NAMES.get(over.variable, over.variable)} {share}"
 
 
-def _lead(comparison: Comparison, over: Mapping[str, Followed]) -> Markup:
+def _lead(comparison: Comparison, over: Mapping[str, Attribution]) -> Markup:
     outputs = comparison.outputs
     texts = [distance_text(name, error, over.get(name)) for name, error in outputs.items()]
     rows = [

@@ -48,7 +48,7 @@ def sections(
             section(
                 "confusion",
                 f"Effects that cannot be distinguished with these {diagnosis.data}",
-                tables.confusion(diagnosis, effects),
+                tables.equivalence(diagnosis, effects),
             ),
             section(
                 "detectable",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.diagnosis.fleet.anova import SharedError, SharedFollowed
+from winchkit.diagnosis.fleet.anova import SharedAttribution, SharedError
 from winchkit.diagnosis.fleet.meta_analysis import Pooled, SharedEffect
 from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Step
 from winchkit.report.html.markup import Markup, compact, details, element, section, table
@@ -123,14 +123,14 @@ def error_texts(shared: Mapping[str, SharedError]) -> list[str]:
     return out
 
 
-def _followed(one: SharedFollowed) -> str:
+def _followed(one: SharedAttribution) -> str:
     name = "constant of each winch" if one.variable == "winch" else VARIABLE_NAMES[one.variable]
     text = f"{name} {percent(one.share)}"
     if one.variable != "winch":
         if one.common >= _ALL * one.share:
             return f"{text}, common to all"
         text += f", {percent(one.common)} common to all"
-    return f"{text}, outlying: {listed(list(one.apart))}" if one.apart else text
+    return f"{text}, outlying: {listed(list(one.outlying))}" if one.outlying else text
 
 
 def _found(one: Diagnosis) -> str:
@@ -162,15 +162,15 @@ def _where(shared: SharedEffect) -> str:
 
 def _likeness(shared: SharedEffect) -> str:
     """Homogeneity of the winches over all parameters of the effect."""
-    outlying = dict.fromkeys(name for p in shared.parameters.values() for name in p.apart)
-    if all(p.alike for p in shared.parameters.values()):
+    outlying = dict.fromkeys(name for p in shared.parameters.values() for name in p.outlying)
+    if all(p.homogeneous for p in shared.parameters.values()):
         return "equal in size"
     return f"equal in size except {listed(list(outlying))}" if outlying else "of different sizes"
 
 
 def _value(name: str, one: Pooled) -> str:
     text = estimate_text(name, Estimate(one.value, one.std, one.unit))
-    if one.alike or one.apart:
+    if one.homogeneous or one.outlying:
         return text
     return f"{text} in the mean, standard deviation {quantity(one.spread, one.unit, 2)} of winches"
 

@@ -19,23 +19,27 @@ B. Triggs et al., *Bundle Adjustment – A Modern Synthesis*, 2000. P. J. Huber,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.calibration.robot.equations import Equations, State
-from winchkit.model.robot import Pose
+from winchkit.model.robot.constraints import Constraint
+from winchkit.model.robot.kinematics import Pose
 from winchkit.model.robot.pose_estimation import Iteration, estimated_pose, moved_pose
 
 __all__ = [
+    "Equations",
     "Linear",
     "Loss",
     "Progress",
+    "Rows",
     "Solution",
+    "State",
+    "Unknowns",
     "Weights",
     "leverage",
     "linearise",
@@ -55,6 +59,57 @@ _DONE = 1e-3
 _POSE_DAMPING, _ROUNDING = 1.0, 1e-13
 _MOST_DAMPED = 1e8
 _PLACING = Iteration(damping=_POSE_DAMPING, relative_damping=_ROUNDING, tolerance=1e-7, steps=30)
+
+
+class Unknowns(Protocol):
+    """Parameters that are estimated, each with a Gaussian prior and bounds; (q,) each."""
+
+    @property
+    def nominal(self) -> Array:
+        """Means of the priors."""
+
+    @property
+    def std(self) -> Array:
+        """Standard deviations of the priors; zero for a parameter that is held."""
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds."""
+
+
+@dataclass(frozen=True)
+class State:
+    """Point at which the equations are evaluated: parameters (q,), and p poses."""
+
+    values: Array
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Equations of one kind at p poses, NaN in the residual where nothing was measured."""
+
+    kind: str
+    residual: Array
+    """Model less measurement, (p, k)."""
+    by_pose: Array
+    """Derivative by position and rotation vector, (p, k, 6)."""
+    by_values: Array | None
+    """Derivative by the parameters, (p, k, q); None where it is zero."""
+
+
+class Equations(Protocol):
+    """Observation equations of poses as functions of parameters and poses."""
+
+    @property
+    def parameters(self) -> Unknowns:
+        """The parameters."""
+
+    def constraints(self, state: State) -> Iterable[tuple[str, Constraint]]:
+        """Equations by kind with derivatives by the pose at least."""
+
+    def rows(self, state: State) -> Iterable[Rows]:
+        """Equations by kind with derivatives by the vector of parameters."""
 
 
 @dataclass(frozen=True)
