@@ -95,6 +95,18 @@ def undescribed_fields(public: type) -> Iterator[str]:
                 yield field.target.id
 
 
+def test_every_package_describes_itself_and_names_its_folders() -> None:
+    lacking = []
+    for file in sorted(Path(winchkit.__file__).parent.rglob("__init__.py")):
+        text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+        folders = [init.parent.name for init in file.parent.glob("*/__init__.py")]
+        if file.parent != Path(winchkit.__file__).parent:
+            lacking += [f"{file.parent}: {name}" for name in folders if f"``{name}``" not in text]
+        if "\n\n" not in text:
+            lacking.append(f"{file.parent}: one line only")
+    assert not lacking
+
+
 def test_functions_without_a_section_are_recognised() -> None:
     def bare(x: float) -> float:
         """One line."""
