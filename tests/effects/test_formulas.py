@@ -47,7 +47,7 @@ def _state() -> SimpleNamespace:
 
 
 def _wound(phi: np.ndarray, radius: float = RADIUS, growth: float = GROWTH) -> np.ndarray:
-    """Rope on a spiral drum: whole turns summed one by one, then the turn that is begun."""
+    """Cable on a spiral drum: whole turns summed one by one, then the turn that is begun."""
     out = np.empty_like(phi)
     for i, angle in enumerate((2 * pi * TURNS + phi).tolist()):
         turns = int(angle // (2 * pi))

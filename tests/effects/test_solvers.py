@@ -108,7 +108,7 @@ def test_noise_of_the_encoder_opens_no_play_at_rest() -> None:
 
 
 def _stack(wound: np.ndarray, strain: np.ndarray) -> np.ndarray:
-    """Rope on the drum as a list of pieces, last in first out."""
+    """Cable on the drum as a list of pieces, last in first out."""
     before = float(np.mean(strain))
     pieces: list[tuple[float, float]] = []
     bottom, out = wound[0], [before * wound[0]]

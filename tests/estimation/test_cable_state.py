@@ -1,4 +1,4 @@
-"""The rope sample by sample against the same effects over whole runs, and against a simulation."""
+"""The cable sample by sample against the same effects over whole runs, and against a simulation."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_the_tension_is_the_load_that_the_whole_run_had(effect: Effect) -> None:
     states = followed(term, signals, cell=cell)
     tension = cell + np.array([s.correction for s in states])
     missed = np.abs(tension - signals.load)
-    # Friction lets the reading jump where the rope starts and stops, and it is smoothed.
+    # Friction lets the reading jump where the cable starts and stops, and it is smoothed.
     assert np.quantile(missed[steady(signals)], 0.95) < 0.02 * size
     assert np.max(missed) < 0.15 * size
 

@@ -101,7 +101,7 @@ def test_a_closed_loop_costs_energy(sizes: list[float], shape: float) -> None:
         for there in np.linspace(position, target, 30)[1:]:
             before = sum(estimator.forces)
             estimator.update(tension, float(there))
-            # Friction is counted along paying out, the rope's way is minus what is wound in.
+            # Friction is counted along paying out, the cable's way is minus what is wound in.
             work += (before + sum(estimator.forces)) / 2 * (position - float(there))
             position = float(there)
     assert work > 0

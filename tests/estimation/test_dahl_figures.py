@@ -13,7 +13,7 @@ import dahl_estimator as figures
 
 def test_the_exact_step_is_far_nearer_than_eulers() -> None:
     errors = figures.coarse_errors()
-    # What is left is where between two samples the rope turned round.
+    # What is left is where between two samples the cable turned round.
     assert 0 < errors["exact step"] < 0.1 * figures.LIMIT
     assert errors["euler"] > 5 * errors["exact step"]
 

@@ -47,7 +47,7 @@ SWIVEL, WINDING, ROPE = 8.6e-3, 60e-3, 0.48e-3
 
 
 def cable_length(anchor: np.ndarray, point: np.ndarray, swivel: float) -> float:
-    """Arc on a swivel pulley that the rope reaches running along +z, and free rope."""
+    """Arc on a swivel pulley that the cable reaches running along +z, and free cable."""
     reach = hypot(anchor[0] - point[0], anchor[1] - point[1])
     rise = anchor[2] - point[2]
     free = sqrt((reach - swivel) ** 2 + rise**2 - swivel**2)
@@ -72,7 +72,7 @@ def test_eq_2_is_the_spiral_drum_wound_with_negative_angles(
 
 
 def test_eq_2_read_with_positive_angles_for_wound_turns_the_winch_round() -> None:
-    """Winding in shortens the free rope; as a positive l it would lengthen it (Eq. 3)."""
+    """Winding in shortens the free cable; as a positive l it would lengthen it (Eq. 3)."""
     before, after = 4 * pi, 6 * pi
     shorter = printed_eq_2(-after, WINDING, ROPE) - printed_eq_2(-before, WINDING, ROPE)
     longer = printed_eq_2(after, WINDING, ROPE) - printed_eq_2(before, WINDING, ROPE)
@@ -92,7 +92,7 @@ def test_eq_2_steps_where_a_spiral_climbs_evenly() -> None:
 def test_eq_3_leaves_out_the_home_length_and_the_arc(line: int) -> None:
     point, anchor = EXIT[:, line] / 1e3, ANCHOR[:, line] / 1e3
     if point[2] < 0.5:
-        # The rope reaches the lower pulleys from above.
+        # The cable reaches the lower pulleys from above.
         point, anchor, home = (v * [1, 1, -1] for v in (point, anchor, HOME))
     else:
         home = HOME
@@ -117,7 +117,7 @@ def test_the_arc_is_that_of_a_rope_laid_around_a_circle() -> None:
     touch = centre[:, None] + swivel * np.array([-np.cos(phi), np.sin(phi)])
     aside = np.array([np.sin(phi), np.cos(phi)])
     to_anchor = np.array([[0.4], [-0.3]]) - touch
-    # Tangent: the rope leaves along the way it runs on the pulley.
+    # Tangent: the cable leaves along the way it runs on the pulley.
     cross = to_anchor[0] * aside[1] - to_anchor[1] * aside[0]
     ahead = (to_anchor * aside).sum(axis=0) > 0
     at = np.flatnonzero((np.sign(cross[:-1]) != np.sign(cross[1:])) & ahead[:-1])[0]

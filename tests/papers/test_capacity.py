@@ -1,4 +1,4 @@
-"""How much rope a drum takes, what is left on it, and what ``winchkit check`` says."""
+"""How much cable a drum takes, what is left on it, and what ``winchkit check`` says."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_groove_holds_its_width_over_its_pitch() -> None:
 
 
 def test_a_spiral_drum_counts_its_layers() -> None:
-    """Rope centres at 50, 56, … 80 mm: the sixth layer's outer side just meets 83 mm."""
+    """Cable centres at 50, 56, … 80 mm: the sixth layer's outer side just meets 83 mm."""
     found = capacity(SPIRAL)
     assert (found.turns, found.limited_by) == (6.0, "flange")
     assert found.length == pytest.approx(2 * pi * sum((0.05, 0.056, 0.062, 0.068, 0.074, 0.080)))
@@ -74,7 +74,7 @@ def test_a_spiral_that_climbs_evenly_ends_at_the_flange() -> None:
     found = capacity(DRUMS["archimedean"])
     assert 0.05 + 0.006 * found.turns + 0.003 == pytest.approx(0.083)
     inner, outer = 0.05, 0.080
-    # Its area is that of the ring between the first and the last rope centre.
+    # Its area is that of the ring between the first and the last cable centre.
     assert found.length * 0.006 == pytest.approx(pi * (outer**2 - inner**2), rel=1e-9)
 
 

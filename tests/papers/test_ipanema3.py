@@ -102,7 +102,7 @@ def test_eq_8_leaves_what_ropes_can_bear() -> None:
 
 
 def test_k0_is_an_origin_that_cancels(robot: Robot) -> None:
-    """As printed a rope under 500 N would be shorter by 2.5 % than one that nothing pulls."""
+    """As printed a cable under 500 N would be shorter by 2.5 % than one that nothing pulls."""
     assert Linear(439.13e3, 11382.76).strain(500.0) < -0.02
     away = flat_pose(Pose(np.array([[0.55, -0.55, 1.8]]), np.eye(3)[None]))
     stretches = [

@@ -1,4 +1,4 @@
-"""Gearboxes and the rope guide."""
+"""Gearboxes and the cable guide."""
 
 from __future__ import annotations
 

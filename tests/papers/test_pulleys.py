@@ -53,7 +53,7 @@ def test_walking_back_gives_what_was_there(
     ],
 )
 def test_from_cell_to_platform_and_back(law: Eyelets | Bearings) -> None:
-    """The same walk in the other order, the rope running the other way along it."""
+    """The same walk in the other order, the cable running the other way along it."""
     wound_in = np.array([-0.5, -0.01, 0.0, 0.003, 0.2])
     platform = np.array([100.0, 200.0, 300.0, 400.0, 500.0])
     cell = over_pulleys(platform, WRAPS[::-1], wound_in, law)
@@ -120,7 +120,7 @@ def summed_friction(wraps: tuple[float, ...], friction: float, *, printed: bool)
 
 
 def test_eq_24_has_the_last_pulleys_ratio_under_every_root() -> None:
-    """What all pulleys rub adds up to what the rope loses, T_4 − T_1; not as it is printed."""
+    """What all pulleys rub adds up to what the cable loses, T_4 − T_1; not as it is printed."""
     wraps = (pi / 2, pi, pi / 3)
     lost = float(over_pulleys(1.0, wraps[::-1], 1.0, Bearings(0.05))) - 1
     assert summed_friction(wraps, 0.05, printed=False) == pytest.approx(lost, rel=1e-12)

@@ -121,7 +121,7 @@ def test_eq_13_speed_needs_the_whole_circumference() -> None:
     assert found == pytest.approx(286.5, abs=0.05)
     printed = 0.05 * 30 / (pi * 0.05) * 60
     assert printed == pytest.approx(2 * found)
-    # Turning at that speed the rope runs at 0.05 m/s.
+    # Turning at that speed the cable runs at 0.05 m/s.
     assert found / 60 / 30 * 2 * pi * 0.05 == pytest.approx(0.05)
 
 
@@ -211,7 +211,7 @@ def test_a_belt_is_as_long_as_its_straight_and_round_parts() -> None:
 
 @given(st.floats(1, 1e3), st.floats(1, 1e3), st.floats(0, pi))
 def test_eq_22_is_right_with_alpha_the_wrap_angle(before: float, after: float, wrap: float) -> None:
-    """The rope pulls along −x where it comes and turns by the wrap: add the two vectors."""
+    """The cable pulls along −x where it comes and turns by the wrap: add the two vectors."""
     pull = np.array([-before, 0.0]) + after * np.array([cos(wrap), sin(wrap)])
     found = float(normal_force(np.asarray(before), np.asarray(after), wrap))
     assert found == pytest.approx(hypot(*pull), abs=1e-6)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from report_answers import (
+    ELASTIC,
     FIVE_CORNERS,
     FRICTION,
     NOISY,
-    STRETCH,
     answer_of,
     answered,
+    diagnosis_of,
     recorded,
     recorded_both,
-    told,
 )
 from winchkit.catalog import find
 from winchkit.diagnosis.add import add
@@ -47,13 +47,13 @@ def test_the_story_fits_a_terminal(bench: str) -> None:
 
 
 @pytest.mark.parametrize("bench", ["demo-elastic-rope", "demo-adequate", "five-cornered-drum"])
-def test_every_verdict_tells_what_these_runs_could_show_and_what_not(bench: str) -> None:
+def test_every_verdict_has_the_detectable_effects(bench: str) -> None:
     answer = answer_of(bench)
     text = report_text(answer)
     rows = visible(answer)
     able = sum(row.share <= 1 for row in rows)
     blind = [effect for effect, _ in untestable(answer)]
-    head = f"would have shown {able} of {len(rows) + len(blind)} effects in their usual size"
+    head = f"(90 % power): {able} of {len(rows) + len(blind)} effects at typical size"
     assert head in text
     faint = [row.effect for row in rows if not row.share <= 1]
     assert faint
@@ -75,22 +75,23 @@ def test_several_effects_are_told_by_what_each_buys() -> None:
     stretch, drag = "cable-elongation-linear", "motor-coulomb"
     assert {step.effects[0] for step in answer.diagnosis.steps} == {stretch, drag}
     rows = {line[:34].strip(): line[34:].split() for line in report_text(answer).splitlines()}
-    # With two effects, one alone is all but the other; the rope moves the length, the drag not.
+    # With two effects, one alone is all but the other; the cable moves the length, the drag not.
     assert rows[f"only {stretch}"] == rows[f"all but {drag}"]
-    assert rows[f"only {drag}"][:2] == rows["profile as it is"][:2] != rows[f"only {stretch}"][:2]
+    assert rows[f"only {drag}"][:2] == rows["unchanged profile"][:2] != rows[f"only {stretch}"][:2]
 
 
 def test_errors_before_and_after_stand_beside_the_noise() -> None:
-    text = report_text(saying(told("explained", STRETCH)))
+    text = report_text(saying(diagnosis_of("explained", ELASTIC)))
     (row,) = [line for line in text.splitlines() if line.startswith("  cable length")]
     assert row.split() == ["cable", "length", "1.63", "mm", "0.360", "mm", "0.300", "mm"]
 
 
 def test_without_a_name_there_is_no_after() -> None:
-    text = report_text(saying(told("unknown", where=FIVE_CORNERS, unexplained_share=1.0)))
+    text = report_text(saying(diagnosis_of("unknown", where=FIVE_CORNERS, unexplained_share=1.0)))
     head = next(line for line in text.splitlines() if "held-out" in line)
     assert head.split()[-2:] == ["error", "noise"]
-    assert "  tension, 5 times per drum turn (44 % of its error)" in text.splitlines()
+    line = "  tension, 5 periods per drum turn (44 % of its residual variance)"
+    assert line in text.splitlines()
 
 
 def test_rivals_are_shown_with_their_angle_and_the_run_that_separates_them() -> None:
@@ -98,26 +99,26 @@ def test_rivals_are_shown_with_their_angle_and_the_run_that_separates_them() -> 
         NextRun(("pulley-coulomb", "pulley-capstan"), "full stroke, three loads", 0.93),
         NextRun(("pulley-coulomb", "pulley-capstan"), "change a wrap angle", float("nan")),
     )
-    text = report_text(saying(told("explained", FRICTION, next_runs=runs)))
-    assert "pulley-coulomb / pulley-capstan  0.1° apart" in text
+    text = report_text(saying(diagnosis_of("explained", FRICTION, next_runs=runs)))
+    assert "pulley-coulomb / pulley-capstan  0.1° between signatures" in text
     assert "full stroke, three loads (power 93 %)" in text
     assert "change a wrap angle" in [line.rpartition(": ")[2] for line in text.splitlines()]
 
 
 def test_too_much_to_say_is_cut_and_says_so() -> None:
     notes = tuple(f"run number {n} has something about it" for n in range(90))
-    lines = report_text(saying(told("explained", STRETCH, notes=notes))).splitlines()
+    lines = report_text(saying(diagnosis_of("explained", ELASTIC, notes=notes))).splitlines()
     assert len(lines) == 70
-    assert lines[-1] == "… the rest is in --json and --html"
+    assert lines[-1] == "… more in --json and --html"
 
 
-def test_a_comparison_says_how_far_off_and_what_the_error_follows() -> None:
+def test_a_comparison_has_errors_and_their_attribution() -> None:
     error = OutputError(
         "m", 100, None, 2.5, 1.6e-3, 4e-3, -3e-19, None, (("load", 0.82), ("time", 0.1))
     )
     lines = compare_text(Comparison({"cable_length": error}, 2.39e-3, ("a note",))).splitlines()
     assert lines[1].split()[2:] == ["1.60", "mm", "0", "mm", "4.00", "mm", "unknown", "2.50", "m"]
-    assert "  cable length follows load 82 % and time 10 %" in lines
+    assert "  cable length: load 82 % and time 10 %" in lines
     assert "offset of the length instrument, fitted: 2.39 mm" in lines
     assert lines[-1] == "  a note"
 

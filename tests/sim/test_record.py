@@ -161,7 +161,7 @@ def test_the_command_writes_runs_that_can_be_read(suffix: str, tmp_path: Path) -
     run = read_run(entry["path"])
     assert len(run) == entry["rows"]
     assert run.load_mass == 10.0
-    # The rope is longer than declared by what its load stretches it.
+    # The cable is longer than declared by what its load stretches it.
     assert run["cable_length"][0] == pytest.approx(4.0 + 10 * GRAVITY * 5.5 / 90e3, abs=2e-3)
     assert "hidden" not in Path(entry["path"]).read_bytes().decode("latin-1")
 

@@ -66,7 +66,7 @@ class Served:
         self.line.stop()
 
     def bench(self, folder: Path, more: str = "") -> Path:
-        """A wiring file that leads here."""
+        """A bench file that leads here."""
         if self.serial:
             bus = f'kind = "modbus-rtu"\nport = "{self.line.port}"'
         else:

@@ -191,7 +191,7 @@ def test_outliers_cost_a_robust_fit_little() -> None:
 
 
 def test_a_hanging_platform_of_four_ropes_is_calibrated_too() -> None:
-    """Four ropes leave two freedoms; with whole poses measured the rest is overdetermined."""
+    """Four cables leave two freedoms; with whole poses measured the rest is overdetermined."""
     profile = replace(robot().profile, line=robot().profile.line[:4], prior=NO_BOUNDS)
     full = measured(csv(rows(), angles=True))
     cut = {
@@ -262,7 +262,7 @@ def test_proposed_poses_say_more_than_poses_at_random() -> None:
         place, turned = np.array([pose.position]), rotation_of(*np.array([pose.angles]).T)
         structure = structure_matrix(geometry, place, turned)[0]
         weight = np.array([0, 0, -3 * 9.80665, 0, 0, 0])
-        assert nnls(structure, -weight)[1] < 1e-9, "ropes that pull hold the platform"
+        assert nnls(structure, -weight)[1] < 1e-9, "cables that pull hold the platform"
 
     def volume(extra: Measured) -> float:
         joined = {

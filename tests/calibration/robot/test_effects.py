@@ -1,4 +1,4 @@
-"""Effects that join a calibration by name: elastic ropes, home lengths, the payload."""
+"""Effects that join a calibration by name: elastic cables, home lengths, the payload."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from winchkit.runs.poses import Measured
 
 @pytest.fixture(scope="module")
 def elastic() -> tuple[Measured, Measured]:
-    """Poses to fit and to judge by, of ropes of 20 kN (0.5 mm of steel)."""
+    """Poses to fit and to judge by, of cables of 20 kN (0.5 mm of steel)."""
     fit = measured(csv(elastic_rows(90, 7), tension=True))
     return fit, measured(csv(elastic_rows(30, 77, EXACT), angles=True, tension=True))
 
@@ -36,7 +36,7 @@ def test_hidden_elasticity_is_explained_by_the_effect_and_by_nothing_else(
     assert rms(without.validation_after.distance) > 3e-4
     assert rms(shifted.validation_after.distance) > 3e-4
     assert rms(named.validation_after.distance) < 2e-5
-    # The fit without shows it: its ropes seem a hundred times noisier than the encoders are.
+    # The fit without shows it: its cables seem a hundred times noisier than the encoders are.
     assert without.weights.sigma["rope"] > 3e-4
     assert named.weights.sigma["rope"] < 1e-5
     # And says what it lacks.
@@ -104,7 +104,7 @@ def balanced(mass: float, centre: tuple[float, float, float], sigma: float) -> l
 
 
 def stretched(found: tuple[Row, ...], stiffness: float) -> list[Row]:
-    """Rows of ropes that stretch under the profile's platform at 40 N, no cell beside them."""
+    """Rows of cables that stretch under the profile's platform at 40 N, no cell beside them."""
     at_home = replace(found[0], position=HOME, angles=(0.0, 0.0, 0.0))
     begin = pulls(at_home, 3.0, (0.0, 0.0, 0.0), 40.0)
     out = []

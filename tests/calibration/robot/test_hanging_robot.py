@@ -27,7 +27,7 @@ TRACKER, ENCODER, ANGLE = 2e-5, 1e-4, 1e-3
 
 
 def truth() -> Truth:
-    """The upper ropes of the paper's robot, led to points above its platform."""
+    """The upper cables of the paper's robot, led to points above its platform."""
     whole = Truth()
     anchor = tuple((x, y, 0.0635 + 0.002 * i) for i, (x, y, _) in enumerate(whole.anchor[:ROPES]))
     return replace(whole, exit=whole.exit[:ROPES], anchor=anchor)
@@ -44,7 +44,7 @@ def height(pose: Array) -> float:
 
 
 def rest(given: Array, start: Array) -> Array:
-    """The pose of the lowest weight with ropes of these lengths."""
+    """The pose of the lowest weight with cables of these lengths."""
     found = minimize(
         height,
         start,
@@ -57,7 +57,7 @@ def rest(given: Array, start: Array) -> Array:
 
 
 def wound_in(line: int, shorter: float) -> float:
-    """Drum angle since home at which the rope is that much shorter."""
+    """Drum angle since home at which the cable is that much shorter."""
     begin = 2 * pi * truth().turns
     at_home = truth().wound(line, begin)
     return float(brentq(lambda a: truth().wound(line, begin + a) - at_home - shorter, -20, 20))
@@ -124,7 +124,7 @@ def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None
 
 
 def test_proposed_poses_are_such_that_it_rests_there() -> None:
-    """No motion that keeps the ropes' lengths moves the centre of mass up or down."""
+    """No motion that keeps the cables' lengths moves the centre of mass up or down."""
     believed, measured = hanging()
     fit, held = split(measured)
     found = calibrate(believed, fit, held)

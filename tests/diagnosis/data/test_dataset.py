@@ -25,7 +25,7 @@ def compared(profile: WinchProfile, output: str, *, known_weight: bool = False) 
 
 
 def layers_begun(profile: WinchProfile) -> np.ndarray:
-    """Samples after which the rope lies on another layer; it begins at rest on such a step."""
+    """Samples after which the cable lies on another layer; it begins at rest on such a step."""
     wound = 2 * np.pi * profile.reference.wound_turns + RIDE.angle / profile.gearbox.ratio
     return np.flatnonzero(np.diff(np.floor(wound / (2 * np.pi))))
 

@@ -99,7 +99,7 @@ def test_short_runs_are_left_alone_and_quick_ones_are_not_spoilt() -> None:
 
 
 def long_run() -> Run:
-    """Two minutes at 1 kHz of a rope that stretches and a motor that rubs."""
+    """Two minutes at 1 kHz of a cable that stretches and a motor that rubs."""
     random = np.random.default_rng(5)
     time = np.arange(0.0, 120.0, 1 / RATE)
     angle = 150 * np.sin(2 * np.pi * time / 9.0) + 60 * np.sin(2 * np.pi * time / 3.7)

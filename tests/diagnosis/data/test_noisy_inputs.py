@@ -1,4 +1,4 @@
-"""How the rope speeds up, known better than differences of samples tell: loops and ripples.
+"""How the cable speeds up, known better than differences of samples tell: loops and ripples.
 
 The truth is a motion in closed form, with its own second derivative, and a loop that is walked in
 steps of a 64th of a sample.
@@ -23,7 +23,7 @@ RATIO = GROOVED.gearbox.ratio
 TURN = float(
     np.hypot(GROOVED.drum.winding_radius, (GROOVED.drum.groove_pitch or 0.0) / (2 * np.pi))
 )
-"""Rope per drum angle, m/rad."""
+"""Cable per drum angle, m/rad."""
 STIFFNESS, FRACTION = 2e4, 0.03
 AMPLITUDE, ORDER, PHASE = 1.5e-3, 4.0, 0.4
 NOISE = {"cable_length": 1e-4, "tension": 0.4, "motor_torque": 3e-3}
@@ -74,7 +74,7 @@ def recorded(
 
 
 def rubbing(mass: float, seed: int, *, measured: bool) -> Run:
-    """A run whose rope has a loop of hysteresis."""
+    """A run whose cable has a loop of hysteresis."""
     fine = np.arange(COUNT * FINER) / (RATE * FINER)
     angle, _, acceleration = motion(fine, BRISK)
     free = 4.0 - TURN * angle / RATIO

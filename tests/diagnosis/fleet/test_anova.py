@@ -99,4 +99,4 @@ def test_in_words() -> None:
         }
     (text,) = error_texts(shared_errors(winches))
     assert "100 % of the squares in H" in text
-    assert "direction 100 %, 12 % alike in all, most of the difference in H" in text
+    assert "direction 100 %, 12 % common to all, outlying: H" in text

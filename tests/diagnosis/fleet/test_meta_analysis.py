@@ -135,8 +135,8 @@ def test_one_alone_is_named_with_who_would_have_shown_it() -> None:
     assert one.without == ("A",)
     assert one.unsure == ("B", "C", "D")
     assert one.parameters["torque"].value == 0.08
-    assert "in H at least: torque = 80.0 ± 1.0 mN m" in effect_text(one)
-    assert "of B, C and D these runs cannot tell" in effect_text(one)
+    assert "at least in H: torque = 80.0 ± 1.0 mN m" in effect_text(one)
+    assert "not decidable in B, C and D with these runs" in effect_text(one)
 
 
 def test_a_weaker_stiffness_is_the_larger_effect() -> None:
@@ -204,7 +204,7 @@ def test_text_tells_each_winch_in_a_line_and_then_what_is_common() -> None:
     lines = text.splitlines()
     assert lines[0] == "all 8 winches"
     assert [line.split()[0] for line in lines[1:9]] == list(NAMES)
-    assert "in all 8, alike but for H" in " ".join(text.split())
+    assert "in all 8, equal in size except H" in " ".join(text.split())
     assert max(map(len, lines)) <= 80
 
 

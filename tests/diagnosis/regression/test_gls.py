@@ -123,7 +123,7 @@ def test_a_fit_carries_its_own_residual_and_derivative() -> None:
 
 
 def test_bounds_are_kept() -> None:
-    """Data that ask for a rope that shortens under load get one that does not stretch."""
+    """Data that ask for a cable that shortens under load get one that does not stretch."""
     backwards = (term("cable-elongation-linear", axial_stiffness=2e5),)
     regression, inverse_sigma = problem_of(())
     stretch = regression.change(Hypothesis().with_term(backwards[0], regression.n_runs))

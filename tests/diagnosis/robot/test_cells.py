@@ -1,4 +1,4 @@
-"""Rope forces behind what a robot's cells show, whatever the cells do to them."""
+"""Cable forces behind what a robot's cells show, whatever the cells do to them."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def test_an_effect_is_added_on_its_line_and_taken_back(tmp_path: Path) -> None:
 
 
 def test_effects_are_added_removed_and_taken_back_with_the_others_refitted(tmp_path: Path) -> None:
-    """A rope's law brings home lengths along; each line has one, whatever comes after."""
+    """A cable's law brings home lengths along; each line has one, whatever comes after."""
     profile, run = files(tmp_path, "elastic, exit point", count=40, repeats=12)
     names = ("rope", "both", "rope-again", "back")
     rope, both, again, back = (tmp_path / f"{name}.toml" for name in names)

@@ -76,7 +76,7 @@ def columns_of(found: Signatures) -> dict[str, np.ndarray]:
 
 
 def test_updated_signatures_equal_newly_computed_ones() -> None:
-    """A wrong ratio reaches every output, a stretching rope the length alone."""
+    """A wrong ratio reaches every output, a stretching cable the length alone."""
     for grown in (
         term("gear-ratio", ratio_error=0.02),
         term("cable-elongation-linear", axial_stiffness=3e5),

@@ -22,7 +22,7 @@ HIDDEN = {
 }
 
 BENDS = (14000.0, 16000.0, 18000.0)
-"""Force scales of ropes that are nearly straight under 50 to 400 N, N."""
+"""Force scales of cables that are nearly straight under 50 to 400 N, N."""
 
 
 @cache
@@ -105,7 +105,7 @@ def test_the_parsimonious_one_comes_first_and_values_are_of_all(
 
 @cache
 def rope(force_scale: float) -> Diagnosis:
-    """Of a rope that is stiffer when tight: the less so, the larger its ``force_scale``."""
+    """Of a cable that is stiffer when tight: the less so, the larger its ``force_scale``."""
     law = term(
         "cable-elongation-exponential", strain_scale=force_scale / 2e5, force_scale=force_scale
     )
@@ -141,7 +141,7 @@ GUIDED = replace(GROOVED, guide=GuideSpec(screw_lead=0.005, distance=0.3))
 
 
 def guided(offset: float, mismatch: float) -> Diagnosis:
-    """A guide far aside, whose rope bends the more the more its screw is wrong."""
+    """A guide far aside, whose cable bends the more the more its screw is wrong."""
     own = (term("guide-offset", offset=offset, mismatch=mismatch),)
     ride = Ride(samples=400, stroke=400.0)
     runs = [

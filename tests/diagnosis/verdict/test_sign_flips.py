@@ -9,7 +9,7 @@ from diagnosis_runs import Ride, engine_for, term
 from winchkit.diagnosis.verdict.equivalence import equivalence_set
 
 ONE_WAY = Ride(samples=1500, rate=25.0, period=100.0)
-"""Wound in once and not quite out again: a creep can look like a wrong length of rope."""
+"""Wound in once and not quite out again: a creep can look like a wrong length of cable."""
 
 
 @pytest.mark.parametrize("radius_error", [-1e-3, -5e-4, 1e-3])

@@ -37,12 +37,12 @@ RIDES = (Ride(samples=600, stroke=400.0), Ride(samples=600, stroke=150.0))
 
 
 def speed_of(run: Run) -> Array:
-    """Of the rope paid out, m/s, of a grooved drum of 60 mm behind 20.4 turns."""
+    """Of the cable paid out, m/s, of a grooved drum of 60 mm behind 20.4 turns."""
     return np.asarray(-np.gradient(run["motor_angle"], run.time) / 20.4 * 0.06)
 
 
 def driven(hidden: tuple[Term, ...] = (), drag: float = 0.0) -> list[Run]:
-    """Fast and slow under two loads, twice; ``drag``: N per (m/s)² on the rope, in the cell."""
+    """Fast and slow under two loads, twice; ``drag``: N per (m/s)² on the cable, in the cell."""
     out = []
     for i, (ride, mass) in enumerate((r, m) for r in RIDES for m in (10.0, 20.0)):
         for repeat in range(2):

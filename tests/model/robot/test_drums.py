@@ -74,7 +74,7 @@ def test_rope_wound_is_the_integral_of_the_radius(kind: str) -> None:
 @pytest.mark.parametrize("kind", DRUMS)
 @pytest.mark.parametrize("turns", [0.2, 4.0])
 def test_motor_angles_and_back(kind: str, turns: float) -> None:
-    """With 0.2 turns at home some ropes are paid out past the bare drum."""
+    """With 0.2 turns at home some cables are paid out past the bare drum."""
     robot = with_drum(kind, turns)
     poses = near(robot, 2, 50, 0.3)
     angles = robot.motor_angles(poses)

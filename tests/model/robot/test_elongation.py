@@ -90,7 +90,7 @@ def test_correction_is_strain_between_here_and_the_reference(law: ElongationLaw)
 def elastic_pose(robot: Robot, motor_angles: Array, stiffness: float, initial: Array) -> Array:
     """Where a platform on linear springs rests, by solving six balances for six unknowns.
 
-    The drums pay out rope that bears the reference's force; beyond that it stretches.
+    The drums pay out cable that bears the reference's force; beyond that it stretches.
     """
     paid_out = robot.lengths_at(motor_angles)[0] + robot.dead_length
 

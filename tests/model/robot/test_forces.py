@@ -1,4 +1,4 @@
-"""Rope forces against scipy's optimisers, and where one freedom is left against its interval."""
+"""Cable forces against scipy's optimisers, and where one freedom is left against its interval."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def test_a_wrench_that_ropes_from_above_cannot_hold() -> None:
 
 
 def test_a_wrench_beyond_the_matrix_has_no_margin_at_all() -> None:
-    """All ropes through one point: nothing takes a moment."""
+    """All cables through one point: nothing takes a moment."""
     structure = matrix_of(0)
     structure[3:] = 0.0
     moment = np.array([0, 0, 0, 5.0, 0, 0])

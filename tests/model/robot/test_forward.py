@@ -35,7 +35,7 @@ def moved(pose: Pose, step: Array) -> Pose:
 
 
 def suspended(count: int = 4) -> Geometry:
-    """Ropes from the corners of a frame 3 m above to the top of a platform."""
+    """Cables from the corners of a frame 3 m above to the top of a platform."""
     turn = 2 * np.pi * (np.arange(count) + 0.3) / count
     ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(count)], axis=1)
     return Geometry(
@@ -115,7 +115,7 @@ def test_ropes_that_leave_a_freedom_give_no_pose() -> None:
 def heights_in_reach(
     geometry: Geometry, given_lengths: Array, rest: Pose, rng: np.random.Generator
 ) -> Array:
-    """Heights of the centre of mass at random poses around ``rest`` that no rope forbids."""
+    """Heights of the centre of mass at random poses around ``rest`` that no cable forbids."""
     steps = rng.normal(size=(4000, 6)) * 10.0 ** rng.uniform(-4, -1.5, (4000, 1))
     position = rest.position + steps[:, :3]
     rotation = rotation_by(steps[:, 3:]) @ rest.rotation

@@ -1,4 +1,4 @@
-"""Rope lengths against tangents found by search, their derivatives against differences."""
+"""Cable lengths against tangents found by search, their derivatives against differences."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ STEP = 1e-6
 
 
 def tangent_by_search(exit_point: Array, axis: Array, radius: float, anchor: Array) -> float:
-    """Go round the pulley until the rope leaves it straight towards the anchor."""
+    """Go round the pulley until the cable leaves it straight towards the anchor."""
     seen = anchor - exit_point
     outward = seen - (seen @ axis) * axis
     outward /= np.linalg.norm(outward)
@@ -76,7 +76,7 @@ def test_lengths_are_those_of_the_tangent(seed: int) -> None:
 
 
 def one_line(x: float, y: float, radius: float) -> tuple[float, float]:
-    """Length and wrap of a rope that arrives upwards in the origin, anchor at (x, 0, y)."""
+    """Length and wrap of a cable that arrives upwards in the origin, anchor at (x, 0, y)."""
     geometry = Geometry(
         np.zeros((1, 3)), np.zeros((1, 3)), np.array([radius]), np.array([[0.0, 0.0, 1.0]])
     )
@@ -227,7 +227,7 @@ def test_swivel_angle_of_an_upright_pulley_counts_from_x() -> None:
 @few
 @given(seeds)
 def test_structure_matrix_is_virtual_work(seed: int) -> None:
-    """What the ropes take in, force times shortening, is what their wrench does on the platform."""
+    """The work of the cables, force times shortening, is that of their wrench."""
     geometry, poses = random_geometry(seed), random_poses(seed, 4)
     rng = np.random.default_rng(seed)
     velocity, spin, force = rng.normal(size=3), rng.normal(size=3), rng.uniform(1, 9, 8)

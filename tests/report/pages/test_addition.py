@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from report_answers import CALM, NOISY, RUBBING, recorded
+from report_answers import AT_NOISE, FRICTIONAL, NOISY, recorded
 from report_parsed import HOSTILE, Page
 from winchkit.catalog import find
 from winchkit.diagnosis.add import Addition, Grown, add, grow
@@ -21,7 +21,7 @@ from winchkit.report.pages.pages import addition_html
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_profile
 
-STRETCH = "cable-elongation-linear"
+ELASTIC = "cable-elongation-linear"
 
 
 def profile() -> WinchProfile:
@@ -29,7 +29,7 @@ def profile() -> WinchProfile:
 
 
 @cache
-def grown(effect: str = STRETCH) -> Grown:
+def grown(effect: str = ELASTIC) -> Grown:
     return grow(effect, recorded("demo-elastic-rope"), profile())
 
 
@@ -39,14 +39,14 @@ def page() -> Page:
 
 
 def told(**outputs: OutputFit) -> str:
-    term = Term(load_catalogue()[STRETCH], {"axial_stiffness": 249_900.0})
+    term = Term(load_catalogue()[ELASTIC], {"axial_stiffness": 249_900.0})
     values = {"axial_stiffness": Estimate(249_900.0, 7_000.0, "N")}
     return addition_sentence(Addition(outputs, ((term, values),)))
 
 
 def test_the_page_belongs_to_the_figures_of_the_addition() -> None:
     known = grown().addition
-    assert known.to_json() == add(STRETCH, recorded("demo-elastic-rope"), profile()).to_json()
+    assert known.to_json() == add(ELASTIC, recorded("demo-elastic-rope"), profile()).to_json()
     raw = next(word for word in page().words if word.startswith("{"))
     assert json.loads(raw) == json.loads(json.dumps(known.to_json()))
     assert addition_sentence(known) in page().text
@@ -70,7 +70,7 @@ def test_before_and_after_are_drawn_where_the_effect_acts_and_nowhere_else() -> 
         if name.startswith("time-")
     }
     assert names["cable_length"] == ["before", "after"]
-    assert names["tension"] == ["residual"], "a longer rope weighs the same"
+    assert names["tension"] == ["residual"], "a longer cable weighs the same"
     before, after = (
         np.array([v for v in one["values"] if v is not None])
         for one in page().plots["time-cable_length"]["series"]
@@ -83,7 +83,7 @@ def test_before_and_after_are_drawn_where_the_effect_acts_and_nowhere_else() -> 
 def test_the_commands_make_the_profile_and_go_on_with_it() -> None:
     runs = " ".join(run.path or run.name for run in recorded("demo-elastic-rope"))
     for command in (
-        f"winchkit add {STRETCH} --profile nominal.toml --fit {runs} -o 'my better.toml'",
+        f"winchkit add {ELASTIC} --profile nominal.toml --fit {runs} -o 'my better.toml'",
         f"winchkit compare {runs} --profile 'my better.toml'",
         f"winchkit diagnose {runs} --profile 'my better.toml' --html report.html",
     ):
@@ -97,42 +97,45 @@ def test_values_of_all_effects_are_told() -> None:
     rubbing = (friction, {"friction": Estimate(0.015, 0.0001, "1")})
     both = replace(known.addition, terms=(rubbing, (term, values)))
     text = Page(addition_html(replace(known, addition=both), "x")).text
-    assert "pulley-coulombrefittedyour pulleys rubfriction = 0.01500 ± 0.00010" in text
+    row = "pulley-coulombrefittedthe pulleys have Coulomb frictionfriction = 0.01500 ± 0.00010"
+    assert row in text
     assert "Added cable-elongation-linear to the profile" in text
 
 
-def test_what_it_bought_in_words() -> None:
-    assert told(cable_length=NOISY, tension=CALM) == (
-        "Added cable-elongation-linear to the profile: your rope stretches, "
-        "EA = 249.9 ± 7.0 kN. With it the held-out error of the cable length falls from 1.63 mm "
-        "to 0.360 mm; the instruments' noise is 0.300 mm."
+def test_the_change_of_the_held_out_error_in_words() -> None:
+    assert told(cable_length=NOISY, tension=AT_NOISE) == (
+        "Added cable-elongation-linear to the profile: the cable is elastic, "
+        "EA = 249.9 ± 7.0 kN. With it, the held-out error of the cable length falls from 1.63 mm "
+        "to 0.360 mm; the noise floor is 0.300 mm."
     )
 
 
-def test_an_addition_that_buys_nothing_or_harms_says_so() -> None:
-    assert told(tension=CALM).endswith("It leaves the held-out errors as they are.")
-    harmed = replace(RUBBING, heldout_rms_before=3.0e-3, heldout_rms_after=3.6e-3)
+def test_an_addition_without_a_smaller_error_is_reported_so() -> None:
+    assert told(tension=AT_NOISE).endswith("It does not change the held-out errors.")
+    harmed = replace(FRICTIONAL, heldout_rms_before=3.0e-3, heldout_rms_after=3.6e-3)
     text = told(cable_length=NOISY, motor_torque=harmed)
     assert text.endswith(
         "It raises the held-out error of the motor torque from 3.00 mN m to 3.60 mN m."
     )
     assert "falls from 1.63 mm" in text
-    assert "as they are" not in told(motor_torque=harmed)
+    assert "does not change" not in told(motor_torque=harmed)
     known = grown()
     for outputs, chip in (
-        ({"tension": CALM}, "Added without gain"),
-        ({"motor_torque": harmed}, "Added, and worse"),
+        ({"tension": AT_NOISE}, "Added without gain"),
+        ({"motor_torque": harmed}, "Added, with larger errors"),
     ):
         said = replace(known, addition=replace(known.addition, outputs=outputs))
         assert chip in Page(addition_html(said, "x")).text
 
 
 def test_an_effect_of_the_user_is_told_by_its_name() -> None:
-    own = replace(load_catalogue()[STRETCH], id="my-spring", what="A spring of mine.")
+    own = replace(load_catalogue()[ELASTIC], id="my-spring", what="A spring of mine.")
     term = Term(own, {"axial_stiffness": 1.0})
-    said = replace(grown(), addition=Addition({"tension": CALM}, ((term, {}),), notes=(HOSTILE,)))
+    said = replace(
+        grown(), addition=Addition({"tension": AT_NOISE}, ((term, {}),), notes=(HOSTILE,))
+    )
     page = Page(addition_html(said, HOSTILE, HOSTILE, HOSTILE))
-    assert "Added my-spring to the profile. It leaves" in page.text
+    assert "Added my-spring to the profile. It does not change" in page.text
     assert "A spring of mine." in page.text
     assert page.count("script") == 3
     assert page.count("img") == 0

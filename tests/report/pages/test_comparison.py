@@ -82,8 +82,8 @@ def test_every_output_gets_its_sentence_and_the_offset_is_told() -> None:
     text = page_of("demo-elastic-rope").text
     assert "Above the noise" in text
     for name in ("cable length", "tension", "motor torque"):
-        assert f"The {name} is off by" in text
-    assert "it follows the load (" in text
+        assert f"The error of the {name} is" in text
+    assert "it depends on load (" in text
     assert known.offset is not None
     assert f"fitted: {1000 * known.offset:.2f} mm." in text
 
@@ -99,7 +99,7 @@ def test_without_repeats_the_noise_is_not_invented() -> None:
     known = compared(first, read_profile(find("profiles", "bench-spiral")))
     page = Page(comparison_html(known, "x"))
     assert "Noise unknown" in page.text
-    assert "its noise unknown without a repeated run" in page.text
+    assert "its noise is unknown without repeats" in page.text
     assert {plot["noise"] for plot in page.plots.values()} == {None}
 
 
@@ -109,35 +109,35 @@ def test_without_repeats_the_noise_is_not_invented() -> None:
         (
             STRETCHED,
             Attribution("cable_length", "load", 0.82),
-            "The cable length is off by 1.60 mm rms, 4.0 times its noise of 0.400 mm; "
-            "it follows the load (82 % of the error).",
+            "The error of the cable length is 1.60 mm rms, 4.0 times its noise of 0.400 mm; "
+            "it depends on load (82 % of its variance).",
         ),
         (
             STRETCHED,
             Attribution("cable_length", "drum_angle", 0.5, order=5),
-            "The cable length is off by 1.60 mm rms, 4.0 times its noise of 0.400 mm; "
-            "it repeats 5 times per drum turn (50 % of the error).",
+            "The error of the cable length is 1.60 mm rms, 4.0 times its noise of 0.400 mm; "
+            "it has 5 periods per drum turn (50 % of its variance).",
         ),
         (
             replace(STRETCHED, noise_rms=1.5e-3),
             Attribution("cable_length", "load", 0.82),
-            "The cable length is off by 1.60 mm rms, about its noise of 1.50 mm.",
+            "The error of the cable length is 1.60 mm rms, about its noise of 1.50 mm.",
         ),
         (
             replace(STRETCHED, noise_rms=None),
             None,
-            "The cable length is off by 1.60 mm rms, its noise unknown without a repeated run; "
-            "it hardly follows anything that was measured.",
+            "The error of the cable length is 1.60 mm rms; its noise is unknown without repeats; "
+            "no measured variable explains it.",
         ),
         (
             replace(STRETCHED, noise_rms=0.0),
             None,
-            "The cable length is off by 1.60 mm rms, beside its noise of 0 m; "
-            "it hardly follows anything that was measured.",
+            "The error of the cable length is 1.60 mm rms, with its noise of 0 m; "
+            "no measured variable explains it.",
         ),
     ],
 )
-def test_the_distance_in_words(error: OutputError, over: Attribution | None, text: str) -> None:
+def test_the_error_in_words(error: OutputError, over: Attribution | None, text: str) -> None:
     assert distance_text("cable_length", error, over) == text
 
 
@@ -160,9 +160,9 @@ def test_hostile_names_stay_text() -> None:
     assert HOSTILE in "".join(page.words)
 
 
-def test_an_order_within_a_turn_is_told_where_no_trend_is() -> None:
+def test_an_order_within_a_turn_is_reported_without_a_trend() -> None:
     known = held_against("five-cornered-drum").comparison
     text = page_of("five-cornered-drum").text
     assert known.outputs["tension"].follows == ()
-    assert "it repeats 5 times per drum turn" in text
-    assert "nothing that was measured" not in text
+    assert "it has 5 periods per drum turn" in text
+    assert "no measured variable" not in text

@@ -126,7 +126,7 @@ def test_a_stretch_is_drawn_over_the_load() -> None:
         known = np.array([v is not None for v in one["values"]])
         means = np.array([v for v in one["values"] if v is not None])
         slopes.append(np.polyfit(x[known], means, 1)[0])
-    assert slopes[0] > 0, "a stretched rope is longer under more load"
+    assert slopes[0] > 0, "an elastic cable is longer under more load"
     assert abs(slopes[1]) < 0.2 * slopes[0]
 
 
@@ -148,8 +148,8 @@ def test_nothing_named_draws_nothing_after_and_no_ladder() -> None:
     page = page_of("five-cornered-drum")
     names = {one["name"] for plot in page.plots.values() for one in plot["series"]}
     assert names == {"residual"}
-    assert "What each step buys" not in page.text
-    assert "What is left unexplained" in page.text
+    assert "Contribution of each effect" not in page.text
+    assert "Unexplained residual" in page.text
 
 
 def test_the_ladder_begins_and_ends_at_the_figures() -> None:
@@ -169,7 +169,7 @@ def test_a_confusion_set_is_told_with_angles() -> None:
     answer = answer_of("demo-elastic-rope")
     said = replace(answer.diagnosis, steps=(FRICTION,))
     page = Page(report_html(WinchAnswer(answer.engine, answer.result, said), "x"))
-    assert "What these runs cannot tell apart" in page.text
+    assert "Effects that cannot be distinguished with these runs" in page.text
     assert "0.1°" in page.text
 
 
@@ -178,7 +178,7 @@ def test_without_repeats_the_page_says_what_cannot_be_excluded() -> None:
     answer = answered(first)
     assert {o.noise_source for o in answer.diagnosis.outputs.values()} == {"saturated fit"}
     page = Page(report_html(answer, "x"))
-    assert "without a repeated run an unknown one cannot be excluded" in page.text
+    assert "an unknown effect cannot be excluded without repeats" in page.text
 
 
 def test_partly_without_a_name_shows_what_is_left() -> None:
@@ -186,7 +186,7 @@ def test_partly_without_a_name_shows_what_is_left() -> None:
     said = replace(real.diagnosis, verdict="partly", unexplained_share=0.31)
     page = Page(report_html(WinchAnswer(real.engine, real.result, said), "x"))
     assert "Partly explained" in page.text
-    assert "31 % of what stood above the noise is left" in page.text
+    assert "31 % of the residual variance above the noise floor remains" in page.text
 
 
 def test_story_truth_and_commands_are_told() -> None:
@@ -200,7 +200,7 @@ def test_story_truth_and_commands_are_told() -> None:
         )
     )
     assert "The bench was started." in page.text
-    assert page.text.index("elastic rope") > page.text.index("What else was considered")
+    assert page.text.index("elastic rope") > page.text.index("Candidate effects")
     assert "--profile 'my profile.toml' --html report.html" in page.text
     assert "winchkit add cable-elongation-linear" in page.text
 

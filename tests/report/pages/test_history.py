@@ -33,14 +33,14 @@ def test_every_step_has_a_bar_as_long_as_its_error() -> None:
     ]
     # Before, and after each of the two steps: 4 N, 1 N, 0.8 N.
     assert [w / widths[0] for w in widths] == pytest.approx([1.0, 0.25, 0.2], abs=0.002)
-    assert "your pulleys rub" in page.text
+    assert "the pulleys have Coulomb friction" in page.text
     assert "on 2 runs" in page.text
     assert page.count("script") == 0
 
 
 def test_an_empty_ledger_says_so_and_names_stay_text() -> None:
     page = Page(ladder_html(HOSTILE, ()))
-    assert "Nothing was added" in page.text
+    assert "No effect was added" in page.text
     assert page.count("script") == 0
 
 

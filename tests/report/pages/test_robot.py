@@ -60,14 +60,14 @@ def test_the_page_says_what_the_json_says(drum: dict[str, Any]) -> None:
     page, answer = Page(drum["html"]), drum["answer"]
     assert answer["sentence"].replace("\u00a0", " ") in page.text
     assert "drum-radius/2" in page.text
-    assert "These poses cannot tell" in page.text
+    assert "cannot be distinguished with these poses" in page.text
     assert answer["would_change"] in page.text
     assert f"winchkit add drum-radius/2 --profile {drum['robot']}" in page.text
     assert "these runs" not in page.text.lower()
 
 
 def test_errors_are_drawn_over_what_they_follow(drum: dict[str, Any]) -> None:
-    """A wrong radius errs along the rope of its line, and no longer once it is fitted."""
+    """A wrong radius errs along the cable of its line, and no longer once it is fitted."""
     before, after = (drum["answer"]["residuals"][when] for when in ("before", "after"))
     (own,) = [curve for curve in before if curve["output"] == "cable_length"]
     (then,) = [curve for curve in after if curve["output"] == "cable_length"]
@@ -97,7 +97,7 @@ def test_candidates_have_errors_in_the_units_of_the_outputs(drum: dict[str, Any]
 def test_a_rest_is_located_drawn_and_told_within_eighty_columns(unknown: dict[str, Any]) -> None:
     text, page = unknown["text"], Page(unknown["html"])
     assert text.startswith("UNKNOWN")
-    assert "following the platform's x" in text
+    assert "as a function of platform x" in text
     assert "▁" in text
     assert max(map(len, text.splitlines())) <= 80
     assert len(text.splitlines()) <= 70
@@ -113,7 +113,7 @@ def test_a_comparison_and_an_addition_have_pages_too(drum: dict[str, Any], tmp_p
     better = tmp_path / "better.toml"
     call("add", "drum-radius/2", "--fit", run, "-p", profile, "-o", better, "--html", second)
     compared, added = (Page(path.read_text()) for path in (first, second))
-    assert "cable length is off by" in compared.text
+    assert "error of the cable length is" in compared.text
     assert "Written to" in added.text
     assert compared.scripts == added.scripts == []
 
@@ -135,6 +135,7 @@ def test_a_geometry_off_as_a_whole_is_told_so_and_calibrated(
         call("diagnose", drum["run"], "-p", "cabtive", "--json", "--html", page).stdout
     )
     assert answer["steps"][0]["whole"]
-    assert "geometry is off as a whole" in answer["sentence"]
-    assert [rung["model"] for rung in answer["waterfall"]["rungs"]][1].startswith("+ the geometry")
+    assert "geometry of the robot differs as a whole" in answer["sentence"]
+    rungs = [rung["model"] for rung in answer["waterfall"]["rungs"]]
+    assert rungs[1].startswith("+ the whole geometry")
     assert "winchkit calibrate cabtive" in Page(page.read_text()).text

@@ -147,7 +147,7 @@ def test_torque_and_current_limits_hold_a_lift_back(index: int, limited: bool) -
 
 
 def test_each_sign_of_torque_has_its_own_limit() -> None:
-    """A rope cannot push, so a winch's load never asks for negative torque: ask the command."""
+    """A cable cannot push, so a winch's load never asks for negative torque: ask the command."""
     rig = Rig(Flywheel())
     rig.write(0x60E0, 0, 400)
     rig.write(0x60E1, 0, 50)

@@ -1,4 +1,4 @@
-"""The load on its rope against an ODE solver, free fall and statics."""
+"""The load on its cable against an ODE solver, free fall and statics."""
 
 from math import cos, sqrt
 
@@ -15,7 +15,7 @@ MASS, COMPLIANCE = 20.0, 2.5e-5
 
 
 def swinging(end_of: object, speed_of: object, duration: float) -> tuple[float, float]:
-    """Position and speed from scipy, for a rope end that moves."""
+    """Position and speed from scipy, for a cable end that moves."""
     damping = 2 * _DAMPING_RATIO * sqrt(MASS / COMPLIANCE)
 
     def rates(t: float, y: np.ndarray) -> list[float]:

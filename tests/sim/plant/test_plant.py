@@ -49,7 +49,7 @@ def test_the_declared_winch_is_the_nominal_one(profile: WinchProfile, direction:
     assert column(rows, "cable_length") == pytest.approx(length, abs=7e-6)
     assert length[-1] < 2.2
     assert column(rows, "tension") == pytest.approx(column(rows, "load"))
-    # m (g − ℓ̈) over windows that are long beside a climb of the rope on the drum
+    # m (g − ℓ̈) over windows that are long beside a climb of the cable on the drum
     speed = np.gradient(length, time)
     window = 100
     mean = column(rows, "load")[1:].reshape(-1)[: len(rows) // window * window - window]

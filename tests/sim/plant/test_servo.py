@@ -38,7 +38,7 @@ def test_a_load_weighs_the_same_whatever_the_last_portion(portions: tuple[float,
         slopes.append((winch.motor_velocity, winch.load / winch.load_mass - GRAVITY))
     settled = np.array(slopes[len(slopes) // 2 :])
     arm = settled[:, 1] / ramp
-    # The rope's acceleration is the arm times the ramp, within what the arm itself changes.
+    # The cable's acceleration is the arm times the ramp, within what the arm itself changes.
     assert np.ptp(arm) < 0.01 * abs(arm.mean())
     assert abs(arm.mean()) == pytest.approx(abs(_arm(winch)), rel=0.01)
 

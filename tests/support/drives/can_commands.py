@@ -34,7 +34,7 @@ def invoke(*arguments: object, text: str | None = None) -> Result:
 
 @dataclass
 class Served:
-    """A simulated bench and the wiring file that leads to it."""
+    """A simulated bench and the bench file that leads to it."""
 
     live: LiveBench
     file: Path

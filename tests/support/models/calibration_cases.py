@@ -71,7 +71,7 @@ def rows(
 
 @lru_cache(maxsize=4)
 def elastic_rows(count: int, seed: int, noise: Noise | None = None) -> tuple[Row, ...]:
-    """With ropes that stretch, under tensions between 20 and 60 N."""
+    """With cables that stretch, under tensions between 20 and 60 N."""
     pull: Callable[[random.Random], float] = lambda rng: rng.uniform(20.0, 60.0)  # noqa: E731
     return tuple(poses(ELASTIC, count, seed, noise=noise, tension=pull))
 

@@ -21,7 +21,7 @@ def cell_readings(
     stiffness: float = 1500.0,
     shape: float = 1.0,
 ) -> np.ndarray:
-    """Tension at the drum over time, from the platform's and the rope wound in."""
+    """Tension at the drum over time, from the platform's and the cable wound in."""
     pulleys = PreslidingPulleys(friction, stiffness, shape)
     state, out = State(), []
     for load, moved in zip(platform, np.diff(wound, prepend=wound[0]), strict=True):
@@ -34,7 +34,7 @@ def cell_readings(
 
 
 def wander(seconds: float = 40.0, rate: float = 50.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Time, tension at the platform and rope wound in, with reversals of many sizes."""
+    """Time, tension at the platform and cable wound in, with reversals of many sizes."""
     time = np.arange(0, seconds, 1 / rate)
     wound = 0.05 * np.sin(2 * pi * time / 9) + 0.01 * np.sin(2 * pi * time / 2.3)
     return time, 300 + 40 * np.sin(2 * pi * time / 13), wound

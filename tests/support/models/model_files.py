@@ -36,11 +36,11 @@ KINK = Effect(
     parameters=(Parameter("height", "m", null=0.0, typical=1e-3),),
     apply=apply,
     outputs=("cable_length",),
-    what="The rope has a kink.",
+    what="The cable has a kink.",
     formula="l + h exp(-((l - 2.2 m) / 0.15 m)^2)",
     source="the user's own eyes",
     looks_like="A bump at one length.",
-    told_apart="Wind the rope the other way round.",
+    told_apart="Wind the cable the other way round.",
 )
 """
 """A user's own effect, which no catalogue has."""

@@ -15,9 +15,9 @@ from winchkit.sim.bench import profiles_of, programme_path
 from winchkit.sim.record import simulate
 
 NOISY = OutputFit("m", None, 2.5, 1.7e-3, 0.31e-3, 1.63e-3, 0.36e-3, 0.30e-3)
-CALM = OutputFit("N", None, 155.0, 0.75, 0.75, 0.753, 0.753, 0.742)
-RUBBING = OutputFit("N m", 5.0, 0.46, 16.5e-3, 3.0e-3, 16.5e-3, 3.04e-3, 2.88e-3)
-STRETCH = Step(
+AT_NOISE = OutputFit("N", None, 155.0, 0.75, 0.75, 0.753, 0.753, 0.742)
+FRICTIONAL = OutputFit("N m", 5.0, 0.46, 16.5e-3, 3.0e-3, 16.5e-3, 3.04e-3, 2.88e-3)
+ELASTIC = Step(
     ("cable-elongation-linear",),
     {"cable-elongation-linear": {"axial_stiffness": Estimate(249_900.0, 7_000.0, "N")}},
     0.95,
@@ -38,10 +38,10 @@ FIVE_CORNERS = (
 )
 
 
-def told(verdict: str, *steps: Step, **more: object) -> Diagnosis:
+def diagnosis_of(verdict: str, *steps: Step, **more: object) -> Diagnosis:
     """A diagnosis made up from its parts."""
     parts = {
-        "outputs": {"cable_length": NOISY, "tension": CALM},
+        "outputs": {"cable_length": NOISY, "tension": AT_NOISE},
         "candidates": (),
         "detectable": (),
         "unexplained_share": 0.0,
