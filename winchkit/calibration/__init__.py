@@ -4,5 +4,5 @@
 of a cable robot to measured poses; its solver (:mod:`winchkit.model.robot.bundle_adjustment`) and
 its equations also serve the diagnosis of robots. The public functions are
 :func:`~winchkit.calibration.cell.fit.fit_cell` and
-:func:`~winchkit.calibration.robot.calibrate.calibrate`.
+:func:`winchkit.calibrate`.
 """

@@ -5,7 +5,6 @@ Measured runs pass the packages in this order: ``data`` (validation, repeats, sp
 selection of effects) beside ``residuals`` (attribution of what remains), then ``verdict``
 (decision rule, specification test, equivalence sets) and ``design`` (the next experiment).
 ``fleet`` compares several winches; ``robot`` does the same for poses of cable robots. The public
-functions are :func:`~winchkit.diagnosis.compare.compare`,
-:func:`~winchkit.diagnosis.diagnose.diagnose` and :func:`~winchkit.diagnosis.add.add`; their results
-are the dataclasses of ``results``. docs/methods.md describes every test for a statistician.
+functions are :func:`winchkit.compare`, :func:`winchkit.diagnose`,
+:func:`winchkit.plan` and :func:`winchkit.add`; their results are the dataclasses of ``results``. docs/methods.md describes every test for a statistician.
 """

@@ -32,10 +32,10 @@ _SIZES = (0.8, 1.3)
 
 def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
     """Read the declared profile of every winch on the bench."""
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.read import read_profile
 
     return {
-        name: read_winch(find("profiles", wiring.profile, beside=bench.bench.path or None))
+        name: read_profile(find("profiles", wiring.profile, beside=bench.bench.path or None))
         for name, wiring in bench.bench.winch.items()
     }
 

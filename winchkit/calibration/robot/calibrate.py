@@ -121,7 +121,7 @@ def split(measured: Measured) -> tuple[Measured, Measured]:
 def calibrate(
     robot: Robot,
     fit: Measured,
-    validation: Measured,
+    validation: Measured | None = None,
     options: Options | None = None,
     progress: ProgressCallback = lambda text: None,
 ) -> Calibrated:
@@ -133,8 +133,8 @@ def calibrate(
         With the nominal values, which are the means of the priors.
     fit : Measured
         Poses to fit, p of n lines.
-    validation : Measured
-        Poses for the held-out error.
+    validation : Measured, optional
+        Poses for the held-out error; by default every tenth of ``fit``, which is then not fitted.
     options : Options, optional
         Effects, loss and known standard deviations.
     progress : callable, optional
@@ -151,6 +151,8 @@ def calibrate(
         Where the poses have no redundancy, or a measurement is missing that an effect needs.
     """
     options = options or Options()
+    if validation is None:
+        fit, validation = split(fit)
     effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
     begin = perf_counter()
     equations = equations_of(robot, fit, options)
