@@ -6,5 +6,6 @@ selection of effects) beside ``residuals`` (attribution of what remains), then `
 (decision rule, specification test, equivalence sets) and ``design`` (the next experiment).
 ``fleet`` compares several winches; ``robot`` does the same for poses of cable robots. The public
 functions are :func:`winchkit.compare`, :func:`winchkit.diagnose`,
-:func:`winchkit.plan` and :func:`winchkit.add`; their results are the dataclasses of ``results``. docs/methods.md describes every test for a statistician.
+:func:`winchkit.plan` and :func:`winchkit.add`; their results are the dataclasses of ``results``.
+docs/methods.md describes every test for a statistician.
 """
