@@ -81,17 +81,35 @@ def test_log_ends_with_its_rows(served: Path, tmp_path: Path) -> None:
     assert found["output"] == str(path)
 
 
-def test_a_log_that_is_interrupted_ends_with_its_rows_too(served: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_a_log_that_is_interrupted_ends_with_its_rows_too(
+    served: Path, tmp_path: Path, number: int, code: int
+) -> None:
     path = tmp_path / "lift.csv"
     with start("log", "-b", served, "-o", path, "--json") as process:
         end = time.monotonic() + 40
         while not path.is_file() or path.read_bytes().count(b"\n") < 60:
             assert time.monotonic() < end
             time.sleep(0.05)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         out, told = process.communicate(timeout=60)
-    assert process.returncode == 0, told
+    assert process.returncode == code, told
     assert json.loads(out)["rows"] == len(read_run(path))
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_monitor_ends_at_a_signal(served: Path, number: int, code: int) -> None:
+    """Ctrl-C is its usual end."""
+    with start("monitor", "-b", served, "--json") as process:
+        assert process.stdout is not None
+        assert json.loads(process.stdout.readline())["winch"]
+        process.send_signal(number)
+        process.communicate(timeout=60)
+    assert process.returncode == code
 
 
 def test_a_log_that_fails_says_how_many_rows_are_saved(served: Path, tmp_path: Path) -> None:

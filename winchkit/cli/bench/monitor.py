@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.bench.remote.interruption import Terminated
 from winchkit.cli.core.options import bench_option
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import cell
@@ -37,6 +38,8 @@ def command(*, bench: str, period: str, duration: str | None, as_json: bool) -> 
     end = None if limit is None else time.monotonic() + limit
     try:
         (_print_lines if as_json else _show_table)(bench, pause, end)
+    except Terminated:
+        raise
     except KeyboardInterrupt:
         click.echo("", err=True)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.bench.remote.interruption import Terminated
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.options import complete_bench, effects_option
 from winchkit.cli.core.output import echo_json
@@ -85,8 +86,8 @@ def command(
         log = _Log(output, rotate, replace, limit, pause if sinks else _CHECK_PERIOD, sinks)
         try:
             watch(bench, "log", log.follow, log.lose, effects)
-        except KeyboardInterrupt:
-            click.echo("ending the log", err=True)
+        except KeyboardInterrupt as error:
+            log.note_interrupt(error)
         except WinchkitError as error:
             if as_json:
                 echo_json(log.result | {"problem": str(error)})
@@ -96,6 +97,8 @@ def command(
     elif output and not jsonl:
         for file, rows in log.files.items():
             click.echo(f"{file}: {rows} rows")
+    if log.terminated is not None:
+        raise log.terminated
 
 
 class _Log:
@@ -112,6 +115,8 @@ class _Log:
     ) -> None:
         self.files: dict[str, int] = {}
         """Rows by file."""
+        self.terminated: Terminated | None = None
+        """SIGTERM, SIGHUP or a closed terminal, where one has ended it; Ctrl-C is its usual end."""
         self._output, self._rotate, self._replace = output, rotate, replace
         self._limit, self._pause, self._sinks = limit, pause, sinks
         self._counted: dict[str, dict[str, Any]] = {}
@@ -128,6 +133,11 @@ class _Log:
             "rows": sum(self.files.values()),
         }
 
+    def note_interrupt(self, error: KeyboardInterrupt) -> None:
+        """The log ends by an interrupt."""
+        self.terminated = error if isinstance(error, Terminated) else None
+        click.echo("ending the log", err=True)
+
     def lose(self, words: str) -> None:
         """Tell that an owner has gone."""
         goes_on = f"; the log goes on in {self._next()}" if self._output else ""
@@ -143,8 +153,8 @@ class _Log:
         try:
             with _counter_row(station) as show:
                 self._watch(station, file, show)
-        except KeyboardInterrupt:
-            click.echo("ending the log", err=True)
+        except KeyboardInterrupt as error:
+            self.note_interrupt(error)
         except WinchkitError:
             self._note_rows(station, file)
             raise
