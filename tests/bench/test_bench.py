@@ -265,7 +265,7 @@ def test_of_two_stations_that_log_onto_one_path_one_is_refused(
     rows = station.end_log()
     assert other.end_log() == 0
     assert len(read_run(path)) == rows
-    with pytest.raises(UsageError, match="holds a log already"):
+    with pytest.raises(UsageError, match="contains a log already"):
         bench.log(path)
     station.close()
     other.close()

@@ -44,7 +44,7 @@ def survives(path: Path) -> None:
     readers: tuple[Callable[[], object], ...] = (
         lambda: read_run(path),
         lambda: info_of(read_log(path)),
-        lambda: read_log(recover(path, path.with_name(f"saved{path.suffix}")).output),
+        lambda: read_log(recover(path, path.with_name(f"saved{path.suffix}"), replace=True).output),
     )
     for reader in readers:
         with suppress(FileError):

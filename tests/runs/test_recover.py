@@ -26,7 +26,7 @@ def test_recover_never_fails_on_a_cut_log(tmp_path: Path, data: bytes) -> None:
     kept = -1
     for length in [*range(0, 300), *range(300, len(data), 131), len(data)]:
         path.write_bytes(data[:length])
-        found = recover(path, saved)
+        found = recover(path, saved, replace=True)
         assert found.kept >= kept, "a longer file has as much"
         assert found.dropped_pieces == 0
         assert found.was_whole is (length == len(data))
@@ -90,7 +90,7 @@ def test_rows_of_text_are_recovered(tmp_path: Path) -> None:
     data = path.read_bytes()
     for length in range(len(data) + 1):
         path.write_bytes(data[:length])
-        found = recover(path)
+        found = recover(path, replace=True)
         assert found.dropped_pieces == 0
         assert found.kept == max(data[:length].count(b"\n") - 3, 0)
         assert found.dropped_bytes == length - data[:length].rfind(b"\n") - 1
@@ -115,6 +115,10 @@ def test_what_cannot_be_recovered(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "a.mcap"
     with pytest.raises(UsageError, match="would replace"):
         recover(path, path)
+    (tmp_path / "a.recovered.mcap").write_bytes(b"recovered before")
+    with pytest.raises(UsageError, match="exists already"):
+        recover(path)
+    assert (tmp_path / "a.recovered.mcap").read_bytes() == b"recovered before"
     with pytest.raises(RunError, match="no such file"):
         recover(tmp_path / "none.mcap")
     with pytest.raises(FileError, match="cannot be written"):
@@ -143,6 +147,6 @@ def test_what_cannot_be_saved_leaves_what_was_there(
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", full)
         with pytest.raises(FileError, match="No space left"):
-            recover(source, target)
+            recover(source, target, replace=True)
     assert target.read_bytes() == b"what was there"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "saved.mcap"]

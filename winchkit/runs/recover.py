@@ -50,7 +50,9 @@ def recovered_path(path: Path) -> Path:
     return path.with_suffix(f".recovered{path.suffix}")
 
 
-def recover(path: str | Path, output: str | Path | None = None) -> Recovered:
+def recover(
+    path: str | Path, output: str | Path | None = None, *, replace: bool = False
+) -> Recovered:
     """Write the complete records of a file to another, complete one.
 
     Parameters
@@ -59,6 +61,8 @@ def recover(path: str | Path, output: str | Path | None = None) -> Recovered:
         MCAP or CSV file of winchkit, cut off at any position or damaged.
     output : str or Path, optional
         By default ``lift.recovered.mcap`` for ``lift.mcap``.
+    replace : bool
+        Write over a file of that name.
 
     Returns
     -------
@@ -71,12 +75,19 @@ def recover(path: str | Path, output: str | Path | None = None) -> Recovered:
         For a file that is neither MCAP nor CSV.
     FileError
         Where the output cannot be written.
+    UsageError
+        Where the output is the file itself, or exists and is not to be replaced.
     """
     source = Path(path)
     target = Path(output) if output else recovered_path(source)
     suffix = source.suffix.lower()
     if target.resolve() == source.resolve():
         raise UsageError(f"{target}: would replace the file that is to be recovered; name another")
+    if target.exists() and not replace:
+        raise UsageError(
+            f"{target} exists already; name another file, or write over it "
+            "(--replace, in Python replace=True)"
+        )
     data = read_bytes(source, may_be_empty=True)
     if suffix == ".mcap":
         saved, found = _mcap(data, source, target)

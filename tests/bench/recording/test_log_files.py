@@ -34,11 +34,11 @@ def test_an_earlier_log_is_never_written_over_unasked(tmp_path: Path, suffix: st
         fed.run(recorder, 1.0)
     held = path.read_bytes()
     for name in (path, tmp_path / "." / ".." / tmp_path.name / path.name):
-        with pytest.raises(UsageError, match="holds a log already; name another file"):
+        with pytest.raises(UsageError, match="contains a log already; name another file"):
             started(name)
-    with pytest.raises(UsageError, match="holds a log already"):
+    with pytest.raises(UsageError, match="contains a log already"):
         started(path, PARTS), "its parts would stand beside it"
-    with pytest.raises(UsageError, match="holds a log already"):
+    with pytest.raises(UsageError, match="contains a log already"):
         open_writer(path, [("time", "s")])
     assert path.read_bytes() == held
     started(path, replace=True).close()
@@ -82,7 +82,7 @@ def test_nothing_else_writes_to_a_log_that_is_being_written(tmp_path: Path, suff
         with pytest.raises(UsageError, match="another log is being written to it"):
             write_run(other, path)
         with pytest.raises(UsageError, match="another log is being written to it"):
-            recover(tmp_path / f"other.{suffix}", path)
+            recover(tmp_path / f"other.{suffix}", path, replace=True)
     assert len(read_run(path)) == 46
 
 
@@ -116,9 +116,9 @@ def test_a_log_in_parts_holds_the_whole_name(tmp_path: Path, suffix: str) -> Non
         fed.run(recorder, 0.2)
     assert read_log(path).closed is (True if suffix == "mcap" else None)
     kept = [part.read_bytes() for part in recorder.parts]
-    with pytest.raises(UsageError, match="holds a log already"):
+    with pytest.raises(UsageError, match="contains a log already"):
         started(path, PARTS)
-    with pytest.raises(UsageError, match="holds a log already"):
+    with pytest.raises(UsageError, match="contains a log already"):
         started(path)
     assert [part.read_bytes() for part in recorder.parts] == kept
     started(path, replace=True).close()

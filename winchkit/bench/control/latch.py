@@ -153,7 +153,8 @@ class LatchFile:
         for row in record["tripped"]:
             kind, winch, since = str(row["kind"]), str(row["winch"]), str(row["time"])
             self._since[kind, winch] = since
-            message = f"{row['message']} (latched {since})"
+            note = f" (latched {since})"
+            message = str(row["message"]).removesuffix(note) + note
             trips.append(Trip(kind, winch, message, latches=True))
         return tuple(trips)
 

@@ -14,12 +14,13 @@ __all__ = ["command"]
 @click.option(
     "-o", "--output", metavar="OUT", help="Where to; without it FILE with .recovered in its name."
 )
+@click.option("--replace", is_flag=True, help="Write over a file of that name.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def command(file: str, output: str | None, as_json: bool) -> None:
+def command(*, file: str, output: str | None, replace: bool, as_json: bool) -> None:
     """Save everything whole of FILE (.mcap or .csv), which stays as it is."""
     from winchkit.runs.recover import recover
 
-    found = recover(file, output)
+    found = recover(file, output, replace=replace)
     if as_json:
         echo_json({"schema": 1, "file": file, **vars(found)})
         return
