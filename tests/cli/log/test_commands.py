@@ -97,7 +97,7 @@ def test_an_earlier_log_is_not_written_over_unasked(log: Path) -> None:
     assert "contains a log already" in told
     log.rename(log.with_suffix(".003.mcap"))
     told = run("-b", bench, "-o", log, "--rotate", "1s", "--for", "1s", code=2).stderr
-    assert "lift.003.mcap contains a log already" in told, "a part would be read as one of the new log"
+    assert "lift.003.mcap contains a log already" in told, "it would be read as a part of the new"
     run("-b", bench, "-o", log, "--replace", "--for", "1s", code=3)
     assert log.with_suffix(".003.mcap").exists(), "without a bench there is nothing to replace it"
     log.touch()

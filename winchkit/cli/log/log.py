@@ -208,7 +208,9 @@ def _refuse_to_lose(output: str | None) -> None:
     """Raise UsageError where an earlier log would be written over."""
     held = [item for item in _earlier(output) if item.stat().st_size] if output else []
     if held:
-        raise click.UsageError(f"{held[0]} contains a log already; name another file, or --replace.")
+        raise click.UsageError(
+            f"{held[0]} contains a log already; name another file, or --replace."
+        )
 
 
 def _refuse(
