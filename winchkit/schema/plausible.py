@@ -40,7 +40,22 @@ LARGEST: Mapping[str, Bound] = {
 
 
 def check_size(value: float, dimension: str, text: object) -> float:
-    """The value, where it is finite and not beyond its dimension's bound; raises UsageError."""
+    """The value, where it is finite and not beyond its dimension's bound; raises UsageError.
+
+    Parameters
+    ----------
+    value : float
+        SI value.
+    dimension : str
+        Name of the dimension.
+    text : object
+        The value as written, for the message.
+
+    Returns
+    -------
+    float
+        The value.
+    """
     if not math.isfinite(value):
         raise UsageError(f"'{text}' must be finite; leave the key out where there is no value")
     bound = LARGEST.get(dimension)

@@ -139,7 +139,15 @@ _ORDER = ("ask", "load_mass", "temperature", "to", "by", "speed", "acceleration"
 
 
 def write_programme(programme: Programme, path: Path) -> None:
-    """Write a programme file; raises FileError."""
+    """Write a programme file; raises FileError.
+
+    Parameters
+    ----------
+    programme : Programme
+        The programme.
+    path : Path
+        The file.
+    """
     import tomlkit
 
     document = tomlkit.document()

@@ -69,57 +69,235 @@ class Declaration:
 
 
 def read_winch(path: PathLike) -> WinchProfile:
-    """Read a winch's profile."""
+    """Read a winch's profile.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``winch``.
+
+    Returns
+    -------
+    WinchProfile
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "winch", WinchProfile)
 
 
 def read_robot(path: PathLike) -> RobotProfile:
-    """Read a robot's profile, with the winch profiles that its lines name."""
+    """Read a robot's profile, with the winch profiles that its lines name.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``robot``.
+
+    Returns
+    -------
+    RobotProfile
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "robot", RobotProfile)
 
 
 def read_bench(path: PathLike) -> BenchSpec:
-    """Read a bench file; its profiles and devices must exist and fit."""
+    """Read a bench file; its profiles and devices must exist and fit.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``bench``.
+
+    Returns
+    -------
+    BenchSpec
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "bench", BenchSpec)
 
 
 def read_programme(path: PathLike) -> Programme:
-    """Read a motion programme."""
+    """Read a motion programme.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``programme``.
+
+    Returns
+    -------
+    Programme
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "programme", Programme)
 
 
 def read_simbench(path: PathLike) -> SimBench:
-    """Read a simulated bench."""
+    """Read a simulated bench.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``sim-bench``.
+
+    Returns
+    -------
+    SimBench
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "sim-bench", SimBench)
 
 
 def read_device(path: PathLike) -> DeviceSpec:
-    """Read a device file."""
+    """Read a device file.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``device``.
+
+    Returns
+    -------
+    DeviceSpec
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "device", DeviceSpec)
 
 
 def read_size(path: PathLike) -> SizeSpec:
-    """Read a sizing specification."""
+    """Read a sizing specification.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``size``.
+
+    Returns
+    -------
+    SizeSpec
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "size", SizeSpec)
 
 
 def read_calibration(path: PathLike) -> CellCalibration:
-    """Read the calibration of a load cell."""
+    """Read the calibration of a load cell.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``calibration``.
+
+    Returns
+    -------
+    CellCalibration
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "calibration", CellCalibration)
 
 
 def read_tares(path: PathLike) -> TareBook:
-    """Read the host's tares of a bench."""
+    """Read the host's tares of a bench.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``tares``.
+
+    Returns
+    -------
+    TareBook
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "tares", TareBook)
 
 
 def read_any(path: PathLike) -> Declared:
-    """Read a declaration of the kind that it declares."""
+    """Read a declaration of the kind that it declares.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of any kind.
+
+    Returns
+    -------
+    Declared
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return load(path).value
 
 
 def load(path: PathLike, kind: str | None = None) -> Declaration:
-    """Read a declaration with its warnings; ``kind``, if given, is required."""
+    """Read a declaration with its warnings; ``kind``, if given, is required.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file.
+    kind : str, optional
+        Required kind.
+
+    Returns
+    -------
+    Declaration
+        Value and warnings.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     reading = Reading(open_source(path))
     found = reading.source.kind
     if kind is not None and found != kind:

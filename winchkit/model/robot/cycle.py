@@ -25,7 +25,18 @@ _STEPS = 20
 
 
 def flat_pose(pose: Pose) -> list[float]:
-    """The first pose of a batch as twelve floats: position, then the rotation by rows."""
+    """The first pose of a batch as twelve floats: position, then the rotation by rows.
+
+    Parameters
+    ----------
+    pose : Pose
+        Pose, of which the first is taken.
+
+    Returns
+    -------
+    list of float
+        12 floats, m and 1.
+    """
     return [*pose.position[0].tolist(), *pose.rotation[0].ravel().tolist()]
 
 

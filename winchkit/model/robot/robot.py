@@ -221,7 +221,24 @@ def standing(
     tension: Array | None = None,
     temperature: Array | None = None,
 ) -> At:
-    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default."""
+    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default.
+
+    Parameters
+    ----------
+    line : Line
+        The line.
+    motor_angle : (n,) array
+        rad.
+    tension : (n,) array, optional
+        N.
+    temperature : (n,) array, optional
+        Degrees Celsius.
+
+    Returns
+    -------
+    At
+        Inputs of modifiers.
+    """
     zero = np.zeros_like(motor_angle)
     pulled = zero if tension is None else tension
     warm = zero + 20.0 if temperature is None else temperature
@@ -229,7 +246,23 @@ def standing(
 
 
 def cables_of(robot: Robot) -> list[CableLine]:
-    """Lines for the loops of a control cycle."""
+    """Lines for the loops of a control cycle.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    list of CableLine
+        One per line.
+
+    Raises
+    ------
+    UsageError
+        For effects that the loops do not compute.
+    """
     return [_cable(robot, i, winch) for i, winch in enumerate(robot.winches)]
 
 

@@ -30,7 +30,20 @@ _MOTION = (
 
 
 def effects_html(effects: Sequence[Effect], title: str) -> str:
-    """The page of one effect, or of a catalogue with its contents first."""
+    """The page of one effect, or of a catalogue with its contents first.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        The effects.
+    title : str
+        Title of the page.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     contents = [_contents(effects)] if len(effects) > 1 else []
     return page(title, (), *contents, *(_card(effect) for effect in effects))
 
