@@ -266,7 +266,18 @@ def _with_remarks(health: Health, duration: float) -> Health:
 
 
 def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> Samples:
-    """Samples from rows of time, raw counts, value, usable, saturated."""
+    """Samples from rows of time, raw counts, value, usable, saturated.
+
+    Parameters
+    ----------
+    rows : (n, 5) array
+        Time, s, raw counts, value, usable, saturated.
+
+    Returns
+    -------
+    Samples
+        Samples.
+    """
     time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
     return Samples(
         time.astype(float),

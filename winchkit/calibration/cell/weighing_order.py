@@ -57,7 +57,18 @@ def plan(weights: str, series: int) -> tuple[CalibrationPoint, ...]:
 
 
 def spoken(point: CalibrationPoint) -> str:
-    """``5 kg (49.03 N, going up, series 1)``."""
+    """``5 kg (49.03 N, going up, series 1)``.
+
+    Parameters
+    ----------
+    point : CalibrationPoint
+        Requested load.
+
+    Returns
+    -------
+    str
+        Text for the operator.
+    """
     return (
         f"{point.load / GRAVITY:.4g} kg ({point.load:.4g} N, going {point.going}, "
         f"series {point.series})"
