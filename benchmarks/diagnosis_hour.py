@@ -35,7 +35,7 @@ from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects import load_catalogue
 from winchkit.runs import read_run
 from winchkit.runs.run import Channel, Run
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 RATE = 1000.0
 WINCH = Winch("grooved", 0.06, 5e-3, 20.4, 1, 0.0, 6.0, 5.0, 1.5, 90.0, (90.0, 60.0), 0.0)
@@ -174,7 +174,7 @@ def main() -> int:
     args = parser.parse_args()
     folder = args.csv or Path(tempfile.mkdtemp())
     write_profile(WINCH, folder / "hour.toml")
-    profile = read_winch(folder / "hour.toml")
+    profile = read_profile(folder / "hour.toml")
     runs: list[Run] = recordings(args.minutes, args.winches)
     read: dict[str, float] = {}
     if args.csv:

@@ -24,7 +24,7 @@ from campaign.rivals import RIVALS, regression_of
 from campaign.sizes import CATALOGUE, OUTSIDE
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.read import read_run
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 OURS = "winchkit"
 
@@ -59,7 +59,7 @@ class Named:
 
 def all_named(case: Case) -> list[Named]:
     """Every method on one case."""
-    answer = diagnose([read_run(path) for path in case.runs], read_winch(case.profile))
+    answer = diagnose([read_run(path) for path in case.runs], read_profile(case.profile))
     sets = {OURS: tuple(step.effects for step in answer.diagnosis.steps)}
     data = regression_of(answer.engine)
     sets |= {name: tuple((e,) for e in method(data)) for name, method in RIVALS.items()}

@@ -24,7 +24,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme, Step
 from winchkit.schema.read import read_simbench
 from winchkit.sim.bench import hiding, profiles_of
-from winchkit.sim.record import record
+from winchkit.sim.record import simulate
 
 SECONDS = 180.0
 RATE = 50.0
@@ -70,7 +70,7 @@ def recorded(hidden: str) -> tuple[list[Run], WinchProfile]:
     bench = hiding(read_simbench(find("sim", "spiral-bench")), [hidden])
     profiles = profiles_of(bench)
     rows = round(SECONDS * RATE)
-    runs = [cut(run, rows) for run in record(bench, profiles, programme(), seed=1, rate=RATE)]
+    runs = [cut(run, rows) for run in simulate(bench, profiles, programme(), seed=1, rate=RATE)]
     return runs, profiles["A"]
 
 

@@ -7,7 +7,8 @@ import inspect
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from winchkit.catalog import find, names
+from winchkit import find
+from winchkit.catalog import names
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.servo import OptionSpec, PdoSpec, QuirkSpec, ServoSpec
 from winchkit.schema.host_loss import VendorObject, VendorWatchdog

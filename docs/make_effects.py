@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from winchkit.effects import Catalogue, load_catalogue
+from winchkit import load_catalogue
+from winchkit.effects import Catalogue
 from winchkit.effects.card import card
 
 PAGE = Path(__file__).with_name("effects.md")

@@ -14,17 +14,21 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from winchkit import open_bench
-from winchkit.catalog import find
+from winchkit import (
+    LiveBench,
+    SimulatedClock,
+    add,
+    diagnose,
+    find,
+    open_bench,
+    read_profile,
+    read_programme,
+    read_simbench,
+    simulate,
+)
 from winchkit.cli.model.add import write_addition
-from winchkit.diagnosis.add import add
-from winchkit.diagnosis.diagnose import diagnose
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.read import read_programme, read_simbench, read_winch
 from winchkit.schema.simbench import SimBench
-from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live.bench import LiveBench
-from winchkit.sim.record import record
 
 LENGTHS = (3.0, 1.0, 2.0)
 """Cable lengths to go to, m."""
@@ -55,9 +59,9 @@ def main(bench: str = "soft-frame", effect: str | None = None) -> tuple[float, f
     """Record, diagnose, add, move; returns rms position errors before and after, m."""
     declared = read_simbench(find("sim", bench))
     bare = find("profiles", declared.bench.winch["A"].profile)
-    profile = read_winch(bare)
+    profile = read_profile(bare)
     programme = read_programme(str(Path(__file__).with_name("ladder.toml")))
-    runs = list(record(declared, {"A": profile}, programme))
+    runs = list(simulate(declared, {"A": profile}, programme))
     found = diagnose(runs, profile)
     if effect is None:
         if found.diagnosis.verdict != "explained":

@@ -6,13 +6,17 @@ For a real bench only the first lines differ: ``with open_bench("bench.toml") as
 import math
 from pathlib import Path
 
-from winchkit import Bench, open_bench, read_run
-from winchkit.bench.control.snapshot import BenchSnapshot
-from winchkit.catalog import find
-from winchkit.runs.run import Run
-from winchkit.schema.read import read_simbench
-from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live.bench import LiveBench
+from winchkit import (
+    Bench,
+    BenchSnapshot,
+    LiveBench,
+    Run,
+    SimulatedClock,
+    find,
+    open_bench,
+    read_run,
+    read_simbench,
+)
 
 PERIOD = 2.0
 """Period of the waves, s."""

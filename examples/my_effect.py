@@ -6,7 +6,8 @@ then listed, has a card, and is a candidate of the diagnosis like every other ef
 
 import numpy as np
 
-from winchkit.effects import Effect, Parameter, Values
+from winchkit import Effect, Parameter
+from winchkit.effects import Values
 from winchkit.model.stages import At, Path, Stage
 
 CORNERS = 5

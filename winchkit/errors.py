@@ -66,9 +66,13 @@ class Fault:
     """One fault of a file: its place and a description."""
 
     message: str
+    """What is wrong, the value, the limit, and what to do."""
     path: str = ""
+    """File."""
     line: int | None = None
+    """Line of the file, from 1."""
     key: str = ""
+    """Dotted key of a declaration, or column of a run."""
 
     def __str__(self) -> str:
         place = self.path if self.line is None else f"{self.path}:{self.line}"
@@ -77,7 +81,13 @@ class Fault:
 
 
 class FileError(WinchkitError, ValueError):
-    """A file that cannot be used; carries every fault found in it, not only the first."""
+    """A file that cannot be used; carries every fault found in it, not only the first.
+
+    Parameters
+    ----------
+    faults : Fault, sequence of Fault, or str
+        Faults of the file; they are the attribute ``faults``, a tuple.
+    """
 
     exit_code = 3
 

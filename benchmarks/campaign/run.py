@@ -28,12 +28,12 @@ def answer(case: Case) -> Score:
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.errors import WinchkitError
     from winchkit.runs.read import read_run
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.read import read_profile
 
     runs = [read_run(path) for path in case.runs]
     begun = time.perf_counter()
     try:
-        answer = diagnose(runs, read_winch(case.profile))
+        answer = diagnose(runs, read_profile(case.profile))
     except WinchkitError as error:
         # A refusal of good files is an answer too, a wrong one.
         return refused(case, str(error), time.perf_counter() - begun)

@@ -95,12 +95,12 @@ def answer_several(case: Several) -> SeveralScore:
     from winchkit.diagnosis.fleet.meta_analysis import shared_effects
     from winchkit.effects import load_catalogue
     from winchkit.runs.read import read_run
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.read import read_profile
 
     runs, catalogue = [read_run(path) for path in case.runs], load_catalogue()
     winches = {name: [run.of_winch(name) for run in runs] for name in case.hidden}
     begun = time.perf_counter()
-    each = diagnose_each(winches, read_winch(case.profile), catalogue)
+    each = diagnose_each(winches, read_profile(case.profile), catalogue)
     found = {name: answer.diagnosis for name, answer in each}
     shared = tuple(one.to_json() for one in shared_effects(found, catalogue))
     return SeveralScore(

@@ -37,7 +37,7 @@ from winchkit.effects import line_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec, LimitSpec
 from winchkit.schema.devices.device import DeviceSpec
-from winchkit.schema.read import read_device, read_winch
+from winchkit.schema.read import read_device, read_profile
 
 CYCLE, HEARTBEAT = 0.004, 0.05
 LIMITS = LimitSpec(
@@ -202,7 +202,7 @@ def bench(
     """A bench of jogging winches around ``ControlLoop``, not yet running."""
     clock = Clock()
     device = read_device(catalog.find("devices", "generic-cia402"))
-    profile = read_winch(catalog.find("profiles", "bench-spiral"))
+    profile = read_profile(catalog.find("profiles", "bench-spiral"))
     watch = WatchSpec(127, HEARTBEAT, cycle, True, prove=False)
     winches, opened, served = {}, [], []
     with ExitStack() as stack:

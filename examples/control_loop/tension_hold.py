@@ -12,8 +12,7 @@ import argparse
 import math
 from collections.abc import Callable
 
-from winchkit import Bench, open_bench
-from winchkit.bench.control.snapshot import BenchSnapshot
+from winchkit import Bench, BenchSnapshot, open_bench
 
 GAIN = 0.01
 """Cable speed per error, m/s per N."""

@@ -14,9 +14,9 @@ from diagnosis_runs import CATALOGUE, recorded
 from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
-PROFILE = read_winch(find("profiles", "bench-spiral"))
+PROFILE = read_profile(find("profiles", "bench-spiral"))
 HIDDEN = {
     "fat drum": "drum-radius",
     "thick layers": "layer-thickness",

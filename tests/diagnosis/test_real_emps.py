@@ -30,7 +30,7 @@ from winchkit.model.stages import Signals
 from winchkit.runs import read_run
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 VARIABLE = "WINCHKIT_EMPS"
 PROFILE = """\
@@ -90,7 +90,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def profile(source: Path) -> WinchProfile:
-    return read_winch(source)
+    return read_profile(source)
 
 
 @pytest.fixture(scope="module")
@@ -160,7 +160,7 @@ def test_with_friction_the_error_falls_under_nine_percent(
 ) -> None:
     better = tmp_path / "better.toml"
     write_addition(source, addition, ["train.csv"], better)
-    assert error_on_test(line_of(read_winch(better))) < 0.09
+    assert error_on_test(line_of(read_profile(better))) < 0.09
 
 
 def test_the_sizes_are_those_that_others_found(addition: Addition) -> None:

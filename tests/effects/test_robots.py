@@ -170,7 +170,7 @@ def test_every_fault_of_a_robots_effects_is_told_with_its_line(tmp_path: Path) -
 
 def test_a_winch_cannot_have_an_effect_of_robots(tmp_path: Path) -> None:
     from winchkit.effects import check_profile
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.read import read_profile
 
     path = tmp_path / "winch.toml"
     path.write_text(
@@ -179,7 +179,7 @@ def test_a_winch_cannot_have_an_effect_of_robots(tmp_path: Path) -> None:
         "[gearbox]\nratio = 1.0\n[reference]\nwound_turns = 1.0\n"
         '[[effect]]\nid = "home-length"\nlength = "1 mm"\n'
     )
-    assert "only a robot can have it" in str(check_profile(read_winch(path))[0])
+    assert "only a robot can have it" in str(check_profile(read_profile(path))[0])
 
 
 def test_placements_are_those_that_an_effect_declares() -> None:

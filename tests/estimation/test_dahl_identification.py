@@ -27,8 +27,8 @@ from winchkit.schema.profiles.winch import (
     ReferenceSpec,
     WinchProfile,
 )
-from winchkit.schema.read import read_programme, read_simbench, read_winch
-from winchkit.sim.record import record
+from winchkit.schema.read import read_profile, read_programme, read_simbench
+from winchkit.sim.record import simulate
 
 PROFILE = WinchProfile(
     name="w",
@@ -184,9 +184,9 @@ def test_directions_without_data_are_nan() -> None:
 def test_a_simulated_bench_gives_back_what_it_hides() -> None:
     """Recorded with drive, ramp, noise and quantisation: 0.012 and 0.5 N/mm stand in its file."""
     bench = read_simbench(find("sim", "demo-presliding-pulleys"))
-    profile = read_winch(find("profiles", bench.bench.winch["A"].profile))
+    profile = read_profile(find("profiles", bench.bench.winch["A"].profile))
     programme = read_programme(find("sim", "programme-demo"))
-    records = [record_of(run, profile) for run in record(bench, {"A": profile}, programme)]
+    records = [record_of(run, profile) for run in simulate(bench, {"A": profile}, programme)]
     wraps = tuple(pulley.wrap for pulley in profile.pulley)
     found = identify_dahl(records, [wraps], shape=1.0)
     (group,) = found.groups

@@ -30,7 +30,7 @@ from winchkit.schema.profiles.winch import (
     ReferenceSpec,
     WinchProfile,
 )
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 
 def winch(drum: DrumSpec, turns: float = 4.0, length: float | None = 8.0) -> WinchProfile:
@@ -209,4 +209,4 @@ def test_a_flange_below_the_rope_is_a_fault(tmp_path: Path) -> None:
     file = tmp_path / "w.toml"
     file.write_text(FILE.replace("width =", 'flange_radius = "50 mm"\nwidth ='))
     with pytest.raises(FileError, match=r"w\.toml:8: drum\.flange_radius: 0\.05 m must be above"):
-        read_winch(file)
+        read_profile(file)

@@ -15,7 +15,7 @@ from winchkit.errors import UsageError
 from winchkit.model.capacity import turns_at
 from winchkit.model.gearbox import Gearbox, GearStage, worm_stage
 from winchkit.model.guide import FLEET_LIMIT, Guide, guide_of, guide_warnings
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 efficiencies = st.floats(0.3, 1.0)
 stages = st.lists(st.tuples(st.floats(1, 60), efficiencies), min_size=1, max_size=4)
@@ -136,7 +136,7 @@ def test_travel_limits() -> None:
 
 def test_a_guide_that_runs_away_from_the_rope_is_told() -> None:
     """5.2 mm a turn in grooves of 5 mm: after 30 turns 6 mm aside of 100 mm are 3.4 degrees."""
-    profile = read_winch(find("profiles", "bench-grooved"))
+    profile = read_profile(find("profiles", "bench-grooved"))
     assert profile.guide is not None
     assert list(guide_warnings(profile)) == []
     astray = replace(
@@ -158,8 +158,8 @@ def test_a_guide_that_runs_away_from_the_rope_is_told() -> None:
 
 
 def test_the_guide_of_a_profile() -> None:
-    guide = guide_of(read_winch(find("profiles", "bench-grooved")))
+    guide = guide_of(read_profile(find("profiles", "bench-grooved")))
     assert guide == Guide(0.005, 1.0, 0.4, 0.005)
-    bare = replace(read_winch(find("profiles", "bench-grooved")), guide=None)
+    bare = replace(read_profile(find("profiles", "bench-grooved")), guide=None)
     with pytest.raises(UsageError, match="has no"):
         guide_of(bare)

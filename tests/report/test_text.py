@@ -26,7 +26,7 @@ from winchkit.diagnosis.results import Comparison, Diagnosis, NextRun, OutputErr
 from winchkit.report.detectability import untestable, visible
 from winchkit.report.text import addition_text, compare_text, report_text
 from winchkit.report.words.sentence import changes_text, sentence
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 
 def saying(diagnosis: Diagnosis) -> WinchAnswer:
@@ -124,7 +124,7 @@ def test_a_comparison_has_errors_and_their_attribution() -> None:
 
 
 def test_a_comparison_of_real_runs_fits_a_terminal() -> None:
-    profile = read_winch(find("profiles", "bench-spiral"))
+    profile = read_profile(find("profiles", "bench-spiral"))
     lines = compare_text(compare(recorded("demo-elastic-rope"), profile)).splitlines()
     assert len(lines) <= 70
     assert max(map(len, lines)) <= 80
@@ -140,7 +140,7 @@ def test_a_comparison_without_outputs_has_nothing_to_follow() -> None:
 
 
 def test_an_addition_is_told_with_value_and_gain() -> None:
-    profile = read_winch(find("profiles", "bench-spiral"))
+    profile = read_profile(find("profiles", "bench-spiral"))
     addition = add("cable-elongation-linear", recorded("demo-elastic-rope"), profile)
     text = addition_text(replace(addition, outputs={"cable_length": NOISY}))
     (value,) = [line for line in text.splitlines() if "EA = " in line]

@@ -18,8 +18,8 @@ from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
 from winchkit.runs.run import Run
-from winchkit.schema.read import read_programme, read_simbench, read_winch
-from winchkit.sim.record import record
+from winchkit.schema.read import read_profile, read_programme, read_simbench
+from winchkit.sim.record import simulate
 
 EXAMPLES = ROOT / "examples"
 
@@ -27,10 +27,10 @@ EXAMPLES = ROOT / "examples"
 def recorded(bench: str, programme: str | Path, **options: Any) -> list[Run]:
     declared = read_simbench(find("sim", bench))
     profiles = {
-        name: read_winch(find("profiles", wiring.profile))
+        name: read_profile(find("profiles", wiring.profile))
         for name, wiring in declared.bench.winch.items()
     }
-    return list(record(declared, profiles, read_programme(str(programme)), **options))
+    return list(simulate(declared, profiles, read_programme(str(programme)), **options))
 
 
 def test_every_example_is_known_here() -> None:
@@ -41,7 +41,7 @@ def test_every_example_is_known_here() -> None:
 
 def test_ones_own_effect_explains_what_the_catalogue_cannot() -> None:
     runs = recorded("five-cornered-drum", find("sim", "programme-demo"))
-    profile = read_winch(find("profiles", "bench-spiral"))
+    profile = read_profile(find("profiles", "bench-spiral"))
     known = diagnose(runs, profile).diagnosis
     assert known.verdict == "unknown"
     assert any((w.variable, w.order) == ("drum_angle", 5) for w in known.where)

@@ -19,10 +19,10 @@ from winchkit.schema.read import (
     load,
     read_bench,
     read_device,
+    read_profile,
     read_programme,
     read_robot,
     read_simbench,
-    read_winch,
 )
 from winchkit.units import UNITS, format_quantity, parse
 
@@ -70,7 +70,7 @@ fitted = { runs = ["a.csv"], date = 2026-11-21 }
 def test_a_winch_in_si(tmp_path: Path) -> None:
     file = tmp_path / "w.toml"
     file.write_text(FULL_WINCH)
-    winch = read_winch(file)
+    winch = read_profile(file)
     assert winch.drum.winding_radius == 0.06
     assert winch.cable.dead_length == 1.5
     assert winch.path.inclination == pytest.approx(math.pi / 4)

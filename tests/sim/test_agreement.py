@@ -19,7 +19,7 @@ from winchkit.schema.simbench import NoiseSpec
 from winchkit.sim.bench import hiding, profiles_of, programme_path
 from winchkit.sim.physics.parameters import number_names
 from winchkit.sim.physics.table import PHYSICS
-from winchkit.sim.record import record
+from winchkit.sim.record import simulate
 
 LEFT = 0.3
 """Rms that may be left, in units of the noise."""
@@ -83,7 +83,7 @@ def misses(pair: Pair) -> tuple[dict[str, float], dict[str, float]]:
     bench = hiding(replace(bench, noise=NoiseSpec(), truth=warming), [pair.physics])
     profiles = profiles_of(bench)
     programme = replace(read_programme(programme_path("programme-demo")), repeat=1)
-    runs = list(record(bench, profiles, programme))
+    runs = list(simulate(bench, profiles, programme))
     kind = PHYSICS[pair.physics]
     numbers = {pair.names.get(name, name): getattr(kind(), name) for name in number_names(kind)}
     effect = load_catalogue()[pair.effect]

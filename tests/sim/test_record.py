@@ -15,7 +15,7 @@ from winchkit.runs import read_run
 from winchkit.schema.bench import BenchSpec, LimitSpec
 from winchkit.schema.programme import Programme, Step
 from winchkit.schema.simbench import NoiseSpec, SimBench, WinchTruth
-from winchkit.sim.record import record
+from winchkit.sim.record import simulate
 from winchkit.sim.schedule import ASK_PAUSE, schedule
 
 LIMITS = {"A": LimitSpec(speed=0.5, acceleration=1.0, length=(0.5, 5.0))}
@@ -77,7 +77,7 @@ def test_steps_that_do_not_fit(step: Step, message: str) -> None:
 
 
 def test_a_run_shows_the_motion_and_the_load() -> None:
-    runs = list(record(bench(), {"A": GROOVED}, programme(*TWO_LOADS, repeat=2), rate=50.0))
+    runs = list(simulate(bench(), {"A": GROOVED}, programme(*TWO_LOADS, repeat=2), rate=50.0))
     assert [run.name for run in runs] == ["try-10kg-1", "try-20kg-1", "try-10kg-2", "try-20kg-2"]
     for run in runs:
         assert run.time == pytest.approx(np.arange(len(run)) / 50)
@@ -94,7 +94,7 @@ def test_the_seed_is_all_that_differs() -> None:
     motion = programme(*UP_AND_DOWN, repeat=2)
 
     def tension(seed: int) -> list[np.ndarray]:
-        return [run["tension"] for run in record(noisy, {"A": GROOVED}, motion, seed=seed)]
+        return [run["tension"] for run in simulate(noisy, {"A": GROOVED}, motion, seed=seed)]
 
     first, again, other = tension(1), tension(1), tension(2)
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
@@ -104,7 +104,7 @@ def test_the_seed_is_all_that_differs() -> None:
 
 def test_temperature_goes_on_from_run_to_run() -> None:
     warming = bench(truth={"A": WinchTruth(load_mass=10.0, temperature_drift=360.0)})
-    runs = list(record(warming, {"A": GROOVED}, programme(*TWO_LOADS)))
+    runs = list(simulate(warming, {"A": GROOVED}, programme(*TWO_LOADS)))
     assert runs[0]["temperature"][0] == pytest.approx(20.0 + 0.1 * ASK_PAUSE, abs=0.01)
     gained = 0.1 * (runs[0].time[-1] + ASK_PAUSE)
     assert runs[1]["temperature"][0] - runs[0]["temperature"][0] == pytest.approx(gained, abs=0.01)
@@ -112,7 +112,7 @@ def test_temperature_goes_on_from_run_to_run() -> None:
 
 def test_memories_start_afresh_in_every_run() -> None:
     creeping = bench(truth={"A": WinchTruth(hidden=(hide("creeping rope"),), load_mass=10.0)})
-    one, two = record(creeping, {"A": GROOVED}, programme(*UP_AND_DOWN, repeat=2))
+    one, two = simulate(creeping, {"A": GROOVED}, programme(*UP_AND_DOWN, repeat=2))
     assert np.array_equal(one["cable_length"], two["cable_length"])
 
 
@@ -121,7 +121,7 @@ def test_two_winches_share_a_file() -> None:
     wiring = {"A": single.bench.winch["A"], "B": single.bench.winch["A"]}
     pair = SimBench("pair", BenchSpec("pair", wiring, {}), dict.fromkeys("AB", single.truth["A"]))
     motion = programme(Step(winch="B", to=3.5, speed=0.5), Step(to=3.8, speed=0.2))
-    (run,) = record(pair, {"A": GROOVED, "B": GROOVED}, motion)
+    (run,) = simulate(pair, {"A": GROOVED, "B": GROOVED}, motion)
     assert run.winches() == ["A", "B"]
     a, b = run.of_winch("A")["cable_length"], run.of_winch("B")["cable_length"]
     assert a[0] == pytest.approx(b[0]) == pytest.approx(3.8)
@@ -134,7 +134,7 @@ def test_a_load_cell_at_the_platform_needs_no_declared_mass() -> None:
     plain = bench()
     wired = replace(plain.bench.winch["A"], load=plain.bench.winch["A"].cell, cell=None)
     celled = replace(plain, bench=replace(plain.bench, winch={"A": wired}))
-    (run,) = record(celled, {"A": GROOVED}, programme(*UP_AND_DOWN))
+    (run,) = simulate(celled, {"A": GROOVED}, programme(*UP_AND_DOWN))
     assert run.load_mass is None
     assert run["load"][0] == pytest.approx(10 * GRAVITY, rel=1e-3)
     assert "tension" not in run
@@ -143,7 +143,7 @@ def test_a_load_cell_at_the_platform_needs_no_declared_mass() -> None:
 @pytest.mark.parametrize("rate", [0.0, -5.0, 2000.0, float("nan")])
 def test_a_rate_that_cannot_be(rate: float) -> None:
     with pytest.raises(UsageError, match="at most 1000 Hz"):
-        list(record(bench(), {"A": GROOVED}, programme(*UP_AND_DOWN), rate=rate))
+        list(simulate(bench(), {"A": GROOVED}, programme(*UP_AND_DOWN), rate=rate))
 
 
 @pytest.mark.parametrize("suffix", ["csv", "mcap"])

@@ -1,1 +1,6 @@
-"""A wired bench: its winches, control loop, supervisor, recorder and motion programmes."""
+"""An open bench: winches, control loop, supervision, logs, and motion programmes.
+
+``control`` is the control loop, ``drives``, ``cells`` and ``recording`` the devices and logs around
+it, ``commissioning`` the record that permits motion, ``remote`` the processes that share a bench.
+The public functions are :func:`winchkit.open_bench` and :func:`winchkit.attach`.
+"""

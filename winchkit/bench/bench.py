@@ -79,7 +79,27 @@ class Stations(Protocol):
 
 
 class Bench:
-    """An open bench; this process owns it until it is closed."""
+    """An open bench; this process owns it until it is closed.
+
+    Made by :func:`winchkit.open_bench`. ``bench.winch["A"]`` is one of its winches.
+
+    Parameters
+    ----------
+    spec
+        What the bench file declares.
+    clock
+        Clock of the control loop.
+    name
+        What other clients see of this program.
+    ownership
+        Held already by the caller; by default it is taken.
+    serve
+        Starts the server through which other processes take part.
+    realtime
+        Real-time settings: False, ``"try"`` or True.
+    commissioning
+        Whether the opening thread, and no other, may move it without a commissioning record.
+    """
 
     def __init__(
         self,
@@ -92,11 +112,7 @@ class Bench:
         realtime: Request = False,
         commissioning: bool = False,
     ) -> None:
-        """Use :func:`winchkit.open_bench`. Raises every error of opening, with nothing left open.
-
-        ``serve`` starts the server through which other processes take part.
-        With ``commissioning`` the opening thread, and no other, may move it without a record.
-        """
+        """Open it; raises every error of opening, with nothing left open."""
         self.spec = spec
         self.clock = clock
         self.not_commissioned = ""

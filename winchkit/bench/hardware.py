@@ -227,9 +227,9 @@ def _moving(axis: Cia402Axis, rope: RopeMap) -> Callable[[], bool]:
 
 
 def _profile(spec: BenchSpec, winch: WinchWiring) -> WinchProfile:
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.read import read_profile
 
-    return read_winch(catalog.find("profiles", winch.profile, spec.path or None))
+    return read_profile(catalog.find("profiles", winch.profile, spec.path or None))
 
 
 def _open_buses(spec: BenchSpec, clock: Clock, stack: ExitStack) -> dict[str, CanBus]:

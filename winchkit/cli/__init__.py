@@ -1,4 +1,9 @@
-"""The command line. One command a file; this table is all that ``--help`` needs."""
+"""The command line: one file per command, in folders by subject.
+
+``bench``, ``cell``, ``drive``, ``files``, ``log``, ``model`` and ``sim`` have the commands,
+``core`` their common parts. The table below is all that ``--help`` needs: a command imports
+other packages when it runs. :func:`~winchkit.cli.main` is the entry.
+"""
 
 from __future__ import annotations
 

@@ -137,6 +137,11 @@ def add(
     band
         Cut-off frequency of the torque's low-pass filter, Hz.
 
+    Returns
+    -------
+    Addition
+        Every effect with its estimates, and the errors before and after.
+
     Raises
     ------
     UsageError

@@ -63,6 +63,11 @@ def compare(
     band
         Cut-off frequency of the torque's low-pass filter, Hz.
 
+    Returns
+    -------
+    Comparison
+        Errors per output, with their noise floor and their attribution.
+
     Raises
     ------
     RunError

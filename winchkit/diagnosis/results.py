@@ -198,8 +198,8 @@ class Diagnosis:
     @property
     def empirical(self) -> tuple[str, ...]:
         """Empirical effects that would describe the unexplained residual, largest share first."""
-        seen = [empirical_id(w.output, w.variable) for w in self.where if w.frequency is None]
-        return tuple(dict.fromkeys(seen))
+        names = [empirical_id(w.output, w.variable) for w in self.where if w.frequency is None]
+        return tuple(dict.fromkeys(names))
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that ``winchkit diagnose --json`` prints."""

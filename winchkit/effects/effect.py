@@ -39,13 +39,17 @@ class Parameter:
     """One parameter of an effect, as files have it."""
 
     name: str
+    """Key in a profile."""
     unit: str
+    """Unit in a profile."""
     null: float
     """Value at which the effect vanishes; for a shape, the default."""
     typical: float
     """Typical size, in ``unit``: prior scale and secant step."""
     low: float = float("-inf")
+    """Lower bound, in ``unit``."""
     high: float = float("inf")
+    """Upper bound, in ``unit``."""
     role: Literal["amplitude", "shape", "fixed"] = "amplitude"
     """An amplitude scales the effect, a shape changes its form; a fixed one is not fitted."""
     reciprocal: bool = False
@@ -61,24 +65,35 @@ class Effect:
     """A physical effect that a model may contain."""
 
     id: str
+    """Name in profiles and commands."""
     stage: Stage
+    """Quantity that it changes."""
     parameters: tuple[Parameter, ...]
+    """Their values are handed to ``apply``."""
     apply: Callable[[Any, At, Values], Any]
     """Value of the stage with the effect: a pure function, exactly its input at the null."""
     outputs: tuple[Output, ...]
     """Outputs that it changes."""
     what: str
+    """Description in one sentence."""
     formula: str
+    """Equation of the change."""
     source: str
+    """Reference."""
     looks_like: str
+    """Appearance in the residuals."""
     told_apart: str
     """Run that distinguishes it from the effects in ``confused_with``."""
     confused_with: tuple[str, ...] = ()
+    """Effects that are easily mistaken for it."""
     family: str = ""
+    """Group of effects of one physical cause."""
     contains: tuple[str, ...] = ()
     """Effects that are special cases of it and must not be in the same model."""
     needs: tuple[Need, ...] = ()
+    """Channels and parts without which it is no candidate."""
     order: int = 0
+    """Order of application among the effects of one stage."""
     polar: tuple[str, str] | None = None
     """Amplitude and phase fitted as a pair of cosine and sine amplitudes."""
     memory: bool = False

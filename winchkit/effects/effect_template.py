@@ -34,7 +34,8 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 
-from winchkit.effects import Effect, Parameter, Values
+from winchkit import Effect, Parameter
+from winchkit.effects import Values
 from winchkit.model.stages import At, Stage
 from winchkit.model.variables import VARIABLES
 
@@ -97,7 +98,8 @@ order of the drum: the sine is added to the wound length, and torque and tension
 
 import numpy as np
 
-from winchkit.effects import Effect, Parameter, Values
+from winchkit import Effect, Parameter
+from winchkit.effects import Values
 from winchkit.model.stages import At, Path, Stage
 
 ORDER = {order}

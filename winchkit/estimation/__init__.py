@@ -1,4 +1,10 @@
-"""Online estimators for control: tension and elongation from signals that do not measure them."""
+"""Online estimators for control: tension and elongation that no instrument measures.
+
+``dahl`` removes the friction of pulleys from a cell's reading, ``elongation`` corrects a robot's
+kinematics, ``cable_state`` serves the control loop. The public names are
+:class:`winchkit.DahlEstimator`, :func:`winchkit.identify_dahl` and
+:class:`winchkit.ElongationCorrection`.
+"""
 
 from winchkit.estimation.dahl import DahlEstimator, PlatformTension
 from winchkit.estimation.groups import PulleyGroup

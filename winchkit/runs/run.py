@@ -51,11 +51,15 @@ class Run:
     """Channels of one recording, all of shape (n,) on ``time``, and its metadata."""
 
     name: str
+    """Of the file, without its suffix."""
     time: Array
     """Seconds, strictly increasing, shape (n,)."""
     channels: Mapping[str, Channel]
+    """Channel by name, in SI."""
     metadata: Mapping[str, str] = field(default_factory=dict)
+    """Keys and texts, e.g. ``load_mass``."""
     path: str = ""
+    """File; empty where it was not read from one."""
     notes: tuple[str, ...] = ()
     """Notes of the reader, e.g. on a column that was left out."""
 

@@ -1,6 +1,6 @@
 """Readers of declarations in TOML into frozen dataclasses in SI.
 
-    winch = read_winch("profiles/bench-spiral.toml")
+    winch = read_profile("profiles/bench-spiral.toml")
 
 Every function raises FileError with all faults of the file at once, each with its line:
 ``bench.toml:12: winch.A.limits.speed: unknown speed unit 'm/sec'; use one of m/s, mm/s``.
@@ -35,12 +35,12 @@ __all__ = [
     "read_bench",
     "read_calibration",
     "read_device",
+    "read_profile",
     "read_programme",
     "read_robot",
     "read_simbench",
     "read_size",
     "read_tares",
-    "read_winch",
 ]
 
 Declared = (
@@ -68,44 +68,44 @@ class Declaration:
     warnings: tuple[Fault, ...] = ()
 
 
-def read_winch(path: PathLike) -> WinchProfile:
-    """Read a winch's profile.
+def read_profile(path: PathLike) -> WinchProfile:
+    """Read the profile of a winch.
 
     Parameters
     ----------
-    path : PathLike
-        TOML file of the kind ``winch``.
+    path : str or Path
+        File in TOML of the kind ``winch``.
 
     Returns
     -------
     WinchProfile
-        In SI.
+        Drum, gearbox, guide, cable, pulleys, reference and effects, in SI.
 
     Raises
     ------
     FileError
-        With every fault of the file.
+        With every fault of the file, each with its line.
     """
     return _read(path, "winch", WinchProfile)
 
 
 def read_robot(path: PathLike) -> RobotProfile:
-    """Read a robot's profile, with the winch profiles that its lines name.
+    """Read the profile of a cable robot, with the winch profiles that its lines name.
 
     Parameters
     ----------
-    path : PathLike
-        TOML file of the kind ``robot``.
+    path : str or Path
+        File in TOML of the kind ``robot``.
 
     Returns
     -------
     RobotProfile
-        In SI.
+        Platform, home pose, priors and lines, in SI.
 
     Raises
     ------
     FileError
-        With every fault of the file.
+        With every fault of the file, each with its line.
     """
     return _read(path, "robot", RobotProfile)
 
@@ -115,18 +115,18 @@ def read_bench(path: PathLike) -> BenchSpec:
 
     Parameters
     ----------
-    path : PathLike
-        TOML file of the kind ``bench``.
+    path : str or Path
+        File in TOML of the kind ``bench``.
 
     Returns
     -------
     BenchSpec
-        In SI.
+        Buses, and winches with their devices and limits, in SI.
 
     Raises
     ------
     FileError
-        With every fault of the file.
+        With every fault of the file, each with its line.
     """
     return _read(path, "bench", BenchSpec)
 
@@ -136,18 +136,18 @@ def read_programme(path: PathLike) -> Programme:
 
     Parameters
     ----------
-    path : PathLike
-        TOML file of the kind ``programme``.
+    path : str or Path
+        File in TOML of the kind ``programme``.
 
     Returns
     -------
     Programme
-        In SI.
+        Moves, holds and operator requests, in SI.
 
     Raises
     ------
     FileError
-        With every fault of the file.
+        With every fault of the file, each with its line.
     """
     return _read(path, "programme", Programme)
 
@@ -157,18 +157,18 @@ def read_simbench(path: PathLike) -> SimBench:
 
     Parameters
     ----------
-    path : PathLike
-        TOML file of the kind ``sim-bench``.
+    path : str or Path
+        File in TOML of the kind ``sim-bench``.
 
     Returns
     -------
     SimBench
-        In SI.
+        The bench with its true values, hidden effects, noise and faults, in SI.
 
     Raises
     ------
     FileError
-        With every fault of the file.
+        With every fault of the file, each with its line.
     """
     return _read(path, "sim-bench", SimBench)
 
@@ -353,7 +353,7 @@ def _named_winch(reading: Reading, name: str, at: Key) -> WinchProfile | None:
     if path is None:
         return None
     try:
-        return read_winch(path)
+        return read_profile(path)
     except FileError as error:
         reading.faults += error.faults
         return None

@@ -43,10 +43,10 @@ def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
     dict
         By winch.
     """
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.read import read_profile
 
     return {
-        name: read_winch(find("profiles", wiring.profile, beside=bench.bench.path or None))
+        name: read_profile(find("profiles", wiring.profile, beside=bench.bench.path or None))
         for name, wiring in bench.bench.winch.items()
     }
 

@@ -21,7 +21,7 @@ from winchkit.sim.schedule import RunPlan, schedule
 if TYPE_CHECKING:
     from winchkit.runs.run import Run
 
-__all__ = ["record"]
+__all__ = ["simulate"]
 
 Row = tuple[float, dict[str, Measurement]]
 
@@ -38,7 +38,7 @@ _SWITCH_ON = 0.02
 """Hold of the drive before the first sample, s."""
 
 
-def record(
+def simulate(
     bench: SimBench,
     profiles: Mapping[str, WinchProfile],
     programme: Programme,

@@ -19,7 +19,7 @@ from winchkit.effects import load_catalogue, terms_of
 from winchkit.errors import FileError
 from winchkit.estimation.cable_state import RopeNow, Sample
 from winchkit.schema.bench import LimitSpec
-from winchkit.schema.read import read_bench, read_simbench, read_winch
+from winchkit.schema.read import read_bench, read_profile, read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.bench_file import write_bench
@@ -80,7 +80,7 @@ def invoke(*arguments: object) -> Result:
 
 def rope_now(folder: Path, effects: str) -> RopeNow:
     file, profile = write(folder, effects)
-    declared = read_winch(profile)
+    declared = read_profile(profile)
     return RopeNow(declared, terms_of(declared, load_catalogue([file])), 0.0)
 
 
@@ -157,7 +157,7 @@ def test_an_effect_that_fails_under_way_ramps_the_winch_down(
         f"def yields(length, at, values):\n    if at.speed[-1] > 0.3:\n        {body}\n",
     )
     file, profile = write(tmp_path, MINE, own)
-    declared = read_winch(profile)
+    declared = read_profile(profile)
     now = RopeNow(declared, terms_of(declared, load_catalogue([file])), 0.0)
     limits = LimitSpec(0.6, 1.0, (0.5, 9.0))
     rig = Rig(limits, rope=RopeMap.of(now))

@@ -14,7 +14,7 @@ from model_files import edited, invoke
 from winchkit.catalog import find
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 ROWS = 200
 HEADER = 2
@@ -26,7 +26,7 @@ def good_lines() -> list[str]:
     random = np.random.default_rng(1)
     time = np.arange(ROWS) / 50
     angle = 150 * (1 - np.cos(np.pi * np.clip(time - 0.5, 0, 3) / 1.5))
-    line = Line(read_winch(find("profiles", "bench-spiral")))
+    line = Line(read_profile(find("profiles", "bench-spiral")))
     told = line.predict(line.motion(Signals(time, angle, load_mass=10.0)))
     sizes = (("motor_torque", 5e-3), ("tension", 0.8), ("cable_length", 3e-4))
     columns = [time, angle, *(told[n] + s * random.standard_normal(ROWS) for n, s in sizes)]

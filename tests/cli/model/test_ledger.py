@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from model_files import SHIPPED, answer, invoke, record_files
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 
 @pytest.fixture(scope="module")
@@ -43,11 +43,11 @@ def test_every_step_is_noted_and_taken_back(
     assert steps[0]["after"]["motor_torque"] == pytest.approx(torque["heldout_rms_after"])
     assert steps[2]["after"]["motor_torque"] > 2 * steps[1]["after"]["motor_torque"]
     assert "motor-coulomb" not in gone["parameters"]
-    assert read_winch(declared).cable.axial_stiffness == 500e3
-    assert read_winch(first).cable.axial_stiffness != 500e3
+    assert read_profile(declared).cable.axial_stiffness == 500e3
+    assert read_profile(first).cable.axial_stiffness != 500e3
     for path, before in ((third, second), (second, first), (first, declared)):
         assert invoke("undo", "-p", path).exit_code == 0
-        restored, was = read_winch(path), read_winch(before)
+        restored, was = read_profile(path), read_profile(before)
         assert restored.cable == was.cable
         assert [(t.id, t.values) for t in restored.effect] == [(t.id, t.values) for t in was.effect]
         assert restored.ledger == was.ledger
@@ -65,14 +65,14 @@ def test_an_effect_goes_without_runs_too(runs: list[Path], declared: Path, tmp_p
     )
     answer("add", "motor-coulomb", "-p", declared, "--fit", *runs, "-o", added)
     assert invoke("remove", "motor-coulomb", "-p", added, "-o", less).exit_code == 0
-    assert read_winch(less).effect == ()
-    assert read_winch(less).gearbox.efficiency == pytest.approx(1.0, abs=0.02)
+    assert read_profile(less).effect == ()
+    assert read_profile(less).gearbox.efficiency == pytest.approx(1.0, abs=0.02)
     shown = invoke("ledger", "-p", less).stdout
     assert "+ motor-coulomb" in shown
     assert "− motor-coulomb" in shown
     assert "—" in shown
     assert invoke("remove", "gear-efficiency", "-p", less, "-o", less).exit_code == 0
-    assert read_winch(less).gearbox.efficiency is None
+    assert read_profile(less).gearbox.efficiency is None
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,10 @@ from winchkit.diagnosis.design.plan import programme_of
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES
 from winchkit.runs import read_run, write_csv
 from winchkit.schema.programme import Programme
-from winchkit.schema.read import read_programme, read_simbench, read_winch
+from winchkit.schema.read import read_profile, read_programme, read_simbench
 from winchkit.sim.bench import profiles_of
 from winchkit.sim.live.bench_file import write_bench
-from winchkit.sim.record import record
+from winchkit.sim.record import simulate
 
 BENCH = read_simbench(find("sim", "demo-fat-drum"))
 PROFILE = find("profiles", "bench-spiral")
@@ -24,7 +24,7 @@ PROFILE = find("profiles", "bench-spiral")
 
 def recorded(programme: Programme, folder: Path, seed: int) -> list[Path]:
     out = []
-    for run in record(BENCH, profiles_of(BENCH), programme, seed=seed):
+    for run in simulate(BENCH, profiles_of(BENCH), programme, seed=seed):
         out.append(folder / f"{seed}-{run.name}.csv")
         write_csv(run, out[-1])
     return out
@@ -111,13 +111,13 @@ def test_with_a_bench_the_plan_uses_the_room_that_its_limits_leave(
 
 
 def test_a_warmed_programme_asks_for_temperatures_that_a_simulation_obeys(tmp_path: Path) -> None:
-    dataset = prepare([read_run(p) for p in record_files(tmp_path)], read_winch(PROFILE))
+    dataset = prepare([read_run(p) for p in record_files(tmp_path)], read_profile(PROFILE))
     warmed = next(kind for kind in CANDIDATE_PROGRAMMES if len(kind.temperature_rises) > 1)
     programme = programme_of(dataset, warmed, "warm")
     asked = [step.temperature for step in programme.step if step.temperature is not None]
     assert len(asked) == 2
     assert asked[1] == pytest.approx(asked[0] + 15.0)
-    runs = list(record(BENCH, profiles_of(BENCH), programme, rate=10.0))
+    runs = list(simulate(BENCH, profiles_of(BENCH), programme, rate=10.0))
     assert len(runs) == 4
     means = [float(run["temperature"].mean()) for run in runs]
     assert means == pytest.approx([asked[0], asked[1]] * 2, abs=0.1)

@@ -12,7 +12,7 @@ import pytest
 
 from model_files import SHIPPED, answer, invoke, record_files, side_by_side
 from winchkit.runs import read_run, write_csv
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 BOTH = "motor drag, torque=30 mN m", "stretched cell, gain_error=0.02"
@@ -175,7 +175,7 @@ def test_add_builds_on_itself_and_keeps_the_users_words(
     assert written.startswith(text.rstrip("\n"))
     for line in text.splitlines():
         assert line in written.splitlines()
-    effects = read_winch(second).effect
+    effects = read_profile(second).effect
     assert [table.id for table in effects] == ["motor-coulomb", "cell-gain"]
     for table in effects:
         fitted = table.values["fitted"]
@@ -200,7 +200,7 @@ def test_add_refuses_what_is_there(runs: list[Path], profile: Path, tmp_path: Pa
 
 def test_add_may_write_over_its_source(runs: list[Path], profile: Path) -> None:
     answer("add", "motor-coulomb", "-p", profile, "--fit", *runs[:4], "-o", profile)
-    assert [table.id for table in read_winch(profile).effect] == ["motor-coulomb"]
+    assert [table.id for table in read_profile(profile).effect] == ["motor-coulomb"]
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_options_of_add_come_in_any_order(
             arguments.append(words.get(word, word.replace("=P", f"={profile}")))
     result = invoke("add", *arguments)
     assert result.exit_code == 0, result.stderr
-    fitted = read_winch(new).effect[0].values["fitted"]
+    fitted = read_profile(new).effect[0].values["fitted"]
     assert fitted["runs"] == [run.name for run in runs[:2]]
 
 

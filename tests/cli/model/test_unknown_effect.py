@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from model_files import answer, invoke, record_files
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_the_curve_is_offered_added_and_marked(cornered: list[Path], tmp_path: P
     )
     torque = added["outputs"]["motor_torque"]
     assert torque["heldout_rms_after"] < 0.8 * torque["heldout_rms_before"]
-    (table,) = read_winch(new).effect
+    (table,) = read_profile(new).effect
     assert table.values["order"] == 5.0
     assert "Cause unknown" in invoke("effects", table.id).stdout
 

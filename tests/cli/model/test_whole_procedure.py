@@ -16,7 +16,7 @@ from winchkit.bench.control.cable import RopeMap
 from winchkit.catalog import find
 from winchkit.effects import terms_of
 from winchkit.estimation.cable_state import RopeNow, Sample
-from winchkit.schema.read import read_simbench, read_winch
+from winchkit.schema.read import read_profile, read_simbench
 from winchkit.sim.bench import hiding
 from winchkit.sim.live.bench_file import write_bench
 from winchkit.sim.plant.plant import WinchPlant
@@ -107,7 +107,7 @@ def record(programme: Path, physics: str, folder: Path, seed: int) -> list[str]:
 def errors(profile: Path, physics: str, load: float) -> tuple[float, float]:
     """Of length (m) and tension (N), the largest after moves to three lengths with a profile."""
     declared = hiding(read_simbench(find("sim", BENCH)), [physics])
-    nominal, better = read_winch(find("profiles", "bench-spiral")), read_winch(profile)
+    nominal, better = read_profile(find("profiles", "bench-spiral")), read_profile(profile)
     now = RopeNow(better, terms_of(better), load * 9.80665)
     rope = RopeMap.of(now)
     plant = WinchPlant(nominal, declared.truth["A"], seed=1, noise=declared.noise)

@@ -11,7 +11,7 @@ from winchkit.diagnosis.data import decimation as decimate
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.fleet.diagnose import diagnose_each
 from winchkit.effects import load_catalogue
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
@@ -36,7 +36,7 @@ def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, floa
         patched.setattr(decimate, "_WANTED", 1000)
         each = diagnose_each(
             of_winch,
-            read_winch(path),
+            read_profile(path),
             load_catalogue(),
             progress=lambda what, share: heard.append((what, share)),
         )

@@ -13,7 +13,7 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.residuals.attribution import attributions, ranked
 from winchkit.effects import load_catalogue
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Told:
 
 def first_followed(*physics: str) -> dict[str, str]:
     """Per output the variable that its error follows most."""
-    profile = read_winch(find("profiles", "bench-spiral"))
+    profile = read_profile(find("profiles", "bench-spiral"))
     engine = selection_engine(prepare(recorded(*physics), profile), load_catalogue())
     present, _ = engine.fit_with_noise(engine.initial_model)
     out: dict[str, str] = {}

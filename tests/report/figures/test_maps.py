@@ -21,9 +21,9 @@ from winchkit.report.html.chart import Axis, Chart, axis_over, reading
 from winchkit.report.pages.pages import comparison_html
 from winchkit.report.text import compare_text
 from winchkit.report.words.numbers import Scale
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
-PROFILE = read_winch(find("profiles", "bench-spiral"))
+PROFILE = read_profile(find("profiles", "bench-spiral"))
 
 
 def held(bench: str) -> Compared:

@@ -19,13 +19,13 @@ from winchkit.effects.term import Term
 from winchkit.report.pages.addition import addition_sentence
 from winchkit.report.pages.pages import addition_html
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 ELASTIC = "cable-elongation-linear"
 
 
 def profile() -> WinchProfile:
-    return read_winch(find("profiles", "bench-spiral"))
+    return read_profile(find("profiles", "bench-spiral"))
 
 
 @cache

@@ -18,14 +18,14 @@ from winchkit.diagnosis.results import OutputError
 from winchkit.report.figures.plots import Residuals, plots_of
 from winchkit.report.pages.comparison import distance_text
 from winchkit.report.pages.pages import comparison_html
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 
 STRETCHED = OutputError("m", 100, None, 2.5, 1.6e-3, 4e-3, 0.0, 0.4e-3, (("load", 0.82),))
 
 
 @cache
 def held_against(bench: str) -> Compared:
-    return compared(recorded(bench), read_winch(find("profiles", "bench-spiral")))
+    return compared(recorded(bench), read_profile(find("profiles", "bench-spiral")))
 
 
 def page_of(bench: str) -> Page:
@@ -38,7 +38,7 @@ def outputs_drawn(page: Page, kind: str) -> set[str]:
 
 def test_the_page_belongs_to_the_figures_of_the_comparison() -> None:
     known = held_against("demo-elastic-rope")
-    profile = read_winch(find("profiles", "bench-spiral"))
+    profile = read_profile(find("profiles", "bench-spiral"))
     assert known.comparison == compare(recorded("demo-elastic-rope"), profile)
     raw = next(w for w in page_of("demo-elastic-rope").words if w.startswith("{"))
     assert json.loads(raw) == json.loads(json.dumps(known.comparison.to_json()))
@@ -96,7 +96,7 @@ def test_a_true_profile_is_at_the_noise() -> None:
 
 def test_without_repeats_the_noise_is_not_invented() -> None:
     first = [run for run in recorded("demo-adequate") if run.name.endswith("-1")]
-    known = compared(first, read_winch(find("profiles", "bench-spiral")))
+    known = compared(first, read_profile(find("profiles", "bench-spiral")))
     page = Page(comparison_html(known, "x"))
     assert "Noise unknown" in page.text
     assert "its noise is unknown without repeats" in page.text

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from drive_rig import COUNT, Flywheel, Rig
 from winchkit.catalog import find
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 from winchkit.schema.simbench import WinchTruth
 from winchkit.sim.drive.cyclic_modes import MovingAverage
 from winchkit.sim.plant.plant import WinchPlant
@@ -19,7 +19,7 @@ PP, PV, CSP, CSV = 1, 3, 8, 9
 
 
 def winch() -> WinchPlant:
-    return WinchPlant(read_winch(find("profiles", "bench-spiral")), WinchTruth(), seed=2)
+    return WinchPlant(read_profile(find("profiles", "bench-spiral")), WinchTruth(), seed=2)
 
 
 def test_profile_velocity_ramps_and_says_when_it_is_there() -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from drive_rig import COUNT, NODE, Flywheel, Rig
 from winchkit.catalog import find
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 from winchkit.schema.simbench import WinchTruth
 from winchkit.sim.plant.plant import WinchPlant
 
@@ -228,7 +228,7 @@ def test_a_killed_master_stops_the_real_winch_in_time(
     speed: int, moment: float, option: int, mode: int
 ) -> None:
     """At any moment: within the heartbeat time, the ramp and the servo's lag it stands."""
-    profile = read_winch(find("profiles", "bench-spiral"))
+    profile = read_profile(find("profiles", "bench-spiral"))
     rig = Rig(WinchPlant(profile, WinchTruth(load_mass=10.0), seed=1))
     rig.write(0x6007, 0, option)
     rig.write(0x6085, 0, QUICK)
@@ -253,7 +253,7 @@ def test_a_killed_master_stops_the_real_winch_in_time(
 
 def test_a_motor_that_is_dragged_along_does_not_keep_its_drive_in_the_fault_reaction() -> None:
     """A torque limit below the load's weight: the fault follows, and the brake with it."""
-    profile = read_winch(find("profiles", "bench-spiral"))
+    profile = read_profile(find("profiles", "bench-spiral"))
     rig = Rig(WinchPlant(profile, WinchTruth(load_mass=10.0), seed=1))
     rig.enable(CSV)
     rig.write(0x6072, 0, 20)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from drive_rig import Flywheel, Rig
 from winchkit.catalog import find
-from winchkit.schema.read import read_winch
+from winchkit.schema.read import read_profile
 from winchkit.schema.simbench import WinchTruth
 from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.plant.servo import DriveCommand, Servo
@@ -21,7 +21,7 @@ RATED = 2.0
 
 
 def winch(load_mass: float = 10.0) -> WinchPlant:
-    profile = read_winch(find("profiles", "bench-spiral"))
+    profile = read_profile(find("profiles", "bench-spiral"))
     return WinchPlant(profile, WinchTruth(load_mass=load_mass), seed=2)
 
 

@@ -30,7 +30,7 @@ from winchkit.schema.profiles.winch import (
 )
 from winchkit.schema.read import read_programme, read_simbench
 from winchkit.sim.bench import hiding, profiles_of, programme_path
-from winchkit.sim.record import record
+from winchkit.sim.record import simulate
 
 CATALOGUE = load_catalogue()
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
@@ -139,5 +139,5 @@ def recorded(*physics: str, seed: int = 7, bench: str = "spiral-bench") -> tuple
     return tuple(
         run
         for name in ("programme-demo-fast", "programme-demo-slow")
-        for run in record(declared, profiles, read_programme(programme_path(name)), seed=seed)
+        for run in simulate(declared, profiles, read_programme(programme_path(name)), seed=seed)
     )

@@ -17,7 +17,7 @@ from winchkit.runs import write_csv
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.read import read_programme, read_simbench
 from winchkit.sim.bench import hiding, profiles_of, programme_path
-from winchkit.sim.record import record
+from winchkit.sim.record import simulate
 
 KINK = """\
 import numpy as np
@@ -77,7 +77,7 @@ def record_files(
     out = []
     for name in ("programme-demo-fast", "programme-demo-slow"):
         programme = read_programme(programme_path(name))
-        for run in record(declared, profiles_of(declared), programme, seed=11):
+        for run in simulate(declared, profiles_of(declared), programme, seed=11):
             path = folder / f"{run.name}.csv"
             write_csv(change(run) if change else run, path)
             out.append(path)

@@ -10,9 +10,9 @@ from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
 from winchkit.diagnosis.results import Diagnosis, Estimate, OutputFit, Step, Where
 from winchkit.runs.run import Run
-from winchkit.schema.read import read_programme, read_simbench, read_winch
+from winchkit.schema.read import read_profile, read_programme, read_simbench
 from winchkit.sim.bench import profiles_of, programme_path
-from winchkit.sim.record import record
+from winchkit.sim.record import simulate
 
 NOISY = OutputFit("m", None, 2.5, 1.7e-3, 0.31e-3, 1.63e-3, 0.36e-3, 0.30e-3)
 AT_NOISE = OutputFit("N", None, 155.0, 0.75, 0.75, 0.753, 0.753, 0.742)
@@ -56,7 +56,7 @@ def recorded(bench: str) -> tuple[Run, ...]:
     """Runs of the demo's programme on a shipped simulated bench."""
     declared = read_simbench(find("sim", bench))
     programme = read_programme(programme_path("programme-demo"))
-    return tuple(record(declared, profiles_of(declared), programme, seed=3, rate=25.0))
+    return tuple(simulate(declared, profiles_of(declared), programme, seed=3, rate=25.0))
 
 
 @cache
@@ -69,11 +69,11 @@ def recorded_both(first: str, second: str) -> tuple[Run, ...]:
     }
     declared = replace(one, truth=truth)
     programme = read_programme(programme_path("programme-demo"))
-    return tuple(record(declared, profiles_of(declared), programme, seed=3, rate=25.0))
+    return tuple(simulate(declared, profiles_of(declared), programme, seed=3, rate=25.0))
 
 
 def answered(runs: Sequence[Run]) -> WinchAnswer:
-    return diagnose(runs, read_winch(find("profiles", "bench-spiral")))
+    return diagnose(runs, read_profile(find("profiles", "bench-spiral")))
 
 
 @cache

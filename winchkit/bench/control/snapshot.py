@@ -131,12 +131,15 @@ class BenchSnapshot:
     time: float
     """On the bench's clock, s."""
     cycle: int
+    """Number of the control cycle."""
     winch: Mapping[str, WinchSnapshot]
+    """State of each winch."""
     tripped: tuple[Trip, ...] = ()
     """Latched, until a reset."""
     blocked: tuple[Trip, ...] = ()
     """True now, and forbidding motion."""
     overruns: int = 0
+    """Cycles that ended late."""
     warnings: tuple[Trip, ...] = ()
     """What holds and forbids nothing."""
 

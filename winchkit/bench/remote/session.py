@@ -30,12 +30,34 @@ _POLL = 0.05
 def attach(
     bench: str | Path, effects: Sequence[str | Path] = (), *, name: str = "", observer: bool = False
 ) -> RemoteStation:
-    """A station at a bench; a bench process is started where nobody owns it.
+    """Take part in a bench that another process owns; start a bench process where there is none.
 
-    ``name`` is what others see of this program; an ``observer`` never keeps another program from
-    owning the bench. Use it in a ``with`` block: leaving it stops what was started here. Raises
-    the errors of ``open_bench``; NotPermitted for a bench on the interface ``virtual`` that
-    nobody in this process owns.
+    Use it in a ``with`` block: leaving it stops what was started here.
+
+    Parameters
+    ----------
+    bench
+        A bench file.
+    effects
+        Python files with effects of your own that its profiles have.
+    name
+        What other clients see of this program; its file and process by default.
+    observer
+        Whether it orders no motion; an observer never keeps another program from owning the bench.
+
+    Returns
+    -------
+    RemoteStation
+        The operations of the commands: ``jog``, ``move``, ``stop``, ``status`` …
+
+    Raises
+    ------
+    FileError
+        A file of the bench is missing or wrong.
+    ConnectionLost
+        A bus, a device or the owner of the bench does not answer.
+    NotPermitted
+        The bench is on the interface ``virtual``, and nobody in this process owns it.
     """
     from winchkit.schema.read import read_bench
 

@@ -49,14 +49,14 @@ from winchkit.runs.poses import Measured
 
 __all__ = ["Calibrated", "Estimated", "Options", "calibrate", "equations_of", "split"]
 
-Told = Callable[[str], None]
+ProgressCallback = Callable[[str], None]
 
-_EVERY = 10
-_WORDS = {"rope": "lengths by the drums", "position": "positions"}
+_HELD_OUT_EVERY = 10
+_NAMES = {"rope": "lengths by the drums", "position": "positions"}
 _NOISE_ROUNDS = 8
-_SETTLED = 0.03
+_SETTLED_CHANGE = 0.03
 """Relative change of a standard deviation at which variance components have settled."""
-_COARSE = 5.0
+_COARSE_RATIO = 5.0
 """Standard deviation of positions, in that of the exit points' prior, above which a warning is due
 (rule of thumb: a camera may be coarser than a drawing)."""
 
@@ -125,16 +125,16 @@ def split(measured: Measured) -> tuple[Measured, Measured]:
     tuple[Measured, Measured]
         Poses to fit, and held-out poses.
     """
-    held = np.arange(len(measured)) % _EVERY == _EVERY - 1
+    held = np.arange(len(measured)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
     return measured[~held], measured[held]
 
 
 def calibrate(
     robot: Robot,
     fit: Measured,
-    validation: Measured,
+    validation: Measured | None = None,
     options: Options | None = None,
-    tell: Told = lambda text: None,
+    progress: ProgressCallback = lambda text: None,
 ) -> Calibrated:
     """Fit a robot's geometry, winches and named effects to poses.
 
@@ -144,11 +144,11 @@ def calibrate(
         With the nominal values, which are the means of the priors.
     fit : Measured
         Poses to fit, p of n lines.
-    validation : Measured
-        Poses for the held-out error.
+    validation : Measured, optional
+        Poses for the held-out error; by default every tenth of ``fit``, which is then not fitted.
     options : Options, optional
         Effects, loss and known standard deviations.
-    tell : callable, optional
+    progress : callable, optional
         Called with a line of progress.
 
     Returns
@@ -162,18 +162,22 @@ def calibrate(
         Where the poses have no redundancy, or a measurement is missing that an effect needs.
     """
     options = options or Options()
+    if validation is None:
+        fit, validation = split(fit)
     effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
     begin = perf_counter()
     equations = equations_of(robot, fit, options)
     refuse_unfit(equations)
     equations, state = _start(equations, options)
-    solution, weights = _fit(equations, state, options, tell)
+    solution, weights = _fit(equations, state, options, progress)
     observed = observability(equations, solution, weights)
     seconds = perf_counter() - begin
-    judged = replace(equations, measured=validation, forces=_forces(validation, options))
+    held_out_equations = replace(
+        equations, measured=validation, forces=_forces(validation, options)
+    )
     nominal = equations.parameters.nominal
     values = solution.state.values
-    after = errors_at(judged, values)
+    after = errors_at(held_out_equations, values)
     return Calibrated(
         equations=equations,
         solution=solution,
@@ -181,7 +185,7 @@ def calibrate(
         estimates=_estimates(equations.parameters, solution, observed),
         fit_before=errors_at(equations, nominal),
         fit_after=errors_at(equations, values),
-        validation_before=errors_at(judged, nominal),
+        validation_before=errors_at(held_out_equations, nominal),
         validation_after=after,
         observed=observed,
         candidates=candidates(equations, solution, weights, effects),
@@ -235,8 +239,8 @@ def _start(equations: Equations, options: Options) -> tuple[Equations, State]:
     """Nominal parameters within bounds, poses estimated with them, zeros of instruments."""
     low, high = equations.parameters.bounds
     values = np.clip(equations.parameters.nominal, low, high)
-    blind = Weights({**_sigma(equations, options), "swivel": np.inf, "cable_length": np.inf})
-    state = place(equations, State(values, start_of(equations)), blind)
+    placing = Weights({**_sigma(equations, options), "swivel": np.inf, "cable_length": np.inf})
+    state = place(equations, State(values, start_of(equations)), placing)
     parameters = equations.parameters
     for kind, block in (("swivel", "swivel_zero"), ("cable_length", "length_offset")):
         if block in parameters.block:
@@ -251,27 +255,27 @@ def _sigma(equations: Equations, options: Options) -> dict[str, float]:
 
 
 def _fit(
-    equations: Equations, state: State, options: Options, tell: Told
+    equations: Equations, state: State, options: Options, progress: ProgressCallback
 ) -> tuple[Solution, Weights]:
     """Fit and variance components in turn until both have settled."""
     given = options.sigma or {}
     weights = Weights(_sigma(equations, options))
-    solution = solve(equations, state, weights, _teller(tell, "fit"))
+    solution = solve(equations, state, weights, _reporter(progress, "fit"))
     for _ in range(_NOISE_ROUNDS):
         found = replace(re_estimated_weights(solution, weights, given), loss=options.loss)
         if found.loss == weights.loss and _settled(found.sigma, weights.sigma):
             break
         weights = found
-        solution = solve(equations, solution.state, weights, _teller(tell, "refit"))
+        solution = solve(equations, solution.state, weights, _reporter(progress, "refit"))
     return solution, weights
 
 
-def _teller(tell: Told, word: str) -> Callable[[int, float], None]:
-    return lambda step, cost: tell(f"{word}: step {step}, cost {cost:.6g}")
+def _reporter(progress: ProgressCallback, word: str) -> Callable[[int, float], None]:
+    return lambda step, cost: progress(f"{word}: step {step}, cost {cost:.6g}")
 
 
 def _settled(new: Mapping[str, float], old: Mapping[str, float]) -> bool:
-    return all(abs(new[kind] - old[kind]) <= _SETTLED * old[kind] for kind in new)
+    return all(abs(new[kind] - old[kind]) <= _SETTLED_CHANGE * old[kind] for kind in new)
 
 
 def _estimates(
@@ -301,32 +305,36 @@ def _left_out(equations: Equations) -> list[str]:
 
 def _disagreements(equations: Equations, weights: Weights) -> list[str]:
     """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
-    doubt, sigma = float(equations.parameters.std[0]), weights.sigma
-    causes = {
+    prior_std, sigma = float(equations.parameters.std[0]), weights.sigma
+    checks = {
         "rope": "gearbox.direction, the lines' order, [home] and the motor angles there",
         "position": "that the poses are of this robot, in its base frame",
     }
     # A camera may well be coarser than a drawing.
-    most = {"rope": doubt, "position": _COARSE * doubt}
+    most = {"rope": prior_std, "position": _COARSE_RATIO * prior_std}
     return [
-        f"{_WORDS[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the "
+        f"{_NAMES[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the "
         f"standard deviation of the exit points' prior: check {cause}"
-        for kind, cause in causes.items()
+        for kind, cause in checks.items()
         if sigma.get(kind, 0.0) > most[kind]
     ]
 
 
 def _warnings(
-    equations: Equations, solution: Solution, weights: Weights, observed: Observability, lost: int
+    equations: Equations,
+    solution: Solution,
+    weights: Weights,
+    observed: Observability,
+    unfound: int,
 ) -> tuple[str, ...]:
     out = [*equations.measured.notes, *_left_out(equations)]
     out += outside_bounds(equations.parameters)
     # A robust fit has already done what would be advised.
     out += gross_errors(equations, solution) if weights.loss == "least-squares" else []
-    if lost:
+    if unfound:
         out.append(
-            f"{lost} held-out poses were not found from their motor angles: a tension is missing "
-            "that an effect needs, or the cables contradict each other"
+            f"{unfound} held-out poses were not found from their motor angles: a tension is "
+            "missing that an effect needs, or the cables contradict each other"
         )
     out += _disagreements(equations, weights)
     if not solution.converged:

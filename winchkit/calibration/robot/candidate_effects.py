@@ -24,11 +24,11 @@ __all__ = ["Candidate", "candidates"]
 Blocks = Mapping[str, NDArray[np.intp]]
 Values = NDArray[np.float64] | NDArray[np.bool_]
 
-_WORTH = 0.2
+_LEAST_SHARE = 0.2
 """Least share of the cost (rule of thumb)."""
-_SURE = 25.0
+_LEAST_GAIN = 25.0
 """Least fall of the cost, half of χ² (rule of thumb: seven standard deviations)."""
-_ALIKE = 0.1
+_EQUAL_SHARES = 0.1
 """Difference of shares within which the law with fewest parameters is named (rule of thumb)."""
 
 
@@ -64,13 +64,13 @@ def candidates(
             continue
         gain = _gain(equations, solution, weights, (*effects, effect))
         share = gain / max(solution.linear.cost, gain)
-        if gain > _SURE and share > _WORTH:
+        if gain > _LEAST_GAIN and share > _LEAST_SHARE:
             out.append(Candidate(effect, share))
     laws = [c for c in out if c.effect in LAWS]
     if laws:
         best = max(c.share for c in laws)
         # They are in the order of their numbers of parameters.
-        kept = next(c for c in laws if c.share > best - _ALIKE)
+        kept = next(c for c in laws if c.share > best - _EQUAL_SHARES)
         out = [c for c in out if c not in laws or c == kept]
     return tuple(sorted(out, key=lambda c: -c.share))
 
@@ -95,8 +95,8 @@ def _gain(
     )
     values = wider.nominal
     _carry(equations.parameters.block, wider.block, solution.state.values, values)
-    grown = replace(equations, parameters=_with_nominal(equations, wider))
-    linear = linearise(grown, State(values, solution.state.pose), weights)
+    wider_equations = replace(equations, parameters=_with_nominal(equations, wider))
+    linear = linearise(wider_equations, State(values, solution.state.pose), weights)
     held = np.zeros(len(values), dtype=bool)
     _carry(equations.parameters.block, wider.block, solution.held != 0, held)
     free = ~held

@@ -27,12 +27,12 @@ __all__ = [
     "refuse_unfit",
 ]
 
-_SEEN = 1e-11
+_LEAST_EIGENVALUE = 1e-11
 """Least eigenvalue of an identifiable direction, as a share of the largest: above rounding."""
 _SIGNIFICANT = 25.0
 """Variance of rotations over that of their noise above which the platform has turned (rule of
 thumb: five standard deviations)."""
-_BESIDE = 0.1
+_LEAST_COMPLEMENT = 0.1
 """Least singular value of a direction that others do not span (rule of thumb)."""
 _NAMED = 4
 _LISTED = 6
@@ -65,16 +65,22 @@ def observability(equations: Equations, solution: Solution, weights: Weights) ->
     inverse = np.linalg.inv(data + np.eye(len(data)))
     std = scale * np.sqrt(np.maximum(np.diagonal(inverse), 0.0))
     lasting = equations.parameters.lasting
-    calm = _calmed(equations, solution, weights)[np.ix_(lasting, lasting)]
-    values, vectors = np.linalg.eigh(calm)
-    unseen = values < _SEEN * values[-1]
-    words = tuple(_words(equations, calm, vectors[:, unseen], _SEEN * values[-1]))
+    significant = _significant_information(equations, solution, weights)[np.ix_(lasting, lasting)]
+    values, vectors = np.linalg.eigh(significant)
+    unidentifiable = values < _LEAST_EIGENVALUE * values[-1]
+    words = tuple(
+        _words(equations, significant, vectors[:, unidentifiable], _LEAST_EIGENVALUE * values[-1])
+    )
     return Observability(
-        std, values[::-1], int(np.count_nonzero(~unseen)), int(np.count_nonzero(values < 1)), words
+        std,
+        values[::-1],
+        int(np.count_nonzero(~unidentifiable)),
+        int(np.count_nonzero(values < 1)),
+        words,
     )
 
 
-def _calmed(equations: Equations, solution: Solution, weights: Weights) -> Array:
+def _significant_information(equations: Equations, solution: Solution, weights: Weights) -> Array:
     """Information at poses whose rotations are replaced by their significant part.
 
     A platform that never turned seems to turn by the noise of its estimated poses, which would
@@ -84,15 +90,17 @@ def _calmed(equations: Equations, solution: Solution, weights: Weights) -> Array
     mean, home = _mean_rotation(pose.rotation), equations.robot.home.rotation[0]
     turned = rotation_vector(pose.rotation @ mean.T)
     noise = _rotation_noise(solution.linear)
-    off = rotation_vector(mean @ home.T)
-    middle = home if off @ off <= _SIGNIFICANT * np.trace(noise) else mean
+    home_difference = rotation_vector(mean @ home.T)
+    mean_or_home = (
+        home if home_difference @ home_difference <= _SIGNIFICANT * np.trace(noise) else mean
+    )
     size, axes = np.linalg.eigh(turned.T @ turned / many)
-    real = size > _SIGNIFICANT * np.einsum("ik,ij,jk->k", axes, noise, axes)
+    is_significant = size > _SIGNIFICANT * np.einsum("ik,ij,jk->k", axes, noise, axes)
     data = solution.linear.information
-    if not np.all(real):
-        kept = axes * real
-        calm = Pose(pose.position, rotation_by(turned @ kept @ kept.T) @ middle)
-        state = State(solution.state.values, calm)
+    if not np.all(is_significant):
+        kept = axes * is_significant
+        significant = Pose(pose.position, rotation_by(turned @ kept @ kept.T) @ mean_or_home)
+        state = State(solution.state.values, significant)
         data = linearise(equations, state, weights).information
     zeros = equations.parameters.free & ~equations.parameters.lasting
     if not np.any(zeros):
@@ -105,10 +113,10 @@ def _rotation_noise(linear: Linear) -> Array:
     """Mean covariance of the poses' rotations, with that of the parameters, (3, 3)."""
     inverse = np.swapaxes(linear.factor, 1, 2) @ linear.factor
     coupled = np.swapaxes(linear.stack.by_pose, 1, 2) @ linear.stack.by_values
-    follow = (inverse[:, 3:] @ coupled).reshape(-1, coupled.shape[2])
+    by_parameters = (inverse[:, 3:] @ coupled).reshape(-1, coupled.shape[2])
     posterior = np.linalg.inv(linear.information + np.eye(len(linear.gradient)))
-    spread = (follow @ posterior).reshape(len(inverse), 3, -1)
-    spread = spread @ np.swapaxes(follow.reshape(len(inverse), 3, -1), 1, 2)
+    spread = (by_parameters @ posterior).reshape(len(inverse), 3, -1)
+    spread = spread @ np.swapaxes(by_parameters.reshape(len(inverse), 3, -1), 1, 2)
     return np.asarray(np.mean(inverse[:, 3:, 3:] + spread, axis=0))
 
 
@@ -118,21 +126,23 @@ def _mean_rotation(rotation: Array) -> Array:
     return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
 
 
-def _words(equations: Equations, data: Array, unseen: Array, floor: float) -> Iterator[str]:
+def _words(equations: Equations, data: Array, unidentifiable: Array, floor: float) -> Iterator[str]:
     """Directions with a known reason first, then the others by their largest parameters."""
-    if not unseen.shape[1]:
+    if not unidentifiable.shape[1]:
         return
     lasting = equations.parameters.lasting
-    told = np.zeros((int(np.count_nonzero(lasting)), 0))
+    explained = np.zeros((int(np.count_nonzero(lasting)), 0))
     for text, directions in _reasons(equations):
         own = [d[lasting] / np.linalg.norm(d[lasting]) for d in directions]
-        blind = np.array([d for d in own if d @ data @ d < floor]).reshape(-1, len(told))
-        new = _beyond(told, blind.T)
+        not_identifiable = np.array([d for d in own if d @ data @ d < floor]).reshape(
+            -1, len(explained)
+        )
+        new = _complement(explained, not_identifiable.T)
         if count := new.shape[1]:
-            told = np.concatenate([told, new], axis=1)
+            explained = np.concatenate([explained, new], axis=1)
             yield text.format(count=count, s="s" if count > 1 else "")
     names = [p.name for p in equations.parameters if p.std > 0 and not p.zero]
-    others = _beyond(told, unseen).T
+    others = _complement(explained, unidentifiable).T
     for direction in others[:_LISTED]:
         largest = np.argsort(-np.abs(direction))[:_NAMED]
         listed = ", ".join(f"{direction[i]:+.2f} {names[i]}" for i in largest)
@@ -141,11 +151,11 @@ def _words(equations: Equations, data: Array, unseen: Array, floor: float) -> It
         yield f"and {len(others) - _LISTED} more combinations of that kind"
 
 
-def _beyond(told: Array, directions: Array) -> Array:
+def _complement(explained: Array, directions: Array) -> Array:
     """Orthonormal basis of ``directions`` (q, k) with the basis ``told`` (q, m) projected out."""
-    rest = directions - told @ (told.T @ directions)
+    rest = directions - explained @ (explained.T @ directions)
     left, size, _ = np.linalg.svd(rest, full_matrices=False)
-    return np.asarray(left[:, size > _BESIDE])
+    return np.asarray(left[:, size > _LEAST_COMPLEMENT])
 
 
 def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
@@ -167,11 +177,11 @@ def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
     seen = nominal.exit_point - home.position
     whole = [points(np.tile(axis, (lines, 1))) for axis in np.eye(3)]
     for axis in np.eye(3):
-        spun = {
+        rotated = {
             "exit_point": seen @ skew(axis).T,
             "anchor_point": nominal.anchor_point @ (turn.T @ skew(axis) @ turn).T,
         }
-        whole.append(_scaled(equations, spun))
+        whole.append(_scaled(equations, rotated))
     yield (
         "nothing measured ties the platform to the base frame: all exit and anchor points may be "
         "shifted or turned together ({count} direction{s}); measure positions",
@@ -222,7 +232,7 @@ def refuse_unfit(equations: Equations) -> None:
             f"{many} rows: each is a pose at rest, and at most {_MOST} can be fitted; keep the "
             "rows where the platform stood"
         )
-    _near(equations)
+    _refuse_out_of_reach(equations)
     if many < _FEW or known <= 6 * many:
         cure = f"record more poses (90 is a good number, {_FEW} the least)"
         if known <= 6 * many:
@@ -233,15 +243,15 @@ def refuse_unfit(equations: Equations) -> None:
         )
 
 
-def _near(equations: Equations) -> None:
+def _refuse_out_of_reach(equations: Equations) -> None:
     """Refuse positions that a robot of this size cannot reach: wrong unit or frame."""
     exits, home = equations.robot.geometry.exit_point, equations.robot.home.position
     size = float(np.max(np.linalg.norm(exits[:, None] - exits, axis=2)))
-    away = np.linalg.norm(equations.measured.position - home, axis=1)
-    away = away[np.isfinite(away)]
-    if len(away) and float(np.median(away)) > _REACH * size:
+    distance = np.linalg.norm(equations.measured.position - home, axis=1)
+    distance = distance[np.isfinite(distance)]
+    if len(distance) and float(np.median(distance)) > _REACH * size:
         raise UsageError(
-            f"the positions measured lie {float(np.median(away)):.4g} m from home, in a robot "
+            f"the positions measured lie {float(np.median(distance)):.4g} m from home, in a robot "
             f"whose exit points are at most {size:.4g} m apart; is platform_x … in its unit and in "
             "the base frame?"
         )

@@ -18,11 +18,11 @@ _WORDS = {
     "swivel": "swivel angles",
     "cable_length": "cable lengths",
 }
-_FAR = 10.0
+_LIMIT = 10.0
 """Limit in robust standard deviations; the largest of ten thousand normal values is near four."""
 _NORMAL = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
-_MOST = 0.1
+_MOST_SHARE = 0.1
 _LISTED = 5
 
 
@@ -38,23 +38,23 @@ def gross_errors(equations: Equations, solution: Solution) -> list[str]:
     for rows in equations.rows(solution.state):
         if rows.kind not in _WORDS:
             continue
-        far, known = _far(rows.residual)
-        if 0 < np.count_nonzero(far) <= _MOST * known:
-            places = equations.measured.place[np.any(far, axis=1)].tolist()
-            more = f" and {len(places) - _LISTED} more" if len(places) > _LISTED else ""
+        outside, known = _outside(rows.residual)
+        if 0 < np.count_nonzero(outside) <= _MOST_SHARE * known:
+            listed = equations.measured.place[np.any(outside, axis=1)].tolist()
+            more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
             out.append(
-                f"gross errors in the {_WORDS[rows.kind]} of {', '.join(places[:_LISTED])}{more}? "
+                f"gross errors in the {_WORDS[rows.kind]} of {', '.join(listed[:_LISTED])}{more}? "
                 "they are more than ten times as far off as is usual: measure them again, leave "
                 "them out, or use --loss cauchy"
             )
     return out
 
 
-def _far(residual: Array) -> tuple[NDArray[np.bool_], int]:
+def _outside(residual: Array) -> tuple[NDArray[np.bool_], int]:
     """Mask of gross residuals (p, k), and the number of residuals."""
     size = np.abs(residual)
     known = np.isfinite(size)
     if not np.any(known):
         return known, 0
     usual = _NORMAL * float(np.median(size[known]))
-    return known & (size > _FAR * usual) & (usual > 0), int(np.count_nonzero(known))
+    return known & (size > _LIMIT * usual) & (usual > 0), int(np.count_nonzero(known))

@@ -1,1 +1,4 @@
-"""``winchkit log``: records benches; shows, recovers and replays what was recorded."""
+"""``winchkit log``: records a bench; describes, recovers and replays what was recorded.
+
+``log`` is the group of commands and records; the other files are a command each.
+"""

@@ -42,11 +42,11 @@ def command(
     Values that the profile has already are refitted with it; every value gets its standard
     deviation, the runs and the date.
     """
-    from winchkit.cli.model.options import read_profile, refuse_options
+    from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.add import grow
     from winchkit.schema.profiles.robot import RobotProfile
 
-    declared, catalogue = read_profile(asked.source), asked.catalogue
+    declared, catalogue = declared_profile(asked.source), asked.catalogue
     names = [Path(run).name for run in runs]
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band)

@@ -98,17 +98,15 @@ def _calibrated(
     source: Path, runs: Sequence[str], validate: Sequence[str], options: Options
 ) -> Calibrated:
     """Fit all rows where others validate, else nine of ten."""
-    from winchkit.calibration.robot.calibrate import calibrate, split
+    from winchkit.calibration.robot.calibrate import calibrate
     from winchkit.model.robot import robot_of
     from winchkit.runs.poses import read_poses
     from winchkit.schema.read import read_robot
 
     profile = read_robot(source)
     measured = read_poses(read_all(runs), profile)
-    fit, held = split(measured)
-    if validate:
-        fit, held = measured, read_poses(read_all(validate), profile)
-    return calibrate(robot_of(profile), fit, held, options, lambda t: click.echo(t, err=True))
+    held = read_poses(read_all(validate), profile) if validate else None
+    return calibrate(robot_of(profile), measured, held, options, lambda t: click.echo(t, err=True))
 
 
 def _tell(found: Calibrated, ahead: Sequence[NextPose], as_json: bool) -> None:

@@ -39,12 +39,12 @@ __all__ = ["command"]
 @html_option
 def command(runs: Sequence[str], asked: Asked, as_json: bool, html: str | None) -> None:
     """Compare runs with a profile at its file values; only the length offset is fitted."""
-    from winchkit.cli.model.options import read_profile, refuse_options
+    from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.compare import compared
     from winchkit.report.pages.pages import comparison_html
     from winchkit.schema.profiles.robot import RobotProfile
 
-    declared = read_profile(asked.source)
+    declared = declared_profile(asked.source)
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band, asked.winch)
         _tell_robot(runs, declared, asked, as_json, html)

@@ -49,10 +49,10 @@ def command(
     Long runs are thinned out as far as their signals allow; --winch all takes each by itself
     and tells what they have in common.
     """
-    from winchkit.cli.model.options import read_profile, refuse_options
+    from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.schema.profiles.robot import RobotProfile
 
-    declared, thin = read_profile(asked.source), not every_sample
+    declared, thin = declared_profile(asked.source), not every_sample
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band, asked.winch)
         _tell_robot(runs, declared, asked, as_json, html)

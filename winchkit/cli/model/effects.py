@@ -120,10 +120,10 @@ def new(
 
     It is ready for --effects: diagnose with it, then put in the physics that you recognise.
     """
-    from winchkit.cli.model.options import read_profile, refuse_curves
+    from winchkit.cli.model.options import declared_profile, refuse_curves
     from winchkit.effects.effect_template import check_own, write_wave_on_drum
 
-    refuse_curves(read_profile(asked.source))
+    refuse_curves(declared_profile(asked.source))
     name = effect_id or Path(file).stem.replace("_", "-")
     check_own(name, Path(file), asked.catalogue)
     data = (asked.runs(runs), asked.declared, asked.catalogue, asked.band)

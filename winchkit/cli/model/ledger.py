@@ -17,10 +17,10 @@ __all__ = ["command"]
 def command(profile: str, as_json: bool, html: str | None) -> None:
     """Show every effect that was added to or removed from a profile and what that did."""
     from winchkit.catalog import find
-    from winchkit.cli.model.options import read_profile
+    from winchkit.cli.model.options import declared_profile
     from winchkit.profile_edit.history import ladder
 
-    declared = read_profile(find("profiles", profile))
+    declared = declared_profile(find("profiles", profile))
     rungs = ladder(declared)
     if as_json:
         steps = [rung.to_json() for rung in rungs]

@@ -27,6 +27,7 @@ __all__ = [
     "ALL",
     "Asked",
     "ManyValues",
+    "declared_profile",
     "html_option",
     "json_option",
     "model_options",
@@ -35,7 +36,6 @@ __all__ = [
     "provenance",
     "read_all",
     "read_each",
-    "read_profile",
     "read_runs",
     "refuse_curves",
     "refuse_options",
@@ -76,9 +76,9 @@ class Asked:
     @property
     def declared(self) -> WinchProfile:
         """The profile. Raises FileError with its faults."""
-        from winchkit.schema.read import read_winch
+        from winchkit.schema.read import read_profile
 
-        return read_winch(self.source)
+        return read_profile(self.source)
 
     @property
     def catalogue(self) -> Catalogue:
@@ -249,15 +249,15 @@ def _may_be_replaced(target: Path) -> bool:
         return there.read(len(_PAGE_BEGINS)) in {b"", _PAGE_BEGINS}
 
 
-def read_profile(path: Path) -> WinchProfile | RobotProfile:
+def declared_profile(path: Path) -> WinchProfile | RobotProfile:
     """The profile of a winch or of a robot. Raises FileError."""
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
-    from winchkit.schema.read import read_any, read_winch
+    from winchkit.schema.read import read_any, read_profile
 
     value = read_any(path)
     # The reader of winches refuses every other kind in its own words.
-    return value if isinstance(value, (WinchProfile, RobotProfile)) else read_winch(path)
+    return value if isinstance(value, (WinchProfile, RobotProfile)) else read_profile(path)
 
 
 def refuse_options(band: float | None, winch: str | None = None) -> None:

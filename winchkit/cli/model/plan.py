@@ -17,7 +17,7 @@ from winchkit.units import suggest
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.design.plan import Offer
-    from winchkit.diagnosis.design.programmes import OperatingRange
+    from winchkit.diagnosis.plan import Plan
     from winchkit.diagnosis.robot.plan import PosePlan
     from winchkit.effects.term import Term
     from winchkit.schema.bench import LimitSpec
@@ -163,10 +163,10 @@ def command(
     could not. Run the file with 'winchkit run NEXT.toml --bench B' and diagnose again.
     For a robot's profile the plan is a list of poses, and NEXT.csv a run of them to measure at.
     """
-    from winchkit.cli.model.options import read_profile
+    from winchkit.cli.model.options import declared_profile
     from winchkit.schema.profiles.robot import RobotProfile
 
-    declared = read_profile(asked.source)
+    declared = declared_profile(asked.source)
     if isinstance(declared, RobotProfile):
         from winchkit.cli.model.plan import tell_poses
 
@@ -184,41 +184,22 @@ def _plan_winch(
     as_json: bool,
 ) -> None:
     """The next programme of one winch."""
-    from winchkit.diagnosis.design.plan import offers, programme_of
-    from winchkit.diagnosis.design.programmes import range_of_limits, range_of_runs
     from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.diagnosis.plan import plan
     from winchkit.schema.programme import write_programme
 
     limits = None if bench is None else _limits(bench, asked.winch)
-    catalogue = asked.catalogue
-    answer = diagnose(asked.runs(runs), declared, catalogue, asked.band)
-    regression, pairs = answer.engine.regression, answer.pairs
-    operating_range = (
-        range_of_runs(regression.dataset)
-        if limits is None
-        else range_of_limits(regression.dataset, limits)
-    )
-    noise = answer.result.noise.rms
-    found = offers(
-        regression,
-        pairs,
-        noise,
-        list(catalogue),
-        threshold=answer.threshold,
-        operating_range=operating_range,
-    )
+    answer = diagnose(asked.runs(runs), declared, asked.catalogue, asked.band)
+    found = plan(answer, asked.catalogue, limits)
     if output:
         path = Path(output)
-        write_programme(
-            programme_of(regression.dataset, found[0].kind, path.stem, operating_range), path
-        )
+        write_programme(found.programme(path.stem), path)
         click.echo(f"written: {output}", err=True)
     if as_json:
-        listed = [offer.to_json(pairs) for offer in found]
-        echo_json({"schema": 1, "offers": listed, "programme": output})
+        echo_json({**found.to_json(), "programme": output})
     else:
-        click.echo(_text(found, pairs, named=bool(answer.sets)))
-        for line in _silent(found, pairs, operating_range, widened=limits is not None):
+        click.echo(_text(found.offers, found.pairs, named=bool(answer.sets)))
+        for line in _silent(found, widened=limits is not None):
             click.echo(line)
 
 
@@ -238,19 +219,12 @@ def _limits(bench: str, winch: str | None) -> LimitSpec:
     return wired[name].limits
 
 
-def _silent(
-    found: Sequence[Offer],
-    pairs: Sequence[tuple[Term, Term]],
-    operating_range: OperatingRange,
-    *,
-    widened: bool,
-) -> list[str]:
+def _silent(found: Plan, *, widened: bool) -> list[str]:
     """What none of these programmes tells apart, and what does."""
-    from winchkit.diagnosis.design.plan import inseparable
     from winchkit.effects.effect import told_apart
 
-    lines = []
-    for first, second in inseparable(found, pairs):
+    lines, operating_range = [], found.operating_range
+    for first, second in found.inseparable:
         names = f"{first.effect.id} / {second.effect.id}"
         lines.append(
             f"{names}: no such motion within {operating_range.low:.2f} m to "

@@ -29,11 +29,11 @@ def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json
     A robot's effect on one line is EFFECT/LINE, or EFFECT with --winch LINE. The ledger notes the
     step, and 'winchkit undo' takes it back.
     """
-    from winchkit.cli.model.options import read_profile, refuse_options
+    from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.add import remove
     from winchkit.schema.profiles.robot import RobotProfile
 
-    declared, removal = read_profile(asked.source), None
+    declared, removal = declared_profile(asked.source), None
     if isinstance(declared, RobotProfile):
         from winchkit.diagnosis.robot.add import remove_from_robot
 

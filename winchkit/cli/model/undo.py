@@ -15,12 +15,12 @@ __all__ = ["command"]
 def command(profile: str, output: str | None) -> None:
     """Take back what 'add' or 'remove' did last; values that it refitted are as before too."""
     from winchkit.catalog import find
-    from winchkit.cli.model.options import read_profile
+    from winchkit.cli.model.options import declared_profile
     from winchkit.errors import UsageError
     from winchkit.profile_edit.ledger import undo
 
     source = find("profiles", profile)
-    read_profile(source)
+    declared_profile(source)
     if output is None and source != Path(profile):
         raise UsageError(f"'{profile}' ships with winchkit; write the copy to a file with -o")
     done = undo(source, Path(output) if output else source)

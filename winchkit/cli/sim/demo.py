@@ -48,7 +48,7 @@ def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
     from winchkit.cli.sim import demo_loop
     from winchkit.diagnosis.compare import compare
     from winchkit.runs import read_run
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.read import read_profile
     from winchkit.sim import choose_bench
 
     started = time.monotonic()
@@ -60,7 +60,7 @@ def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
         paths = demo_loop.record(bench, seed, out / "runs", progress)
         progress("diagnosing", _RECORDING_SECONDS)
         runs = [read_run(path) for path in paths]
-        comparison = compare(runs, read_winch(find("profiles", profile_name)))
+        comparison = compare(runs, read_profile(find("profiles", profile_name)))
         findings = demo_loop.learn(runs, profile_name, out)
     story.add(
         f"{len(runs)} runs were recorded, each motion twice under two loads: "

@@ -112,12 +112,12 @@ def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
     from winchkit.cli.model.add import write_addition
     from winchkit.diagnosis.add import add
     from winchkit.diagnosis.diagnose import diagnose
-    from winchkit.schema.read import read_winch
+    from winchkit.schema.read import read_profile
 
     source = find("profiles", profile_name)
     nominal = out / "nominal.toml"
     shutil.copyfile(source, nominal)
-    profile = read_winch(nominal)
+    profile = read_profile(nominal)
     answer = diagnose(runs, profile)
     if not answer.diagnosis.steps:
         return Findings(answer, None)

@@ -63,7 +63,7 @@ def command(
     from winchkit.runs import write_csv, write_mcap
     from winchkit.schema.read import read_programme, read_simbench
     from winchkit.sim.bench import hiding, profiles_of, programme_path
-    from winchkit.sim.record import record
+    from winchkit.sim.record import simulate
 
     declared = read_simbench(find("sim", bench))
     if hidden:
@@ -74,7 +74,7 @@ def command(
     written = []
     for name in programmes:
         programme = read_programme(programme_path(name))
-        for run in record(declared, profiles, programme, seed=seed, rate=hertz):
+        for run in simulate(declared, profiles, programme, seed=seed, rate=hertz):
             path = out / f"{run.name}.{suffix}"
             out.mkdir(parents=True, exist_ok=True)
             write(run, path)

@@ -77,13 +77,13 @@ def next_runs(
             minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
             strength = separation(programme, first, second, noise, known=known)
             offers.append((strength / minutes, power_of(strength), kind.name))
-        # Any programme sure to separate them will do: of those the quickest per minute.
+        # Of programmes with equal power the one with the largest λ per minute comes first.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
         useful = [offer for offer in offers if offer[1] >= _LEAST_POWER][:_MOST_OFFERS]
         out += [NextRun(names, name, power) for _, power, name in useful]
         if not useful:
-            # No motion separates them: what does is on the card, and its power is not known.
+            # No motion separates them: the advice of the catalogue, whose power is not known.
             out.append(NextRun(names, told_apart(first.effect, second.effect), float("nan")))
     return tuple(out)
 

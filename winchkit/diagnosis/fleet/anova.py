@@ -138,7 +138,7 @@ def _follows(own: Mapping[str, WinchErrors]) -> tuple[SharedAttribution, ...]:
     errors = np.concatenate([e.error for e in own.values()])
     if len(own) < 2 or not np.any(errors):
         return ()
-    # A winch by itself is one bin over nothing: a level of its own.
+    # The variable winch has one bin per winch: a constant for each.
     over = {"winch": np.zeros(len(errors), dtype=np.intp)}
     for name in next(iter(own.values())).variables:
         if all(name in e.variables for e in own.values()):

@@ -1,1 +1,5 @@
-"""Residual analysis: error statistics, attribution to variables (correlation ratio), maps."""
+"""Residual analysis: what remains after the fit.
+
+Errors per output (``error_statistics``), their attribution to variables and orders by the
+correlation ratio η² (``attribution``), and their means over two variables (``maps``).
+"""

@@ -30,11 +30,11 @@ class StopBandLeakage:
         """Mean square of the residual of a hypothesis."""
         if not self._filtered:
             return {}
-        beyond = self._beyond(hypothesis)
+        leakage = self._leakage(hypothesis)
         out = {}
         for output in self._filtered:
             own = [s for s in self._regression.segments if s.output == output]
-            total = sum(float(beyond[s.rows] @ beyond[s.rows]) for s in own)
+            total = sum(float(leakage[s.rows] @ leakage[s.rows]) for s in own)
             out[output] = total / self._regression.n_samples(output)
         return out
 
@@ -42,14 +42,16 @@ class StopBandLeakage:
         """Mean square of the differences of repeats; without repeats that of the residual."""
         if not self._filtered:
             return {}
-        apart = replicate_rms(self._regression, self._beyond(hypothesis))
-        return self.residual(hypothesis) | {o: apart[o] ** 2 for o in self._filtered & set(apart)}
+        noise_rms = replicate_rms(self._regression, self._leakage(hypothesis))
+        return self.residual(hypothesis) | {
+            o: noise_rms[o] ** 2 for o in self._filtered & set(noise_rms)
+        }
 
     @cached_property
     def _regression(self) -> Regression:
         return self._without_filter()
 
-    def _beyond(self, hypothesis: Hypothesis) -> Array:
+    def _leakage(self, hypothesis: Hypothesis) -> Array:
         """Residual without the coefficients up to the cut-off, (rows,)."""
         rows = self._regression.residual(hypothesis)
         for segment in self._regression.segments:

@@ -38,9 +38,9 @@ def missing_pose_excitation(preparation: Preparation) -> list[str]:
             "cells cannot be judged; does something else pull at the platform?"
         )
     if not np.isfinite(measured.temperature).all():
-        notes.append("no temperature measured: thermal effects cannot be seen")
+        notes.append("no temperature measured: thermal effects cannot be detected")
     if not np.isfinite(measured.position).any():
-        notes.append("no position measured: where the platform frame lies cannot be seen")
+        notes.append("no position measured: the origin of the platform frame cannot be determined")
     whole = measured.angles[np.isfinite(measured.angles).all(axis=1)]
     if len(whole):
         turned = rotation_vector(rotation_of(*whole.T) @ rotation_of(*whole[0]).T)

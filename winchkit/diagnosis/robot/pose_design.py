@@ -240,11 +240,11 @@ def next_pose_runs(
     for first, second in pairs:
         offers = pose_offers(regression, final, [(first, second)], [SEPARATED_AT])
         names = (first.effect.id, second.effect.id)
-        sure = [o for o in offers if o.powers[0] >= _HIGH_POWER][:1]
-        fair = sorted(offers, key=lambda o: -o.powers[0])
-        useful = sure or [o for o in fair if o.powers[0] >= LEAST_POWER][:_OFFERED]
-        out += [NextRun(names, _words(o), o.powers[0]) for o in useful]
-        if not useful:
+        certain = [o for o in offers if o.powers[0] >= _HIGH_POWER][:1]
+        ranked = sorted(offers, key=lambda o: -o.powers[0])
+        offered = certain or [o for o in ranked if o.powers[0] >= LEAST_POWER][:_OFFERED]
+        out += [NextRun(names, _words(o), o.powers[0]) for o in offered]
+        if not offered:
             advice = told_apart(first.effect, second.effect)
             out.append(NextRun(names, advice, float("nan")))
     return tuple(out)

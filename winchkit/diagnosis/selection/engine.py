@@ -104,7 +104,7 @@ class LastValue(Generic[Answer]):
         return self._kept[2]
 
 
-_WILD = 1.0
+_WHOLE_CORRECTION = 1.0
 """In units of the theoretical correction: a larger one is not a discretisation error."""
 
 
@@ -321,12 +321,12 @@ class SelectionEngine(ABC):
         Before the hysteresis was in the model, a large correction explained a part of it; a fit
         started there ends in a local minimum with its reversals too late.
         """
-        wild = (
+        exceeds_correction = (
             self.regression.fits_discretization
             and bool(start.nuisances)
-            and abs(start.nuisances[-1]) > _WILD
+            and abs(start.nuisances[-1]) > _WHOLE_CORRECTION
         )
-        if not wild or not start.terms[-1].effect.memory:
+        if not exceeds_correction or not start.terms[-1].effect.memory:
             return []
         return [replace(start, nuisances=(*start.nuisances[:-1], 0.0))]
 

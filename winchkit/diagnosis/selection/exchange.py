@@ -19,7 +19,7 @@ __all__ = [
     "pair_exchange",
 ]
 
-_NEARLY = 0.1
+_MARGIN = 0.1
 """Share of the term's explained χ² by which the linear prediction may miss the target."""
 
 
@@ -71,19 +71,19 @@ class Exchange:
         scores = self._engine.scores(held, self._noise)
         return held, least, {item.candidate.effect.id: item for item in scores}
 
-    def trial(self, rival: Score, enough: float) -> Trial:
+    def trial(self, rival: Score, target: float) -> Trial:
         """Fit a rival in the effect's place.
 
         It is fitted again from the others' present values where its χ² is above ``enough`` and
         would nearly reach that value by linear prediction.
         """
         first_trial = self._engine.trial(self.base, rival, self._noise)
-        if first_trial.fit.chi_square < enough or not self._others.terms:
+        if first_trial.fit.chi_square < target or not self._others.terms:
             return first_trial
         held, least, scores = self._held
         rival_beside = scores.get(rival.candidate.effect.id)
-        nearly = enough + _NEARLY * (self.base.chi_square - enough)
-        if rival_beside is None or least - rival_beside.explained_ss > nearly:
+        limit = target + _MARGIN * (self.base.chi_square - target)
+        if rival_beside is None or least - rival_beside.explained_ss > limit:
             return first_trial
         second_trial = self._engine.trial(held, rival_beside, self._noise)
         return min(
@@ -91,8 +91,8 @@ class Exchange:
         )
 
 
-_TRIED = 2
-_MOST = 3
+_MOST_TRIALS = 2
+_MOST_ADDITIONS = 3
 
 
 def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:
@@ -110,10 +110,10 @@ def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged
         Number of additions to be replaced, one or two.
     """
     added = range(engine.n_initial_terms, len(present.hypothesis.terms))
-    if not 0 < len(added) <= _MOST:
+    if not 0 < len(added) <= _MOST_ADDITIONS:
         return present  # More than three additions are not replaced by a pair.
     # The number of trials is limited, since every one refits the whole model.
-    tried = _TRIED if exchanged > 1 else max(1, _TRIED // len(added))
+    tried = _MOST_TRIALS if exchanged > 1 else max(1, _MOST_TRIALS // len(added))
     exchanges = [
         _better(engine, present, noise, own, tried) for own in combinations(added, exchanged)
     ]
@@ -129,14 +129,16 @@ def _better(
     for index in reversed(indices):
         hypothesis = hypothesis.without(index)
     base = engine.refit(hypothesis, noise)
-    needed = engine.criterion(base) - engine.criterion(present) + MIN_GAIN
-    leave = {present.hypothesis.terms[index].effect.id for index in indices}
-    promising = [
-        pair for pair in engine.pairs(base, noise) if pair.net_gain > needed and pair.ids != leave
+    required = engine.criterion(base) - engine.criterion(present) + MIN_GAIN
+    removed = {present.hypothesis.terms[index].effect.id for index in indices}
+    candidates = [
+        pair
+        for pair in engine.pairs(base, noise)
+        if pair.net_gain > required and pair.ids != removed
     ]
-    for pair in promising[:tried]:
+    for pair in candidates[:tried]:
         # New effects first: one that explained both would keep its old values.
-        first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in leave)
+        first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in removed)
         trial = engine.trial(engine.trial(base, first, noise).fit, second, noise)
         if trial.criterion < engine.criterion(present) - MIN_GAIN:
             return trial.fit

@@ -19,7 +19,7 @@ from winchkit.diagnosis.selection.scores import Projected, Score
 
 __all__ = ["Pair", "screened_pairs"]
 
-_TOGETHER = 1.5
+_SUPPRESSION_RATIO = 1.5
 _UNIDENTIFIABLE = 1e-5
 
 
@@ -52,7 +52,7 @@ class Pair:
     @property
     def suppressed(self) -> bool:
         """Whether they explain jointly far more than one at a time."""
-        return self.explained_ss > _TOGETHER * self.single_gain
+        return self.explained_ss > _SUPPRESSION_RATIO * self.single_gain
 
 
 def screened_pairs(

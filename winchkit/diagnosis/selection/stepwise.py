@@ -96,7 +96,7 @@ def stepwise_selection(engine: SelectionEngine) -> SelectionResult:
     last_model, noise, tried = _forward_selection(
         engine, initial_model, initial_noise, initial_scores, threshold
     )
-    final, noise = _without_doubtful_terms(engine, last_model, noise)
+    final, noise = _without_minor_terms(engine, last_model, noise)
     lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
     lack_of_fit_at_start = grew or _has_lack_of_fit(
@@ -302,21 +302,17 @@ def _another(item: Score, own: Term) -> bool:
     return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
 
 
-def _without_doubtful_terms(
-    engine: SelectionEngine, present: Fit, noise: Noise
-) -> tuple[Fit, Noise]:
+def _without_minor_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
     """Model without additions that explain less than the lack of fit."""
     left = engine.lack_of_fit_test(present, noise)
-    missing = float(np.sum(np.maximum(left.excess_power, 0.0)[left.rejected]))
-    doubtful = present
+    excess = float(np.sum(np.maximum(left.excess_power, 0.0)[left.rejected]))
+    reduced = present
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = engine.refit(present.hypothesis.without(index), noise)
-        if without.chi_square - present.chi_square < missing:
-            doubtful = engine.refit(doubtful.hypothesis.without(index), noise)
+        if without.chi_square - present.chi_square < excess:
+            reduced = engine.refit(reduced.hypothesis.without(index), noise)
     return (
-        (present, noise)
-        if doubtful is present
-        else engine.fit_with_noise(doubtful.hypothesis, noise)
+        (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
     )
 
 

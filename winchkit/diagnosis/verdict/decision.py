@@ -73,7 +73,7 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     )
     verdict = _verdict(result, outputs, share)
     added = result.final.labels[engine.n_initial_terms :]
-    # Nothing but the effect itself explains nearly all of what is far above the noise.
+    # Only the effect itself explains nearly all of a residual far above the noise floor.
     explained_but_detectable = share < _EXPLAINED_SHARE and result.noise.from_repeats
     if verdict == "explained" or explained_but_detectable or not added:
         return Judgement(verdict, share, outputs, result, ())
@@ -116,7 +116,7 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
         held_out_rms(engine.regression, fitted, result.noise, folds)
         for fitted in (result.initial_model, result.final)
     ]
-    # Where the bands hold nothing more, what an output is over its noise may be chance.
+    # Without a lack of fit, an error above the noise floor may be chance.
     expected_excess = {} if result.lack_of_fit else result.noise.uncertainty(engine.regression)
     excess = [
         sum(
@@ -165,20 +165,15 @@ def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: f
         fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
         for fitted in outputs.values()
     )
-    # What imitates something unknown leaves as much; where the trace is certain it must be small.
-    share_limit = (
-        _EXPLAINED_SHARE_UNCERTAIN
-        if result.lack_of_fit_test.p_value > _UNCERTAIN_P_VALUE
-        else _EXPLAINED_SHARE
-    )
-    allowed = (
-        share_limit
-        if error_ratio < _AT_NOISE
-        else _EXPLAINED_SHARE_NEAR_NOISE
-        if error_ratio < _NEAR_NOISE
-        else 0.0
-    )
-    return "explained" if share < allowed else "partly"
+    # An effect that imitates an unknown one leaves a share of this size; where the lack of fit is
+    # certain, the limit is therefore small.
+    limit = 0.0
+    if error_ratio < _AT_NOISE:
+        uncertain = result.lack_of_fit_test.p_value > _UNCERTAIN_P_VALUE
+        limit = _EXPLAINED_SHARE_UNCERTAIN if uncertain else _EXPLAINED_SHARE
+    elif error_ratio < _NEAR_NOISE:
+        limit = _EXPLAINED_SHARE_NEAR_NOISE
+    return "explained" if share < limit else "partly"
 
 
 def output_fits(

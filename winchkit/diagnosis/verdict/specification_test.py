@@ -119,7 +119,7 @@ class _BasisProducts:
             np.maximum(np.diag(coefficients.T @ self.before @ coefficients), _LEAST_SQUARED_LENGTH)
         )
         after = coefficients.T @ self.after @ coefficients / np.outer(size, size)
-        # Measured by what they were: of what a fit explains whole only rounding is left.
+        # Relative to the lengths before projection: a curve that the fit explains leaves rounding.
         return explained_ss(after, (coefficients.T @ self.inner_products) / size, _UNIDENTIFIABLE)
 
 
@@ -230,7 +230,7 @@ class SpecificationTest:
         """A curve that outperforms terms by the margin; None where there is none."""
         if not self._outperforming_curve(indices, discretization=False):
             return None
-        # What sampling may have rounded is not held against a name; it takes a while to know.
+        # The discretisation error is slow to compute, so that it is projected out here only.
         return self._outperforming_curve(indices, discretization=True)
 
     def _outperforming_curve(self, indices: Sequence[int], *, discretization: bool) -> Curve | None:
@@ -246,7 +246,7 @@ class SpecificationTest:
         )
         outputs = sorted({output for effect in effects for output in effect.outputs})
         curve = best_curve(engine.regression, partial, outputs, engine.penalty_per_parameter)
-        # What is certainly there is no chance deviation of the right formula.
+        # A certain lack of fit is no chance deviation from the right formula.
         relative_margin = _MARGIN_WITH_LACK_OF_FIT if self.result.lack_of_fit else _MARGIN
         margin = engine.penalty_per_parameter + relative_margin * explained_ss
         return curve if curve and curve.net_gain > net_gain + margin else None

@@ -1,1 +1,5 @@
-"""CANopen: the bus, SDO nodes, PDO codec, heartbeats, emergencies and the CiA 402 axis."""
+"""CAN: the bus, CANopen services, CiA 402 drives, host loss, and tools.
+
+``bus`` moves frames, ``canopen`` has the services of CiA 301, ``cia402`` the drives, ``host_loss``
+their watchdogs, ``tools`` scan and settings; ``process_value`` is an instrument after CiA 404.
+"""

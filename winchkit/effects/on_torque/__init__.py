@@ -1,1 +1,4 @@
-"""Effects on the motor torque, one per file."""
+"""Effects on the motor torque, from the cable force on; one per file.
+
+Each file defines ``EFFECT``, which :func:`winchkit.load_catalogue` collects.
+"""

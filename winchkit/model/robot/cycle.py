@@ -46,6 +46,13 @@ class RobotCycle:
     Poses are twelve floats as of :func:`flat_pose`; with compiled kernels they and all other
     sequences are float64 arrays, made by ``kernels.array``. What is returned is overwritten by the
     next call.
+
+    Parameters
+    ----------
+    robot : Robot
+        Kinematic model.
+    kernels : RobotKernels, optional
+        Compiled or plain loops, as of :func:`winchkit.model.robot.fastest`.
     """
 
     __slots__ = (

@@ -34,7 +34,9 @@ class ForceLimits:
     """Least and greatest cable force, N: one for all lines or one each, (n,)."""
 
     low: float | Array
+    """N; below it a cable counts as slack."""
     high: float | Array
+    """N."""
 
     def spread(self, count: int) -> tuple[Array, Array]:
         """Both limits per line; raises UsageError where low is not below high."""

@@ -42,11 +42,15 @@ class Robot:
     """
 
     profile: RobotProfile
+    """As declared."""
     geometry: Geometry
+    """Exit points, anchor points and swivel pulleys of the n lines."""
     home: Pose
+    """Pose at which all motor angles are zero."""
     home_length: Array
-    """(n,), m."""
+    """Cable lengths at home, (n,), m."""
     platform: PlatformSpec
+    """Mass and centre of mass."""
     modifiers: tuple[tuple[Modifier, ...], ...]
     """Per line, in the stages of a winch."""
 
@@ -187,6 +191,11 @@ def robot_of(
         ``winchkit.effects.robot_with_effects`` applies the profile's own effects.
     payload : sequence, optional
         Modifiers of the platform.
+
+    Returns
+    -------
+    Robot
+        Kinematic model of the robot.
     """
     home, geometry = home_of(profile), geometry_of(profile)
     own = tuple(tuple(m) for m in modifiers) or ((),) * len(profile.line)

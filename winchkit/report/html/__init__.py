@@ -1,1 +1,4 @@
-"""Self-contained HTML: escaped markup, SVG charts, the page with its styles and scripts."""
+"""Self-contained HTML: escaped markup, SVG charts, and the frame of every page.
+
+:func:`~winchkit.report.html.page.page` is the entry; a page needs no network.
+"""

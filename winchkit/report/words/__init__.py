@@ -1,1 +1,4 @@
-"""Numbers with units and uncertainty, the vocabulary, and sentences of verdicts."""
+"""Text of results: numbers with units, vocabulary, columns, and sentences of verdicts.
+
+:func:`~winchkit.report.words.sentence.sentence` is the verdict of a diagnosis.
+"""

@@ -40,6 +40,11 @@ class SimulatedClock:
     and advances while it sleeps or waits on this clock. Threads are started by :meth:`thread`. Any
     other thread may call :meth:`now` and :meth:`sleep`, but time does not wait for it. Callbacks
     (:meth:`call_at`) run between the threads.
+
+    Parameters
+    ----------
+    start : float
+        First time, s.
     """
 
     def __init__(self, start: float = 1000.0) -> None:

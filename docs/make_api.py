@@ -1,0 +1,58 @@
+"""Writes docs/api.md from the docstrings of the public names: ``python docs/make_api.py``."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import winchkit
+
+PAGE = Path(__file__).with_name("api.md")
+SECTIONS = {
+    "A bench": ("open_bench", "attach", "Bench", "BenchSnapshot"),
+    "A simulated bench": ("LiveBench", "SimulatedClock", "simulate"),
+    "Files": (
+        *("find", "read_profile", "read_robot", "read_bench", "read_programme", "read_simbench"),
+        *("read_run", "read_poses", "write_run", "open_writer", "Run"),
+    ),
+    "Diagnosis": ("compare", "diagnose", "plan", "add", "load_catalogue", "Effect", "Parameter"),
+    "Cable robots": ("robot_of", "Robot", "Pose", "RobotCycle", "ForceLimits", "calibrate"),
+    "Estimators": ("DahlEstimator", "identify_dahl", "ElongationCorrection"),
+    "Errors": (
+        *("WinchkitError", "UsageError", "FileError", "Fault", "RunError", "ConnectionLost"),
+        *("NoReply", "DeviceRefused", "MotionError", "DriveFault", "LimitTripped", "NotPermitted"),
+    ),
+}
+"""Public names by subject; ``__version__`` is a text."""
+_BEGIN = """\
+# Public names
+
+Written by `python docs/make_api.py` from the docstrings; do not edit it by hand.
+`help(winchkit.open_bench)` shows parameters with units, results and errors.
+
+    from winchkit import diagnose, read_profile, read_run
+
+For effects of your own there are `winchkit.effects` and `winchkit.model.stages` besides, for
+control loops `winchkit.model.robot` and `winchkit.estimation`, for tests `winchkit.testing`. Paths
+of other modules may change with any version. `import winchkit` loads no other package: a name is
+imported when it is first used. `winchkit.__version__` is the version.
+"""
+
+
+def page() -> str:
+    """The page: public names by subject, each with the first line of its docstring."""
+    parts = [_BEGIN]
+    for title, names in SECTIONS.items():
+        parts.append(f"## {title}\n\n| name | what |\n|---|---|")
+        parts += [f"| `{name}` | {_summary(name)} |" for name in names]
+        parts.append("")
+    return "\n".join(parts)
+
+
+def _summary(name: str) -> str:
+    first = (inspect.getdoc(getattr(winchkit, name)) or "").split("\n")[0]
+    return first.replace("``", "`").removesuffix(".").replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

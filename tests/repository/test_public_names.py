@@ -1,0 +1,145 @@
+"""The public names of winchkit: importable, documented, typed, and used by docs and examples."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import re
+import runpy
+import subprocess
+import sys
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import winchkit
+from snippets import ROOT
+
+NAMES = sorted(set(winchkit.__all__) - {"__version__"})
+PAGES = sorted(
+    path
+    for pattern in ("*.md", "docs/**/*.md", "docs/*.py", "examples/**/*.py")
+    for path in ROOT.glob(pattern)
+)
+HEAVY = {"numpy", "scipy", "can", "canopen", "pymodbus", "pydantic", "rich", "click", "serial"}
+_IMPORT = re.compile(r"^ *from (winchkit[\w.]*) import (?:\(([^)]*)\)|(.+))$", re.MULTILINE)
+
+
+def test_importing_winchkit_stays_light_and_knows_its_names() -> None:
+    code = "import sys, winchkit; print(*dir(winchkit)); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    names, modules = (set(line.split()) for line in done.stdout.splitlines())
+    assert set(winchkit.__all__) <= names
+    assert not HEAVY & modules
+
+
+def test_type_checkers_see_the_names_that_there_are() -> None:
+    tree = ast.parse(Path(winchkit.__file__).read_text(encoding="utf-8"))
+    (typed,) = (node for node in tree.body if isinstance(node, ast.If))
+    seen = {
+        alias.name: node.module
+        for node in typed.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert sorted(seen) == NAMES
+    for name, module in seen.items():
+        assert getattr(importlib.import_module(str(module)), name) is getattr(winchkit, name)
+
+
+def test_a_wrong_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'open_becnh'"):
+        _ = winchkit.open_becnh
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_public_name_is_described_with_the_sections_that_apply(name: str) -> None:
+    assert not lacking(getattr(winchkit, name))
+
+
+def lacking(public: object) -> list[str]:
+    """Sections, and fields of a dataclass, that the description of a public object lacks."""
+    text = inspect.getdoc(public) or ""
+    if dataclasses.is_dataclass(public) and isinstance(public, type):
+        return [field for field in undescribed_fields(public) if field not in text]
+    if isinstance(public, type):
+        has_own = "__init__" in vars(public)
+        text += textwrap.dedent(public.__init__.__doc__ or "") if has_own else ""
+        needed = ["Parameters"] if has_own and len(parameters(public)) > 0 else []
+    else:
+        assert callable(public)
+        result = inspect.signature(public).return_annotation
+        gives = "Yields" if str(result).startswith("Iterator") else "Returns"
+        needed = ["Parameters"] + ([gives] if result != "None" else [])
+    return [each for each in needed if not re.search(rf"^ *{each}\n *-+$", text, re.MULTILINE)] + (
+        [] if text else ["summary"]
+    )
+
+
+def parameters(public: type) -> list[str]:
+    return [name for name in inspect.signature(public.__init__).parameters if name != "self"]
+
+
+def undescribed_fields(public: type) -> Iterator[str]:
+    """Fields of a dataclass that no docstring follows."""
+    (node,) = ast.parse(textwrap.dedent(inspect.getsource(public))).body
+    assert isinstance(node, ast.ClassDef)
+    for field, after in zip(node.body, [*node.body[1:], None], strict=True):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+            described = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            if not described:
+                yield field.target.id
+
+
+def test_every_package_describes_itself_and_names_its_folders() -> None:
+    lacking = []
+    for file in sorted(Path(winchkit.__file__).parent.rglob("__init__.py")):
+        text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+        folders = [init.parent.name for init in file.parent.glob("*/__init__.py")]
+        if file.parent != Path(winchkit.__file__).parent:
+            lacking += [f"{file.parent}: {name}" for name in folders if f"``{name}``" not in text]
+        if "\n\n" not in text:
+            lacking.append(f"{file.parent}: one line only")
+    assert not lacking
+
+
+def test_functions_without_a_section_are_recognised() -> None:
+    def bare(x: float) -> float:
+        """One line."""
+        return x
+
+    assert lacking(bare) == ["Parameters", "Returns"]
+
+
+def deep_imports(text: str) -> Iterator[tuple[str, str]]:
+    """Modules below winchkit, each with a name that a text imports from there."""
+    for module, grouped, listed in _IMPORT.findall(text):
+        for name in (grouped or listed).split(","):
+            if module != "winchkit" and name.strip():
+                yield module, name.split()[0]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_pages_and_examples_import_public_names_from_winchkit(path: Path) -> None:
+    public = {id(getattr(winchkit, name)) for name in NAMES}
+    for module, name in deep_imports(path.read_text(encoding="utf-8")):
+        found = getattr(importlib.import_module(module), name, None)
+        assert found is None or id(found) not in public, f"from winchkit import {name}"
+
+
+def test_deep_imports_are_found_in_groups_and_lists() -> None:
+    text = "from winchkit.a import (\n    b,\n    c as d,\n)\n    from winchkit.e import f, g\n"
+    found = [("winchkit.a", "b"), ("winchkit.a", "c"), ("winchkit.e", "f"), ("winchkit.e", "g")]
+    assert list(deep_imports(text + "from winchkit import h\n")) == found
+
+
+def test_the_page_of_public_names_is_up_to_date() -> None:
+    script = runpy.run_path(str(ROOT / "docs/make_api.py"))
+    listed = [name for names in script["SECTIONS"].values() for name in names]
+    assert sorted(listed) == NAMES
+    there = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    assert there == script["page"](), "run: python docs/make_api.py"
