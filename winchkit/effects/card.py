@@ -29,7 +29,7 @@ __all__ = [
     "usual_values",
 ]
 
-_PLACES = {"all": "all lines alike", "one": "one line", "platform": "the platform"}
+_PLACES = {"all": "all lines equally", "one": "one line", "platform": "the platform"}
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 36

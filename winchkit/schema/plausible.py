@@ -36,7 +36,7 @@ LARGEST: Mapping[str, Bound] = {
     "force per time": Bound(1e12, "no cable breaks so fast"),
     "temperature": Bound(1e4, "no cable withstands it"),
 }
-"""By dimension; others, and ratios, have none in general."""
+"""By dimension; other dimensions and ratios have no general bound."""
 
 
 def check_size(value: float, dimension: str, text: object) -> float:

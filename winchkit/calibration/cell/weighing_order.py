@@ -41,7 +41,7 @@ def plan(weights: str, series: int) -> tuple[CalibrationPoint, ...]:
     try:
         numbers = [float(word) for word in re.split(r"[,;\s]+", found[1].strip())]
     except ValueError:
-        raise UsageError(f"'{weights}' holds something that is no number") from None
+        raise UsageError(f"'{weights}' contains a text that is not a number") from None
     loads = [_force(number, found[2]) for number in numbers]
     if sorted(set(loads)) != loads:
         raise UsageError(f"'{weights}' must rise from one weight to the next; they are hung so")

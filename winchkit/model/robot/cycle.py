@@ -118,7 +118,7 @@ class RobotCycle:
         """
         if len(self._lines) < 6:
             raise UsageError(
-                f"{len(self._lines)} lines leave the platform free; its pose comes from "
+                f"{len(self._lines)} lines do not constrain the platform; compute its pose by "
                 "winchkit.model.robot.forward"
             )
         pose = self._pose.copy()

@@ -88,9 +88,9 @@ class _Tangent(NamedTuple):
     """The cable around its pulley: arrays of shape (p, n), vectors by component."""
 
     arm: tuple[Array, Array, Array]
-    """Anchor point seen from the platform's origin, in base axes."""
+    """Anchor point relative to the platform's origin, in base axes."""
     outward: tuple[Array, Array, Array]
-    """From the axis to the anchor, square to the axis, as long as it is."""
+    """From the axis to the anchor, perpendicular to the axis, not normalised."""
     distance: Array
     """Length of ``outward``."""
     free: Array

@@ -326,7 +326,7 @@ def _law(drum: Drum) -> tuple[float, float, float]:
             return 0.0, radius, np.pi * build_up
         case Grooved(radius, pitch):
             return 0.0, float(np.hypot(radius, pitch / _TURN)), 0.0
-    raise TypeError(f"{type(drum).__name__} is no winding law that the loops know")
+    raise TypeError(f"{type(drum).__name__} is not a winding law of the loops")
 
 
 def _ratio(winch: WinchProfile) -> float:

@@ -118,7 +118,7 @@ def _size(value: float, unit: str) -> str:
 def _drawing(effect: Effect) -> list[Markup]:
     drawn = signature(effect)
     if not drawn.changes:
-        return [element("p", "It changes nothing on the standard motion.", class_="quiet")]
+        return [element("p", "It has no effect on the standard motion.", class_="quiet")]
     over = "pose of the standard robot, line 1" if effect.of_robots else "time [s]"
     figures = [_moves(drawn, over), *(_change(drawn, name, over) for name in drawn.changes)]
     sizes = ", ".join(
