@@ -121,17 +121,19 @@ def test_a_cell_that_was_quiet_before_is_not_frozen_when_quiet_again() -> None:
     assert not any(told[1110:])
 
 
-def test_counts_that_stand_still_while_the_winch_moves_are_frozen() -> None:
+def test_a_coarse_cell_may_stand_still_under_a_constant_load_while_the_winch_moves() -> None:
+    """Whether it should have changed is a question to the predicted tension (cell frozen)."""
     before = [1000.0 + k for k in range(150)]
-    told = watch(before + [before[-1]] * 300, moving=True)
-    assert told.index(True) == 149 + 200
+    assert not any(watch(before + [before[-1]] * 5000, moving=True))
+    assert not any(watch([1000.0] * 5000, moving=True))
 
 
-def test_a_coarse_cell_has_the_benefit_of_the_doubt_when_the_winch_moves() -> None:
-    told = watch([1000.0] * 1200, moving=True)
-    assert told.index(True) == 1000
-    steps = [float(k // 150) for k in range(3000)]
-    assert not any(watch(steps, moving=True))
+def test_a_noisy_cell_that_stops_while_the_winch_moves_is_frozen() -> None:
+    random = Random(1)
+    noisy = [float(round(random.gauss(1000, 3))) for _ in range(1000)]
+    seen = watch(noisy + [noisy[-1]] * 100, moving=True)
+    assert not any(seen[:1000])
+    assert seen[-1]
 
 
 def test_polling_faster_than_it_converts_is_not_frozen() -> None:

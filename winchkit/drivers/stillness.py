@@ -20,10 +20,6 @@ _NOISE = 1.0
 
 A step is the smallest change that was ever seen: of an indicator with a division of 10 it is 10.
 """
-_MOVING, _UNKNOWN, _KNOWN = 200, 1000, 100
-"""Trials alike that are too many while the winch moves: for a cell whose counts were seen to move
-then for at least so many trials, and for one of which nothing is known, perhaps a coarse one."""
-_MARGIN = 2
 
 
 @dataclass(slots=True)
@@ -34,10 +30,6 @@ class _State:
     """Blocks seen, every one of them noisy."""
     quiet: bool = False
     """Whether a block was ever quiet and ended by itself."""
-    longest: float = 0.0
-    """Trials alike that ended by themselves."""
-    seen: float = 0.0
-    """Trials in all that ended in a change."""
     step: float = math.inf
     """Smallest change of the counts."""
     squares: float = 0.0
@@ -46,8 +38,6 @@ class _State:
     def learn(self, change: float, run: float) -> None:
         """Take in a change of the counts after a run of ``run`` trials alike."""
         self.step = min(self.step, abs(change))
-        self.longest = max(self.longest, run)
-        self.seen += run
         self.quiet |= run >= _BLOCK
         self.squares += change * change / 2
         self.trials += run
@@ -59,12 +49,9 @@ class _State:
             self.noisy += 1
         self.squares = self.trials = 0.0
 
-    def too_long(self, run: float, moving: bool) -> bool:
+    def too_long(self, run: float) -> bool:
         """Whether so many trials alike cannot be."""
-        if not self.quiet and self.noisy >= _BLOCKS and run >= _BLOCK:
-            return True
-        known = self.seen >= _KNOWN
-        return moving and run >= max(_MOVING if known else _UNKNOWN, _MARGIN * self.longest)
+        return not self.quiet and self.noisy >= _BLOCKS and run >= _BLOCK
 
 
 @dataclass(slots=True)
@@ -91,4 +78,4 @@ class Stillness:
             self._last, self._run = counts, 0.0
             return False
         self._run += trial
-        return self._states[moving].too_long(self._run, moving)
+        return self._states[moving].too_long(self._run)

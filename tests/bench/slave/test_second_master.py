@@ -47,6 +47,7 @@ COMMANDS: dict[str, Frame] = {
     "NMT stop": (0x000, bytes((0x02, 1))),
     "NMT pre-operational, all": (0x000, bytes((0x80, 0))),
     "NMT reset": (0x000, bytes((0x81, 1))),
+    "heartbeat of the host": (0x77F, bytes((0x05,))),
 }
 HARMLESS: dict[str, Frame] = {
     "read 6041h": (0x601, bytes.fromhex("4041600000000000")),

@@ -102,7 +102,7 @@ def _settled(regression: TimeSeriesRegression, start: Hypothesis) -> tuple[Fit, 
 
 
 def test_profile_ends_agree_with_full_refits() -> None:
-    """Against scipy's own least squares with the coordinate held: a nonlinear friction."""
+    """Against scipy: least squares with the coordinate held, for a weak, nonlinear friction."""
     friction = term("motor-stribeck", torque=0.006, stribeck_speed=8.0)
     runs = [made(seed, GROOVED, (friction,), {"motor_torque": 6e-3}, ride=RIDE) for seed in (1, 2)]
     regression = TimeSeriesRegression(prepare(runs, GROOVED))

@@ -129,7 +129,7 @@ def test_laws_of_a_curved_rope_are_told_together(force_scale: float) -> None:
 
 
 def test_a_bend_that_the_data_lean_to_is_not_denied() -> None:
-    """At a curvature near the noise the linear and the curved law form a set."""
+    """Between a clear bend and one below the noise, the linear and the curved law form a set."""
     sets = [set(rope(scale).steps[0].effects) for scale in (400.0, *BENDS, 1e6)]
     straight = "cable-elongation-linear"
     assert straight not in sets[0]

@@ -123,7 +123,7 @@ def _stale_words(item: WinchInput, _own: Supervised, _memory: Memory) -> str:
 CONDITIONS: tuple[Condition, ...] = (
     Condition(
         "second master",
-        "RPDOs, SDO writes and NMT commands to the drive that were not sent here",
+        "RPDOs, SDO writes, NMT commands to the drive, heartbeats of this host, not sent here",
         "none",
         lambda item, _own, _memory: bool(item.second_master),
         lambda item, *_: (

@@ -37,6 +37,28 @@ def until(condition: Callable[[], bool]) -> None:
         time.sleep(0.002)
 
 
+def test_an_exception_of_a_handler_is_a_fault_of_the_bus_that_names_it() -> None:
+    """The receive thread ends; the control loop latches the fault, and a reset opens it again."""
+    spec = bus_spec()
+    bus = CanBus(spec, "can", CLOCK)
+    other = can.Bus(interface=spec.interface, channel=spec.channel)
+    heard: list[bytes] = []
+    try:
+        bus.on(0x181, lambda data, _now: heard.append(data[7:8] or data[8]))  # type: ignore[arg-type]
+        other.send(can.Message(arbitration_id=0x181, data=bytes(2), is_extended_id=False))
+        until(lambda: bus.fault is not None)
+        assert "internal error" in (bus.fault or "")
+        assert "181h: IndexError" in (bus.fault or "")
+        until(lambda: bus.health.state is BusState.DOWN)
+        bus.reopen()
+        assert bus.fault is None
+        other.send(can.Message(arbitration_id=0x181, data=bytes(8), is_extended_id=False))
+        until(lambda: bool(heard))
+    finally:
+        other.shutdown()
+        bus.close()
+
+
 # Error frames as the kernel's header can/error.h lays them out.
 
 

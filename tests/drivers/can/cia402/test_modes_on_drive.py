@@ -41,6 +41,9 @@ def device_in(mode: str) -> DeviceSpec:
     )
 
 
+pytestmark = pytest.mark.realtime
+
+
 class Rig:
     """An axis, its drive, and a control loop in miniature between them."""
 

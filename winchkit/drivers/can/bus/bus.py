@@ -105,7 +105,8 @@ for _library in ("canopen", "can"):
 class CanBus:
     """An open bus. ``fault`` says why it died, once it has; :meth:`reopen` gives it new life.
 
-    Handlers check what they are given and raise nothing: they run on the receive thread.
+    Handlers check what they are given and raise nothing: they run on the receive thread. One that
+    raises ends reception, and ``fault`` names its exception.
     """
 
     def __init__(self, spec: BusSpec, name: str, clock: Clock) -> None:
@@ -343,7 +344,14 @@ class CanBus:
                 continue
             failures = 0
             if frame is not None:
-                self._dispatch(frame)
+                try:
+                    self._dispatch(frame)
+                except Exception as error:  # noqa: BLE001 - a defect: it is named, the bench stops
+                    self.fault = (
+                        f"internal error in the receive thread at frame {frame.identifier:03X}h: "
+                        f"{type(error).__name__}: {error}"
+                    )
+                    return
             elif (state := port.state()) is not None:
                 self._errors.enter(state)
 

@@ -74,7 +74,9 @@ class Cia402Axis:
         self._boot_ups = self._beats = 0
         self._previous = 0
         self._sdo_stop = SdoStop(bus, node)
-        self._others = SecondMaster(bus, node, [pdo.number for pdo in device.servo.rpdo])
+        self._others = SecondMaster(
+            bus, node, [pdo.number for pdo in device.servo.rpdo], watch.host
+        )
         self._stop_frames: list[tuple[int, bytes]] = []
         bus.on(0x700 + node, self.heartbeat.receive)
         bus.on(0x080 + node, self.emergencies.receive)

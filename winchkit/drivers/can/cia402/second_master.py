@@ -1,4 +1,4 @@
-"""Hears commands to one drive that were not sent here: RPDOs, SDO writes, NMT commands.
+"""Commands to one drive that were not sent here: RPDOs, SDO writes, NMT, the host's heartbeat.
 
 Reading by SDO changes nothing and does not count. Every SDO write does, whatever its object: a
 maker's own object may command a motion, and one of the communication area end the supervision.
@@ -15,7 +15,7 @@ from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 
 __all__ = ["SecondMaster"]
 
-_NMT, _SDO_REQUEST = 0x000, 0x600
+_NMT, _SDO_REQUEST, _HEARTBEAT = 0x000, 0x600, 0x700
 _FURTHER_SERVERS = range(0x1201, 0x1280)
 _INVALID, _IDENTIFIER = 1 << 31, 0x7FF
 _DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6
@@ -38,8 +38,12 @@ class SecondMaster:
     (:mod:`~winchkit.drivers.can.bus.own_frames`).
     """
 
-    def __init__(self, bus: CanBus, node: int, rpdos: Iterable[int]) -> None:
-        """Listen to the commands to ``node``; ``rpdos`` are the numbers of its RPDOs in use."""
+    def __init__(self, bus: CanBus, node: int, rpdos: Iterable[int], host: int) -> None:
+        """Listen to the commands to ``node``; ``rpdos`` are the numbers of its RPDOs in use.
+
+        ``host`` is the node number of this host: its heartbeat from elsewhere would keep the drive
+        enabled after this program has ended.
+        """
         self.heard = ""
         """The first command that was not sent here, in words; empty where there was none."""
         self._bus, self._node = bus, node
@@ -47,6 +51,7 @@ class SecondMaster:
             bus.on_foreign(cob_id("rpdo", number, node), partial(self._take_rpdo, number))
         bus.on_foreign(_SDO_REQUEST + node, self._take_sdo)
         bus.on_foreign(_NMT, self._take_nmt)
+        bus.on_foreign(_HEARTBEAT + host, self._take_heartbeat)
 
     def hear_further_servers(self, node: SdoNode) -> None:
         """Listen to the drive's further SDO servers too; raises NoReply, DeviceRefused."""
@@ -76,6 +81,9 @@ class SecondMaster:
         if len(data) > 1 and data[1] in (0, self._node):
             to = f"node {self._node}" if data[1] else "all nodes"
             self._note(f"NMT command {_COMMANDS.get(data[0], f'{data[0]:02X}h')} to {to}")
+
+    def _take_heartbeat(self, data: bytes, _now: float) -> None:
+        self._note(f"heartbeat with the node number of this host ({data.hex(' ')})")
 
     def _note(self, words: str) -> None:
         if not self.heard:
