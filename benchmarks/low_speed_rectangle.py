@@ -128,7 +128,7 @@ class Winch:
         moved = np.concatenate([approach, -np.diff(length, prepend=length[0])])
         loads = np.concatenate([np.full(100, platform[0]), platform])
         for load, step in zip(loads.tolist(), moved.tolist(), strict=True):
-            state.rope_speed, tension = step, load
+            state.winding_speed, tension = step, load
             for index in (2, 1, 0):
                 tension += pulleys[index].pulley(state, index, WRAPS[index], tension, 1.0)
             out.append(tension)

@@ -76,11 +76,14 @@ def test_what_keeps_them_is_read(tmp_path: Path, formula: str) -> None:
             r"mine.py: effect 'mine' changes the tension by up to 1 N where it should vanish "
             r"\(scale = 0\); at its null it must return its input",
         ),
-        ('value + values["scale"] * np.nan', "changes the tension into no number where it should"),
-        ("value / 0.0", "changes the tension into no number where it should vanish"),
+        (
+            'value + values["scale"] * np.nan',
+            "changes the tension to a value that is not finite where it should",
+        ),
+        ("value / 0.0", "changes the tension to a value that is not finite where it should vanish"),
         (
             'value + (np.log(-values["scale"]) if values["scale"] else 0.0)',
-            r"gives no number for the tension anywhere on the standard motion, with scale = 1",
+            r"gives no finite tension anywhere on the standard motion, with scale = 1",
         ),
     ],
 )

@@ -32,7 +32,20 @@ _HOME_LENGTH = "home-length"
 
 
 def robot_with_effects(profile: RobotProfile, catalogue: Catalogue | None = None) -> Robot:
-    """The robot that a profile declares, its effects included. Raises FileError."""
+    """The robot that a profile declares, its effects included. Raises FileError.
+
+    Parameters
+    ----------
+    profile : RobotProfile
+        The robot, with the profiles of its winches read.
+    catalogue : Catalogue, optional
+        Effects; by default all.
+
+    Returns
+    -------
+    Robot
+        Kinematic model with the modifiers of the effects.
+    """
     return robot_with_terms(profile, robot_terms(profile, catalogue))
 
 
@@ -40,6 +53,18 @@ def robot_terms(profile: RobotProfile, catalogue: Catalogue | None = None) -> tu
     """Terms of a robot and of its lines' winches. Raises FileError with every fault.
 
     Effects of winches that need a motion, such as friction, are left out.
+
+    Parameters
+    ----------
+    profile : RobotProfile
+        The robot.
+    catalogue : Catalogue, optional
+        Effects; by default all.
+
+    Returns
+    -------
+    tuple[Term, ...]
+        Terms of the robot and of its winches.
     """
     catalogue = catalogue or load_catalogue()
     terms = declared_terms(profile, catalogue)
@@ -54,7 +79,20 @@ def robot_terms(profile: RobotProfile, catalogue: Catalogue | None = None) -> tu
 
 
 def declared_terms(profile: RobotProfile, catalogue: Catalogue) -> list[Term]:
-    """Terms of the robot's own tables alone. Raises FileError with every fault."""
+    """Terms of the robot's own tables alone. Raises FileError with every fault.
+
+    Parameters
+    ----------
+    profile : RobotProfile
+        The robot.
+    catalogue : Catalogue
+        Effects.
+
+    Returns
+    -------
+    list of Term
+        Terms of the robot's own tables.
+    """
     terms, faults = _bind(profile, catalogue)
     if faults:
         raise FileError(faults)
@@ -62,12 +100,36 @@ def declared_terms(profile: RobotProfile, catalogue: Catalogue) -> list[Term]:
 
 
 def check_robot(profile: RobotProfile, catalogue: Catalogue | None = None) -> list[Fault]:
-    """Every fault of the effects that a robot declares itself."""
+    """Every fault of the effects that a robot declares itself.
+
+    Parameters
+    ----------
+    profile : RobotProfile
+        The robot.
+    catalogue : Catalogue, optional
+        Effects; by default all.
+
+    Returns
+    -------
+    list of Fault
+        Faults with the lines of the file.
+    """
     return _bind(profile, catalogue or load_catalogue())[1]
 
 
 def lines_with_home_length(profile: RobotProfile) -> set[str]:
-    """Lines whose home length the profile has as an effect already."""
+    """Lines whose home length the profile has as an effect already.
+
+    Parameters
+    ----------
+    profile : RobotProfile
+        The robot.
+
+    Returns
+    -------
+    set[str]
+        Names of lines.
+    """
     own = (table for table in _single(profile.effect) if table.id == _HOME_LENGTH)
     return {str(table.values["line"]) for table in own if "line" in table.values}
 

@@ -29,7 +29,7 @@ __all__ = [
     "usual_values",
 ]
 
-_PLACES = {"all": "all lines alike", "one": "one line", "platform": "the platform"}
+_PLACES = {"all": "all lines equally", "one": "one line", "platform": "the platform"}
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 36
@@ -52,7 +52,18 @@ class Signature:
 
 
 def usual_values(effect: Effect) -> dict[str, float]:
-    """Values of typical size: amplitudes at their typical value, shapes at their default."""
+    """Values of typical size: amplitudes at their typical value, shapes at their default.
+
+    Parameters
+    ----------
+    effect : Effect
+        The effect.
+
+    Returns
+    -------
+    dict
+        SI, by parameter.
+    """
     sizes = {p.name: p.typical for p in effect.parameters if p.role == "amplitude"}
     return effect.null | sizes | dict(effect.probes[-1] if effect.probes else {})
 
@@ -93,6 +104,18 @@ def sparkline(values: Array, width: int = _WIDTH) -> str:
     """Values as ``width`` bars from their lowest to their highest; a gap where all are NaN.
 
     Each bar is the value of its interval farthest from the median, so that spikes are visible.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Any unit; NaN where missing.
+    width : int
+        Number of bars.
+
+    Returns
+    -------
+    str
+        Unicode block characters.
     """
     finite = values[np.isfinite(values)]
     if not len(finite):
@@ -112,7 +135,18 @@ def sparkline(values: Array, width: int = _WIDTH) -> str:
 
 
 def card(effect: Effect) -> str:
-    """The card as text of at most 80 columns."""
+    """The card as text of at most 80 columns.
+
+    Parameters
+    ----------
+    effect : Effect
+        The effect.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
     paragraphs = [
         ("What", effect.what),
         ("Formula", effect.formula),
@@ -134,13 +168,37 @@ def card(effect: Effect) -> str:
 
 
 def in_control(effect: Effect) -> str:
-    """Whether the length and tension of an open winch use an effect, or the reason why not."""
+    """Whether the length and tension of an open winch use an effect, or the reason why not.
+
+    Parameters
+    ----------
+    effect : Effect
+        The effect.
+
+    Returns
+    -------
+    str
+        A sentence.
+    """
     reason = effect.not_in_control
     return f"left out: {reason}" if reason else "used for a winch's length or tension"
 
 
 def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
-    """The card as data, SI; ``width`` samples of the signature at most."""
+    """The card as data, SI; ``width`` samples of the signature at most.
+
+    Parameters
+    ----------
+    effect : Effect
+        The effect.
+    width : int
+        Largest number of samples of the signature.
+
+    Returns
+    -------
+    dict
+        As ``winchkit effects ID --json`` prints it.
+    """
     drawn = signature(effect)
     return {
         "id": effect.id,
@@ -193,7 +251,20 @@ def _table(effect: Effect) -> list[str]:
 
 
 def parameter_kind(effect: Effect, parameter: Parameter) -> str:
-    """Kind of a parameter: an amplitude, a phase, a shape, a whole order, or fixed."""
+    """Kind of a parameter: an amplitude, a phase, a shape, a whole order, or fixed.
+
+    Parameters
+    ----------
+    effect : Effect
+        The effect.
+    parameter : Parameter
+        One of its parameters.
+
+    Returns
+    -------
+    str
+        One or two words.
+    """
     if effect.polar and parameter.name == effect.polar[1]:
         return "phase"
     return "whole order" if parameter.whole else parameter.role

@@ -35,7 +35,20 @@ class LineEffect(Effect):
 
 
 def at_line(effect: Effect, line: str) -> LineEffect:
-    """An effect placed on one line."""
+    """An effect placed on one line.
+
+    Parameters
+    ----------
+    effect : Effect
+        An effect that may act on one line.
+    line : str
+        Name of the line.
+
+    Returns
+    -------
+    LineEffect
+        Effect with the id ``EFFECT/LINE``.
+    """
     own = {f.name: getattr(effect, f.name) for f in fields(Effect)}
     own["id"] = f"{effect.id}/{line}"
     own["contains"] = tuple(f"{name}/{line}" for name in effect.contains)
@@ -47,6 +60,18 @@ def with_home_lengths(effect: Effect, lines: Sequence[str]) -> Effect:
 
     The cables are strained at home too, by unknown tensions. The law gives the strain relative to
     home, and the home lengths absorb the difference.
+
+    Parameters
+    ----------
+    effect : Effect
+        A law of the cable.
+    lines : sequence of str
+        Names of lines.
+
+    Returns
+    -------
+    Effect
+        Effect with a further parameter per line, m.
     """
     place = line_of_effect(effect)
     on = [line for line in lines if place in ("", line)]
@@ -60,17 +85,52 @@ def with_home_lengths(effect: Effect, lines: Sequence[str]) -> Effect:
 
 
 def base_of(effect: Effect) -> str:
-    """Id of an effect without its place."""
+    """Id of an effect without its place.
+
+    Parameters
+    ----------
+    effect : Effect
+        A placed effect, or one without a place.
+
+    Returns
+    -------
+    str
+        Id in the catalogue.
+    """
     return effect.base if isinstance(effect, LineEffect) else effect.id
 
 
 def line_of_effect(effect: Effect) -> str:
-    """Line on which an effect is placed; empty where it acts on all."""
+    """Line on which an effect is placed; empty where it acts on all.
+
+    Parameters
+    ----------
+    effect : Effect
+        A placed effect, or one without a place.
+
+    Returns
+    -------
+    str
+        Name of the line.
+    """
     return effect.line if isinstance(effect, LineEffect) else ""
 
 
 def placements(effect: Effect, lines: Sequence[str]) -> Iterator[Effect]:
-    """Every placement of an effect on a robot at rest."""
+    """Every placement of an effect on a robot at rest.
+
+    Parameters
+    ----------
+    effect : Effect
+        The effect.
+    lines : sequence of str
+        Names of all lines.
+
+    Yields
+    ------
+    Iterator[Effect]
+        Placed effects.
+    """
     if effect.on_robot & {"all", "platform"}:
         yield effect
     if "one" in effect.on_robot:

@@ -84,12 +84,36 @@ class Term:
 
 
 def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:
-    """Modifiers of several terms."""
+    """Modifiers of several terms.
+
+    Parameters
+    ----------
+    terms : iterable of Term
+        Effects with values.
+
+    Returns
+    -------
+    tuple[Modifier, ...]
+        In the order of the terms.
+    """
     return tuple(term.modifier() for term in terms)
 
 
 def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
-    """The robot with these effects in place of its own."""
+    """The robot with these effects in place of its own.
+
+    Parameters
+    ----------
+    profile : RobotProfile
+        The robot.
+    terms : iterable of Term
+        Effects with values, in place of those of the profile.
+
+    Returns
+    -------
+    Robot
+        Kinematic model.
+    """
     lines: dict[str, list[Modifier]] = {line.name: [] for line in profile.line}
     payload: list[Modifier] = []
     for term in terms:

@@ -24,7 +24,11 @@ def broken_promises(effect: Effect) -> list[str]:
     out = []
     for name, change in still.changes.items():
         by = float(np.max(np.abs(change)))
-        size = f"by up to {by:.3g} {UNITS[name]}" if np.isfinite(by) else "to a value that is NaN"
+        size = (
+            f"by up to {by:.3g} {UNITS[name]}"
+            if np.isfinite(by)
+            else "to a value that is not finite"
+        )
         if not by <= _ROUNDING:
             out.append(
                 f"changes the {name.replace('_', ' ')} {size} where it should vanish "

@@ -54,7 +54,7 @@ class RopeState:
     length: float
     """True cable length, m."""
     tension: float
-    """At the platform end, low-passed, N; the last known one where nothing measures it."""
+    """At the platform end, low-passed, N; the last known one without an instrument."""
     correction: float
     """Tension at the platform end less the cell's reading, N; 0 where the cell is not corrected."""
 

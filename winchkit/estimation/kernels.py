@@ -192,8 +192,8 @@ def compiled() -> Kernels:
         from numba import njit
     except ImportError:
         raise UsageError(
-            "numba is not installed, so nothing can be compiled; pip install 'winchkit[fast]', "
-            "or go on in plain Python with winchkit.estimation.PLAIN"
+            "numba is not installed, which compiles the loops; pip install 'winchkit[fast]', "
+            "or use plain Python with winchkit.estimation.PLAIN"
         ) from None
     import numpy as np
 

@@ -55,6 +55,18 @@ def is_smoother(measured: Array, differences: Array) -> bool:
 
     Jitter of the time stamps adds noise to differences of the angle and none to the velocity that a
     drive reports; a velocity that is quantised or filtered has more noise or does not agree.
+
+    Parameters
+    ----------
+    measured : (n,) array
+        Measured rate.
+    differences : (n,) array
+        Rate by differences of the angle, in the same unit.
+
+    Returns
+    -------
+    bool
+        Whether to use the measured rate.
     """
     spread = float(np.std(differences))
     if spread == 0.0 or float(np.std(measured - differences)) > _AGREES * spread:
@@ -125,7 +137,20 @@ def _by_number(x: Array) -> Array:
 
 
 def shifted(signal: Array, time: Array, later: float) -> Array:
-    """The signal ``later`` seconds later, by cubic Hermite interpolation; constant at the ends."""
+    """The signal ``later`` seconds later, by cubic Hermite interpolation; constant at the ends.
+
+    Parameters
+    ----------
+    signal, time : (n,) array
+        Signal, and its times, s.
+    later : float
+        Shift, s; negative for an earlier signal.
+
+    Returns
+    -------
+    (n,) array
+        In the unit of the signal.
+    """
     if later == 0.0 or len(time) < 2:
         return signal
     slope = np.gradient(signal, time)

@@ -73,17 +73,60 @@ def tension_after(
 
 
 def coulomb_ratio(friction: Array, wrap: float) -> Array:
-    """T1/T0 over a pulley with Coulomb friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1."""
+    """T1/T0 over a pulley with Coulomb friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1.
+
+    Parameters
+    ----------
+    friction : array
+        Coefficient μ, signed.
+    wrap : float
+        Wrap angle α, rad.
+
+    Returns
+    -------
+    array
+        T1/T0, of the shape of ``friction``.
+    """
     return tension_after(1.0, wrap, friction)
 
 
 def capstan_ratio(friction: Array, wrap: float) -> Array:
-    """T1/T0 of a cable that slides around ``wrap`` rad: e^(μ α), μ signed (Eq. 19)."""
+    """T1/T0 of a cable that slides around ``wrap`` rad: e^(μ α), μ signed (Eq. 19).
+
+    Parameters
+    ----------
+    friction : array
+        Coefficient μ, signed.
+    wrap : float
+        Wrap angle α, rad.
+
+    Returns
+    -------
+    array
+        T1/T0, of the shape of ``friction``.
+    """
     return np.asarray(np.exp(friction * wrap))
 
 
 def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float) -> Array:
-    """Coefficient μc + (μs − μc) e^(−(v/vs)²), unsigned; speeds in m/s."""
+    """Coefficient μc + (μs − μc) e^(−(v/vs)²), unsigned; speeds in m/s.
+
+    Parameters
+    ----------
+    speed : array
+        m/s, any shape.
+    coulomb : float
+        μc.
+    static : float
+        μs.
+    stribeck_speed : float
+        vs, m/s.
+
+    Returns
+    -------
+    array
+        Of the shape of ``speed``.
+    """
     fallen = np.exp(-((speed / stribeck_speed) ** 2))
     return np.asarray(coulomb * (1 - fallen) + static * fallen)
 
@@ -92,6 +135,18 @@ def has_fallen(speed: Array, stribeck_speed: float) -> bool:
     """Whether the excess of a Stribeck curve over μc falls to a tenth within the speeds.
 
     Where it does not, the curve cannot be distinguished from Coulomb friction.
+
+    Parameters
+    ----------
+    speed : array
+        m/s.
+    stribeck_speed : float
+        vs, m/s.
+
+    Returns
+    -------
+    bool
+        Whether the highest speed is sufficient.
     """
     return bool(np.max(np.abs(speed), initial=0.0) > _FALLEN * stribeck_speed)
 

@@ -94,6 +94,16 @@ def presliding_step(step: Step) -> PulleyStep:
     """Build the Dahl friction of one pulley over one move from ``step`` (:func:`dahl_step`).
 
     The same source runs as plain Python or, with a compiled ``step``, is compiled by numba.
+
+    Parameters
+    ----------
+    step : Step
+        Function as :func:`dahl_step`.
+
+    Returns
+    -------
+    PulleyStep
+        Function of force, tension, displacement and parameters of one pulley.
     """
 
     def pulley_step(  # noqa: PLR0917 - numba takes no keywords

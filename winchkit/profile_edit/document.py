@@ -18,7 +18,18 @@ __all__ = ["effect_tables", "read_document", "shorthands", "tables", "write_docu
 
 
 def read_document(path: Path) -> Any:
-    """Parse a profile with its comments and layout. Raises FileError."""
+    """Parse a profile with its comments and layout. Raises FileError.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Any
+        Document of tomlkit.
+    """
     try:
         return tomlkit.parse(read_text(path))
     except OSError as error:
@@ -28,7 +39,15 @@ def read_document(path: Path) -> Any:
 
 
 def write_document(document: Any, path: Path) -> None:
-    """Write a document, empty lists of tables left out. Raises FileError."""
+    """Write a document, empty lists of tables left out. Raises FileError.
+
+    Parameters
+    ----------
+    document : Any
+        Document of tomlkit.
+    path : Path
+        The file.
+    """
     for name in ("effect", "ledger"):
         if name in document and not len(document[name]):
             del document[name]
@@ -48,7 +67,18 @@ def tables(document: Any, name: str) -> AoT:
 
 
 def effect_tables(document: Any) -> AoT:
-    """The ``[[effect]]`` tables."""
+    """The ``[[effect]]`` tables.
+
+    Parameters
+    ----------
+    document : Any
+        Document of tomlkit.
+
+    Returns
+    -------
+    AoT
+        Array of tables, part of the document.
+    """
     return tables(document, "effect")
 
 

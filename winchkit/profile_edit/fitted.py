@@ -47,6 +47,15 @@ def write_fitted(source: Path, fitted: Sequence[Fitted], out: Path, judged: Judg
     """Copy the profile ``source`` to ``out`` with fitted effects, the last one new.
 
     Raises FileError where a file cannot be read or written.
+
+    Parameters
+    ----------
+    source, out : Path
+        The profile, and its copy.
+    fitted : sequence of Fitted
+        Effects with values and standard deviations.
+    judged : Judged
+        Runs and held-out errors for the ledger.
     """
     document = read_document(source)
     note(document, "add", fitted[-1].term.effect.id, judged)
@@ -61,6 +70,17 @@ def write_without(
 
     A robot's effect on one line is ``EFFECT/LINE``. Raises FileError where the profile has no such
     effect or a file cannot be read or written.
+
+    Parameters
+    ----------
+    source, out : Path
+        The profile, and its copy.
+    effect_id : str
+        The removed effect.
+    fitted : sequence of Fitted
+        The other effects, refitted.
+    judged : Judged
+        Runs and held-out errors for the ledger.
     """
     document = read_document(source)
     short = {SHORTHANDS[key]: key for key in shorthands(document)}

@@ -45,7 +45,18 @@ class Rung:
 
 
 def ladder(profile: WinchProfile | RobotProfile) -> tuple[Rung, ...]:
-    """Every step of a profile's ledger, oldest first. Raises FileError for a wrong quantity."""
+    """Every step of a profile's ledger, oldest first. Raises FileError for a wrong quantity.
+
+    Parameters
+    ----------
+    profile : WinchProfile or RobotProfile
+        Of a winch or a robot.
+
+    Returns
+    -------
+    tuple[Rung, ...]
+        Held-out errors per step, SI.
+    """
     return tuple(_rung(entry) for entry in profile.ledger)
 
 

@@ -60,12 +60,12 @@ def visible(answer: Answer) -> list[Visible]:
 def _on_any_line(rows: Sequence[Visible], elsewhere: bool) -> Visible:
     """The row of the line with the largest detectable size, for all lines of a robot.
 
-    ``elsewhere``: whether the same effect may be on one line and on all lines alike.
+    ``elsewhere``: whether the same effect may be on one line and on all lines equally.
     """
     worst = max(rows, key=lambda row: (isnan(row.share), row.share))
     name, _, line = worst.effect.partition("/")
     if not line:
-        return replace(worst, text=f"{worst.text} on all lines alike") if elsewhere else worst
+        return replace(worst, text=f"{worst.text} on all lines equally") if elsewhere else worst
     of = "on any line" if len(rows) > 1 else f"on line {line}"
     return replace(worst, effect=name, text=f"{worst.text} {of}")
 

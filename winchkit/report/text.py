@@ -77,7 +77,18 @@ def report_text(answer: Answer) -> str:
 
 
 def compare_text(comparison: Comparison) -> str:
-    """A comparison as text: errors per output, and their attribution to variables."""
+    """A comparison as text: errors per output, and their attribution to variables.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        The comparison.
+
+    Returns
+    -------
+    str
+        Text of at most 80 columns.
+    """
     attributed: list[str] = []
     for name, error in comparison.outputs.items():
         text = f"{OUTPUT_NAMES.get(name, name)}: {followed(error)}"
@@ -95,7 +106,18 @@ def compare_text(comparison: Comparison) -> str:
 
 
 def addition_text(addition: Addition | Removal) -> str:
-    """An added or removed effect as text: fitted values, and held-out errors."""
+    """An added or removed effect as text: fitted values, and held-out errors.
+
+    Parameters
+    ----------
+    addition : Addition or Removal
+        The added or removed effect.
+
+    Returns
+    -------
+    str
+        Text of at most 80 columns.
+    """
     fitted = []
     for term, every in addition.terms:
         values = {name: e for name, e in every.items() if not name.startswith(HOME)}

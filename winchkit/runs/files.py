@@ -14,7 +14,15 @@ __all__ = ["abandoned", "write_whole"]
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all; raises FileError, UsageError for an open log."""
+    """Write a file completely or not at all; raises FileError, UsageError for an open log.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    data : bytes
+        Its content.
+    """
     refuse_written([path])
     beside = path.with_name(f".{path.name}.new")
     try:

@@ -69,7 +69,18 @@ class LogInfo:
 
 
 def info_of(log: Log) -> LogInfo:
-    """Sum up a log."""
+    """Sum up a log.
+
+    Parameters
+    ----------
+    log : Log
+        The log.
+
+    Returns
+    -------
+    LogInfo
+        Summary by source.
+    """
     first, last = log.span
     offset = log.layout.clock_offset
     begun = None
@@ -168,7 +179,18 @@ class RunSummary:
 
 
 def summary_of(run: Run) -> RunSummary:
-    """Summarise a run."""
+    """Summarise a run.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    RunSummary
+        Size, rate, gaps and missing values.
+    """
     in_time = run.metadata.get("time") != "row number" and len(run) > 1
     constant = tuple(name for name in run if _is_constant(run, name))
     return RunSummary(

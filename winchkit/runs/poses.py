@@ -96,7 +96,18 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
 
 
 def joined(parts: Sequence[Measured]) -> Measured:
-    """Concatenated poses of several parts."""
+    """Concatenated poses of several parts.
+
+    Parameters
+    ----------
+    parts : sequence of Measured
+        Measurements at poses of one robot.
+
+    Returns
+    -------
+    Measured
+        All poses in order.
+    """
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
     }

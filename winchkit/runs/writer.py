@@ -85,12 +85,28 @@ def write_run(run: Run, path: str | Path) -> None:
 
 
 def write_csv(run: Run, path: str | Path) -> None:
-    """Write a run as CSV, independent of the file's suffix."""
+    """Write a run as CSV, independent of the file's suffix.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    path : str or Path
+        The file.
+    """
     _write(run, path, CsvWriter)
 
 
 def write_mcap(run: Run, path: str | Path) -> None:
-    """Write a run as MCAP, independent of the file's suffix."""
+    """Write a run as MCAP, independent of the file's suffix.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    path : str or Path
+        The file.
+    """
     from winchkit.runs.formats.mcap_write import McapWriter
 
     _write(run, path, McapWriter)

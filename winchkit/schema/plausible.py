@@ -36,11 +36,26 @@ LARGEST: Mapping[str, Bound] = {
     "force per time": Bound(1e12, "no cable breaks so fast"),
     "temperature": Bound(1e4, "no cable withstands it"),
 }
-"""By dimension; others, and ratios, have none in general."""
+"""By dimension; other dimensions and ratios have no general bound."""
 
 
 def check_size(value: float, dimension: str, text: object) -> float:
-    """The value, where it is finite and not beyond its dimension's bound; raises UsageError."""
+    """The value, where it is finite and not beyond its dimension's bound; raises UsageError.
+
+    Parameters
+    ----------
+    value : float
+        SI value.
+    dimension : str
+        Name of the dimension.
+    text : object
+        The value as written, for the message.
+
+    Returns
+    -------
+    float
+        The value.
+    """
     if not math.isfinite(value):
         raise UsageError(f"'{text}' must be finite; leave the key out where there is no value")
     bound = LARGEST.get(dimension)

@@ -47,7 +47,7 @@ class Step(Table):
     ask: str | None = None
     """Request to the operator; the programme waits for the answer."""
     load_mass: PositiveMass | None = None
-    """The known weight that hangs on the cable from this step on, kg."""
+    """Known mass on the cable from this step on, kg."""
     temperature: Temperature | None = None
     """Temperature of cable and machine from this step on, degC."""
 
@@ -139,7 +139,15 @@ _ORDER = ("ask", "load_mass", "temperature", "to", "by", "speed", "acceleration"
 
 
 def write_programme(programme: Programme, path: Path) -> None:
-    """Write a programme file; raises FileError."""
+    """Write a programme file; raises FileError.
+
+    Parameters
+    ----------
+    programme : Programme
+        The programme.
+    path : Path
+        The file.
+    """
     import tomlkit
 
     document = tomlkit.document()

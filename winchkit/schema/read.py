@@ -163,7 +163,7 @@ def read_simbench(path: PathLike) -> SimBench:
     Returns
     -------
     SimBench
-        The bench, and what is true, hidden, noisy and faulty there, in SI.
+        The bench with its true values, hidden effects, noise and faults, in SI.
 
     Raises
     ------
@@ -174,32 +174,130 @@ def read_simbench(path: PathLike) -> SimBench:
 
 
 def read_device(path: PathLike) -> DeviceSpec:
-    """Read a device file."""
+    """Read a device file.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``device``.
+
+    Returns
+    -------
+    DeviceSpec
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "device", DeviceSpec)
 
 
 def read_size(path: PathLike) -> SizeSpec:
-    """Read a sizing specification."""
+    """Read a sizing specification.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``size``.
+
+    Returns
+    -------
+    SizeSpec
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "size", SizeSpec)
 
 
 def read_calibration(path: PathLike) -> CellCalibration:
-    """Read the calibration of a load cell."""
+    """Read the calibration of a load cell.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``calibration``.
+
+    Returns
+    -------
+    CellCalibration
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "calibration", CellCalibration)
 
 
 def read_tares(path: PathLike) -> TareBook:
-    """Read the host's tares of a bench."""
+    """Read the host's tares of a bench.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``tares``.
+
+    Returns
+    -------
+    TareBook
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return _read(path, "tares", TareBook)
 
 
 def read_any(path: PathLike) -> Declared:
-    """Read a declaration of the kind that it declares."""
+    """Read a declaration of the kind that it declares.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of any kind.
+
+    Returns
+    -------
+    Declared
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     return load(path).value
 
 
 def load(path: PathLike, kind: str | None = None) -> Declaration:
-    """Read a declaration with its warnings; ``kind``, if given, is required."""
+    """Read a declaration with its warnings; ``kind``, if given, is required.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file.
+    kind : str, optional
+        Required kind.
+
+    Returns
+    -------
+    Declaration
+        Value and warnings.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
     reading = Reading(open_source(path))
     found = reading.source.kind
     if kind is not None and found != kind:

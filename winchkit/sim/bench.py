@@ -31,7 +31,18 @@ _SIZES = (0.8, 1.3)
 
 
 def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
-    """Read the declared profile of every winch on the bench."""
+    """Read the declared profile of every winch on the bench.
+
+    Parameters
+    ----------
+    bench : SimBench
+        The simulated bench.
+
+    Returns
+    -------
+    dict
+        By winch.
+    """
     from winchkit.schema.read import read_profile
 
     return {
@@ -44,6 +55,16 @@ def programme_path(name: str) -> Path:
     """Path of a motion programme: a file, or one shipped beside the simulated benches.
 
     Raises FileError with the shipped ones.
+
+    Parameters
+    ----------
+    name : str
+        Path, or shipped name.
+
+    Returns
+    -------
+    Path
+        An existing file.
     """
     for path in (Path(name), folder("sim") / f"{name}.toml"):
         if path.is_file():
@@ -115,6 +136,16 @@ def choose_bench(seed: int) -> SimBench:
     """The demonstration's bench for a seed, which determines the hidden effect and its size.
 
     Consecutive seeds give all benches in turn; sizes are 0.8 to 1.3 times the declared ones.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of effect and size.
+
+    Returns
+    -------
+    SimBench
+        Copy of a shipped bench.
     """
     from winchkit.schema.read import read_simbench
 

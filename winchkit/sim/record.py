@@ -153,7 +153,7 @@ class _Recording:
 
 
 def _truth_of_run(truth: WinchTruth, run_plan: RunPlan, winch: str) -> WinchTruth:
-    """The truth with the run's load and the temperature reached by its start."""
+    """True values with the run's load and the temperature at its start."""
     begun = run_plan.temperature.get(winch, truth.temperature)
     warmer = truth.temperature_drift * (run_plan.elapsed - run_plan.warmed) / 3600
     return replace(truth, load_mass=run_plan.load_mass[winch], temperature=begun + warmer)

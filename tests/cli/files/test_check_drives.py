@@ -97,7 +97,7 @@ def test_faults_of_the_eds_are_the_device_s(tmp_path: Path) -> None:
     code, output = check(path)
     assert code == 3
     assert "generic-cia402.eds:" in output
-    assert "DataType 'U32' is no number" in output
+    assert "DataType 'U32' is not a number" in output
 
 
 BENCH = """\

@@ -1,6 +1,6 @@
-"""How the cable speeds up, known better than differences of samples tell: loops and ripples.
+"""Cable acceleration more accurate than by differences of samples: hysteresis and ripples.
 
-The truth is a motion in closed form, with its own second derivative, and a loop that is walked in
+The reference is a motion in closed form, with its second derivative, and a hysteresis integrated in
 steps of a 64th of a sample.
 """
 

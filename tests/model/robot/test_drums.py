@@ -186,7 +186,7 @@ def test_a_hanging_robot_has_motor_angles_but_no_pose_in_the_cycle() -> None:
     robot = robot_of(replace(profile, line=profile.line[:4]))
     cycle = RobotCycle(robot)
     np.testing.assert_allclose(cycle.motor_angles(flat_pose(robot.home)), 0.0, atol=1e-12)
-    with pytest.raises(UsageError, match="4 lines leave the platform free"):
+    with pytest.raises(UsageError, match="4 lines do not constrain"):
         cycle.pose_at(robot.home_length.tolist())
 
 

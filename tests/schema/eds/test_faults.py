@@ -38,21 +38,21 @@ def test_the_files_that_we_ship_have_no_warnings(name: str) -> None:
 MENDED: list[tuple[str, str, str, str]] = [
     # replaced text, replacement, reported line, and message
     ("VendorNumber=0x12", "VendorNumber=", "VendorNumber", "is empty; taken as 0"),
-    ("ProductNumber=3", "ProductNumber=three", "ProductNumber", "'three' is no number"),
+    ("ProductNumber=3", "ProductNumber=three", "ProductNumber", "'three' is not a number"),
     ("[DeviceInfo]", "[DeviceInformation]", "[FileInfo]", "[DeviceInfo] is missing"),
     ("NrOfTXPDO=4", "NrOfTXPDO=4\nNrOfTXPDO=4", "NrOfTXPDO", "stands twice"),
     ("SupportedObjects=3", "SupportedObjects=4", "SupportedObjects=4", "but 3 are listed"),
     ("SupportedObjects=2", "", "[OptionalObjects]", "SupportedObjects is missing"),
     ("2=0x6064", "2=0x6065", "2=0x6065", "lists 6065h, which has no section"),
     ("2=0x6064", "2=0x6065", "[6064]", "is in no list of objects"),
-    ("2=0x1001", "2=one", "2=one", "is no index"),
+    ("2=0x1001", "2=one", "2=one", "is not an index"),
     ("SubNumber=2", "SubNumber=7", "SubNumber", "SubNumber is 7, but 2 sub-indices follow"),
     ("SubNumber=2", "SubNumber=", "SubNumber", "SubNumber is empty, but 2"),
     ("DataType=0x0004", "DataType=0x0017", "DataType=0x0017", "data type 17h is unknown"),
     ("DataType=0x0004", "DataType=0x00A0", "DataType=0x00A0", "a structure of the maker's"),
-    ("LowLimit=-5", "LowLimit=low", "LowLimit", "'low' is no number; left out"),
+    ("LowLimit=-5", "LowLimit=low", "LowLimit", "'low' is not a number; left out"),
     ("LowLimit=-5", "LowLimit=0x123456789", "LowLimit", "does not fit into 32 bits"),
-    ("DefaultValue=$NODEID+0x80", "DefaultValue=$NODEID+x", "DefaultValue=$N", "is no number"),
+    ("DefaultValue=$NODEID+0x80", "DefaultValue=$NODEID+x", "DefaultValue=$N", "is not a number"),
     ("PDOMapping=1\n[Man", "PDOMapping=yes\n[Man", "PDOMapping=yes", "taken as 0"),
     ("AccessType=rw", "AccessType=full", "AccessType=full", "'full' is none of ro, rw"),
     ("AccessType=rw\n", "", "[1014]", "no AccessType; taken as ro"),
@@ -205,10 +205,10 @@ def test_the_node_number_counts_in_any_spelling(tmp_path: Path) -> None:
 
 
 REFUSED: list[tuple[str, str, str, str]] = [
-    ("DataType=0x0004", "DataType=INT32", "DataType=INT32", "'INT32' is no number"),
+    ("DataType=0x0004", "DataType=INT32", "DataType=INT32", "'INT32' is not a number"),
     ("DataType=0x0004\n", "", "[6064]", "has no DataType"),
     ("[1001]", "[1001", "[1001", "is not a section; it should read [name]"),
-    ("ObjectType=0x9", "ObjectType=record", "ObjectType=record", "'record' is no number"),
+    ("ObjectType=0x9", "ObjectType=record", "ObjectType=record", "'record' is not a number"),
     ("ProductNumber=3", "ProductNumber=3\nProductNumber=8", "ProductNumber=8", "'8' here and '3'"),
     ("DataType=0x0004", "DataType=0x0004\nDataType=7", "DataType=7", "'7' here and '0x0004'"),
     ("[OptionalObjects]", "[1001]\nDataType=7\n[OptionalObjects]", "[1001]", "differs from line"),

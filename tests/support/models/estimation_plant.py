@@ -25,7 +25,7 @@ def cell_readings(
     pulleys = PreslidingPulleys(friction, stiffness, shape)
     state, out = State(), []
     for load, moved in zip(platform, np.diff(wound, prepend=wound[0]), strict=True):
-        state.rope_speed = float(moved)
+        state.winding_speed = float(moved)
         tension = float(load)
         for index, wrap in enumerate(reversed(wraps)):
             tension += pulleys.pulley(state, index, wrap, tension, 1.0)

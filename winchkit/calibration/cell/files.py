@@ -26,7 +26,18 @@ _COLUMNS = ("load", "indicated", "std", "going", "series")
 
 
 def calibration_toml(calibration: CellCalibration) -> str:
-    """Text of a calibration file."""
+    """Text of a calibration file.
+
+    Parameters
+    ----------
+    calibration : CellCalibration
+        The calibration.
+
+    Returns
+    -------
+    str
+        TOML text.
+    """
     lines = [
         "schema = 1",
         'kind = "calibration"',
@@ -55,7 +66,18 @@ def calibration_toml(calibration: CellCalibration) -> str:
 
 
 def tares_toml(book: TareBook) -> str:
-    """Text of a bench's tare file."""
+    """Text of a bench's tare file.
+
+    Parameters
+    ----------
+    book : TareBook
+        Tares of the host.
+
+    Returns
+    -------
+    str
+        TOML text.
+    """
     lines = ["schema = 1", 'kind = "tares"', f"name = {json.dumps(book.name)}"]
     for name, tare in book.tare.items():
         unit = "m" if name.endswith(".length") else "N"
@@ -64,7 +86,20 @@ def tares_toml(book: TareBook) -> str:
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a file atomically; raises FileError."""
+    """Write a file atomically; raises FileError.
+
+    Parameters
+    ----------
+    text : str
+        Content.
+    path : str or Path
+        File, replaced atomically.
+
+    Raises
+    ------
+    FileError
+        Where the file cannot be written.
+    """
     target = Path(path)
     write_whole(target, text.encode())
     return target

@@ -228,5 +228,5 @@ def _warnings(
         if abs(residual) > _FAR * std > 0
     ]
     if max(point.std for point in points) > std > 0:
-        found.append("readings scatter more than the points: let loads come to rest for longer")
+        found.append("the readings have more noise than the points: wait longer after each load")
     return found

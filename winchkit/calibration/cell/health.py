@@ -244,7 +244,7 @@ def _with_remarks(health: Health, duration: float) -> Health:
     if health.unique == 1:
         remarks.append("the counts never change: a frozen cell, or a division far above its noise")
     elif health.noise_counts < 0.5:
-        remarks.append("the noise is below half a count: the division is too coarse to see it")
+        remarks.append("the noise is below half a count: the division is too coarse to measure it")
     if health.duplicates > 0.5 and health.unique > 1:
         remarks.append(
             f"{health.duplicates:.0%} of the readings repeat the one before: it is polled faster "
@@ -258,7 +258,9 @@ def _with_remarks(health: Health, duration: float) -> Health:
     if abs(health.drift) > _SIGNIFICANT * health.drift_std:
         over = abs(health.drift) * duration
         if over > health.noise and duration > _LONG_ENOUGH:
-            remarks.append("it drifts by more than its noise while watched: let it warm up")
+            remarks.append(
+                "it drifted by more than its noise during the test: wait until it is warm"
+            )
     if health.creep and abs(health.creep.change) > _SIGNIFICANT * health.creep.std:
         share = abs(health.creep.change / health.creep.step)
         remarks.append(f"it creeps after the change of load: {share:.2%} of it in 30 minutes")
@@ -266,7 +268,18 @@ def _with_remarks(health: Health, duration: float) -> Health:
 
 
 def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> Samples:
-    """Samples from rows of time, raw counts, value, usable, saturated."""
+    """Samples from rows of time, raw counts, value, usable, saturated.
+
+    Parameters
+    ----------
+    rows : (n, 5) array
+        Time, s, raw counts, value, usable, saturated.
+
+    Returns
+    -------
+    Samples
+        Samples.
+    """
     time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
     return Samples(
         time.astype(float),

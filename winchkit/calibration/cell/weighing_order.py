@@ -41,7 +41,7 @@ def plan(weights: str, series: int) -> tuple[CalibrationPoint, ...]:
     try:
         numbers = [float(word) for word in re.split(r"[,;\s]+", found[1].strip())]
     except ValueError:
-        raise UsageError(f"'{weights}' holds something that is no number") from None
+        raise UsageError(f"'{weights}' contains a text that is not a number") from None
     loads = [_force(number, found[2]) for number in numbers]
     if sorted(set(loads)) != loads:
         raise UsageError(f"'{weights}' must rise from one weight to the next; they are hung so")
@@ -57,7 +57,18 @@ def plan(weights: str, series: int) -> tuple[CalibrationPoint, ...]:
 
 
 def spoken(point: CalibrationPoint) -> str:
-    """``5 kg (49.03 N, going up, series 1)``."""
+    """``5 kg (49.03 N, going up, series 1)``.
+
+    Parameters
+    ----------
+    point : CalibrationPoint
+        Requested load.
+
+    Returns
+    -------
+    str
+        Text for the operator.
+    """
     return (
         f"{point.load / GRAVITY:.4g} kg ({point.load:.4g} N, going {point.going}, "
         f"series {point.series})"

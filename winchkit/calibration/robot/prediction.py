@@ -54,7 +54,18 @@ def errors_at(equations: Equations, values: Array) -> PoseErrors:
 
 
 def rms(values: Sequence[float] | Array) -> float:
-    """Root of the mean square of finite values; NaN without any."""
+    """Root of the mean square of finite values; NaN without any.
+
+    Parameters
+    ----------
+    values : array, any shape
+        Values; NaN is ignored.
+
+    Returns
+    -------
+    float
+        In the unit of the values.
+    """
     known = np.asarray(values)[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 

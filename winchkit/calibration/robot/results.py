@@ -25,7 +25,20 @@ _SHOWN = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0))}
 
 
 def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[str, Any]:
-    """The object that ``winchkit calibrate --json`` prints; SI, rms over poses."""
+    """The object that ``winchkit calibrate --json`` prints; SI, rms over poses.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+    following : sequence of NextPose
+        Proposed poses.
+
+    Returns
+    -------
+    dict
+        SI; null where not finite.
+    """
     after, angle = found.validation_after, found.validation_after.angle
     return {
         "schema": 1,
@@ -73,7 +86,20 @@ def _entry(estimate: Estimated) -> dict[str, Any]:
 
 
 def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
-    """Errors, parameters, unidentifiable directions, candidate effects, warnings, next poses."""
+    """Errors, parameters, unidentifiable directions, candidate effects, warnings, next poses.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+    following : sequence of NextPose
+        Proposed poses.
+
+    Returns
+    -------
+    str
+        Lines for a terminal.
+    """
     return "\n".join(
         [
             *_errors(found),
@@ -88,7 +114,18 @@ def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
 
 
 def candidate_lines(found: Calibrated) -> list[str]:
-    """Candidate effects in words."""
+    """Candidate effects in words.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+
+    Returns
+    -------
+    list of str
+        One line per candidate effect.
+    """
     return [
         f"the effect {c.effect} would explain {c.share * 100:.0f} % of the remaining cost; "
         f"try --effect {c.effect}"
@@ -97,7 +134,18 @@ def candidate_lines(found: Calibrated) -> list[str]:
 
 
 def noise_words(found: Calibrated) -> str:
-    """Standard deviation of each kind of measurement in words."""
+    """Standard deviation of each kind of measurement in words.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+
+    Returns
+    -------
+    str
+        Standard deviations with units.
+    """
     return ", ".join(
         f"{kind.replace('_', ' ')} {_shown(sigma, NOISE[kind].unit)}"
         for kind, sigma in found.weights.sigma.items()
@@ -105,7 +153,18 @@ def noise_words(found: Calibrated) -> str:
 
 
 def in_words(estimate: Estimated) -> tuple[str, str, str, str]:
-    """Nominal value, value, sigma and unit, rounded to the second digit of sigma."""
+    """Nominal value, value, sigma and unit, rounded to the second digit of sigma.
+
+    Parameters
+    ----------
+    estimate : Estimated
+        Value with its uncertainty.
+
+    Returns
+    -------
+    tuple[str, str, str, str]
+        Columns of a table.
+    """
     unit, worth = _SHOWN.get(estimate.parameter.unit, (estimate.parameter.unit, 1.0))
     std = estimate.std * worth
     if not (isfinite(std) and std > 0):

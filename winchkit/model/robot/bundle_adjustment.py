@@ -290,7 +290,7 @@ def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> L
     many, rows, count = stack.by_values.shape
     turned = np.swapaxes(stack.by_pose, 1, 2)
     normal = turned @ stack.by_pose
-    # Directions of a pose that nothing measured stay where they are.
+    # Unmeasured directions of a pose do not change.
     firm = _POSE_DAMPING + _ROUNDING * np.trace(normal, axis1=1, axis2=2)
     normal[:, range(6), range(6)] *= 1 + damping
     normal[:, range(6), range(6)] += firm[:, None]

@@ -302,7 +302,20 @@ def closure_by_geometry(
 
 
 def position(pose: Pose, measured: Array) -> Constraint:
-    """Position of the platform less the measured one, (p, 3), m."""
+    """Position of the platform less the measured one, (p, 3), m.
+
+    Parameters
+    ----------
+    pose : Pose
+        The p poses.
+    measured : (p, 3) array
+        Measured positions, m; NaN where missing.
+
+    Returns
+    -------
+    Constraint
+        With residuals (p, 3), m.
+    """
     by = np.zeros((len(measured), 3, 6))
     by[:, range(3), range(3)] = 1.0
     return Constraint(pose.position - measured, by)
@@ -324,7 +337,20 @@ def rotation(pose: Pose, angles: Array) -> Constraint:
 
 
 def rotation_residual(turned: Array, angles: Array) -> Array:
-    """Rotation vector where all three angles were measured, else angle by angle; (p, 3), rad."""
+    """Rotation vector where all three angles were measured, else angle by angle; (p, 3), rad.
+
+    Parameters
+    ----------
+    turned : (p, 3, 3) array
+        Rotations R.
+    angles : (p, 3) array
+        Measured roll, pitch and yaw, rad; NaN where missing.
+
+    Returns
+    -------
+    (p, 3) array
+        rad.
+    """
     whole = _whole(angles)
     out = wrapped(angles_of(turned) - angles)
     seen = np.swapaxes(rotation_of(*angles[whole].T), 1, 2)
@@ -333,7 +359,20 @@ def rotation_residual(turned: Array, angles: Array) -> Array:
 
 
 def rotation_by_pose(turned: Array, angles: Array) -> Array:
-    """Derivative of :func:`rotation_residual` by position and rotation vector, (p, 3, 6)."""
+    """Derivative of :func:`rotation_residual` by position and rotation vector, (p, 3, 6).
+
+    Parameters
+    ----------
+    turned : (p, 3, 3) array
+        Rotations R.
+    angles : (p, 3) array
+        Measured roll, pitch and yaw, rad; NaN where missing.
+
+    Returns
+    -------
+    (p, 3, 6) array
+        Derivatives.
+    """
     out = np.zeros((len(turned), 3, 6))
     out[..., 3:] = angle_rates(turned)
     out[_whole(angles), :, 3:] = np.eye(3)
@@ -343,14 +382,48 @@ def rotation_by_pose(turned: Array, angles: Array) -> Array:
 def swivel_residual(
     geometry: Geometry, pose: Pose, measured: Array, zero: Array | float = 0.0
 ) -> Array:
-    """Angles of the swivel pulleys plus their instruments' zeros less readings, (p, n), rad."""
+    """Angles of the swivel pulleys plus their instruments' zeros less readings, (p, n), rad.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    pose : Pose
+        The p poses.
+    measured : (p, n) array
+        Readings, rad; NaN where missing.
+    zero : (n,) array or float
+        Zeros of the instruments, rad.
+
+    Returns
+    -------
+    (p, n) array
+        rad, within ±π.
+    """
     return wrapped(swivel_angle(geometry, pose.position, pose.rotation) + zero - measured)
 
 
 def swivel(
     geometry: Geometry, pose: Pose, measured: Array, zero: Array | float = 0.0
 ) -> Constraint:
-    """:func:`swivel_residual` with derivatives by pose, geometry and ``swivel_zero``."""
+    """:func:`swivel_residual` with derivatives by pose, geometry and ``swivel_zero``.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    pose : Pose
+        The p poses.
+    measured : (p, n) array
+        Readings, rad; NaN where missing.
+    zero : (n,) array or float
+        Zeros of the instruments, rad.
+
+    Returns
+    -------
+    Constraint
+        With residuals (p, n), rad.
+    """
     by = swivel_sensitivities(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "swivel_zero": np.ones_like(measured)}
     return Constraint(swivel_residual(geometry, pose, measured, zero), by_pose(by), by_line)
@@ -362,6 +435,22 @@ def cable_length(
     """Geometric lengths plus offsets of their instruments less readings, (p, n), m.
 
     ``by_line`` has the geometry and ``length_offset``.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    pose : Pose
+        The p poses.
+    measured : (p, n) array
+        Readings, m; NaN where missing.
+    offset : (n,) array or float
+        Offsets of the instruments, m.
+
+    Returns
+    -------
+    Constraint
+        With residuals (p, n), m.
     """
     length, by = linearised(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "length_offset": np.ones_like(measured)}
@@ -373,6 +462,17 @@ def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSp
 
     V is the inverse of the Cholesky factor of Aᵀ A, so that the rows are NaN at poses where a force
     is missing or the cables do not hold all six degrees of freedom.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    pose : Pose
+        The p poses.
+    tension : (p, n) array
+        Measured cable forces, N.
+    platform : PlatformSpec
+        Mass and centre of mass.
 
     Returns
     -------
@@ -391,7 +491,22 @@ def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSp
 
 
 def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:
-    """Wrench Aᵀ f + w that cable forces and weight leave over, (p, 6), N and N m."""
+    """Wrench Aᵀ f + w that cable forces and weight leave over, (p, 6), N and N m.
+
+    Parameters
+    ----------
+    structure : (p, 6, n) array
+        Structure matrices Aᵀ.
+    tension : (p, n) array
+        Cable forces f, N.
+    weight : (p, 6) array
+        Wrench w of the weight, N and N m.
+
+    Returns
+    -------
+    (p, 6) array
+        N and N m.
+    """
     return np.asarray((structure @ tension[..., None])[..., 0] + weight)
 
 
@@ -440,7 +555,18 @@ def mean_offset(residual: Array, *, angles: bool) -> Array:
 
 
 def by_pose(by: Sensitivities) -> Array:
-    """Derivatives by position and rotation vector beside each other, (p, n, 6)."""
+    """Derivatives by position and rotation vector beside each other, (p, n, 6).
+
+    Parameters
+    ----------
+    by : Sensitivities
+        Derivatives of a quantity per line.
+
+    Returns
+    -------
+    (p, n, 6) array
+        Position, then rotation vector.
+    """
     return np.concatenate([by.position, by.rotation], axis=-1)
 
 
@@ -450,7 +576,18 @@ def wrapped(angle: Array) -> Array:
 
 
 def by_geometry(by: Sensitivities) -> dict[str, Array]:
-    """Derivatives by each line's own points and swivel radius, by name."""
+    """Derivatives by each line's own points and swivel radius, by name.
+
+    Parameters
+    ----------
+    by : Sensitivities
+        Derivatives of a quantity per line.
+
+    Returns
+    -------
+    dict
+        Arrays by ``exit_point``, ``anchor_point`` and ``swivel_radius``.
+    """
     return {
         "exit_point": by.exit_point,
         "anchor_point": by.anchor_point,

@@ -25,7 +25,18 @@ _STEPS = 20
 
 
 def flat_pose(pose: Pose) -> list[float]:
-    """The first pose of a batch as twelve floats: position, then the rotation by rows."""
+    """The first pose of a batch as twelve floats: position, then the rotation by rows.
+
+    Parameters
+    ----------
+    pose : Pose
+        Pose, of which the first is taken.
+
+    Returns
+    -------
+    list of float
+        12 floats, m and 1.
+    """
     return [*pose.position[0].tolist(), *pose.rotation[0].ravel().tolist()]
 
 
@@ -107,7 +118,7 @@ class RobotCycle:
         """
         if len(self._lines) < 6:
             raise UsageError(
-                f"{len(self._lines)} lines leave the platform free; its pose comes from "
+                f"{len(self._lines)} lines do not constrain the platform; compute its pose by "
                 "winchkit.model.robot.forward"
             )
         pose = self._pose.copy()

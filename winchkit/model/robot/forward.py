@@ -49,7 +49,7 @@ class Found:
     residual: Array
     """Given less geometric length, (p, n), m."""
     forces: Array
-    """Cable forces of a platform that hangs, (p, n), N, zero in a slack cable; NaN with six or
+    """Cable forces of a hanging platform, (p, n), N, zero in a slack cable; NaN with six or
     more cables, which may be tight to any degree."""
     steps: int
 

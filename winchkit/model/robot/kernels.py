@@ -66,7 +66,7 @@ def _build(
 
 
 PLAIN = _build("plain", lambda function: function, list, list)
-"""Plain Python: always there."""
+"""Plain Python, always available."""
 
 
 def compiled() -> RobotKernels:
@@ -81,8 +81,8 @@ def compiled() -> RobotKernels:
         from numba import njit
     except ImportError:
         raise UsageError(
-            "numba is not installed, so nothing can be compiled; pip install 'winchkit[fast]', "
-            "or go on in plain Python with winchkit.model.robot.PLAIN"
+            "numba is not installed, which compiles the loops; pip install 'winchkit[fast]', "
+            "or use plain Python with winchkit.model.robot.PLAIN"
         ) from None
     import numpy as np
 

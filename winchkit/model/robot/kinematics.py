@@ -88,9 +88,9 @@ class _Tangent(NamedTuple):
     """The cable around its pulley: arrays of shape (p, n), vectors by component."""
 
     arm: tuple[Array, Array, Array]
-    """Anchor point seen from the platform's origin, in base axes."""
+    """Anchor point relative to the platform's origin, in base axes."""
     outward: tuple[Array, Array, Array]
-    """From the axis to the anchor, square to the axis, as long as it is."""
+    """From the axis to the anchor, perpendicular to the axis, not normalised."""
     distance: Array
     """Length of ``outward``."""
     free: Array
@@ -111,7 +111,18 @@ def geometry_of(profile: RobotProfile) -> Geometry:
 
 
 def home_of(profile: RobotProfile) -> Pose:
-    """The home pose that a robot's profile declares, (1, 3) and (1, 3, 3)."""
+    """The home pose that a robot's profile declares, (1, 3) and (1, 3, 3).
+
+    Parameters
+    ----------
+    profile : RobotProfile
+        The robot.
+
+    Returns
+    -------
+    Pose
+        One pose.
+    """
     rotation = rotation_of(*profile.home.rotation)
     return Pose(np.array([profile.home.position], dtype=float), rotation[None])
 
@@ -195,6 +206,15 @@ def linearised(geometry: Geometry, position: Array, rotation: Array) -> tuple[Ar
 def swivel_angle(geometry: Geometry, position: Array, rotation: Array) -> Array:
     """Angle of the swivelling pulley about its axis, right-handed.
 
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    position : (p, 3) array
+        Of the platform's origin in the base frame, m.
+    rotation : (p, 3, 3) array
+        From platform to base axes.
+
     Returns
     -------
     (p, n) array
@@ -209,7 +229,22 @@ def swivel_angle(geometry: Geometry, position: Array, rotation: Array) -> Array:
 
 
 def swivel_sensitivities(geometry: Geometry, position: Array, rotation: Array) -> Sensitivities:
-    """Derivatives of :func:`swivel_angle`, rad per m and rad per rad."""
+    """Derivatives of :func:`swivel_angle`, rad per m and rad per rad.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    position : (p, 3) array
+        Of the platform's origin in the base frame, m.
+    rotation : (p, 3, 3) array
+        From platform to base axes.
+
+    Returns
+    -------
+    Sensitivities
+        Derivatives per line.
+    """
     t = _tangent(geometry, position, rotation)
     across = np.cross(geometry.swivel_axis, np.stack(_unit(t), axis=-1))
     distance = np.where(t.distance > 0, t.distance, np.nan)
@@ -218,6 +253,15 @@ def swivel_sensitivities(geometry: Geometry, position: Array, rotation: Array) -
 
 def structure_matrix(geometry: Geometry, position: Array, rotation: Array) -> Array:
     """Structure matrices Aᵀ: their product with the cable forces is the wrench on the platform.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    position : (p, 3) array
+        Of the platform's origin in the base frame, m.
+    rotation : (p, 3, 3) array
+        From platform to base axes.
 
     Returns
     -------

@@ -46,13 +46,39 @@ Box = tuple[Array, Array]
 
 
 def middle_and_half(values: Array) -> Box:
-    """Middle and half width of each column of (p, k)."""
+    """Middle and half width of each column of (p, k).
+
+    Parameters
+    ----------
+    values : (p, k) array
+        Coordinates of poses.
+
+    Returns
+    -------
+    Box
+        Middle and half width, (k,) each.
+    """
     low, high = values.min(axis=0), values.max(axis=0)
     return (low + high) / 2, (high - low) / 2
 
 
 def in_box(box: Box, count: int, rng: np.random.Generator) -> Array:
-    """Points evenly distributed in a box, (count, 3)."""
+    """Points evenly distributed in a box, (count, 3).
+
+    Parameters
+    ----------
+    box : Box
+        Middle and half width of each coordinate.
+    count : int
+        Number of points.
+    rng : np.random.Generator
+        Random generator.
+
+    Returns
+    -------
+    (count, 3) array
+        Points.
+    """
     middle, half = box
     return np.asarray(middle + half * rng.uniform(-1, 1, (count, 3)))
 
@@ -61,6 +87,20 @@ def random_poses(geometry: Geometry, position: Array, angles: Array) -> Pose:
     """Poses of positions (c, 3), m, and angles (c, 3), rad, without those that have no lengths.
 
     A pose has no lengths where an anchor point lies inside a swivel pulley.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    position : (c, 3) array
+        m.
+    angles : (c, 3) array
+        Roll, pitch and yaw, rad.
+
+    Returns
+    -------
+    Pose
+        At most c poses.
     """
     rotation = rotation_of(*angles.T)
     sound = np.all(np.isfinite(lengths(geometry, position, rotation)), axis=1)
@@ -71,6 +111,20 @@ def is_held(geometry: Geometry, platform: PlatformSpec, pose: Pose) -> NDArray[n
     """Whether cables that only pull balance the platform's weight at poses, (p,).
 
     True for robots of fewer than six cables, whose platform hangs.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    platform : PlatformSpec
+        Mass and centre of mass.
+    pose : Pose
+        The p poses.
+
+    Returns
+    -------
+    (p,) array of bool
+        Whether each pose is held.
     """
     if len(geometry.exit_point) < FREEDOMS:
         return np.ones(len(pose.position), dtype=bool)

@@ -230,7 +230,24 @@ def standing(
     tension: Array | None = None,
     temperature: Array | None = None,
 ) -> At:
-    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default."""
+    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default.
+
+    Parameters
+    ----------
+    line : Line
+        The line.
+    motor_angle : (n,) array
+        rad.
+    tension : (n,) array, optional
+        N.
+    temperature : (n,) array, optional
+        Degrees Celsius.
+
+    Returns
+    -------
+    At
+        Inputs of modifiers.
+    """
     zero = np.zeros_like(motor_angle)
     pulled = zero if tension is None else tension
     warm = zero + 20.0 if temperature is None else temperature
@@ -238,7 +255,23 @@ def standing(
 
 
 def cables_of(robot: Robot) -> list[CableLine]:
-    """Lines for the loops of a control cycle."""
+    """Lines for the loops of a control cycle.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    list of CableLine
+        One per line.
+
+    Raises
+    ------
+    UsageError
+        For effects that the loops do not compute.
+    """
     return [_cable(robot, i, winch) for i, winch in enumerate(robot.winches)]
 
 
@@ -293,7 +326,7 @@ def _law(drum: Drum) -> tuple[float, float, float]:
             return 0.0, radius, np.pi * build_up
         case Grooved(radius, pitch):
             return 0.0, float(np.hypot(radius, pitch / _TURN)), 0.0
-    raise TypeError(f"{type(drum).__name__} is no winding law that the loops know")
+    raise TypeError(f"{type(drum).__name__} is not a winding law of the loops")
 
 
 def _ratio(winch: WinchProfile) -> float:

@@ -24,7 +24,18 @@ __all__ = [
 
 
 def rotation_of(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
-    """R = Rz(yaw) Ry(pitch) Rx(roll), angles of shape (...), rad; returns (..., 3, 3)."""
+    """R = Rz(yaw) Ry(pitch) Rx(roll), angles of shape (...), rad; returns (..., 3, 3).
+
+    Parameters
+    ----------
+    roll, pitch, yaw : array_like, (...)
+        Angles, rad.
+
+    Returns
+    -------
+    (..., 3, 3) array
+        From platform to base axes.
+    """
     turns = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (roll, pitch, yaw)))
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in turns)
     rows = (
@@ -39,6 +50,16 @@ def angles_of(rotation: ArrayLike) -> Array:
     """Roll, pitch and yaw of rotations (..., 3, 3); returns (..., 3), rad.
 
     At a pitch of a right angle only yaw ∓ roll is defined; roll is then zero.
+
+    Parameters
+    ----------
+    rotation : array_like, (..., 3, 3)
+        Rotations.
+
+    Returns
+    -------
+    (..., 3) array
+        Roll, pitch and yaw, rad.
     """
     r = np.asarray(rotation, dtype=float)
     flat = np.hypot(r[..., 0, 0], r[..., 1, 0])
@@ -54,7 +75,18 @@ def angles_of(rotation: ArrayLike) -> Array:
 
 
 def skew(vector: ArrayLike) -> Array:
-    """[v]× with [v]× w = v × w, of vectors (..., 3); returns (..., 3, 3)."""
+    """[v]× with [v]× w = v × w, of vectors (..., 3); returns (..., 3, 3).
+
+    Parameters
+    ----------
+    vector : array_like, (..., 3)
+        Vectors v.
+
+    Returns
+    -------
+    (..., 3, 3) array
+        [v]×.
+    """
     v = np.asarray(vector, dtype=float)
     out = np.zeros((*v.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
@@ -63,7 +95,18 @@ def skew(vector: ArrayLike) -> Array:
 
 
 def rotation_by(vector: ArrayLike) -> Array:
-    """exp([ω]×) of rotation vectors (..., 3), rad (Rodrigues); returns (..., 3, 3)."""
+    """exp([ω]×) of rotation vectors (..., 3), rad (Rodrigues); returns (..., 3, 3).
+
+    Parameters
+    ----------
+    vector : array_like, (..., 3)
+        Rotation vectors ω, rad.
+
+    Returns
+    -------
+    (..., 3, 3) array
+        Rotations.
+    """
     v = np.asarray(vector, dtype=float)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     cross = skew(v)
@@ -74,7 +117,18 @@ def rotation_by(vector: ArrayLike) -> Array:
 
 
 def rotation_vector(rotation: ArrayLike) -> Array:
-    """The rotation vector of rotations (..., 3, 3), at most π long; returns (..., 3), rad."""
+    """The rotation vector of rotations (..., 3, 3), at most π long; returns (..., 3), rad.
+
+    Parameters
+    ----------
+    rotation : array_like, (..., 3, 3)
+        Rotations.
+
+    Returns
+    -------
+    (..., 3) array
+        rad, of length at most π.
+    """
     q = quaternion_of(rotation)
     sine = np.linalg.norm(q[..., 1:], axis=-1)
     angle = 2 * np.arctan2(sine, q[..., 0])
@@ -84,7 +138,18 @@ def rotation_vector(rotation: ArrayLike) -> Array:
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Rotations of quaternions (..., 4) as w, x, y, z, of any length but zero; (..., 3, 3)."""
+    """Rotations of quaternions (..., 4) as w, x, y, z, of any length but zero; (..., 3, 3).
+
+    Parameters
+    ----------
+    quaternion : array_like, (..., 4)
+        w, x, y, z, of any length except zero.
+
+    Returns
+    -------
+    (..., 3, 3) array
+        Rotations.
+    """
     q = np.asarray(quaternion, dtype=float)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     cross = skew(q[..., 1:])

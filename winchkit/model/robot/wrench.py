@@ -14,14 +14,40 @@ _DOWN = np.array([0.0, 0.0, -GRAVITY])
 
 
 def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
-    """Weight of the platform on its origin, (p, 6), N and N m in base axes; gravity is −z."""
+    """Weight of the platform on its origin, (p, 6), N and N m in base axes; gravity is −z.
+
+    Parameters
+    ----------
+    platform : PlatformSpec
+        Mass and centre of mass.
+    rotation : (p, 3, 3) array
+        From platform to base axes.
+
+    Returns
+    -------
+    (p, 6) array
+        Force, N, then moment about the platform's origin, N m.
+    """
     lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
     force = np.broadcast_to(platform.mass * _DOWN, lever.shape)
     return np.concatenate([force, np.cross(lever, force)], axis=-1)
 
 
 def weight_by_payload(platform: PlatformSpec, rotation: Array) -> Array:
-    """Derivatives of :func:`gravity_wrench` by mass and centre of mass, (p, 6, 4)."""
+    """Derivatives of :func:`gravity_wrench` by mass and centre of mass, (p, 6, 4).
+
+    Parameters
+    ----------
+    platform : PlatformSpec
+        Mass and centre of mass.
+    rotation : (p, 3, 3) array
+        From platform to base axes.
+
+    Returns
+    -------
+    (p, 6, 4) array
+        By mass, 1/kg, and centre of mass, 1/m.
+    """
     out = np.zeros((len(rotation), 6, 4))
     out[..., 0] = gravity_wrench(PlatformSpec(1.0, platform.center_of_mass), rotation)
     for k in range(3):

@@ -35,7 +35,18 @@ class _Drive:
 
 
 def sized(spec: SizeSpec) -> list[Row]:
-    """Every requirement, in the order of the paper's chain; SI."""
+    """Every requirement, in the order of the paper's chain; SI.
+
+    Parameters
+    ----------
+    spec : SizeSpec
+        Requirements and chosen parts.
+
+    Returns
+    -------
+    list of Row
+        Rows with value, limit and alternatives.
+    """
     drive = _drive(spec)
     rows = [*_motor_rows(spec, drive), *_gearbox_rows(spec), *_drum_rows(spec)]
     return [*rows, *guide_rows(spec)]

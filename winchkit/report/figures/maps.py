@@ -87,7 +87,7 @@ def _figure(state: str, drawn: ResidualMap, peak: float, scale: Scale) -> Markup
     output = OUTPUT_NAMES.get(drawn.output, drawn.output)
     caption = (
         f"Mean residual of the {output}{state} {map_text(drawn, scale)}. "
-        "Empty where nothing was measured."
+        "Empty without measurements."
     )
     axes = [
         Axis(r.label, float(e[0]), float(e[-1]), r.logarithmic)

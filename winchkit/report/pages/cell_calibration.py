@@ -29,7 +29,20 @@ _MARKS = {"up": "^", "down": "v"}
 
 
 def report_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
-    """Coefficients, figures of merit, residuals drawn with characters, warnings."""
+    """Coefficients, figures of merit, residuals drawn with characters, warnings.
+
+    Parameters
+    ----------
+    fit : CellFit
+        The fitted calibration.
+    points : sequence of CalibrationPoint
+        Loads and readings.
+
+    Returns
+    -------
+    list of str
+        Lines of text.
+    """
     lines = [f"calibration over {fit.span:.5g} N from {len(points)} points:"]
     lines += [
         f"  {name:9}{value:+.6g} ± {std:.2g}"
@@ -82,7 +95,20 @@ _TONES = {"up": "above", "down": "below"}
 
 
 def report_page(calibration: CellCalibration, fit: CellFit) -> str:
-    """Page with the load cell, the fit, the residuals and the points."""
+    """Page with the load cell, the fit, the residuals and the points.
+
+    Parameters
+    ----------
+    calibration : CellCalibration
+        The calibration as filed.
+    fit : CellFit
+        The fit.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     coefficients = [
         (name, f"{value:.6g}", f"{std:.2g}")
         for name, value, std in zip(NAMES, fit.coefficients, fit.std, strict=False)

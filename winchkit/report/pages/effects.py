@@ -30,7 +30,20 @@ _MOTION = (
 
 
 def effects_html(effects: Sequence[Effect], title: str) -> str:
-    """The page of one effect, or of a catalogue with its contents first."""
+    """The page of one effect, or of a catalogue with its contents first.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        The effects.
+    title : str
+        Title of the page.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     contents = [_contents(effects)] if len(effects) > 1 else []
     return page(title, (), *contents, *(_card(effect) for effect in effects))
 
@@ -105,7 +118,7 @@ def _size(value: float, unit: str) -> str:
 def _drawing(effect: Effect) -> list[Markup]:
     drawn = signature(effect)
     if not drawn.changes:
-        return [element("p", "It changes nothing on the standard motion.", class_="quiet")]
+        return [element("p", "It has no effect on the standard motion.", class_="quiet")]
     over = "pose of the standard robot, line 1" if effect.of_robots else "time [s]"
     figures = [_moves(drawn, over), *(_change(drawn, name, over) for name in drawn.changes)]
     sizes = ", ".join(

@@ -46,6 +46,20 @@ def shared_effects_text(
     """Diagnoses of all winches, a line each, and their common effects.
 
     ``chances`` are those of :func:`winchkit.diagnosis.fleet.meta_analysis.alarms`.
+
+    Parameters
+    ----------
+    found : mapping
+        Diagnosis by winch.
+    shared : sequence of SharedEffect
+        Effects over all winches.
+    chances : mapping
+        Probability of a false alarm by winch.
+
+    Returns
+    -------
+    str
+        Text of 80 columns.
     """
     lines = [f"all {len(found)} winches", *hanging(winch_rows(found, chances), words=2)]
     if shared:
@@ -55,7 +69,20 @@ def shared_effects_text(
 
 
 def shared_errors_text(found: Mapping[str, Comparison], shared: Mapping[str, SharedError]) -> str:
-    """Comparisons of all winches, a line each, and the common attribution of their errors."""
+    """Comparisons of all winches, a line each, and the common attribution of their errors.
+
+    Parameters
+    ----------
+    found : mapping
+        Comparison by winch.
+    shared : mapping
+        Attribution by output.
+
+    Returns
+    -------
+    str
+        Text of 80 columns.
+    """
     lines = [f"all {len(found)} winches", *aligned(error_rows(found))]
     lines += ["", "share of the errors' variance explained by"]
     lines += [line for text in error_texts(shared) for line in paragraph(text, "  ", "    ")]
@@ -182,7 +209,26 @@ def shared_effects_html(
     title: str,
     pages: Mapping[str, str],
 ) -> str:
-    """The page over the diagnoses of all winches; ``pages`` are the files of the single ones."""
+    """The page over the diagnoses of all winches; ``pages`` are the files of the single ones.
+
+    Parameters
+    ----------
+    found : mapping
+        Diagnosis by winch.
+    shared : sequence of SharedEffect
+        Effects over all winches.
+    chances : mapping
+        Probability of a false alarm by winch.
+    title : str
+        Title of the page.
+    pages : mapping
+        File of each winch's page.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     plain = winch_rows(found, chances)
     rows = [[_link(name, pages), verdict, unbroken(text)] for name, verdict, text in plain]
     texts = [unbroken(effect_text(one)) for one in shared]
@@ -201,7 +247,24 @@ def shared_errors_html(
     title: str,
     pages: Mapping[str, str],
 ) -> str:
-    """The page over the comparisons of all winches, as :func:`shared_effects_html`."""
+    """The page over the comparisons of all winches, as :func:`shared_effects_html`.
+
+    Parameters
+    ----------
+    found : mapping
+        Comparison by winch.
+    shared : mapping
+        Attribution by output.
+    title : str
+        Title of the page.
+    pages : mapping
+        File of each winch's page.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     head, *rows = error_rows(found)
     linked = [[_link(name, pages), *cells] for name, *cells in rows]
     texts = [unbroken(text) for text in error_texts(shared)]

@@ -74,7 +74,24 @@ def residuals_of(answer: WinchAnswer) -> Residuals:
 def comparison_html(
     compared: Compared, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
-    """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`."""
+    """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`.
+
+    Parameters
+    ----------
+    compared : Compared
+        The comparison, with its residuals.
+    title : str
+        Title of the page.
+    profile : str
+        The profile as the user named it.
+    options : sequence of str
+        Further options of the command.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     noise = {name: error.noise_rms for name, error in compared.comparison.outputs.items()}
     residuals = Residuals(compared.regression, compared.residual, None, noise)
     plots = plots_of(residuals)
@@ -87,7 +104,26 @@ def comparison_html(
 def addition_html(
     grown: Grown, title: str, profile: str = "", better: str = "", *, options: Sequence[str] = ()
 ) -> str:
-    """The page of an added effect; ``better`` is the written profile, the others as above."""
+    """The page of an added effect; ``better`` is the written profile, the others as above.
+
+    Parameters
+    ----------
+    grown : Grown
+        The addition, with its residuals.
+    title : str
+        Title of the page.
+    profile : str
+        The profile as the user named it.
+    better : str
+        The written profile.
+    options : sequence of str
+        Further options of the command.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     noise = {name: output.noise_rms for name, output in grown.addition.outputs.items()}
     residuals = Residuals(
         grown.regression, grown.initial_model.residual, grown.final.residual, noise

@@ -180,7 +180,24 @@ def _rms(values: Array) -> float:
 def robot_report_html(
     answer: RobotAnswer, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
-    """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them."""
+    """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them.
+
+    Parameters
+    ----------
+    answer : RobotAnswer
+        The diagnosis.
+    title : str
+        Title of the page.
+    profile : str
+        The profile as the user named it.
+    options : sequence of str
+        Further options of the command.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     diagnosis, selection = answer.diagnosis, answer.selection
     before, after = selection.errors
     noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
@@ -194,7 +211,24 @@ def robot_report_html(
 def robot_comparison_html(
     compared: RobotCompared, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
-    """The page of a robot's comparison."""
+    """The page of a robot's comparison.
+
+    Parameters
+    ----------
+    compared : RobotCompared
+        The comparison, with its residuals.
+    title : str
+        Title of the page.
+    profile : str
+        The profile as the user named it.
+    options : sequence of str
+        Further options of the command.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     comparison, command = (
         compared.comparison,
         Command(compared.regression.dataset, profile, options),
@@ -213,7 +247,26 @@ def robot_addition_html(
     *,
     options: Sequence[str] = (),
 ) -> str:
-    """The page of an effect added to a robot; ``better`` is the profile that was written."""
+    """The page of an effect added to a robot; ``better`` is the profile that was written.
+
+    Parameters
+    ----------
+    grown : RobotGrown
+        The addition, with its residuals.
+    title : str
+        Title of the page.
+    profile : str
+        The profile as the user named it.
+    better : str
+        The written profile.
+    options : sequence of str
+        Further options of the command.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     outputs = grown.addition.outputs
     noise = {name: output.noise_rms for name, output in outputs.items()}
     before, after = grown.errors

@@ -23,7 +23,22 @@ _MM = 1e3
 
 
 def calibration_html(found: Calibrated, following: Sequence[NextPose], title: str) -> str:
-    """The page, self-contained and without script."""
+    """The page, self-contained and without script.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+    following : sequence of NextPose
+        Proposed poses.
+    title : str
+        Title of the page.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
     head, tone = _verdict(found)
     return page(
         title,

@@ -82,7 +82,22 @@ def scale_for(sizes: float | Sequence[float], unit: str) -> Scale:
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """An SI value in its best unit: ``quantity(0.00163, "m") == "1.63 mm"``."""
+    """An SI value in its best unit: ``quantity(0.00163, "m") == "1.63 mm"``.
+
+    Parameters
+    ----------
+    value : float
+        SI value.
+    unit : str
+        SI unit.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+        Number with unit.
+    """
     return scale_for(value, unit).text(value, digits)
 
 
@@ -103,7 +118,18 @@ def with_std(value: float, std: float, unit: str) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as per cent: ``0.934`` is ``93 %``; ``unknown`` where it is NaN."""
+    """A share as per cent: ``0.934`` is ``93 %``; ``unknown`` where it is NaN.
+
+    Parameters
+    ----------
+    share : float
+        Share, 0 to 1.
+
+    Returns
+    -------
+    str
+        Number with ``%``.
+    """
     if isnan(share):
         return "unknown"
     shown = 100 * share

@@ -56,7 +56,18 @@ _COUNTS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """The verdict with its figures, in one to four short sentences."""
+    """The verdict with its figures, in one to four short sentences.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of a winch or a robot.
+
+    Returns
+    -------
+    str
+        Plain text.
+    """
     if diagnosis.verdict == "adequate":
         return _adequate(diagnosis)
     if diagnosis.steps:

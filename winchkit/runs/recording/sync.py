@@ -11,7 +11,7 @@ __all__ = ["SYNC_PERIOD", "Syncer"]
 SYNC_PERIOD = 0.8
 """Period of fsync, s: written data reach the disk within a second."""
 _CANNOT = (errno.EINVAL, errno.ENOTSUP, errno.EROFS)
-"""A pipe or a device has nothing to sync."""
+"""Errors of fsync on a pipe or a device, which need no sync."""
 
 
 class Syncer:

@@ -38,9 +38,9 @@ class QuirkSpec(Table):
     ramps_are_times: Flag = False
     """6083h to 6085h and 609Ah are times from standstill to 3000 rpm, ms."""
     home_gets_offset: Flag = False
-    """After homing the home has the position 607Ch; by the standard zero lies that far from it."""
+    """The home position is 607Ch after homing; in the standard 607Ch is the offset of zero."""
     brake_release: Duration = 0.0
-    """From enabling until the brake is open and set-points count, s."""
+    """From enabling until the brake is open and set-points are effective, s."""
     brake_apply: Duration = 0.0
     """Time for which the motor holds the load while the brake closes, s."""
 
@@ -74,7 +74,7 @@ class PdoSpec(Table):
 
     @property
     def every_sync(self) -> bool:
-        """Whether it comes with each SYNC."""
+        """Whether it is sent with each SYNC."""
         return self.transmission == 1
 
     @property
@@ -122,7 +122,7 @@ class ServoSpec(Table):
     motion_mode: MotionMode = "CSV"
     """Mode of operation in which the bench moves it."""
     increments_per_turn: WholeNumber = 65_536
-    """Position units of one motor turn unless the drive's objects say otherwise."""
+    """Position units of one motor turn unless the drive's objects declare them."""
     home_offset: str = "0x607C"
     """Object of the home position, as ``index`` or ``index:sub``; a maker-specific one where the
     drive lacks 607Ch."""
@@ -130,12 +130,12 @@ class ServoSpec(Table):
     """Lowest and highest count of 6064h before it wraps around, where that is not the range of 32
     bits."""
     speed_unit: Literal["increments/s", "rpm", "0.1 rpm"] = "increments/s"
-    """Of 606Ch, 60FFh, 6081h and, per second, of 6083h to 6085h, where 60A9h does not say."""
+    """Of 606Ch, 60FFh, 6081h and, per second, of 6083h to 6085h, where 60A9h is missing."""
     units: Literal["drive", "file"] = "drive"
     """Source of units: the drive's 608Fh, 6091h, 6092h, 60A8h and 60A9h, or this file, for drives
     that do not use the values of these objects."""
     rated_torque: Annotated[float, Quantity("torque", 0.0, above=True)] = 1.0
-    """N m, unless object 6076h says otherwise."""
+    """N m; object 6076h has precedence."""
     tpdo: tuple[PdoSpec, ...] = ()
     """TPDOs of the drive: at least 6041h, 6064h and 606Ch, the first two with every SYNC."""
     rpdo: tuple[PdoSpec, ...] = ()

@@ -45,7 +45,7 @@ _SPELLING = {key.casefold(): key for key in (*_OBJECT_KEYS, *_OTHER_KEYS, *_DEVI
 
 @dataclass
 class Section:
-    """A section as it stands in the file; ``lines`` are those of its keys."""
+    """A section of the file; ``lines`` are those of its keys."""
 
     name: str
     line: int
@@ -110,7 +110,7 @@ def canonical(name: str) -> str:
 
 
 def canonical_key(key: str) -> str:
-    """The spelling of CiA 306 for a key, which counts in upper and lower case alike."""
+    """The spelling of CiA 306 for a key, which is case-insensitive."""
     return _SPELLING.get(key.casefold(), key)
 
 
@@ -195,7 +195,7 @@ def _mend_device(sections: dict[str, Section], findings: Findings) -> None:
         text = info.values.get(key)
         if text is None or _number(text) is not None:
             continue
-        said = "is empty" if not text else f"{text!r} is no number"
+        said = "is empty" if not text else f"{text!r} is not a number"
         findings.warn(info.lines[key], f"[DeviceInfo] {key} {said}; taken as 0")
         info.values[key] = "0"
 
@@ -279,7 +279,7 @@ def _mend_variable(section: Section, findings: Findings) -> None:
     section.values["AccessType"] = access
     if _number(section.values.get("PDOMapping", "0")) is None:
         findings.warn(
-            section.lines["PDOMapping"], f"[{section.name}] PDOMapping is no number; taken as 0"
+            section.lines["PDOMapping"], f"[{section.name}] PDOMapping is not a number; taken as 0"
         )
         section.values["PDOMapping"] = "0"
     if kind in _BITS:
@@ -290,7 +290,7 @@ def _mend_type(section: Section, findings: Findings) -> int:
     text = section.values.get("DataType")
     kind = _number(text or "")
     if kind is None:
-        said = "has no DataType" if not text else f"DataType {text!r} is no number"
+        said = "has no DataType" if not text else f"DataType {text!r} is not a number"
         findings.fault(section.line_of("DataType"), f"[{section.name}] {said}")
         return 0
     if kind not in _BITS and kind not in _OTHER_TYPES:
@@ -318,7 +318,7 @@ def _mend_numbers(section: Section, bits: int, signed: bool, findings: Findings)
         bare = re.sub(r"\+?\$NODEID\+?", "", text.replace(" ", "").upper()) or "0"
         value = _number(bare)
         if value is None or not -(1 << bits - 1) <= value < 1 << bits:
-            reason = "is no number" if value is None else f"does not fit into {bits} bits"
+            reason = "is not a number" if value is None else f"does not fit into {bits} bits"
             findings.warn(section.lines[key], f"[{section.name}] {key} {text!r} {reason}; left out")
             del section.values[key]
         elif relative:
@@ -369,7 +369,7 @@ def _check_list(section: Section, objects: dict[int, Section], findings: Finding
     for key, text in entries.items():
         index = _number(text)
         if index is None:
-            findings.warn(section.lines[key], f"[{section.name}] {key}={text} is no index")
+            findings.warn(section.lines[key], f"[{section.name}] {key}={text} is not an index")
         else:
             listed.add(index)
             if index not in objects:

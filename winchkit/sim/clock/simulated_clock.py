@@ -179,7 +179,7 @@ class SimulatedClock:
         if following is None:
             raise WinchkitError(
                 "simulated time cannot advance: every thread waits for another one without a "
-                "time-out; a thread of this bench waits for something outside the simulation"
+                "time-out; a thread of this bench waits for an event outside the simulation"
             )
         following.gate.release()
         try:

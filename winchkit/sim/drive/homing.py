@@ -32,7 +32,7 @@ class Switches:
     positive: float = inf
     home: tuple[float, float] = (inf, inf)
     index: float = 0.0
-    """One of the angles of the index pulse, which comes once a turn."""
+    """One of the angles of the index pulse, one per turn."""
 
     def on(self, name: str, angle: float) -> bool:
         """Whether the switch ``negative``, ``positive`` or ``home`` is on."""

@@ -20,7 +20,7 @@ __all__ = [
     "ThermalForce",
     "Viscosity",
     "motor_direction",
-    "rope_direction",
+    "winding_direction",
 ]
 
 Stiffness = Annotated[float, Quantity("stiffness", 0.0, above=True)]
@@ -30,13 +30,13 @@ Expansion = Annotated[float, Quantity("expansion")]
 ForceDrift = Annotated[float, Quantity("force per time")]
 ThermalForce = Annotated[float, Quantity("force per temperature")]
 
-_ROPE_STANDSTILL = 1e-3
+_CABLE_STANDSTILL = 1e-3
 _MOTOR_STANDSTILL = 0.5
 
 
-def rope_direction(state: State) -> float:
+def winding_direction(state: State) -> float:
     """Direction of the cable, +1 winding in, smooth within about 1 mm/s of standstill."""
-    return tanh(state.rope_speed / _ROPE_STANDSTILL)
+    return tanh(state.winding_speed / _CABLE_STANDSTILL)
 
 
 def motor_direction(state: State) -> float:

@@ -15,7 +15,7 @@ from winchkit.schema.quantity import (
     PositiveNumber,
     Quantity,
 )
-from winchkit.sim.physics.base import Physics, Stiffness, rope_direction
+from winchkit.sim.physics.base import Physics, Stiffness, winding_direction
 from winchkit.sim.physics.state import State
 
 __all__ = [
@@ -87,7 +87,7 @@ class StickyPlace(Physics):
         if index != 0:
             return 0.0
         where = (state.unstrained - self.at) / self.width
-        return rope_direction(state) * self.force * exp(-where * where)
+        return winding_direction(state) * self.force * exp(-where * where)
 
 
 @dataclass

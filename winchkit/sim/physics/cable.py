@@ -17,19 +17,19 @@ from winchkit.sim.physics.presliding import relax
 from winchkit.sim.physics.state import GRAVITY, State
 
 __all__ = [
-    "CreepingRope",
-    "ElasticRope",
-    "HeavyRope",
-    "LaggingRope",
+    "CreepingCable",
+    "ElasticCable",
+    "HeavyCable",
+    "LaggingCable",
     "SoftFrame",
-    "WarmRope",
+    "WarmCable",
 ]
 
 _WARM = 20.0
 
 
 @dataclass
-class ElasticRope(Physics):
+class ElasticCable(Physics):
     """The cable is a spring of stiffness EA over all of its stressed length."""
 
     axial_stiffness: PositiveForce = 300e3
@@ -55,7 +55,7 @@ class SoftFrame(Physics):
 
 
 @dataclass
-class WarmRope(Physics):
+class WarmCable(Physics):
     """The cable lengthens with temperature above 20 degC."""
 
     expansion: Expansion = 1.1e-5
@@ -68,7 +68,7 @@ class WarmRope(Physics):
 
 
 @dataclass
-class CreepingRope(Physics):
+class CreepingCable(Physics):
     """Strain that follows the tension slowly, from zero at the start."""
 
     creep_stiffness: PositiveForce = 300e3
@@ -85,7 +85,7 @@ class CreepingRope(Physics):
 
 
 @dataclass
-class LaggingRope(Physics):
+class LaggingCable(Physics):
     """Internal friction of the strands withholds strain: a hysteresis of strain over tension.
 
     The friction takes half of a change of tension from rest, all of it after a full reversal,
@@ -108,7 +108,7 @@ class LaggingRope(Physics):
 
 
 @dataclass
-class HeavyRope(Physics):
+class HeavyCable(Physics):
     """Weight of the free cable."""
 
     mass_per_length: LinearDensity = 0.15

@@ -19,7 +19,7 @@ from winchkit.sim.physics.base import (
     Physics,
     RotationalViscosity,
     motor_direction,
-    rope_direction,
+    winding_direction,
 )
 from winchkit.sim.physics.state import State
 
@@ -47,7 +47,7 @@ class LossyGear(Physics):
 
     def gear(self, state: State, torque: float) -> float:
         """Divide by the efficiency winding in, multiply paying out."""
-        return float(torque * self.efficiency ** -rope_direction(state))
+        return float(torque * self.efficiency ** -winding_direction(state))
 
 
 @dataclass

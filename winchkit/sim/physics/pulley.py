@@ -7,7 +7,7 @@ from math import cos, exp, sqrt
 from typing import ClassVar
 
 from winchkit.schema.quantity import Mass, Number, PositiveNumber, PositiveSpeed
-from winchkit.sim.physics.base import Physics, Stiffness, Viscosity, rope_direction
+from winchkit.sim.physics.base import Physics, Stiffness, Viscosity, winding_direction
 from winchkit.sim.physics.presliding import relax
 from winchkit.sim.physics.state import State
 
@@ -37,7 +37,7 @@ class StickyPulleys(Physics):
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
         """Coulomb friction in proportion to the axle load."""
-        return _dragged(tension, wrap, rope_direction(state) * self.friction)
+        return _dragged(tension, wrap, winding_direction(state) * self.friction)
 
 
 @dataclass
@@ -54,7 +54,7 @@ class PreslidingPulleys(Physics):
         """Dahl force with the sliding force of the present axle load."""
         force = self._force.get(index, 0.0)
         limit = self.friction * _pressure(tension, tension + force, wrap)
-        force = relax(force, state.rope_speed * dt, limit, self.stiffness, self.shape)
+        force = relax(force, state.winding_speed * dt, limit, self.stiffness, self.shape)
         self._force[index] = force
         return force
 
@@ -68,7 +68,7 @@ class ViscousPulleys(Physics):
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
         """Force proportional to speed."""
-        return self.viscosity * state.rope_speed
+        return self.viscosity * state.winding_speed
 
 
 @dataclass
@@ -82,9 +82,9 @@ class CreepPulleys(Physics):
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
         """Stribeck curve times the axle load."""
-        fall = exp(-((state.rope_speed / self.stribeck_speed) ** 2))
+        fall = exp(-((state.winding_speed / self.stribeck_speed) ** 2))
         friction = self.coulomb + (self.static - self.coulomb) * fall
-        return _dragged(tension, wrap, rope_direction(state) * friction)
+        return _dragged(tension, wrap, winding_direction(state) * friction)
 
 
 @dataclass
@@ -96,4 +96,4 @@ class HeavyPulleys(Physics):
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
         """Force proportional to the cable's acceleration."""
-        return self.equivalent_mass * state.rope_acceleration
+        return self.equivalent_mass * state.winding_acceleration

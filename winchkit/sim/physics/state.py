@@ -25,9 +25,9 @@ class State:
     """Total on the drum, rad."""
     arm: float = 0.0
     """Cable wound in per motor radian, m/rad, signed."""
-    rope_speed: float = 0.0
+    winding_speed: float = 0.0
     """Positive winds in, m/s."""
-    rope_acceleration: float = 0.0
+    winding_acceleration: float = 0.0
     unstrained: float = 0.0
     """Unstrained free cable length, m."""
     dead_length: float = 0.0

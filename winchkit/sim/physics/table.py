@@ -8,8 +8,7 @@ from dataclasses import replace
 from winchkit.errors import Fault, FileError
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import HiddenSpec
-from winchkit.sim.physics import beyond, instruments, motor, pulley, winding
-from winchkit.sim.physics import cable as rope
+from winchkit.sim.physics import beyond, cable, instruments, motor, pulley, winding
 from winchkit.sim.physics.base import Physics
 from winchkit.sim.physics.parameters import number_names, read_numbers, with_unit
 from winchkit.units import suggest
@@ -26,13 +25,13 @@ PHYSICS: dict[str, type[Physics]] = {
     "eccentric drum": winding.EccentricDrum,
     "five-cornered drum": beyond.FiveCornerDrum,
     "guide offset": winding.GuideOffset,
-    "elastic rope": rope.ElasticRope,
-    "soft frame": rope.SoftFrame,
-    "creeping rope": rope.CreepingRope,
-    "lagging rope": rope.LaggingRope,
-    "warm rope": rope.WarmRope,
+    "elastic rope": cable.ElasticCable,
+    "soft frame": cable.SoftFrame,
+    "creeping rope": cable.CreepingCable,
+    "lagging rope": cable.LaggingCable,
+    "warm rope": cable.WarmCable,
     "giving joint": beyond.GivingJoint,
-    "heavy rope": rope.HeavyRope,
+    "heavy rope": cable.HeavyCable,
     "sticky pulleys": pulley.StickyPulleys,
     "presliding pulleys": pulley.PreslidingPulleys,
     "viscous pulleys": pulley.ViscousPulleys,
@@ -100,9 +99,9 @@ def declared(profile: WinchProfile, pieces: Sequence[Physics]) -> list[Physics]:
     """Add the effects of a profile's shorthand keys: elastic cable, cable weight, efficiency."""
     own: list[Physics] = []
     if profile.cable.axial_stiffness is not None:
-        own.append(rope.ElasticRope(profile.cable.axial_stiffness))
+        own.append(cable.ElasticCable(profile.cable.axial_stiffness))
     if profile.cable.mass_per_length is not None:
-        own.append(rope.HeavyRope(profile.cable.mass_per_length))
+        own.append(cable.HeavyCable(profile.cable.mass_per_length))
     if profile.gearbox.efficiency is not None:
         own.append(motor.LossyGear(profile.gearbox.efficiency))
     for piece in own:

@@ -27,26 +27,26 @@ class HangingLoad:
     tension: float = 0.0
     """At the platform, N."""
 
-    def rest(self, rope_end: float, compliance: float) -> None:
-        """Set the load to rest on a cable whose unloaded end is at ``rope_end``."""
+    def rest(self, cable_end: float, compliance: float) -> None:
+        """Set the load to rest on a cable whose unloaded end is at ``cable_end``."""
         self.tension = self.mass * GRAVITY
-        self.position = rope_end + compliance * self.tension
+        self.position = cable_end + compliance * self.tension
         self.speed = 0.0
 
-    def step(self, rope_end: float, rope_speed: float, compliance: float, dt: float) -> None:
-        """Advance by ``dt`` s; the unloaded end of the cable is then at ``rope_end``.
+    def step(self, cable_end: float, end_speed: float, compliance: float, dt: float) -> None:
+        """Advance by ``dt`` s; the unloaded end of the cable is then at ``cable_end``.
 
-        ``rope_speed`` is its downward speed. The spring and damper are integrated by the
+        ``end_speed`` is its downward speed. The spring and damper are integrated by the
         trapezoidal rule in closed form; on a slack cable the load falls freely.
         """
         mass = self.mass
         if compliance * mass < (dt / _STIFF) ** 2:
-            self._follow(rope_end, rope_speed, compliance, dt)
+            self._follow(cable_end, end_speed, compliance, dt)
             return
         damping = 2 * _DAMPING_RATIO * sqrt(mass / compliance)
         # Tension at the end of the step is fixed + growth · (speed at the end of the step).
-        fixed = (self.position + dt / 2 * self.speed - rope_end) / compliance
-        fixed -= damping * rope_speed
+        fixed = (self.position + dt / 2 * self.speed - cable_end) / compliance
+        fixed -= damping * end_speed
         growth = dt / (2 * compliance) + damping
         drive = self.speed + dt * GRAVITY - dt / (2 * mass) * (self.tension + fixed)
         speed = drive / (1 + dt * growth / (2 * mass))
@@ -58,8 +58,8 @@ class HangingLoad:
         self.speed = speed
         self.tension = tension
 
-    def _follow(self, rope_end: float, rope_speed: float, compliance: float, dt: float) -> None:
+    def _follow(self, cable_end: float, end_speed: float, compliance: float, dt: float) -> None:
         """Step for a stiff cable: the load moves with it, and the tension is not negative."""
-        self.tension = max(0.0, self.mass * (GRAVITY - (rope_speed - self.speed) / dt))
-        self.speed = rope_speed
-        self.position = rope_end + compliance * self.tension
+        self.tension = max(0.0, self.mass * (GRAVITY - (end_speed - self.speed) / dt))
+        self.speed = end_speed
+        self.position = cable_end + compliance * self.tension

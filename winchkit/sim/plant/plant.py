@@ -196,7 +196,7 @@ class WinchPlant:
         """Find the state at rest under the present load."""
         state, load = self._state, self._load
         state.motor_speed = state.motor_acceleration = 0.0
-        state.rope_speed = state.rope_acceleration = 0.0
+        state.winding_speed = state.winding_acceleration = 0.0
         state.load_mass = load.mass
         # The compliance depends on the cable's end, an elongation on the tension: two iterations.
         for _ in range(2):
@@ -225,13 +225,13 @@ class WinchPlant:
         state.time += dt
         drift = self._truth.temperature_drift / 3600
         state.temperature = self._truth.temperature + drift * state.time
-        rope_speed = self._wind(dt)
-        state.rope_acceleration = (rope_speed - state.rope_speed) / dt
-        state.rope_speed = rope_speed
+        winding_speed = self._wind(dt)
+        state.winding_acceleration = (winding_speed - state.winding_speed) / dt
+        state.winding_speed = winding_speed
         compliance = 0.0
         for hook in self._compliance:
             compliance += hook(state)
-        load.step(state.unstrained + self._stretched(dt), -rope_speed, compliance, dt)
+        load.step(state.unstrained + self._stretched(dt), -winding_speed, compliance, dt)
         state.load = load.tension
         state.cable_length = load.position
         self._powered = command.power and not command.brake
