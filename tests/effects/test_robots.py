@@ -179,7 +179,7 @@ def test_a_winch_cannot_have_an_effect_of_robots(tmp_path: Path) -> None:
         "[gearbox]\nratio = 1.0\n[reference]\nwound_turns = 1.0\n"
         '[[effect]]\nid = "home-length"\nlength = "1 mm"\n'
     )
-    assert "only a robot can have it" in str(check_profile(read_profile(path))[0])
+    assert "is an effect of a robot" in str(check_profile(read_profile(path))[0])
 
 
 def test_placements_are_those_that_an_effect_declares() -> None:

@@ -44,7 +44,7 @@ def test_a_file_adds_its_effects_to_the_catalogue(tmp_path: Path) -> None:
         ("def broken(:\n", "mine.py:1"),
         ("x = 1 / 0\n", "ZeroDivisionError"),
         ("import no_such_module_at_all\n", "no_such_module_at_all"),
-        ("x = 1\n", "holds no"),
+        ("x = 1\n", "has no"),
         (MINE.replace('"m", null', '"furlong", null'), "unknown unit 'furlong'"),
         (MINE.replace("null=0.0", "null=0.0, low=1.0"), "null 0 lies outside"),
     ],

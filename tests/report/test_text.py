@@ -128,13 +128,13 @@ def test_a_comparison_of_real_runs_fits_a_terminal() -> None:
     lines = compare_text(compare(recorded("demo-elastic-rope"), profile)).splitlines()
     assert len(lines) <= 70
     assert max(map(len, lines)) <= 80
-    assert any(line.startswith("  cable length follows load") for line in lines)
+    assert any(line.startswith("  cable length: load") for line in lines)
 
 
 def test_a_comparison_without_outputs_has_nothing_to_follow() -> None:
-    assert "follow" not in compare_text(Comparison({}, None))
+    assert "variance" not in compare_text(Comparison({}, None))
     quiet = OutputError("N", 10, None, 150.0, 0.7, 2.0, 0.1, 0.7, ())
-    assert "tension follows nothing that was measured" in compare_text(
+    assert "  tension: no measured variable" in compare_text(
         Comparison({"tension": quiet}, None)
     )
 

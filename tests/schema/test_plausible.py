@@ -43,7 +43,7 @@ def checked(path: Path, text: str) -> Result:
         ('kind = "bench"', 'kind = "bench"\ncycle = "100 s"', "at most 0.1 s"),
         ("port = 502", 'port = 502\ntimeout = "1 h"', "at most 10 s"),
         ('["1 m", "9 m"]', '["9 m", "1 m"]', "lower limit 9 m is not below"),
-        ('["1 m", "9 m"]', '["-5 m", "9 m"]', "not below 0"),
+        ('["1 m", "9 m"]', '["-5 m", "9 m"]', "at least 0"),
         ('["1 m", "9 m"]', '["1 m", "1e200 m"]', "at most 100000 m"),
         (
             'tension_high = "500 N"',
@@ -112,7 +112,7 @@ def test_a_slow_heartbeat_is_warned_of(bench: Path) -> None:
         ("-inf", "must be finite"),
         ("1e308", "beyond what u16 holds"),
         ("70000", "beyond what u16 holds"),
-        ("0.5", "no whole number"),
+        ("0.5", "not a whole number"),
     ],
 )
 def test_a_command_value_that_is_no_register_is_refused(
