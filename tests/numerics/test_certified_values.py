@@ -8,6 +8,8 @@ fit reaches with residuals of unit variance, as in a diagnosis, is tested by its
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
+from operator import mul
 
 import numpy as np
 import pytest
@@ -44,6 +46,34 @@ def zeros(data: Dataset) -> tuple[float, ...]:
 
 def squares(found: Fit) -> float:
     return float(found.residual @ found.residual)
+
+
+def exact_solution(x: list[list[Fraction]], y: list[Fraction]) -> list[Fraction]:
+    """Least squares by Gauss-Jordan elimination of the normal equations, without rounding."""
+    columns = list(zip(*x, strict=True))
+    rows = [
+        [*(sum(map(mul, a, b)) for b in columns), sum(map(mul, a, y))]  # type: ignore[list-item]
+        for a in columns
+    ]
+    for k in range(len(rows)):
+        rows[k] = [value / rows[k][k] for value in rows[k]]
+        for j in range(len(rows)):
+            if j != k:
+                rows[j] = [a - rows[j][k] * b for a, b in zip(rows[j], rows[k], strict=True)]
+    return [row[-1] for row in rows]
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_certified_values_follow_from_the_data_in_exact_arithmetic(name: str) -> None:
+    """Data and certified values were typed correctly: they agree in all digits that NIST gives."""
+    data = LINEAR[name]
+    if name == "Longley":
+        x = [[Fraction(repr(value)) for value in row] for row in data.x.tolist()]
+    else:
+        order = data.x.shape[1]
+        x = [[Fraction(repr(row[1])) ** k for k in range(order)] for row in data.x.tolist()]
+    found = exact_solution(x, [Fraction(repr(value)) for value in data.y.tolist()])
+    assert [float(value) for value in found] == pytest.approx(data.certified, rel=1e-13)
 
 
 @pytest.mark.parametrize(

@@ -134,9 +134,7 @@ def test_a_comparison_of_real_runs_fits_a_terminal() -> None:
 def test_a_comparison_without_outputs_has_nothing_to_follow() -> None:
     assert "variance" not in compare_text(Comparison({}, None))
     quiet = OutputError("N", 10, None, 150.0, 0.7, 2.0, 0.1, 0.7, ())
-    assert "  tension: no measured variable" in compare_text(
-        Comparison({"tension": quiet}, None)
-    )
+    assert "  tension: no measured variable" in compare_text(Comparison({"tension": quiet}, None))
 
 
 def test_an_addition_is_told_with_value_and_gain() -> None:

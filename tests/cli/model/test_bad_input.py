@@ -82,7 +82,7 @@ CASES: dict[str, tuple[list[str], str]] = {
         replaced("cable_length [m]", "cable_length [metre]"),
         ":2: column 'cable_length' has the unknown unit [metre]",
     ),
-    "text in a number": (edited(GOOD, 41, 3, "n/a"), ":42: column 'tension' holds 'n/a'"),
+    "text in a number": (edited(GOOD, 41, 3, "n/a"), ":42: column 'tension' has 'n/a'"),
     "an empty file": ([], ": the file is empty"),
     "a header alone": (GOOD[:2], ": the run has no rows after its header"),
     "time goes back": (swapped(60, 61), ":62: time goes back from 1.18 s to 1.16 s"),

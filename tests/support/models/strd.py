@@ -1,11 +1,15 @@
 """Statistical Reference Datasets of NIST, with certified values; and a regression made of one.
 
 Data and certified values: NIST StRD, https://www.itl.nist.gov/div898/strd/, a work of the United
-States government and in the public domain. Of every set the name, the file's order and its digits
-are kept. Linear sets: Longley (1967), Norris (NIST, unpublished), Wampler (1970), Filippelli
-(NIST, unpublished). Nonlinear sets: Misra, Thurber, Eckerle, Hahn (NIST), Kowalik and
-Osborne (1978) and Meyer (1970) in Moré, Garbow and Hillstrom (1981), Ratkowsky (1983), Daniel and
-Wood (1980), Box, Hunter and Hunter (1978).
+States government and in the public domain (17 U.S.C. 105). Of every set the name, the file's order
+and its digits are kept. The numbers were typed from public copies of NIST's files; those of the
+nonlinear sets were compared, all equal, with the files that lmfit distributes (2026-11), those of
+the linear sets are checked by exact arithmetic in tests/numerics.
+
+Linear sets: Longley (1967), Norris (NIST, unpublished), Wampler (1970), Filippelli (NIST,
+unpublished). Nonlinear sets: Misra, Thurber, Eckerle, Hahn (NIST), Kowalik and Osborne (1978) and
+Meyer (1970) in Moré, Garbow and Hillstrom (1981), Ratkowsky (1983), Daniel and Wood (1980), Box,
+Hunter and Hunter (1978).
 """
 
 from __future__ import annotations
