@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Generator
@@ -19,6 +20,8 @@ settings.load_profile("winchkit")
 
 TOLERATED = 0.05
 """A longer stall (s) may trip a bench in real time: limits.response_time is 0.06 s."""
+DEFAULT = "not realtime and not slow"
+"""What ``pytest`` runs without ``-m`` (pyproject.toml)."""
 _WATCH = pytest.StashKey[StallWatch]()
 
 
@@ -34,6 +37,25 @@ def pytest_configure() -> None:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """``-n auto``: all processors for the whole suite; none besides for files and for real time."""
+    expression = config.option.markexpr
+    whole = config.args == config.getini("testpaths")
+    in_real_time = "realtime" in expression and "not realtime" not in expression
+    return os.cpu_count() or 1 if whole and not in_real_time else 0
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """How to run what the default selection leaves out."""
+    if config.option.markexpr == DEFAULT and not hasattr(config, "workerinput"):
+        terminalreporter.write_line(
+            'Not run: long tests, pytest -m "slow and not realtime"; '
+            "tests in real time, on a quiet computer, pytest -m realtime."
+        )
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,4 +1,4 @@
-"""Limits and option codes that a wiring file hands on to the drive itself."""
+"""Limits and option codes that a bench file hands on to the drive itself."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def test_a_worm_locks_below_its_angle_of_friction() -> None:
 def test_worms_that_cannot_be_are_refused(
     starts: int, teeth: int, lead: float, friction: float
 ) -> None:
-    with pytest.raises(UsageError, match="cannot be"):
+    with pytest.raises(UsageError, match="is impossible"):
         worm_stage(starts, teeth, lead, friction)
 
 

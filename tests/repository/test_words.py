@@ -19,6 +19,7 @@ from texts_of import Text, texts_of
 
 PACKAGE = ROOT / "winchkit"
 GONE = {
+    r"wiring files?": "bench file",
     r"in disguise": "shape parameter at its bound",
     r"deaf": "does not answer",
     r"crooked": "strongly nonlinear, asymmetric",
@@ -50,7 +51,6 @@ GONE = {
 }
 """Pattern between word boundaries, whatever the case, and what to write instead."""
 PENDING = {
-    r"wiring files?": "bench file",
     r"(?<!wire )ropes?": "cable (a title and a steel wire rope keep the word)",
     r"nobody": "name what is missing",
     r"told": "reported, given, known",

@@ -34,7 +34,7 @@ class Stopped:
 
 
 def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
-    """Quick-stop every drive of a wiring file and wait until each confirms.
+    """Quick-stop every drive of a bench file and wait until each confirms.
 
     All drives are told before any is waited for. Raises ConnectionLost when a bus does not open.
     """

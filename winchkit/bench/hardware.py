@@ -1,4 +1,4 @@
-"""Turns a wiring file into open buses, commissioned drives, polled sensors and a control loop."""
+"""Turns a bench file into open buses, commissioned drives, polled sensors and a control loop."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def _tell_notes(
 
 
 def _weight(winch: WinchWiring) -> float | None:
-    """Of the load that the wiring file declares, N."""
+    """Of the load that the bench file declares, N."""
     return None if winch.load_mass is None else winch.load_mass * GRAVITY
 
 
@@ -273,7 +273,7 @@ def _axis(
 
 
 def _at_shaft(rope: RopeMap, limits: LimitSpec) -> LimitsAtShaft:
-    """What the drive itself is to keep, where the wiring file says so."""
+    """What the drive itself is to keep, where the bench file says so."""
     angle = None
     if limits.in_drive and limits.length is not None:
         low, high = limits.length

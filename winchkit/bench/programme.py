@@ -224,6 +224,6 @@ class _Execution:
 
 
 def _declared_load(bench: Bench) -> float | None:
-    """The load that the wiring file declares, when it is one for all winches."""
+    """The load that the bench file declares, when it is one for all winches."""
     masses = {winch.wiring.load_mass for winch in bench.winch.values()}
     return masses.pop() if len(masses) == 1 else None

@@ -67,7 +67,7 @@ def write(folder: Path, effects: str, own: str = OWN) -> tuple[Path, Path]:
 
 
 def bench_file(folder: Path, profile: Path, line: str = "") -> Path:
-    """A wiring file with a line more on top."""
+    """A bench file with a line more on top."""
     wired = replace(SPIRAL.bench.winch["A"], profile=str(profile))
     path = write_bench(replace(SPIRAL.bench, winch={"A": wired}), folder / "bench.toml")
     path.write_text(f"{line}\n{path.read_text()}")

@@ -67,7 +67,7 @@ def relaxed(text: str) -> str:
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A simulated bench in its own process; yields its wiring file."""
+    """A simulated bench in its own process; yields its bench file."""
     path = tmp_path_factory.mktemp("served") / "bench.toml"
     with start("sim", "serve", "spiral-bench", "--bench-file", str(path)) as process:
         assert process.stdout is not None

@@ -56,7 +56,7 @@ def test_a_good_cell_is_told_in_numbers_and_without_remarks() -> None:
 def test_a_drift_is_found_with_its_uncertainty() -> None:
     health = examine(made(drift=0.2))
     assert health.drift == pytest.approx(0.2, abs=4 * health.drift_std)
-    assert "drifts" in remarks(health)
+    assert "drifted" in remarks(health)
 
 
 def test_slow_noise_is_no_drift() -> None:

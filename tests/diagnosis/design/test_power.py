@@ -18,6 +18,7 @@ from winchkit.diagnosis.design.plan import inseparable
 from winchkit.diagnosis.design.plan import offers as plan_offers
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, range_of_runs
 from winchkit.diagnosis.diagnose import selection_engine
+from winchkit.diagnosis.plan import Plan
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Detectable, NextRun
 from winchkit.diagnosis.selection.scores import null_maxima
@@ -167,7 +168,8 @@ def test_the_plan_says_what_no_motion_separates() -> None:
     assert inseparable(found, pairs) == [(radius, ratio)]
     # The best is the one that separates the other pair.
     assert found[0].powers[1] > 0.9
-    lines = _silent(found, pairs, range_of_runs(grooved), widened=False)
+    plan = Plan(grooved, range_of_runs(grooved), tuple(pairs), tuple(found))
+    lines = _silent(plan, widened=False)
     assert lines[0].startswith("drum-radius / gear-ratio: no such motion within")
     assert lines[0].endswith(CATALOGUE["drum-radius"].told_apart)
     assert "--bench" in lines[1]

@@ -98,5 +98,5 @@ def test_in_words() -> None:
             )
         }
     (text,) = error_texts(shared_errors(winches))
-    assert "100 % of the squares in H" in text
+    assert "100 % of the variance in H" in text
     assert "direction 100 %, 12 % common to all, outlying: H" in text

@@ -33,7 +33,7 @@ def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, floa
     of_winch = {"A": [run.of_winch("A") for run in runs]}
     with pytest.MonkeyPatch.context() as patched:
         # As far as the signals allow, not only as far as is needed: an hour in small.
-        patched.setattr(decimate, "_WANTED", 1000)
+        patched.setattr(decimate, "_TARGET_SAMPLES", 1000)
         each = diagnose_each(
             of_winch,
             read_profile(path),

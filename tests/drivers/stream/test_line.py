@@ -249,22 +249,6 @@ def test_alarms_are_flagged_and_no_number(name: str, kind: str, flag: Quality) -
         assert all(flag in one.quality for one in readings)
 
 
-@pytest.mark.parametrize("name", ["laumas-tlb-ascii", "flintec-ldu", "mantracourt-dsc-ascii"])
-def test_a_count_that_stands_still_while_the_winch_moves_is_no_number(name: str) -> None:
-    rig = Rig(device(name), truth=lambda time: 20.0 + 15.0 * math.sin(time))
-    rig.instrument.publisher.moving = lambda: True
-    rig.run(3.0)
-    rig.sim.inject("frozen")
-    rig.run(5.0)
-    readings = rig.run(1.0)
-    assert readings
-    assert all(Quality.FROZEN in one.quality for one in readings)
-    assert all(math.isnan(one.value) for one in readings)
-    rig.sim.inject("recover")
-    rig.run(0.5)
-    assert all(one.quality.usable for one in rig.run(1.0))
-
-
 def test_an_instrument_that_sends_by_itself_must_be_alone() -> None:
     with pytest.raises(FileError, match="must be alone on its line"):
         Rig(device("laumas-tlb-ascii"), device("flintec-ldu"))

@@ -36,8 +36,8 @@ def test_the_line_of_your_own_is_read(tmp_path: Path) -> None:
 
 
 def test_the_table_has_every_device_and_how_it_speaks() -> None:
-    rows = dict(re.findall(r"^\| (`.+?`) \|.+\| (by itself|polled)", PAGE, re.MULTILINE))
+    rows = dict(re.findall(r"^\| (`.+?`) \|.+\| (continuous|polled)", PAGE, re.MULTILINE))
     said = {name: how for names, how in rows.items() for name in re.findall(r"`(.+?)`", names)}
     assert said == {
-        name: "by itself" if stream(name).mode == "continuous" else "polled" for name in DEVICES
+        name: "continuous" if stream(name).mode == "continuous" else "polled" for name in DEVICES
     }

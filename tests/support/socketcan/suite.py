@@ -30,6 +30,7 @@ def main(folder: Path) -> int:
         witness = subprocess.Popen(["candump", "-d", "-L", "-r", "4000000", CHANNEL], stdout=log)
         time.sleep(_WAKE)
         options = ["-q", "-rs", "-p", "no:cacheprovider", "-p", "no:xdist", "--durations=3"]
+        options += ["-o", "addopts=--import-mode=importlib"]
         suite = [sys.executable, "-m", "pytest", *map(str, SUITES), *options]
         code = subprocess.run(suite, check=False).returncode
         time.sleep(_WAKE)

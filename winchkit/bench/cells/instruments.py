@@ -1,4 +1,4 @@
-"""Instruments of a wiring file by winch and role, and the lines that they hang on."""
+"""Instruments of a bench file by winch and role, and the lines that they hang on."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ ROLES = ("cell", "load", "length", "temperature")
 
 @dataclass(frozen=True)
 class _Wired:
-    """One instrument as the wiring file has it."""
+    """One instrument as the bench file has it."""
 
     label: str
     ref: DeviceRef
@@ -56,7 +56,7 @@ class _Wired:
 
 
 def device_of(spec: BenchSpec, ref: DeviceRef) -> DeviceSpec:
-    """The device file that a wiring file refers to."""
+    """The device file that a bench file refers to."""
     from winchkit.schema.read import read_device
 
     return read_device(catalog.find("devices", ref.device, spec.path or None))
@@ -69,7 +69,7 @@ def eds_of(device: DeviceSpec) -> Path:
 
 
 def calibration_of(spec: BenchSpec, ref: DeviceRef) -> CellCalibration | None:
-    """The calibration that a wiring file names for an instrument; raises FileError."""
+    """The calibration that a bench file names for an instrument; raises FileError."""
     if ref.calibration is None:
         return None
     from winchkit.schema.read import read_calibration
@@ -79,7 +79,7 @@ def calibration_of(spec: BenchSpec, ref: DeviceRef) -> CellCalibration | None:
 
 
 def tares_of(spec: BenchSpec) -> TareBook:
-    """The host's tares, from the file beside the wiring file where there is one."""
+    """The host's tares, from the file beside the bench file where there is one."""
     from winchkit.schema.read import read_tares
 
     path = tare_book_path(spec.path)

@@ -20,7 +20,7 @@ _CHECK = 0.3
 def host_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
     """Add the mean of the present value to the host's tare; raises NotPermitted, NoReply.
 
-    It is kept beside the wiring file; a bench without one keeps it until it is closed.
+    It is kept beside the bench file; a bench without one keeps it until it is closed.
     """
     desk.permit(name)
     _refuse_temperature(name)
@@ -91,7 +91,7 @@ def _keep(desk: CellDesk, book: TareBook, tares: dict[str, HostTare]) -> None:
 
 
 def _book_path(desk: CellDesk) -> str | None:
-    """Where tares are kept; None for a bench without a wiring file."""
+    """Where tares are kept; None for a bench without a bench file."""
     return tare_book_path(desk.spec.path) if desk.spec.path else None
 
 

@@ -1,4 +1,4 @@
-"""Which frames a wiring file puts on each of its CAN buses, and how often."""
+"""Which frames a bench file puts on each of its CAN buses, and how often."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Node:
     device: DeviceSpec
     objects: Objects
     wiring: WinchWiring | None
-    """Of the winch; None for a node that the wiring file does not name."""
+    """Of the winch; None for a node that the bench file does not name."""
 
     @property
     def eds(self) -> Path:
@@ -199,7 +199,7 @@ def _fitting(bus: CanBus, node: int) -> str:
     if not name:
         raise DeviceRefused(
             f"bus '{bus.name}' node {node} ({identity}): no device file fits it, it is no CiA 402 "
-            "drive; name one by --device, or the node in a wiring file"
+            "drive; name one by --device, or the node in a bench file"
         )
     return name
 

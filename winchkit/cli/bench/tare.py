@@ -11,7 +11,7 @@ __all__ = ["command"]
 
 @click.command()
 @click.argument("winch", required=False)
-@click.option("-b", "--bench", required=True, metavar="FILE", help="Wiring file of the bench.")
+@click.option("-b", "--bench", required=True, metavar="FILE", help="Bench file of the bench.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def command(winch: str | None, bench: str, as_json: bool) -> None:
     """Tare the load cell of WINCH, at rest (the only winch where there is one).

@@ -155,7 +155,7 @@ def _force_cell(cell: str | None, bench: str) -> str:
 
 
 def _from_file(name: str, bench: str, points: str) -> _Measured:
-    """Points of a CSV file for a cell of the wiring file; nothing is opened."""
+    """Points of a CSV file for a cell of the bench file; nothing is opened."""
     from winchkit.bench.cells.instruments import device_of, refs_of
     from winchkit.calibration.cell.files import read_points
     from winchkit.schema.read import read_bench

@@ -1,4 +1,4 @@
-"""``winchkit cell tare``: a tare of the host, kept beside the wiring file; no EEPROM is written."""
+"""``winchkit cell tare``: a tare of the host, kept beside the bench file; no EEPROM is written."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ _HEAD = 2000
 
 
 def complete_bench(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Wiring files, and folders that may hold some."""
+    """Bench files, and folders that may hold some."""
     return _files(typed, ("bench",))
 
 
@@ -62,7 +62,7 @@ def complete_device(
 
 
 def complete_winch(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Winches of the wiring file that stands on the line already, or in the environment."""
+    """Winches of the bench file that stands on the line already, or in the environment."""
     bench = ctx.params.get("bench") or _from_environment(ctx)
     if not bench:
         return []
@@ -122,7 +122,7 @@ bench_option: Decorator = click.option(
     required=True,
     metavar="FILE",
     shell_complete=complete_bench,
-    help="Wiring file of the bench.",
+    help="Bench file of the bench.",
 )
 effects_option: Decorator = click.option(
     "--effects",
@@ -175,7 +175,7 @@ def bus_options(function: Callable[..., Any]) -> Callable[..., Any]:
             "--bench",
             metavar="FILE",
             shell_complete=complete_bench,
-            help="Wiring file of the bench.",
+            help="Bench file of the bench.",
         ),
         click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
         click.option("--channel", help="Without a bench: e.g. can0."),

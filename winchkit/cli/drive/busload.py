@@ -1,4 +1,4 @@
-"""``winchkit busload``: what a wiring file puts on its CAN buses."""
+"""``winchkit busload``: what a bench file puts on its CAN buses."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ _SHOW_PERIOD = 0.5
     "--bench",
     metavar="FILE",
     shell_complete=complete_bench,
-    help="Wiring file of the bench.",
+    help="Bench file of the bench.",
 )
 @click.option("-o", "--output", metavar="FILE", help="Where to: a .csv or .mcap file.")
 @click.option("--rotate", metavar="LIMIT", help="Go on in a new file, e.g. after 100MB or 10min.")

@@ -149,7 +149,7 @@ _FEW = 2
     "--bench",
     metavar="FILE",
     shell_complete=complete_bench,
-    help="Wiring file whose limits say how far, how fast and how heavy; else as the RUNs were.",
+    help="Bench file whose limits say how far, how fast and how heavy; else as the RUNs were.",
 )
 @model_options
 @json_option

@@ -30,7 +30,7 @@ _TURN = 5e-4
 @click.option(
     "--bench-file",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="Wiring file to write.  [default: BENCH-bench.toml]",
+    help="Bench file to write.  [default: BENCH-bench.toml]",
 )
 @click.option(
     "--interface",
@@ -59,8 +59,8 @@ def command(
 ) -> None:
     """Run a simulated BENCH live until Ctrl-C: drives on CAN, instruments on Modbus or serial.
 
-    Prints the wiring file to connect to. Takes lines on its input: load A 32 kg, fault A.cell
-    silence, recover A.cell, status, quit. While it runs, 'winchkit run --yes' with that wiring
+    Prints the bench file to connect to. Takes lines on its input: load A 32 kg, fault A.cell
+    silence, recover A.cell, status, quit. While it runs, 'winchkit run --yes' with that bench
     file lets it hang the loads that a programme asks for; it finds the simulation by the file
     BENCH-bench.toml.sim beside it. With --json the first line on stdout says that others can
     connect now: {"schema": 1, "bench": FILE, "ready": true}.

@@ -254,7 +254,7 @@ def simulated_interface(spec: BusSpec, clock: Clock) -> Interface | None:
 
 
 def open_interface(spec: BusSpec, name: str) -> Interface:
-    """Open what a wiring file names; raises ConnectionLost saying what was tried."""
+    """Open what a bench file names; raises ConnectionLost saying what was tried."""
     options: dict[str, Any] = {"interface": spec.interface, "channel": spec.channel}
     if spec.interface not in _NO_BITRATE:
         options["bitrate"] = spec.bitrate

@@ -204,7 +204,7 @@ def _safely(port: ObjectPort, index: int, sub: int = 0) -> int | None:
 
 
 def named_after(spec: BenchSpec, found: list[Found]) -> list[Found]:
-    """The same with the winches of a wiring file."""
+    """The same with the winches of a bench file."""
     winches = {(one.servo.bus, one.servo.node): name for name, one in spec.winch.items()}
     return [replace(item, winch=winches.get((item.bus, item.node), "")) for item in found]
 
