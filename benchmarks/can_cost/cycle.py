@@ -21,7 +21,7 @@ from can_cost.far_drives import FarDrives
 from can_cost.probe import Probes
 from can_cost.wire import PairLibrary, VirtualWire
 from winchkit import catalog
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.loop import ControlLoop, WinchParts
 from winchkit.bench.control.motion import Jog
@@ -221,9 +221,9 @@ def bench(
             for node in nodes:
                 axis = Cia402Axis(bus, node, device, watch, clock)
                 axis.commission()
-                rope = RopeMap(line_of(profile))
+                cable = CableMap(line_of(profile))
                 parts = WinchParts(
-                    axis, rope, Controller(axis, rope, LIMITS), {"cell": Cell(clock)}
+                    axis, cable, Controller(axis, cable, LIMITS), {"cell": Cell(clock)}
                 )
                 winches[f"W{number}{node}"] = parts
             drives.run()
@@ -237,7 +237,7 @@ def bench(
         for parts in winches.values():
             # No heartbeat comes between the commissioning and the first cycle.
             parts.axis.heartbeat.last = None
-        jogs = {name: Jog(parts.rope, LIMITS) for name, parts in winches.items()}
+        jogs = {name: Jog(parts.cable, LIMITS) for name, parts in winches.items()}
         yield Bench(clock, opened, served, loop, jogs)
 
 

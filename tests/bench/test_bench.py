@@ -82,7 +82,7 @@ def test_jog_move_log_and_the_instruments_agree(bench: Bench, tmp_path: Path) ->
     assert 0.008 < run.interval < 0.012
     assert np.isfinite(run["motor_angle"]).mean() > 0.98
     measured, turned = run["cable_length"], run["motor_angle"]
-    expected = np.array([bench.loop.winches["A"].rope.cable_length(a) for a in turned])
+    expected = np.array([bench.loop.winches["A"].cable.cable_length(a) for a in turned])
     assert np.nanmax(np.abs(measured - expected)) < 5e-3
     assert np.nanstd(measured - expected) < 1e-3
 

@@ -86,7 +86,7 @@ def test_a_common_move_starts_from_winches_that_hold() -> None:
 
 def test_a_winch_that_jogs_comes_to_rest_first() -> None:
     rig = Rig(LIMITS, "AB")
-    jog = Jog(rig.rope("A"), rig.limits)
+    jog = Jog(rig.cable("A"), rig.limits)
     jog.refresh(0.3, rig.now + 10)
     rig.controller("A").begin(jog)
     rig.run(0.5)

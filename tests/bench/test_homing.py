@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from fake_axis import CYCLE, StraightLine
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.homing_motion import HomingMotion
 from winchkit.drivers.can.cia402.modes import Homing
 
@@ -26,7 +26,7 @@ def search(
     axis: Searching, farthest: float = math.inf, speed: float = 10.0, cycles: int = 400
 ) -> tuple[HomingMotion, int]:
     """Turn at a speed (rad/s) until it is over; the motion and the cycles that it took."""
-    motion = HomingMotion(axis, RopeMap(StraightLine()), farthest)
+    motion = HomingMotion(axis, CableMap(StraightLine()), farthest)
     motion.start(0.0, 0.0, 0.0)
     for cycle in range(1, cycles):
         target = motion.target(cycle * CYCLE, speed * cycle * CYCLE, 0.0)
@@ -63,7 +63,7 @@ def test_a_search_without_limits_goes_on() -> None:
 @pytest.mark.parametrize("jump", [50.0, -1000.0])
 def test_the_new_zero_is_no_motion(jump: float) -> None:
     axis = Searching()
-    motion = HomingMotion(axis, RopeMap(StraightLine()), 0.5)
+    motion = HomingMotion(axis, CableMap(StraightLine()), 0.5)
     motion.start(0.0, 0.0, 0.0)
     motion.target(CYCLE, 0.01, 0.0)
     assert motion.target(2 * CYCLE, jump, 0.0).winding_speed == 0.0

@@ -44,7 +44,7 @@ def test_the_drive_keeps_the_limits_that_it_is_given() -> None:
         assert winch.length_at(low) == pytest.approx(limits.length[1] + 0.02, abs=1e-4)
         assert winch.length_at(high) == pytest.approx(limits.length[0] - 0.02, abs=1e-4)
         error = objects.number(0x6065) / turn * 2 * math.pi
-        assert error * winch.rope.arm(0.0) == pytest.approx(0.05, rel=1e-3)
+        assert error * winch.cable.arm(0.0) == pytest.approx(0.05, rel=1e-3)
         rated = objects.number(0x6076) * 1e-3
         assert objects.number(0x6072) * 1e-3 * rated == pytest.approx(1.5, rel=1e-3)
         assert objects.number(0x605A) == 6

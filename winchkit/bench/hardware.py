@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from winchkit import catalog
 from winchkit.bench.cells.instruments import can_buses, device_of, instruments
 from winchkit.bench.commissioning.hardware import tell_hardware
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
 from winchkit.bench.control.latch import LatchFile
@@ -44,9 +44,9 @@ _STALE_BEATS = 2
 _LEAST_GAP = 6
 """Cycles that may be late in any case: with a slow cycle two heartbeats are too short."""
 _FURTHER = 0.02
-"""Of rope, by which the drive's own length limits lie beyond the bench's, m."""
+"""Of cable, by which the drive's own length limits lie beyond the bench's, m."""
 _FELT = 0.02
-"""Rope speed at which the counts of a good cell cannot stand still, m/s."""
+"""Cable speed at which the counts of a good cell cannot stand still, m/s."""
 _FASTEST = 1.5
 """Motor speed over that of ``limits.speed`` at which a drive may be missed turning."""
 _HEADROOM = 4.0
@@ -83,25 +83,25 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> W
 
     profiles = {name: _profile(spec, winch) for name, winch in spec.winch.items()}
     catalogue = load_catalogue(spec.effect_files)
-    ropes = {
-        name: RopeMap.of(RopeNow(profile, terms_of(profile, catalogue), _weight(spec.winch[name])))
+    cables = {
+        name: CableMap.of(RopeNow(profile, terms_of(profile, catalogue), _weight(spec.winch[name])))
         for name, profile in profiles.items()
     }
     buses = _open_buses(spec, clock, stack)
     axes = {
-        name: _axis(spec, winch, ropes[name], buses, clock) for name, winch in spec.winch.items()
+        name: _axis(spec, winch, cables[name], buses, clock) for name, winch in spec.winch.items()
     }
     sensors, lines = instruments(
-        spec, clock, buses, {name: _moving(axes[name], ropes[name]) for name in spec.winch}
+        spec, clock, buses, {name: _moving(axes[name], cables[name]) for name in spec.winch}
     )
     slow = SlowDevices(lines, clock)
     stack.callback(slow.close)
     _commission(axes)
     tell_hardware(spec)
     _tell_notes(spec, axes, buses)
-    winches = _winches(spec, axes, ropes, sensors)
+    winches = _winches(spec, axes, cables, sensors)
     stale = max(_STALE_BEATS * spec.bus[name].heartbeat for name in buses)
-    supervisor = _supervisor(spec, stale, axes, ropes, profiles)
+    supervisor = _supervisor(spec, stale, axes, cables, profiles)
     hosts = [(bus, spec.bus[name].node, spec.bus[name].heartbeat) for name, bus in buses.items()]
     loop = ControlLoop(
         hosts,
@@ -121,7 +121,7 @@ def _supervisor(
     spec: BenchSpec,
     stale: float,
     axes: Mapping[str, Cia402Axis],
-    ropes: Mapping[str, RopeMap],
+    cables: Mapping[str, CableMap],
     profiles: Mapping[str, WinchProfile],
 ) -> Supervisor:
     """What holds each winch to its limits; feedback counts as stale after ``stale`` s."""
@@ -131,7 +131,7 @@ def _supervisor(
                 winch.limits,
                 stale,
                 spec.cycle,
-                _resolution(axes[name], ropes[name]),
+                _resolution(axes[name], cables[name]),
                 _safe_length(profiles[name]),
             )
             for name, winch in spec.winch.items()
@@ -142,15 +142,15 @@ def _supervisor(
 def _winches(
     spec: BenchSpec,
     axes: Mapping[str, Cia402Axis],
-    ropes: Mapping[str, RopeMap],
+    cables: Mapping[str, CableMap],
     sensors: Mapping[str, Mapping[str, Sensor]],
 ) -> dict[str, WinchParts]:
     """Each winch as the loop sees it."""
     return {
         name: WinchParts(
             axes[name],
-            ropes[name],
-            Controller(axes[name], ropes[name], winch.limits),
+            cables[name],
+            Controller(axes[name], cables[name], winch.limits),
             sensors[name],
             _frozen_cell(spec, winch),
             HangingLoad(math.nan if winch.load_mass is None else winch.load_mass),
@@ -159,9 +159,9 @@ def _winches(
     }
 
 
-def _resolution(axis: Cia402Axis, rope: RopeMap) -> float:
+def _resolution(axis: Cia402Axis, cable: CableMap) -> float:
     """Of the measured cable speed, m/s: one count of 606Ch."""
-    return 0.0 if axis.drive is None else abs(axis.drive.scale.velocity * rope.arm(0.0))
+    return 0.0 if axis.drive is None else abs(axis.drive.scale.velocity * cable.arm(0.0))
 
 
 def _safe_length(profile: WinchProfile) -> float:
@@ -214,14 +214,14 @@ def _frozen_cell(spec: BenchSpec, winch: WinchWiring) -> FrozenCell | None:
     return FrozenCell(table.rate, correlation=table.filter_delay)
 
 
-def _moving(axis: Cia402Axis, rope: RopeMap) -> Callable[[], bool]:
+def _moving(axis: Cia402Axis, cable: CableMap) -> Callable[[], bool]:
     """Whether a winch moves fast enough for its cells to feel it."""
 
     def moves() -> bool:
         feedback = axis.feedback
         if feedback is None:
             return False
-        return abs(feedback.velocity * rope.arm(feedback.angle)) > _FELT
+        return abs(feedback.velocity * cable.arm(feedback.angle)) > _FELT
 
     return moves
 
@@ -248,7 +248,7 @@ def _open_buses(spec: BenchSpec, clock: Clock, stack: ExitStack) -> dict[str, Ca
 def _axis(
     spec: BenchSpec,
     winch: WinchWiring,
-    rope: RopeMap,
+    cable: CableMap,
     buses: Mapping[str, CanBus],
     clock: Clock,
 ) -> Cia402Axis:
@@ -256,7 +256,7 @@ def _axis(
     bus = spec.bus[ref.bus]
     if ref.node is None:
         raise FileError(Fault(f"servo '{ref.device}' needs its node number", spec.path))
-    arm = abs(rope.arm(0.0))
+    arm = abs(cable.arm(0.0))
     acceleration = _HEADROOM * winch.limits.acceleration / arm
     watch = WatchSpec(
         bus.node,
@@ -264,7 +264,7 @@ def _axis(
         spec.cycle,
         winch.brake,
         acceleration,
-        limits=_at_shaft(rope, winch.limits),
+        limits=_at_shaft(cable, winch.limits),
         speed=_FASTEST * winch.limits.speed / arm,
         options=winch.options,
         hardware=winch.host_loss_description if winch.host_loss else "",
@@ -272,16 +272,16 @@ def _axis(
     return Cia402Axis(buses[ref.bus], ref.node, device_of(spec, ref), watch, clock)
 
 
-def _at_shaft(rope: RopeMap, limits: LimitSpec) -> LimitsAtShaft:
+def _at_shaft(cable: CableMap, limits: LimitSpec) -> LimitsAtShaft:
     """What the drive itself is to keep, where the bench file says so."""
     angle = None
     if limits.in_drive and limits.length is not None:
         low, high = limits.length
         ends = (max(0.0, low - _FURTHER), high + _FURTHER)
-        first, second = sorted(map(rope.motor_angle, ends))
+        first, second = sorted(map(cable.motor_angle, ends))
         angle = (first, second)
     error = limits.following_error
-    following = None if error is None else error / abs(rope.arm(0.0))
+    following = None if error is None else error / abs(cable.arm(0.0))
     return LimitsAtShaft(angle=angle, following_error=following, torque=limits.torque)
 
 

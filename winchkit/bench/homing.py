@@ -23,7 +23,7 @@ _SLOWER = 0.2
 _SHOWN = 3
 """Cycles until a change of mode is seen in feedback and judged."""
 _SAME = 2e-3
-"""Of rope, within which a length counts as defined, m."""
+"""Of cable, within which a length counts as defined, m."""
 
 
 def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[None]:
@@ -96,7 +96,7 @@ def _run(
 ) -> Generator[None]:
     """One homing of the drive, by a method or at the present place, up to the disabled drive."""
     axis, limits = bench.axes[winch.name], winch.wiring.limits
-    arm = abs(winch.rope.at(winch.snapshot.motor_angle)[1])
+    arm = abs(winch.cable.at(winch.snapshot.motor_angle)[1])
     fast = (speed or _SHARE * limits.speed) / arm
     ramp = limits.acceleration / arm
     _prepare(
@@ -107,7 +107,7 @@ def _run(
         ],
     )
     span = math.inf if limits.length is None else limits.length[1] - limits.length[0]
-    motion = HomingMotion(axis, winch.rope, 2 * span)
+    motion = HomingMotion(axis, winch.cable, 2 * span)
     winch.begin(motion)
     while winch.moving:
         winch.raise_trouble()

@@ -6,7 +6,7 @@ import math
 
 from winchkit.bench.cells.device_tare import await_device_tare
 from winchkit.bench.cells.tares import host_tare
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.motion import DEAD_MAN, Jog, MotionSource, Move, StartGate, Trim
 from winchkit.bench.control.snapshot import Phase, WinchSnapshot
@@ -55,7 +55,7 @@ class Winch:
 
     @property
     def tension(self) -> float:
-        """In the rope at the platform end, N; NaN where no instrument tells.
+        """In the cable at the platform end, N; NaN where no instrument tells.
 
         The load's instrument shows it; else the cell's reading, less what the effects of the
         profile put between the two. The bare reading is ``snapshot.tension``.
@@ -63,17 +63,17 @@ class Winch:
         return self.snapshot.rope_tension
 
     @property
-    def rope(self) -> RopeMap:
-        """Between its motor and its rope."""
-        return self._parts.rope
+    def cable(self) -> CableMap:
+        """Between its motor and its cable."""
+        return self._parts.cable
 
     def length_at(self, motor_angle: float) -> float:
         """Cable length (m) at a motor angle (rad) under the present tension, by the profile."""
-        return self._parts.rope.cable_length(motor_angle)
+        return self._parts.cable.cable_length(motor_angle)
 
     def motor_angle_at(self, length: float) -> float:
         """Motor angle (rad) at a cable length (m) under the present tension, by the profile."""
-        return self._parts.rope.motor_angle(length)
+        return self._parts.cable.motor_angle(length)
 
     @property
     def moving(self) -> bool:
@@ -217,18 +217,18 @@ class Winch:
     ) -> Move:
         """The move that ``move_to`` would make; nothing begins. Raises as that does."""
         self._require_length()
-        rope = self._parts.rope
+        cable = self._parts.cable
         move = Move(
-            rope,
+            cable,
             self.wiring.limits,
             length,
             speed=speed,
             acceleration=acceleration,
             holds=hold,
-            trim=Trim(rope, length, self.wiring.limits) if rope.yields else None,
+            trim=Trim(cable, length, self.wiring.limits) if cable.yields else None,
         )
         here = self.snapshot
-        self._bench.axes[self.name].permit_angle(rope.motor_angle(length))
+        self._bench.axes[self.name].permit_angle(cable.motor_angle(length))
         self._bench.permit(self.name, direction_of(here.cable_length - length))
         move.prepare(here.motor_angle)
         return move
@@ -308,7 +308,7 @@ class Winch:
         with self._bench.commanders.claimed(self.name):
             jog = self._jog
             if jog is None or not self.moving or self._controller.source not in (jog, None):
-                jog = self._jog = Jog(self._parts.rope, self.wiring.limits)
+                jog = self._jog = Jog(self._parts.cable, self.wiring.limits)
                 jog.refresh(winding_speed, expires)
                 if winding_speed != 0:
                     self._controller.begin(jog)

@@ -201,7 +201,7 @@ class OpenedBench:
         """The true cable length changed by so much (m) since the opening or :meth:`mark`."""
         moved = self.length(winch) - self._start[winch]
         assert abs(moved - by) <= tolerance, (
-            f"winch {winch}: the rope moved by {moved:+.4f} m, expected {by:+.4f} m "
+            f"winch {winch}: the cable moved by {moved:+.4f} m, expected {by:+.4f} m "
             f"within {tolerance:g} m"
         )
 

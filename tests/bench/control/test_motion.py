@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fake_axis import CYCLE, Rig, StraightLine
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import DEAD_MAN, Jog, Move, Trim
 from winchkit.bench.control.snapshot import Phase
 from winchkit.drivers.can.cia402.state_machine import State
@@ -19,7 +19,7 @@ ENERGISING = {0x06, 0x07}
 
 
 def jog(rig: Rig, speed: float, hold: float = DEAD_MAN) -> Jog:
-    source = Jog(rig.rope(), rig.limits)
+    source = Jog(rig.cable(), rig.limits)
     source.refresh(speed, rig.now + hold)
     rig.controller().begin(source)
     return source
@@ -34,7 +34,7 @@ def test_a_jog_without_refresh_ends_by_itself_and_disables() -> None:
     assert rig.axes["A"].velocity == 0
     assert rig.controller().phase is Phase.DISABLED
     assert rig.axes["A"].state is State.SWITCH_ON_DISABLED
-    moved = 4.0 - rig.rope().at(rig.axes["A"].angle)[0]
+    moved = 4.0 - rig.cable().at(rig.axes["A"].angle)[0]
     assert 0 < moved <= 0.1 * (DEAD_MAN + 0.1)
 
 
@@ -55,7 +55,7 @@ def test_a_jog_slows_down_before_a_length_limit() -> None:
     for _ in range(20):
         source.refresh(0.5, rig.now + DEAD_MAN)
         rig.run(0.1)
-    length = rig.rope().at(rig.axes["A"].angle)[0]
+    length = rig.cable().at(rig.axes["A"].angle)[0]
     assert 3.8 - 1e-3 <= length < 3.81
     assert not rig.supervisor.tripped
 
@@ -120,7 +120,7 @@ class SoftLine(StraightLine):
 def test_a_trim_corrects_what_the_rope_became_on_the_way(longer: float) -> None:
     """Small corrections at rest; what is within 0.1 mm, or beyond belief, is left alone."""
     rig, line = Rig(LIMITS), SoftLine()
-    move = Move(line, LIMITS, 3.0, trim=Trim(RopeMap(line), 3.0, LIMITS))
+    move = Move(line, LIMITS, 3.0, trim=Trim(CableMap(line), 3.0, LIMITS))
     move.prepare(0.0)
     rig.controller().begin(move)
     rig.run(move.duration / 2)

@@ -26,7 +26,7 @@ def moving_rig(speed: float = 0.2, names: str = "AB") -> Rig:
 
 
 def jog(rig: Rig, speed: float = 0.2) -> Jog:
-    source = Jog(rig.rope(), rig.limits)
+    source = Jog(rig.cable(), rig.limits)
     source.refresh(speed, rig.now + 1e6)
     rig.controller().begin(source)
     return source

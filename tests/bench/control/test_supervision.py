@@ -19,7 +19,7 @@ LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0), tension_high=500.0, tension_slack=20.0)
 def moving_rig(speed: float = 0.2, names: str = "AB", limits: LimitSpec = LIMITS) -> Rig:
     """Two winches, A jogging for a long time."""
     rig = Rig(limits, names)
-    source = Jog(rig.rope(), rig.limits)
+    source = Jog(rig.cable(), rig.limits)
     source.refresh(speed, rig.now + 1e6)
     rig.controller().begin(source)
     rig.run(0.5)
@@ -223,7 +223,7 @@ def test_the_host_heartbeat_is_tied_to_the_loop() -> None:
 def test_never_winds_in_above_the_high_limit(tensions: list[float], speed: float) -> None:
     """Whatever the cell says: two cycles after a reading above the limit nothing winds in."""
     rig = Rig(LIMITS)
-    source = Jog(rig.rope(), rig.limits)
+    source = Jog(rig.cable(), rig.limits)
     source.refresh(speed, rig.now + 1e6)
     rig.controller().begin(source)
     rig.run(0.4)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from model_files import answer, invoke
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.catalog import find
 from winchkit.effects import terms_of
 from winchkit.estimation.cable_state import RopeNow, Sample
@@ -55,7 +55,7 @@ speed = "0.2 m/s"
 [[step]]
 hold = "2 s"
 """
-"""Two loads over a hand's breadth of rope: what yields, and not where."""
+"""Two loads over a hand's breadth of cable: what yields, and not where."""
 SHORT = Path(__file__).parents[3] / "examples" / "short.toml"
 BENCH = "spiral-bench"
 
@@ -74,7 +74,7 @@ class Case:
 
 
 CASES = {
-    "rope or frame": Case(
+    "cable or frame": Case(
         "soft frame, stiffness=60 kN/m",
         TIGHT,
         frozenset({"frame-compliance", "cable-elongation-linear"}),
@@ -109,30 +109,30 @@ def errors(profile: Path, physics: str, load: float) -> tuple[float, float]:
     declared = hiding(read_simbench(find("sim", BENCH)), [physics])
     nominal, better = read_profile(find("profiles", "bench-spiral")), read_profile(profile)
     now = RopeNow(better, terms_of(better), load * 9.80665)
-    rope = RopeMap.of(now)
+    cable = CableMap.of(now)
     plant = WinchPlant(nominal, declared.truth["A"], seed=1, noise=declared.noise)
     plant.hang(load)
     missed, force = 0.0, 0.0
     for target in (3.0, 1.0, 2.0):
         angle = plant.motor_angle
         for _ in range(3):
-            step = (rope.motor_angle(target) - angle) / 400
+            step = (cable.motor_angle(target) - angle) / 400
             for _ in range(400):
                 angle += step
-                advance(plant, rope, angle)
+                advance(plant, cable, angle)
             for _ in range(200):
-                advance(plant, rope, angle)
+                advance(plant, cable, angle)
         seen = plant.measure()
         missed = max(missed, abs(plant.cable_length - target))
-        force = max(force, abs(seen.tension + rope.correction - plant.load))
+        force = max(force, abs(seen.tension + cable.correction - plant.load))
     return missed, force
 
 
-def advance(plant: WinchPlant, rope: RopeMap, angle: float) -> None:
-    """A hundredth of a second at a motor angle, and what the rope's map makes of it."""
+def advance(plant: WinchPlant, cable: CableMap, angle: float) -> None:
+    """A hundredth of a second at a motor angle, and what the cable's map makes of it."""
     plant.advance(0.01, DriveCommand(angle=angle))
     seen = plant.measure()
-    rope.feel(Sample(plant.time, plant.motor_angle, plant.motor_velocity, cell=seen.tension))
+    cable.feel(Sample(plant.time, plant.motor_angle, plant.motor_velocity, cell=seen.tension))
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)

@@ -134,7 +134,7 @@ def test_home_where_ropes_would_have_to_push(check: object) -> None:
     assert check(eight).exit_code == 0
     result = check(eight.replace('"1 m"]', '"4 m"]'))
     assert result.exit_code == 3
-    assert "robot.toml:6: home: no pulling ropes hold the platform of 10 kg there" in result.stderr
+    assert "robot.toml:6: home: no pulling cables hold the platform of 10 kg there" in result.stderr
 
 
 def test_an_anchor_inside_its_pulley(check: object) -> None:
@@ -175,4 +175,4 @@ def test_without_mass_nothing_keeps_the_ropes_of_a_suspended_robot_taut(check: o
     )
     result = check(eight.replace('mass = "10 kg"', 'mass = "0 kg"'))
     assert result.exit_code == 0
-    assert "without mass nothing keeps the ropes taut; give mass (warning)" in result.stderr
+    assert "without mass nothing keeps the cables taut; give mass (warning)" in result.stderr

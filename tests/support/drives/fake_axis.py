@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.observation import Supervised
@@ -199,7 +199,7 @@ class Rig:
         names: str = "A",
         *,
         cell: bool = True,
-        rope: RopeMap | None = None,
+        cable: CableMap | None = None,
     ) -> None:
         self.now = 100.0
         self.bus = FakeBus()
@@ -208,7 +208,7 @@ class Rig:
         self.limits = limits
         parts = {}
         for name, axis in self.axes.items():
-            own = rope or RopeMap(StraightLine())
+            own = cable or CableMap(StraightLine())
             sensors = {"cell": self.cells[name]} if cell else {}
             parts[name] = WinchParts(axis, own, Controller(axis, own, limits), sensors)
         self.supervisor = Supervisor(dict.fromkeys(names, Supervised(limits, 0.05, CYCLE)))
@@ -222,8 +222,8 @@ class Rig:
     def controller(self, name: str = "A") -> Controller:
         return self.loop.winches[name].controller
 
-    def rope(self, name: str = "A") -> RopeMap:
-        return self.loop.winches[name].rope
+    def cable(self, name: str = "A") -> CableMap:
+        return self.loop.winches[name].cable
 
     def sleep(self, duration: float) -> None:
         raise AssertionError("simulated time does not sleep")

@@ -39,7 +39,7 @@ class Motions:
     def __init__(self, bench: Bench, name: str, speed: float) -> None:
         self._bench, self._name, self._speed = bench, name, speed
         self._winch = bench.winch[name]
-        arm = abs(self._winch.rope.arm(bench.snapshot.winch[name].motor_angle))
+        arm = abs(self._winch.cable.arm(bench.snapshot.winch[name].motor_angle))
         self.turn = _TURN * arm
         """Cable of one motor turn, m."""
         self.step = min(_STEP, self.turn)

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Self
 
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.hardware import Wired, wire
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
@@ -188,8 +188,8 @@ class Trials:
 
     def _run(self, axis: Cia402Axis, speed: float, duration: float, name: str) -> None:
         """Keep it enabled; the speed is reached on the winch's own ramp."""
-        rope: RopeMap = self._wired.loop.winches[name].rope
-        arm = rope.arm(self._hold)
+        cable: CableMap = self._wired.loop.winches[name].cable
+        arm = cable.arm(self._hold)
         wanted = speed / arm
         slope = self.spec.winch[name].limits.acceleration / abs(arm)
         start = last = self._clock.now()
@@ -211,8 +211,8 @@ class Trials:
             return
         moving = _MOVE_TIME + _patience(axis.host.mechanism)
         way = speed * moving + speed**2 / (2 * limits.acceleration)
-        rope: RopeMap = self._wired.loop.winches[name].rope
-        length, low = rope.cable_length(self._hold), limits.length[0]
+        cable: CableMap = self._wired.loop.winches[name].cable
+        length, low = cable.cable_length(self._hold), limits.length[0]
         if not length - way >= low:
             raise NotPermitted(
                 f"winch {name}: cable length {length:.3f} m: winding in at {speed:g} m/s until the "
@@ -265,14 +265,14 @@ class Trials:
     def _travel(self, name: str, axis: Cia402Axis, angle: float) -> float:
         """Of the cable since an angle, by the drive's position object; positive pays out."""
         assert axis.drive is not None, "it was enabled"
-        rope: RopeMap = self._wired.loop.winches[name].rope
+        cable: CableMap = self._wired.loop.winches[name].cable
         feedback = axis.feedback
         assert feedback is not None, "it was enabled"
         unit = axis.drive.scale.angle
         # Less than half of the counter's range, whichever way: it may wrap.
         counts = axis.objects.read(0x6064) - round(feedback.angle / unit)
         now = feedback.angle + ((counts + _HALF) % (2 * _HALF) - _HALF) * unit
-        return rope.cable_length(now) - rope.cable_length(angle)
+        return cable.cable_length(now) - cable.cable_length(angle)
 
 
 def _patience(mechanism: Mechanism) -> float:

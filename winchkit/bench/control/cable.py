@@ -1,4 +1,4 @@
-"""Between motor and rope, quick enough for every control cycle."""
+"""Between motor and cable, quick enough for every control cycle."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import NamedTuple, Protocol
 from winchkit.errors import FileError
 from winchkit.estimation.cable_state import RopeNow, Sample
 
-__all__ = ["LineModel", "RopeMap"]
+__all__ = ["CableMap", "LineModel"]
 
 _FAR = 5e-3
-"""Of rope, after which length and arm are taken anew, m."""
+"""Of cable, after which length and arm are taken anew, m."""
 _SOON = 0.02
 """After which tension and memory are asked anew, s."""
 
@@ -28,11 +28,11 @@ class LineModel(Protocol):
         """Motor angle (rad) at a free length."""
 
     def arm(self, motor_angle: float) -> float:
-        """Rope wound in per motor angle, m/rad; positive angle times arm winds in."""
+        """Cable wound in per motor angle, m/rad; positive angle times arm winds in."""
 
 
 class _Here(NamedTuple):
-    """The rope near one motor angle."""
+    """The cable near one motor angle."""
 
     angle: float = nan
     length: float = nan
@@ -40,7 +40,7 @@ class _Here(NamedTuple):
 
 
 class _Felt(NamedTuple):
-    """The rope as its effects had it when they were asked last."""
+    """The cable as its effects had it when they were asked last."""
 
     time: float = nan
     angle: float = nan
@@ -49,12 +49,12 @@ class _Felt(NamedTuple):
     correction: float = 0.0
 
 
-class RopeMap:
+class CableMap:
     """Cable length, arm and tension near the last angle; a line model of its own.
 
-    On the bare profile length and arm are renewed after every 5 mm of rope, within which the arm of
-    a drum changes by far less than a thousandth. Where the profile has effects (``now``), what they
-    make of tension and past is asked every 20 ms or 5 mm, whichever comes first.
+    On the bare profile length and arm are renewed after every 5 mm of cable, within which the arm
+    of a drum changes by far less than a thousandth. Where the profile has effects (``now``), they
+    are evaluated with tension and history every 20 ms or 5 mm, whichever comes first.
     """
 
     def __init__(self, line: LineModel, now: RopeNow | None = None) -> None:
@@ -68,7 +68,7 @@ class RopeMap:
         """Why an effect of the profile, perhaps a user's own, could not be used any more."""
 
     @classmethod
-    def of(cls, now: RopeNow) -> RopeMap:
+    def of(cls, now: RopeNow) -> CableMap:
         """The map of a profile with its effects, if it has any that control can use."""
         return cls(now.at_rest, None if now.trivial else now)
 
@@ -146,7 +146,7 @@ class RopeMap:
         return self._now.at_rest.motor_angle(cable_length - self._remembered(), self._force())
 
     def arm(self, motor_angle: float) -> float:
-        """Rope wound in per motor angle, m/rad."""
+        """Cable wound in per motor angle, m/rad."""
         return self._line.arm(motor_angle)
 
     def _pulled(self, motor_angle: float) -> float:

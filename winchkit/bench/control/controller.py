@@ -7,7 +7,7 @@ import threading
 from dataclasses import dataclass
 from typing import Protocol
 
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import MotionSource, RunDown, StartGate, Target
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
@@ -137,9 +137,9 @@ class Controller:
     next ``step``.
     """
 
-    def __init__(self, axis: AxisPort, rope: RopeMap, limits: LimitSpec) -> None:
+    def __init__(self, axis: AxisPort, cable: CableMap, limits: LimitSpec) -> None:
         self.axis = axis
-        self.rope = rope
+        self.cable = cable
         self.limits = limits
         self.phase = Phase.DISABLED
         self.source: MotionSource | None = None
@@ -161,7 +161,7 @@ class Controller:
         self._begun: _Order | None = None
         self._ordered: Phase | None = None
         self._lock = threading.Lock()
-        self._down = RunDown(rope, limits)
+        self._down = RunDown(cable, limits)
         self._angle = 0.0
         self._held: float | None = None
         self._told = True
@@ -376,7 +376,7 @@ class Controller:
                 self._begin_run_down(now)
 
     def _follow(self, target: Target, feedback: AxisFeedback) -> None:
-        fastest = self.limits.speed / abs(self.rope.at(feedback.angle)[1])
+        fastest = self.limits.speed / abs(self.cable.at(feedback.angle)[1])
         velocity = self._velocity = max(-fastest, min(fastest, target.velocity))
         self.commanded = target.winding_speed
         if target.angle is not None:
@@ -386,7 +386,7 @@ class Controller:
         )
 
     def _begin_run_down(self, now: float) -> None:
-        self._down = RunDown(self.rope, self.limits)
+        self._down = RunDown(self.cable, self.limits)
         self._down.start(self._time, self._angle, self.commanded)
         self._enter(Phase.RUN_DOWN, now)
         self.source, self.done = None, self._wanted is None

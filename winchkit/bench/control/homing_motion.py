@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import Target
 from winchkit.drivers.can.cia402.modes import Homing
 
@@ -27,7 +27,7 @@ class HomingRequest:
     at: float | None = None
     """Cable length (m) at the zero that is found, or at the present place where none is sought."""
     speed: float | None = None
-    """Of the rope while searching, m/s."""
+    """Of the cable while searching, m/s."""
 
 
 class HomingAxis(Protocol):
@@ -39,16 +39,16 @@ class HomingAxis(Protocol):
 
 
 class HomingMotion:
-    """A motion that the drive makes itself; says how fast the rope goes, for supervision."""
+    """A motion that the drive makes itself; says how fast the cable goes, for supervision."""
 
     holds = False
     joins = False
 
-    def __init__(self, axis: HomingAxis, rope: RopeMap, farthest: float = math.inf) -> None:
-        """Give up once ``farthest`` (m) of rope have run in the search."""
+    def __init__(self, axis: HomingAxis, cable: CableMap, farthest: float = math.inf) -> None:
+        """Give up once ``farthest`` (m) of cable have run in the search."""
         self.failure = ""
         """Why it found nothing, in words."""
-        self._axis, self._rope, self._left = axis, rope, farthest
+        self._axis, self._cable, self._left = axis, cable, farthest
         self._begun = self._time = self._angle = math.nan
 
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
@@ -61,7 +61,7 @@ class HomingMotion:
         step, change = time - self._time, angle - self._angle
         self._time, self._angle = time, angle
         moves = step > 0 and abs(change) < _JUMP
-        speed = change / step * self._rope.at(angle)[1] if moves else 0.0
+        speed = change / step * self._cable.at(angle)[1] if moves else 0.0
         self._left -= abs(speed) * step
         state = self._axis.homing
         over = time - self._begun >= _SETTLE and state.over

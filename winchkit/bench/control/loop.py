@@ -239,9 +239,9 @@ class ControlLoop:
         self._sync_watched = any(watched)
 
     def _note_failed_ropes(self) -> None:
-        """A rope whose effects fail is known no better than it was: everything stops."""
+        """A cable whose effects fail is known no better than it was: everything stops."""
         for parts in self.winches.values():
-            self.failure = self.failure or parts.rope.failure
+            self.failure = self.failure or parts.cable.failure
 
     def _failing(self) -> str:
         """Which winch must go down because its drive could not go on, and why, in words."""

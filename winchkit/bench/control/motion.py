@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-from winchkit.bench.control.cable import LineModel, RopeMap
+from winchkit.bench.control.cable import CableMap, LineModel
 from winchkit.bench.control.dead_man import DEAD_MAN, FIRST_PRESS
 from winchkit.errors import NotPermitted
 from winchkit.model.trajectory import Trajectory, plan
@@ -31,10 +31,10 @@ __all__ = [
 _CALM = 0.5
 """Waited for the tension before the length is judged, s."""
 _CLOSE = 1e-4
-"""Of rope, within which nothing is corrected, m."""
+"""Of cable, within which nothing is corrected, m."""
 _TRIES = 3
 _MOST = 0.1
-"""Of rope, beyond which the profile's effects are not to be believed, m."""
+"""Of cable, beyond which the profile's effects are not to be believed, m."""
 _SPEED, _ACCELERATION, _JERK = 0.05, 0.2, 1.0
 """Of a correction, m/s, m/s^2, m/s^3, where the winch's own are not lower."""
 
@@ -42,9 +42,9 @@ _SPEED, _ACCELERATION, _JERK = 0.05, 0.2, 1.0
 class Trim:
     """Corrects where a move to a length has ended; evaluated once a cycle."""
 
-    def __init__(self, rope: RopeMap, length: float, limits: LimitSpec) -> None:
+    def __init__(self, cable: CableMap, length: float, limits: LimitSpec) -> None:
         """End at a cable length, m."""
-        self._rope, self._length, self._limits = rope, length, limits
+        self._cable, self._length, self._limits = cable, length, limits
         self._plan: Trajectory | None = None
         self._angle = self._slope = 0.0
         self._since: float | None = None
@@ -72,7 +72,7 @@ class Trim:
 
     def _judge(self, time: float) -> None:
         """Plan the next correction, if there is anything to correct."""
-        length, arm = self._rope.at(self._angle)
+        length, arm = self._cable.at(self._angle)
         missing = self._length - length
         if not _CLOSE < abs(missing) <= _MOST or self._tries == _TRIES:
             self.done = True
@@ -90,9 +90,9 @@ JERK_TIME = 0.3
 _GAIN = 8.0
 """Of the position loop around a speed-controlled drive, 1/s."""
 _MARGIN = 2e-3
-"""Of rope, kept to a length limit, m."""
+"""Of cable, kept to a length limit, m."""
 _SETTLED = 1e-4
-"""Of rope, from the target of a move that counts as done, m."""
+"""Of cable, from the target of a move that counts as done, m."""
 _SETTLE_TIME = 1.0
 """A move counts as done this long after its end at the latest, s."""
 
@@ -117,7 +117,7 @@ class MotionSource(Protocol):
     holds: bool
     """Whether the winch stays enabled, holding its place, after the source is done."""
     joins: bool
-    """Whether it can take over a rope that moves."""
+    """Whether it can take over a cable that moves."""
 
     def start(self, time: float, angle: float, winding_speed: float) -> None:
         """Begin at a motor angle (rad) and a winding speed (m/s)."""
@@ -131,7 +131,7 @@ class MotionSource(Protocol):
 
 
 class Ramp:
-    """Speed that follows a wish with limited acceleration, in rope units."""
+    """Speed that follows a wish with limited acceleration, in cable units."""
 
     def __init__(self, acceleration: float, speed: float = 0.0) -> None:
         self.speed = speed
@@ -152,8 +152,8 @@ class Jog:
     holds = False
     joins = True
 
-    def __init__(self, rope: RopeMap, limits: LimitSpec) -> None:
-        self._rope, self._limits = rope, limits
+    def __init__(self, cable: CableMap, limits: LimitSpec) -> None:
+        self._cable, self._limits = cable, limits
         self._ramp = Ramp(limits.acceleration)
         self._wish = 0.0
         self._expires = -math.inf
@@ -172,7 +172,7 @@ class Jog:
     def target(self, time: float, angle: float, now: float) -> Target:
         """Follow the wish, slow down before a length limit, end once expired and at rest."""
         live = now < self._expires
-        length, arm = self._rope.at(angle)
+        length, arm = self._cable.at(angle)
         wish = self._within(self._wish, length) if live else 0.0
         speed = self._ramp.follow(wish, time)
         velocity = speed / arm
@@ -200,9 +200,9 @@ class RunDown:
     holds = False
     joins = True
 
-    def __init__(self, rope: RopeMap, limits: LimitSpec) -> None:
+    def __init__(self, cable: CableMap, limits: LimitSpec) -> None:
         self.duration = 0.0
-        self._rope, self._acceleration = rope, limits.acceleration
+        self._cable, self._acceleration = cable, limits.acceleration
         self._ramp = Ramp(self._acceleration)
         self._angle = self._last = 0.0
 
@@ -216,7 +216,7 @@ class RunDown:
     def target(self, time: float, angle: float, _now: float) -> Target:
         """Slower by one cycle's worth."""
         before, speed = self._ramp.speed, self._ramp.follow(0.0, time)
-        arm = self._rope.at(angle)[1]
+        arm = self._cable.at(angle)[1]
         self._angle += (before + speed) / 2 / arm * (time - self._last)
         self._last = time
         return Target(speed / arm, self._angle, speed, done=speed == 0.0)
@@ -240,7 +240,7 @@ class Move:
     ) -> None:
         """Raise NotPermitted for a target or a speed beyond the winch's limits.
 
-        ``trim`` corrects the end for what the rope has become on the way.
+        ``trim`` corrects the end for what the cable has become on the way.
         """
         self.holds = holds
         self._trim = trim
@@ -252,7 +252,7 @@ class Move:
         if limits.length is not None and not limits.length[0] <= length <= limits.length[1]:
             raise NotPermitted(
                 f"a cable length of {length:g} m is beyond the limits {limits.length[0]:g} m to "
-                f"{limits.length[1]:g} m; change its limits.length only if the rope allows it"
+                f"{limits.length[1]:g} m; change its limits.length only if the cable allows it"
             )
         if not math.isfinite(length):
             raise NotPermitted("a cable length must be a finite number of metres")

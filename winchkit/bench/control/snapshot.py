@@ -20,7 +20,7 @@ __all__ = [
 
 
 class Direction(Flag):
-    """Directions of rope motion."""
+    """Directions of cable motion."""
 
     NONE = 0
     WIND_IN = 1

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
-from winchkit.bench.control.cable import RopeMap
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import AxisPort, Controller
 from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
 from winchkit.bench.control.observation import Instrumented, WinchInput
@@ -48,7 +48,7 @@ class WinchParts:
     """One winch as the loop sees it."""
 
     axis: AxisPort
-    rope: RopeMap
+    cable: CableMap
     controller: Controller
     sensors: Mapping[str, SensorPort] = field(default_factory=dict)
     """By role: cell, load, length, temperature."""
@@ -70,9 +70,9 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     length = speed = arm = math.nan
     fault = False
     if feedback is not None:
-        if parts.rope.bends:
-            parts.rope.feel(_sample(parts, feedback, now))
-        length, arm = parts.rope.at(feedback.angle)
+        if parts.cable.bends:
+            parts.cable.feel(_sample(parts, feedback, now))
+        length, arm = parts.cable.at(feedback.angle)
         speed = feedback.velocity * arm
         fault = feedback.state in _FAULTS
         if not feedback.turns_known:
@@ -155,7 +155,7 @@ def _instrumented(sensor: SensorPort, now: float, resumed: float) -> Instrumente
 
 
 def _sample(parts: WinchParts, feedback: AxisFeedback, now: float) -> Sample:
-    """What the rope is judged by; NaN for a reading that is too old."""
+    """What the cable is judged by; NaN for a reading that is too old."""
     fresh = {
         role: sensor.latest.value
         for role, sensor in parts.sensors.items()
@@ -184,7 +184,7 @@ class Captured(NamedTuple):
 def captured(parts: WinchParts) -> Captured:
     """The same, now."""
     return Captured(
-        parts.axis.feedback, parts.controller.phase, parts.rope.correction, parts.commander
+        parts.axis.feedback, parts.controller.phase, parts.cable.correction, parts.commander
     )
 
 

@@ -30,7 +30,7 @@ TARED = ("cell", "load", "length")
 
 _DRIVE = {"motor_angle": "rad", "motor_velocity": "rad/s", "motor_torque": "N m"}
 _OF_PROFILE = {"cable_length": "m", "cable_speed": "m/s"}
-"""Of the rope, from the motor angle; a log keeps what the bench showed, a run does not."""
+"""Of the cable, from the motor angle; a log keeps what the bench showed, a run does not."""
 _of_drive = attrgetter("time", *_DRIVE, *_OF_PROFILE, "phase")
 _TORQUE = 1 + list(_DRIVE).index("motor_torque")
 _TIMES = ("t_request", "t_receive", "t_sample", "t_uncertainty")
@@ -146,7 +146,7 @@ def _drive_samples(rows: list[tuple[Any, ...]]) -> Samples:
         return Samples.joined([], len(_DRIVE) + len(_OF_PROFILE))
     unpowered = [row[-1] in _UNPOWERED for row in rows]
     table = np.array([row[:-1] for row in rows])
-    # While the brake holds the rope the drive's torque says nothing of it.
+    # While the brake holds the cable the drive's torque says nothing of it.
     table[unpowered, _TORQUE] = math.nan
     known = np.isfinite(table[:, 0])
     known[1:] &= table[1:, 0] != table[:-1, 0]

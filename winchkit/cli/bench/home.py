@@ -34,7 +34,7 @@ _POLL = 0.02
 )
 @click.option("--at", metavar="LENGTH", help="With --method: cable length at the zero found.")
 @click.option(
-    "--speed", metavar="SPEED", help="Of the rope.  [default: a tenth of the winch's limit]"
+    "--speed", metavar="SPEED", help="Of the cable.  [default: a tenth of the winch's limit]"
 )
 @take_over_option
 @effects_option
@@ -56,7 +56,7 @@ def command(
     """Home WINCH: by a method of its drive, or by telling it the present cable length.
 
     The drive keeps the zero for as long as it is powered, one with an absolute encoder perhaps
-    longer. A search moves the rope by the drive's own means; speed, tension and faults are
+    longer. A search moves the cable by the drive's own means; speed, tension and faults are
     supervised meanwhile, and Ctrl-C stops. Lengths are by the winch's profile.
     """
     from winchkit.cli.core.dry_run import station_for

@@ -176,7 +176,7 @@ def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
 
     clock = PacedClock()
     click.echo(
-        "dry run on simulated drives, each rope at its reference length; nothing is sent", err=True
+        "dry run on simulated drives, each cable at its reference length; nothing is sent", err=True
     )
     with ExitStack() as stack:
         live = stack.enter_context(LiveBench(_simulated(spec), clock=clock.simulation))

@@ -1,4 +1,4 @@
-"""What ``winchkit check`` says about drums: too few turns, too much rope, a guide astray."""
+"""What ``winchkit check`` says about drums: too few turns, too much cable, a guide astray."""
 
 from __future__ import annotations
 

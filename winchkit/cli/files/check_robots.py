@@ -1,4 +1,4 @@
-"""What ``winchkit check`` says about robots: whether the ropes can hold the platform at home."""
+"""What ``winchkit check`` says about robots: whether the cables can hold the platform at home."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def faults_and_warnings(file: str, value: Declared) -> tuple[tuple[Fault, ...], 
 
 
 def _lengths(robot: Robot) -> Said:
-    """Lines whose rope has no way from the pulley to the platform."""
+    """Lines whose cable has no way from the pulley to the platform."""
     from math import isfinite
 
     return [
@@ -57,7 +57,7 @@ def _lengths(robot: Robot) -> Said:
 
 
 def _held(robot: Robot) -> tuple[Said, Said]:
-    """Six lines or more: do pulling ropes balance the weight?"""
+    """Six lines or more: do pulling cables balance the weight?"""
     from winchkit.model.robot import ForceLimits, wrench_feasibility
 
     limits = ForceLimits(0.0, float("inf"))
@@ -68,12 +68,12 @@ def _held(robot: Robot) -> tuple[Said, Said]:
         return [
             (
                 ("home",),
-                f"no pulling ropes hold the platform of {mass:g} kg there: some rope would have to "
-                "push; move home, or mend exit_point, anchor_point or center_of_mass",
+                f"no pulling cables hold the platform of {mass:g} kg there: some cable would "
+                "have to push; move home, or mend exit_point, anchor_point or center_of_mass",
             )
         ], []
     if mass == 0 and not found.margin > 0:
-        return [], [(("platform",), "without mass nothing keeps the ropes taut; give mass")]
+        return [], [(("platform",), "without mass nothing keeps the cables taut; give mass")]
     return [], []
 
 
@@ -89,7 +89,7 @@ def _hanging(robot: Robot) -> tuple[Said, Said]:
         return [(("platform",), f"{few}; give mass")], []
     found = forward(robot.geometry, robot.home_length[None], robot.home, platform)
     if not found.converged[0]:
-        return [(("home",), "with the ropes' lengths at home the platform hangs nowhere")], []
+        return [(("home",), "with the cables' lengths at home the platform hangs nowhere")], []
     there, turned = found.pose.position[0], angles_of(found.pose.rotation[0])
     moved = float(np.linalg.norm(there - robot.home.position[0]))
     if moved <= _NEAR and np.allclose(found.pose.rotation, robot.home.rotation, atol=_NEAR):
@@ -99,7 +99,7 @@ def _hanging(robot: Robot) -> tuple[Said, Said]:
     return [], [
         (
             ("home",),
-            f"the platform does not rest there; with these ropes it hangs at position = [{place}], "
-            f"rotation = [{angles}]",
+            f"the platform does not rest there; with these cables it hangs at "
+            f"position = [{place}], rotation = [{angles}]",
         )
     ]

@@ -44,7 +44,7 @@ _NOISE_DIMENSIONS = {
     help="A known standard deviation, e.g. position='0.02 mm'; else estimated.",
 )  # fmt: skip
 @click.option("--loss", type=click.Choice(_LOSSES), default="least-squares", show_default=True)
-@click.option("--middle-force", metavar="FORCE", help="Rope force kept near, where not measured.")
+@click.option("--middle-force", metavar="FORCE", help="Cable force kept near, where not measured.")
 @click.option("--next", "following", type=click.IntRange(0), default=0, help="Poses to propose.")
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 @html_option
@@ -64,7 +64,7 @@ def command(
     """Calibrate the robot of profile ROBOT on the poses of RUNs and write the better profile.
 
     A row of a run is a pose: motor angles of all lines, and whatever else was measured there, in
-    any mix: position, rotation or some of its angles, swivel angles, rope lengths. The poses
+    any mix: position, rotation or some of its angles, swivel angles, cable lengths. The poses
     themselves are always found beside the parameters.
     """
     from winchkit.calibration.robot.pose_design import next_poses
@@ -74,7 +74,7 @@ def command(
     found = _calibrated(source, runs, validate, _options(effects, noise, loss, middle_force))
     ahead = next_poses(found, following) if following else []
     if len(ahead) < following:
-        click.echo(f"only {len(ahead)} of {following} poses can be held by the ropes", err=True)
+        click.echo(f"only {len(ahead)} of {following} poses can be held by the cables", err=True)
     _write(source, found, Path(output), runs)
     _tell(found, ahead, as_json)
     if html:

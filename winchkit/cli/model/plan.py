@@ -45,7 +45,7 @@ def tell_poses(
     refuse_options(asked.band, asked.winch)
     if bench is not None:
         raise UsageError(
-            "--bench: a robot's plan keeps to the poses that pulling ropes can hold inside its "
+            "--bench: a robot's plan keeps to the poses that pulling cables can hold inside its "
             "frame; leave it out"
         )
     if output is not None and Path(output).suffix == ".toml":
