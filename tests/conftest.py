@@ -80,6 +80,7 @@ def pytest_runtest_makereport(
     watch = item.stash.get(_WATCH, None)
     if watch is None or not report.failed or call.excinfo is None:
         return report
+    watch.sample()
     stall = watch.largest
     if stall <= TOLERATED or "from pytest-timeout" in str(call.excinfo.value):
         return report

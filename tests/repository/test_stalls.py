@@ -98,7 +98,7 @@ def test_what_a_stall_makes_of_a_test(
         text.replace(
             "from stalls import", f"sys.path.insert(0, {str(SUPPORT)!r})\nfrom stalls import"
         )
-        + f"\nStallWatch._sample = lambda self: setattr(self, 'largest', {stall})\n"
+        + f"\nStallWatch.sample = lambda self: setattr(self, 'largest', {stall})\n"
     )
     pytester.makepyfile(
         f"import pytest\n@pytest.mark.realtime\ndef test_it():\n    {body}\n"

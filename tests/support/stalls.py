@@ -36,6 +36,7 @@ class StallWatch:
         os.environ[_MARK] = str(os.getpid())
         self._processes = {str(os.getpid())}
         self._before: dict[str, float] = {}
+        self._lock = threading.Lock()
         self.largest = 0.0
         """s."""
 
@@ -52,7 +53,7 @@ class StallWatch:
     ) -> None:
         self._stopping.set()
         self._thread.join()
-        self._sample()
+        self.sample()
 
     def _run(self) -> None:
         count, before, used = 0, time.monotonic(), time.process_time()
@@ -60,7 +61,7 @@ class StallWatch:
             if count % _SEARCH == 0:
                 self._search()
             count += 1
-            self._sample()
+            self.sample()
             now, spent = time.monotonic(), time.process_time()
             self.largest = max(self.largest, now - before - _PERIOD - (spent - used))
             before, used = now, spent
@@ -80,11 +81,13 @@ class StallWatch:
         except OSError:
             return False
 
-    def _sample(self) -> None:
-        found = self._waits()
-        for thread, total in found.items():
-            self.largest = max(self.largest, total - self._before.get(thread, total))
-        self._before |= found
+    def sample(self) -> None:
+        """Take the waits since the last sample into account."""
+        with self._lock:
+            found = self._waits()
+            for thread, total in found.items():
+                self.largest = max(self.largest, total - self._before.get(thread, total))
+            self._before |= found
 
     def _waits(self) -> dict[str, float]:
         return {
