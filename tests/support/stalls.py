@@ -70,10 +70,9 @@ class StallWatch:
         """Find processes that were started with this one's mark."""
         found = [item for item in self._proc.iterdir() if item.name.isdecimal()]
         present = {item.name for item in found}
-        self._processes &= present
-        for item in found:
-            if item.name not in self._processes and self._marked(item):
-                self._processes.add(item.name)
+        known = self._processes & present
+        new = {item.name for item in found if item.name not in known and self._marked(item)}
+        self._processes = known | new
 
     def _marked(self, process: Path) -> bool:
         try:
