@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Generator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -22,6 +23,33 @@ TOLERATED = 0.05
 """A longer stall (s) may trip a bench in real time: limits.response_time is 0.06 s."""
 DEFAULT = "not realtime and not slow"
 """What ``pytest`` runs without ``-m`` (pyproject.toml)."""
+SLOW = frozenset(
+    map(
+        Path,
+        (
+            "bench/control/test_fault_campaign.py",
+            "calibration/robot/test_benchmark.py",
+            "cli/model/test_whole_procedure.py",
+            "diagnosis/design",
+            "diagnosis/fleet",
+            "diagnosis/robot",
+            "diagnosis/selection",
+            "diagnosis/test_campaign.py",
+            "diagnosis/test_hidden_effects.py",
+            "diagnosis/test_real_emps.py",
+            "diagnosis/verdict",
+            "drivers/modbus/test_cell_fault_campaign.py",
+            "drivers/modbus/test_modbus_campaign.py",
+            "drivers/stream/test_faults.py",
+            "papers/test_ipanema3.py",
+            "repository/test_examples.py",
+            "repository/test_pages.py",
+            "repository/test_wheel.py",
+        ),
+    )
+)
+"""Files and folders whose tests the default run leaves out: diagnoses of many runs, campaigns, and
+sessions of the pages."""
 _WATCH = pytest.StashKey[StallWatch]()
 
 
@@ -39,12 +67,20 @@ def pytest_configure() -> None:
             signal.signal(number, signal.SIG_DFL)
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """``-n auto``: all processors for the whole suite; none besides for files and for real time."""
-    expression = config.option.markexpr
+    """``-n auto``: all processors for the whole suite without real time, else this process."""
     whole = config.args == config.getini("testpaths")
-    in_real_time = "realtime" in expression and "not realtime" not in expression
-    return os.cpu_count() or 1 if whole and not in_real_time else 0
+    return os.cpu_count() or 1 if whole and "not realtime" in config.option.markexpr else 0
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of ``SLOW``."""
+    for item in items:
+        place = item.path.relative_to(Path(__file__).parent)
+        if place in SLOW or SLOW.intersection(place.parents):
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_terminal_summary(
