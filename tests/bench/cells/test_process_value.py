@@ -29,6 +29,6 @@ def test_a_bench_with_its_cell_on_the_can_bus(tmp_path: Path) -> None:
         assert cell_a.latest is not None
         assert bench.winch["A"].tension == pytest.approx(10 * 9.81, rel=0.1)
         assert bench.winch["A"].snapshot.quality is not None
-        bench.command(cell_a, "tare")
+        bench.winch["A"].tare()
         bench.clock.sleep(0.3)
         assert bench.winch["A"].tension == pytest.approx(0.0, abs=10)
