@@ -29,6 +29,9 @@ SLOW = frozenset(
         (
             "bench/control/test_fault_campaign.py",
             "calibration/robot/test_benchmark.py",
+            "cli/model/test_plan.py",
+            "cli/model/test_promises.py",
+            "cli/model/test_unknown_effect.py",
             "cli/model/test_whole_procedure.py",
             "diagnosis/design",
             "diagnosis/fleet",
@@ -42,6 +45,8 @@ SLOW = frozenset(
             "drivers/modbus/test_modbus_campaign.py",
             "drivers/stream/test_faults.py",
             "papers/test_ipanema3.py",
+            "report/pages/test_diagnosis.py",
+            "report/pages/test_robot.py",
             "repository/test_examples.py",
             "repository/test_pages.py",
             "repository/test_wheel.py",
