@@ -189,10 +189,17 @@ def test_the_lower_identifier_wins_the_bus() -> None:
     assert [other.receive(0.0) for _ in range(4)] == [(i, b"") for i in heard]
 
 
-def opened(folder: Path, seed: int) -> tuple[list[Carried], Path]:
-    """Frames of a short motion, and its log."""
+def opened(folder: Path, seed: int) -> tuple[list[Carried], list[bytes], Path]:
+    """Frames of a short motion, the replies of its Modbus cell, and its log."""
     clock = SimulatedClock()
     frames: list[Carried] = []
+    replies: list[bytes] = []
+
+    def heard(reply: bytes) -> bytes:
+        replies.append(reply)
+        return reply
+
+    clock.reply_filter = heard
     declared = read_simbench(find("sim", "spiral-bench"))
     with LiveBench(declared, seed=seed, simulated_time=clock) as live:
         for wire in live.wire.values():
@@ -202,12 +209,14 @@ def opened(folder: Path, seed: int) -> tuple[list[Carried], Path]:
             with bench.log(folder / "lift.csv") as recorder:
                 bench.winch["A"].move_by(wind_in=0.1, speed=0.3)
             assert bench.loop.overruns == 0
-    return frames, recorder.path
+    return frames, replies, recorder.path
 
 
 def test_a_bench_does_the_same_each_time(tmp_path: Path) -> None:
     runs = [opened(tmp_path / name, seed) for name, seed in (("1", 7), ("2", 7), ("3", 8))]
-    (first, log), (second, again), (other, _) = runs
+    (first, replies, log), (second, replies_again, again), (other, _, _) = runs
+    assert len(replies) > 100
+    assert replies == replies_again  # with the number of each transaction
     assert first == second
     assert first != other  # the noise of the drive's torque
     before, after = read_run(log), read_run(again)

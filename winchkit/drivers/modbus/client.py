@@ -68,7 +68,6 @@ class ModbusClient:
         self._known = 0
         self._lost: asyncio.Future[None] | None = None
         """Of the exchange under way: done once no answer to it can be taken."""
-        self._random = Random()
         self.replaced = False
         """Whether the connection was closed here because something else than the answer came."""
         self.refusal = 0
@@ -103,8 +102,10 @@ class ModbusClient:
         if not open_now:
             raise ConnectionLost(f"{self.where}: cannot be opened; check address and power")
         # Transactions of one connection are not those of the one before: a reply to an old
-        # request that a gateway hands over on the new connection answers nothing.
-        client.ctx.next_tid = self._random.randrange(1, _LAST_TRANSACTION)
+        # request that a gateway hands over on the new connection answers nothing. The loop's time
+        # is the seed, so that a bench in simulated time repeats.
+        seed = asyncio.get_running_loop().time()
+        client.ctx.next_tid = Random(seed).randrange(1, _LAST_TRANSACTION)
 
     def close(self) -> None:
         """Close the line."""
