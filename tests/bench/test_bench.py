@@ -218,7 +218,7 @@ def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None
     assert attach(bench.spec) is None
 
 
-def test_a_log_of_a_station_that_cannot_go_on_troubles_nobody_else(
+def test_a_log_of_a_station_that_cannot_go_on_disturbs_no_other(
     bench: Bench, tmp_path: Path
 ) -> None:
     """The folder vanishes, the next part cannot be begun; a thread that raises fails this test."""
@@ -271,7 +271,7 @@ def test_of_two_stations_that_log_onto_one_path_one_is_refused(
     other.close()
 
 
-def test_a_station_that_goes_away_lets_go(bench: Bench) -> None:
+def test_a_station_that_goes_away_releases_its_winches(bench: Bench) -> None:
     station = attach(bench.spec)
     assert station is not None
     station.step("A", 0.6, 0.1)

@@ -137,7 +137,7 @@ def test_a_stop_of_one_stops_all(bench: Bench) -> None:
         bench.winch["A"].wait()
 
 
-def test_a_fault_of_one_is_told_to_whoever_waits(live: LiveBench, bench: Bench) -> None:
+def test_a_fault_of_one_is_reported_to_every_waiting_client(live: LiveBench, bench: Bench) -> None:
     bench.move_together(dict.fromkeys(NAMES, 3.0), speed=0.1, wait=False)
     until_moving(bench)
     live.inject("D.servo", "over-current")

@@ -43,7 +43,7 @@ def test_a_homing_of_before_counts_only_after_a_while() -> None:
     assert 0.05 < cycles * CYCLE < 0.1
 
 
-def test_a_drive_that_fails_is_believed() -> None:
+def test_a_drive_that_fails_is_accepted() -> None:
     motion, _ = search(Searching(Homing.FAILED))
     assert "failed" in motion.failure
 

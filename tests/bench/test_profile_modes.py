@@ -86,7 +86,7 @@ def test_wiring_that_cannot_be_meant(tmp_path: Path, line: str, words: str) -> N
         read_bench(file)
 
 
-def test_a_wiring_file_with_all_of_it(tmp_path: Path) -> None:
+def test_a_bench_file_with_all_of_it(tmp_path: Path) -> None:
     file = tmp_path / "bench.toml"
     file.write_text(
         BENCH + 'length = ["1 m", "2 m"]\nin_drive = true\ntorque = "1 N m"\n'

@@ -78,7 +78,7 @@ def test_a_move_past_the_end_of_the_counter_is_refused_before_it_begins(tmp_path
         assert abs(slave.motor.angle - begun) > 30.0
 
 
-def test_a_length_that_is_not_known_is_told_and_no_move_goes_by_it(tmp_path: Path) -> None:
+def test_a_length_that_is_not_known_is_reported_and_no_move_goes_by_it(tmp_path: Path) -> None:
     """Nothing is heard of the drive for longer than its counter of 16 turns takes to wrap."""
     slave = Slave.from_file(GENERIC, 1, declared=Declared(counter_bits=20))
     rig = Rig(tmp_path, [slave])

@@ -60,14 +60,14 @@ def test_every_object_of_the_file_is_read(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_check_tells_modes_and_host_loss(name: str) -> None:
+def test_check_reports_modes_and_host_loss(name: str) -> None:
     modes, ways = FILES[name]
     drive = described(name)
     assert drive["modes"] == modes
     assert [way["way"] for way in drive["host_loss"]] == ways
 
 
-def test_what_a_drive_lacks_is_told() -> None:
+def test_what_a_drive_lacks_is_reported() -> None:
     animatics = described("animatics-smartmotor.eds")["obstacles"]
     assert "the EDS lacks 6064h, which every motion needs" in animatics
     assert "the EDS declares no receive PDO (1 to 4)" in animatics

@@ -57,7 +57,7 @@ def test_a_flagged_value_is_no_number_whatever_the_device_says() -> None:
     assert Quality.FAULT in publisher.latest.quality
 
 
-def test_listeners_hear_every_reading_and_repeats_are_counted() -> None:
+def test_listeners_get_every_reading_and_repeats_are_counted() -> None:
     publisher, heard = Publisher(100.0), list[Reading]()
     publisher.listeners.append(heard.append)
     for k, counts in enumerate((1.0, 1.0, 2.0, 2.0, 2.0)):
@@ -146,7 +146,7 @@ def test_polling_faster_than_it_converts_is_not_frozen() -> None:
     assert not any(told)
 
 
-def test_latencies_are_told_within_a_bin() -> None:
+def test_latencies_are_reported_within_a_bin() -> None:
     tally = Tally()
     for k in range(1000):
         tally.reading(k * 0.01, 0.002 if k % 100 else 0.05)

@@ -146,7 +146,7 @@ def test_probes_and_secants_change_the_first_output(effect: Effect) -> None:
 
 
 @pytest.mark.parametrize("effect", [e for e in EFFECTS if e.memory], ids=lambda e: e.id)
-def test_memory_starts_where_it_is_told(effect: Effect) -> None:
+def test_memory_starts_at_the_given_state(effect: Effect) -> None:
     start = effect.parameter("start")
     assert (start.role, start.null) == ("fixed", 0.0)
     motion = standard_motion()

@@ -43,7 +43,7 @@ def test_a_sparkline_runs_from_lowest_to_highest_and_keeps_gaps() -> None:
     assert sparkline(spike, 10).count("█") == 1
 
 
-def test_the_signature_of_an_elastic_rope_is_hookes() -> None:
+def test_the_signature_of_an_elastic_cable_is_hookes() -> None:
     drawn = signature(CATALOGUE["cable-elongation-linear"])
     stretch = drawn.changes["cable_length"]
     light, heavy = 15.0 * 9.80665, 45.0 * 9.80665

@@ -138,7 +138,7 @@ def test_a_table_acts_on_its_line_or_on_all(tmp_path: Path) -> None:
     assert wound[0] == pytest.approx([1e-3 * 10 / 20, 0, 0, 0], abs=1e-12)
 
 
-def test_every_fault_of_a_robots_effects_is_told_with_its_line(tmp_path: Path) -> None:
+def test_every_fault_of_a_robots_effects_is_reported_with_its_line(tmp_path: Path) -> None:
     profile = read_robot(
         robot_file(
             tmp_path,

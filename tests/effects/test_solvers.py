@@ -76,7 +76,7 @@ def test_an_instrument_that_is_late_shows_the_length_of_a_moment_ago() -> None:
         assert found[end] == line.predict(line.motion(signals))["cable_length"][end]
 
 
-def test_what_a_drive_is_told_is_the_torque_of_a_moment_later() -> None:
+def test_the_commanded_torque_is_that_of_a_moment_later() -> None:
     time = np.linspace(0, 10, 501)
     line = Line(profile_with("grooved"))
 
@@ -129,14 +129,14 @@ def _stack(wound: np.ndarray, strain: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_rope_on_the_drum_is_paid_out_last_in_first_out(seed: int) -> None:
+def test_cable_on_the_drum_is_paid_out_last_in_first_out(seed: int) -> None:
     rng = np.random.default_rng(seed)
     wound = np.cumsum(rng.normal(0, 0.1, 400) * rng.integers(0, 2, 400)) - rng.random()
     strain = rng.random(400) * 1e-3
     assert np.allclose(stored(wound, strain), _stack(wound, strain), atol=1e-12)
 
 
-def test_winding_in_tight_and_paying_out_slack_leaves_a_longer_rope_while_wound() -> None:
+def test_winding_in_tight_and_paying_out_slack_leaves_a_longer_cable_while_wound() -> None:
     time = np.linspace(0, 20, 1001)
     angle = 60.0 * np.sin(2 * pi * time / 40.0)
     load = np.where(time < 10, 400.0, 200.0)
@@ -149,7 +149,7 @@ def test_winding_in_tight_and_paying_out_slack_leaves_a_longer_rope_while_wound(
 
 
 @pytest.mark.parametrize("bend", [(-300.0, 0.0, 0.0), (80.0, -5e4, 1e6), (0.0, 0.0, -1e9)])
-def test_a_rope_law_that_would_fold_back_stays_monotone(bend: tuple[float, ...]) -> None:
+def test_a_cable_law_that_would_fold_back_stays_monotone(bend: tuple[float, ...]) -> None:
     time = np.linspace(0, 1, 200)
     load = np.linspace(0, 3000, 200)
     profile = profile_with("grooved")

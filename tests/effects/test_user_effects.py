@@ -87,7 +87,7 @@ def test_what_keeps_them_is_read(tmp_path: Path, formula: str) -> None:
         ),
     ],
 )
-def test_what_breaks_them_is_told_with_its_file(
+def test_what_breaks_them_is_reported_with_its_file(
     tmp_path: Path, formula: str, told: str, recwarn: pytest.WarningsRecorder
 ) -> None:
     with pytest.raises(FileError, match=told):

@@ -146,7 +146,7 @@ def test_the_std_holds_what_parameters_drawn_at_random_do() -> None:
     assert np.median(std[later] / spread[later]) == pytest.approx(1.0, abs=0.15)
 
 
-def test_an_unknown_start_is_told_until_the_rope_has_moved() -> None:
+def test_an_unknown_start_is_reported_until_the_cable_has_moved() -> None:
     estimator = DahlEstimator([GROUP], cell_std=0.5)
     first = estimator.update(300.0, 0.0)
     # Anything from −F_c to F_c: a rectangle of that width over each pulley, all alike.
@@ -233,7 +233,7 @@ def test_no_group_and_negative_noise_are_refused() -> None:
         DahlEstimator([GROUP], dead_band=float("nan"))
 
 
-def test_without_numba_the_reason_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_numba_the_reason_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "numba", None)
     with pytest.raises(UsageError, match=r"winchkit\[fast\]"):
         compiled()

@@ -75,7 +75,7 @@ def test_stds_hold_what_noise_does_to_the_values() -> None:
     assert all(fit.groups[0].std[2] == 0.0 for fit in fits)
 
 
-def test_two_groups_of_different_presliding_are_told_apart() -> None:
+def test_two_groups_of_different_presliding_are_distinguished() -> None:
     _, platform, wound = wander(20.0, 25.0)
     rng = np.random.default_rng(5)
     far = cell_readings(platform, wound, (pi,), 0.02, 8000.0)
@@ -112,7 +112,7 @@ def test_the_friction_at_the_start_is_found() -> None:
     assert found.groups[0].friction == pytest.approx(0.02, rel=0.01)
 
 
-def test_a_rope_that_never_moves_tells_nothing() -> None:
+def test_a_cable_that_never_moves_identifies_nothing() -> None:
     rng = np.random.default_rng(0)
     still = Record(300 + rng.normal(0, 1, 200), np.full(200, 300.0), np.zeros(200))
     (group,) = identify_dahl([still], [WRAPS]).groups

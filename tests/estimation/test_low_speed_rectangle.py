@@ -23,7 +23,7 @@ def test_dahl_is_nearest_and_better_than_the_paper() -> None:
     assert answer["identified"]["friction"] == pytest.approx(rectangle.FRICTION, rel=0.3)
 
 
-def test_the_ropes_carry_the_platform() -> None:
+def test_the_cables_carry_the_platform() -> None:
     """The sum of all cable forces, added up by itself, is the weight."""
     positions, accelerations = rectangle.rectangle(10.0, 1.0)
     lengths, tension = rectangle.ropes(positions, np.zeros_like(accelerations))

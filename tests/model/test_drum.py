@@ -42,7 +42,7 @@ def test_angle_is_the_inverse_of_wound(
 
 
 @given(drums(), st.lists(angles, min_size=2, max_size=20))
-def test_more_angle_is_more_rope_and_arrays_agree_with_numbers(
+def test_more_angle_is_more_cable_and_arrays_agree_with_numbers(
     drum: Spiral | Archimedean | Grooved | Squared, some: list[float]
 ) -> None:
     angle = np.sort(np.array(some))
@@ -95,7 +95,7 @@ def test_archimedean_is_the_integral_of_its_arm(radius: float, share: float, ang
 
 
 @given(radii, st.floats(0.0, 0.01), st.floats(0.0, 400.0))
-def test_squared_drum_keeps_the_rope_volume(radius: float, build_up: float, angle: float) -> None:
+def test_squared_drum_keeps_the_cable_volume(radius: float, build_up: float, angle: float) -> None:
     drum = Squared(radius, build_up)
     wound, arm = float(drum.wound(np.asarray(angle))), float(drum.arm(np.asarray(angle)))
     assert arm**2 == pytest.approx(radius**2 + build_up * wound, rel=1e-12)
@@ -118,7 +118,7 @@ def test_without_growth_all_laws_are_one() -> None:
         assert np.allclose(drum.arm(angle), 0.06)
 
 
-def test_a_profile_makes_its_drum_and_layers_grow_by_the_rope_unless_told() -> None:
+def test_a_profile_makes_its_drum_and_layers_grow_by_the_cable_by_default() -> None:
     def made(spec: DrumSpec) -> object:
         return drum_of(
             WinchProfile("w", spec, GearboxSpec(10.0), ReferenceSpec(), CableSpec(diameter=0.006))

@@ -59,7 +59,7 @@ def test_a_hanging_mass_at_uneven_sampling_keeps_a_constant_acceleration() -> No
     assert np.allclose(inner, 10.0 * (GRAVITY + 6.0 * line.arm(0.0)), rtol=1e-6)
 
 
-def test_a_hanging_mass_follows_the_rope_as_it_is_really_paid_out() -> None:
+def test_a_hanging_mass_follows_the_cable_as_it_is_really_paid_out() -> None:
     """Runout of the drum accelerates the load: its tension follows the length."""
     line = line_with(
         profile_with("grooved"), {"drum-eccentricity": {"eccentricity": 0.01, "phase": 0.3}}

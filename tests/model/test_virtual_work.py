@@ -17,7 +17,7 @@ from winchkit.model.stages import Signals
 @pytest.mark.parametrize("drum", DRUMS)
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("effect", [None, *KINEMATIC, "all"])
-def test_work_at_the_motor_is_work_on_the_rope(
+def test_work_at_the_motor_is_work_on_the_cable(
     effect: str | None, direction: int, drum: str
 ) -> None:
     """∫ τ dθ = −F Δℓ, with τ by the line and ℓ by the line: one cannot lie without the other."""
@@ -80,7 +80,7 @@ def test_motor_angle_is_the_inverse_of_cable_length(
 
 
 @given(st.sampled_from(list(DRUMS)), st.sampled_from([1, -1]), st.floats(-50.0, 400.0))
-def test_arm_is_rope_wound_in_per_motor_angle(drum: str, direction: int, angle: float) -> None:
+def test_arm_is_cable_wound_in_per_motor_angle(drum: str, direction: int, angle: float) -> None:
     line = Line(profile_with(drum, direction))
     h = 1e-4
     slope = (line.cable_length(angle - h) - line.cable_length(angle + h)) / (2 * h)

@@ -109,7 +109,7 @@ def test_eq_3_leaves_out_the_home_length_and_the_arc(line: int) -> None:
     assert there[0] + paid_out == pytest.approx(there[1], abs=1e-15)
 
 
-def test_the_arc_is_that_of_a_rope_laid_around_a_circle() -> None:
+def test_the_arc_is_that_of_a_cable_laid_around_a_circle() -> None:
     """Against a search for the shortest way around the pulley that starts along its axis."""
     swivel, point, anchor = 0.03, np.zeros(3), np.array([0.4, 0.0, -0.3])
     centre = np.array([swivel, 0.0])

@@ -167,7 +167,7 @@ def check(*arguments: object) -> Result:
     return CliRunner().invoke(main, ["check", *map(str, arguments)])
 
 
-def test_check_tells_the_safe_stroke(tmp_path: Path) -> None:
+def test_check_reports_the_safe_stroke(tmp_path: Path) -> None:
     file = tmp_path / "w.toml"
     file.write_text(FILE)
     result = check(file)
@@ -205,7 +205,7 @@ def test_check_of_a_bench_looks_at_its_limits(tmp_path: Path) -> None:
     assert warnings(BENCH.replace('"0.2 m", "7 m"', '"0.4 m", "7 m"')) == []
 
 
-def test_a_flange_below_the_rope_is_a_fault(tmp_path: Path) -> None:
+def test_a_flange_below_the_cable_is_a_fault(tmp_path: Path) -> None:
     file = tmp_path / "w.toml"
     file.write_text(FILE.replace("width =", 'flange_radius = "50 mm"\nwidth ='))
     with pytest.raises(FileError, match=r"w\.toml:8: drum\.flange_radius: 0\.05 m must be above"):

@@ -82,7 +82,7 @@ def test_eq_8_put_right_gives_the_forces_closest_to_the_initial_ones(robot: Robo
     np.testing.assert_allclose(approximate_forces(structure, wrench, forces)[0], forces, atol=1e-9)
 
 
-def test_linear_ropes_explain_the_pattern_of_the_uncorrected_poses() -> None:
+def test_linear_cables_explain_the_pattern_of_the_uncorrected_poses() -> None:
     """With the assumptions that benchmarks/ipanema3_poses.py names."""
     outcome = predicted()
     ours = outcome.deviation * 1e3
@@ -92,7 +92,7 @@ def test_linear_ropes_explain_the_pattern_of_the_uncorrected_poses() -> None:
     assert outcome.share_along_z > 0.99, "the biggest error was observed in the z axis"
 
 
-def test_eq_8_leaves_what_ropes_can_bear() -> None:
+def test_eq_8_leaves_what_cables_can_bear() -> None:
     """The forces that explain the pattern are below zero in the high poses."""
     lowest = predicted().forces.min(axis=1)
     assert lowest[15] < -100

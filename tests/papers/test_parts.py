@@ -91,7 +91,7 @@ def test_worms_that_cannot_be_are_refused(
         worm_stage(starts, teeth, lead, friction)
 
 
-def test_a_guide_that_fits_its_groove_stays_over_the_rope() -> None:
+def test_a_guide_that_fits_its_groove_stays_over_the_cable() -> None:
     guide = Guide(0.005, 1.0, 0.4, pitch=0.005)
     angle = np.linspace(0, 100, 7)
     assert guide.mismatch == 0.0
@@ -107,7 +107,7 @@ def test_a_guide_that_fits_its_groove_stays_over_the_rope() -> None:
     st.floats(1e-3, 2e-2),
     st.floats(-0.002, 0.002),
 )
-def test_the_fleet_angle_is_reached_where_it_is_told(
+def test_the_fleet_angle_is_reached_where_it_is_given(
     lead: float, ratio: float, distance: float, pitch: float, offset: float
 ) -> None:
     guide = Guide(lead, ratio, distance, pitch)
@@ -134,7 +134,7 @@ def test_travel_limits() -> None:
         guide.check(-pi, 0.3)
 
 
-def test_a_guide_that_runs_away_from_the_rope_is_told() -> None:
+def test_a_guide_that_runs_away_from_the_cable_is_reported() -> None:
     """5.2 mm a turn in grooves of 5 mm: after 30 turns 6 mm aside of 100 mm are 3.4 degrees."""
     profile = read_profile(find("profiles", "bench-grooved"))
     assert profile.guide is not None

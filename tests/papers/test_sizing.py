@@ -122,14 +122,14 @@ def test_a_margin_counts_for_torque_and_power() -> None:
         assert row(careful, name).value == pytest.approx(2 * row(PAPER, name).value)
 
 
-def test_a_motor_too_weak_for_any_ratio_is_told() -> None:
+def test_a_motor_too_weak_for_any_ratio_is_reported() -> None:
     weak = replace(PAPER, motor=replace(PAPER.motor, power=60.0))
     assert row(weak, "motor torque").alternatives[0].startswith("no gear ratio")
     assert row(weak, "motor power").alternatives == ("a motor of 73.56 W",)
 
 
 @pytest.mark.parametrize(("friction", "note"), [(0.02, "turns back"), (0.1, "locks")])
-def test_a_worm_tells_whether_it_holds(friction: float, note: str) -> None:
+def test_a_worm_reports_whether_it_holds(friction: float, note: str) -> None:
     worm = WormSpec(lead_angle=0.06, friction=friction)
     spec = replace(PAPER, gearbox=replace(PAPER.gearbox, worm=worm))
     assert row(spec, "worm efficiency").note == note
@@ -138,7 +138,7 @@ def test_a_worm_tells_whether_it_holds(friction: float, note: str) -> None:
     assert row(odd, "gear ratio").ok is False
 
 
-def test_without_a_guide_only_motor_and_drum_are_told() -> None:
+def test_without_a_guide_only_motor_and_drum_are_reported() -> None:
     names = [each.name for each in sized(replace(PAPER, screw=None, belt=None))]
     assert names[-1] == "drum width"
 
@@ -147,7 +147,7 @@ sizes = st.floats(1e-4, 1e4)
 
 
 @given(sizes, sizes, sizes, sizes, sizes, sizes)
-def test_no_size_is_too_strange(
+def test_any_size_gives_a_result(
     force: float, ratio: float, radius: float, width: float, diameter: float, power: float
 ) -> None:
     """Every row has its number, and one that fails says what would do."""
@@ -222,7 +222,9 @@ def test_the_json_of_the_command_line(tmp_path: Path) -> None:
         ('ends = "fixed-fixed"', 'ends = "loose"', "expected one of fixed-fixed"),
     ],
 )
-def test_faults_of_a_specification_are_told(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_faults_of_a_specification_are_reported(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
     file = tmp_path / "bad.toml"
     text = EXAMPLE.read_text(encoding="utf-8")
     assert old in text

@@ -218,7 +218,7 @@ def test_we_transfer_segments_with_a_foreign_node(slave: tuple[Peer, CanBus, Sdo
     assert peer.ask("value", 0x2003) == str(0x0102030405060708)
 
 
-def test_we_tell_what_a_foreign_node_refuses(slave: tuple[Peer, CanBus, SdoNode]) -> None:
+def test_we_report_what_a_foreign_node_refuses(slave: tuple[Peer, CanBus, SdoNode]) -> None:
     _, _, node = slave
     with pytest.raises(DeviceRefused, match="0x06010002"):
         node.write(0x2002, 0, 1)
@@ -229,7 +229,7 @@ def test_we_tell_what_a_foreign_node_refuses(slave: tuple[Peer, CanBus, SdoNode]
     assert node.read_if_there(0x2FFF) is None
 
 
-def test_we_start_stop_and_hear_a_foreign_node(slave: tuple[Peer, CanBus, SdoNode]) -> None:
+def test_we_start_stop_and_receive_a_foreign_node(slave: tuple[Peer, CanBus, SdoNode]) -> None:
     peer, bus, node = slave
     watch = HeartbeatWatch(0.4)
     bus.on(0x700 + SLAVE, watch.receive)

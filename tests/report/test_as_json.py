@@ -42,7 +42,7 @@ def test_the_curve_of_the_rest_has_its_five_corners() -> None:
 
 
 @pytest.mark.parametrize("bench", ["demo-elastic-rope", "five-cornered-drum", "demo-adequate"])
-def test_what_is_told_is_told_in_both(bench: str) -> None:
+def test_text_and_json_report_the_same(bench: str) -> None:
     answer = answer_of(bench)
     found = report_json(answer)
     page = Page(report_html(answer, bench))

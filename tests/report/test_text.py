@@ -62,7 +62,7 @@ def test_every_verdict_has_the_detectable_effects(bench: str) -> None:
     assert " ".join(changes_text(answer.diagnosis).split()) in " ".join(text.split())
 
 
-def test_the_shape_of_a_rest_is_drawn_where_it_lives() -> None:
+def test_the_shape_of_a_residual_is_drawn_over_its_variable() -> None:
     lines = report_text(answer_of("five-cornered-drum")).splitlines()
     at = next(n for n, line in enumerate(lines) if "5 periods per drum turn" in line and n > 5)
     heights = np.array(["▁▂▃▄▅▆▇█".index(bar) for bar in lines[at + 1].split()[0]])
@@ -70,7 +70,7 @@ def test_the_shape_of_a_rest_is_drawn_where_it_lives() -> None:
     assert int(np.argmax(np.abs(np.fft.rfft(heights - heights.mean())))) == 5
 
 
-def test_several_effects_are_told_by_what_each_buys() -> None:
+def test_several_effects_are_reported_with_their_shares() -> None:
     answer = answered(recorded_both("demo-elastic-rope", "demo-motor-drag"))
     stretch, drag = "cable-elongation-linear", "motor-coulomb"
     assert {step.effects[0] for step in answer.diagnosis.steps} == {stretch, drag}
@@ -80,7 +80,7 @@ def test_several_effects_are_told_by_what_each_buys() -> None:
     assert rows[f"only {drag}"][:2] == rows["unchanged profile"][:2] != rows[f"only {stretch}"][:2]
 
 
-def test_errors_before_and_after_stand_beside_the_noise() -> None:
+def test_errors_before_and_after_are_shown_with_the_noise() -> None:
     text = report_text(saying(diagnosis_of("explained", ELASTIC)))
     (row,) = [line for line in text.splitlines() if line.startswith("  cable length")]
     assert row.split() == ["cable", "length", "1.63", "mm", "0.360", "mm", "0.300", "mm"]
@@ -137,7 +137,7 @@ def test_a_comparison_without_outputs_has_nothing_to_follow() -> None:
     assert "  tension: no measured variable" in compare_text(Comparison({"tension": quiet}, None))
 
 
-def test_an_addition_is_told_with_value_and_gain() -> None:
+def test_an_addition_is_reported_with_value_and_gain() -> None:
     profile = read_profile(find("profiles", "bench-spiral"))
     addition = add("cable-elongation-linear", recorded("demo-elastic-rope"), profile)
     text = addition_text(replace(addition, outputs={"cable_length": NOISY}))

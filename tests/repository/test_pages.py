@@ -98,7 +98,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-") for h in headings}
 
 
-def test_blocks_are_told_apart(tmp_path: Path) -> None:
+def test_blocks_are_distinguished(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(
         "# x\n```console\n$ echo a\na\n$ echo b\n```\n"

@@ -72,7 +72,7 @@ def test_every_package_says_what_it_holds() -> None:
     assert not silent
 
 
-def test_nothing_tells_of_registries_or_machines() -> None:
+def test_no_file_names_registries_or_machines() -> None:
     found = []
     for path in tracked():
         try:

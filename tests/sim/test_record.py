@@ -33,7 +33,7 @@ def plans(motion: Programme, start: float = 4.0) -> list:
 
 
 @pytest.mark.parametrize("steps", [(Step(to=2.0),), (Step(by=0.0),), (Step(ask="hang"),)])
-def test_a_programme_that_leaves_nothing_to_record_is_told(steps: tuple[Step, ...]) -> None:
+def test_a_programme_that_leaves_nothing_to_record_is_reported(steps: tuple[Step, ...]) -> None:
     """Its repeats end where they start: without the error no file would be written."""
     with pytest.raises(FileError, match="neither a move nor a hold"):
         plans(programme(*steps, repeat=2))

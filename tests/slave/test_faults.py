@@ -74,7 +74,7 @@ def test_a_quick_stop_changes_nothing(name: str) -> None:
     assert wire.slave.motor.velocity > 19
 
 
-def test_a_deaf_slave_minds_no_lost_heartbeat() -> None:
+def test_an_unresponsive_slave_ignores_a_lost_heartbeat() -> None:
     wire = moving()
     wire.write(0x1016, 1, 0x007F0064, 4)
     wire.send(0x77F, "05")

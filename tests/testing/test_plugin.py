@@ -36,7 +36,7 @@ def test_a_bench_by_name_moves_and_its_truth_is_asserted(sim: OpenedBench) -> No
     sim.assert_moved("A", 0.0)
 
 
-def test_what_is_not_true_is_told_with_what_is(sim: OpenedBench) -> None:
+def test_what_is_not_true_is_reported_with_what_is(sim: OpenedBench) -> None:
     with pytest.raises(AssertionError, match=r"moved by \+0.0000 m, expected \+1.0000 m"):
         sim.assert_moved("A", 1.0)
     with pytest.raises(AssertionError, match=r"in 'switch on disabled', not in 'fault'.*disabled"):
@@ -77,7 +77,7 @@ def test_declarations_with_faults_are_refused_like_files(sim_bench: SimBench) ->
         sim_bench("spiral-bench", hidden=["elastick rope"])
 
 
-def test_two_benches_do_not_hear_each_other(sim_bench: SimBench) -> None:
+def test_two_benches_do_not_receive_each_other(sim_bench: SimBench) -> None:
     first, second = sim_bench("spiral-bench"), sim_bench("spiral-bench")
     first.bench.winch["A"].jog(wind_in=0.1, duration=0.3)
     second.assert_moved("A", 0.0, 1e-6)
@@ -176,7 +176,7 @@ def test_faults_of_the_drive_trip_the_bench(sim: OpenedBench, kind: str) -> None
     sim.bench.winch["A"].jog(pay_out=0.1, duration=0.2)
 
 
-def test_a_drive_that_hears_nothing_of_the_host_stops_itself(sim: OpenedBench) -> None:
+def test_a_drive_that_receives_nothing_of_the_host_stops_itself(sim: OpenedBench) -> None:
     sim.bench.winch["A"].jog(pay_out=0.2, hold=1.0)
     sim.assert_state("A", "operation enabled")
     begin = sim.clock.now()

@@ -46,7 +46,7 @@ def test_an_undisturbed_wire_carries_everything_at_once(time: Time) -> None:
     assert drained(wire, from_drive=True) == []
 
 
-def test_what_is_dropped_is_told_as_lost_and_only_while_it_lasts(time: Time) -> None:
+def test_what_is_dropped_is_reported_as_lost_and_only_while_it_lasts(time: Time) -> None:
     wire, heard = Wire(time), []
     wire.taps.append(heard.append)
     end = wire.disturb({0x181})

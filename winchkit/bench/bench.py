@@ -262,11 +262,11 @@ class Bench:
         ConnectionLost.
         """
         self._release.close(set(self.winch))
-        begun = self.clock.now()
+        start = self.clock.now()
         try:
             cleared = reset(self._wired, self.spec, self.clock)
         finally:
-            self._release.resume(begun, self.clock.now())
+            self._release.resume(start, self.clock.now())
             # A bus that was opened again has a new receive thread.
             self.realtime.cover(self._urgent_threads())
         self._look_at_record()
@@ -430,7 +430,7 @@ class Bench:
                 yield name, client
 
     def _end_silent(self, client: Client, names: Collection[str], reason: str) -> None:
-        """Ramp the winches of a client that has fallen silent, and tell everybody why."""
+        """Ramp the winches of a client without a life sign; every client gets the reason."""
         self.stopped_by = f"the dead-man ({client.name} was silent for {LIFE_SIGN:g} s)"
         self.stop_commanded(names, wait=False)
         self.loop.warn(Trip("client", ", ".join(names), reason, Direction.NONE))

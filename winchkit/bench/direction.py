@@ -23,17 +23,17 @@ def paid_out(what: str, pay_out: float | None, wind_in: float | None) -> float:
     assert value is not None, "one of them is given"
     if not 0 < value < math.inf:
         raise UsageError(
-            f"{what}: {name}={value:g} is not a positive number; the name tells the direction, "
+            f"{what}: {name}={value:g} is not a positive number; the name gives the direction, "
             "write pay_out=0.1 or wind_in=0.1"
         )
     return value if wind_in is None else -value
 
 
 def no_positional(call: str, unit: str, given: Sequence[object]) -> None:
-    """Raise TypeError for values without a name: their sign would tell the direction."""
+    """Raise TypeError for values without a name: their sign would give the direction."""
     if given:
         raise TypeError(
-            f"{call}({', '.join(map(repr, given))}): a number without a name does not tell the "
+            f"{call}({', '.join(map(repr, given))}): a number without a name does not give the "
             f"direction; write {call}(pay_out=...) or {call}(wind_in=...) with a positive number "
             f"({unit}), and every other argument by name"
         )

@@ -1,4 +1,4 @@
-"""Stops a bench that nobody owns, on its buses themselves; never energises anything."""
+"""Stops a bench that no process owns, on its buses themselves; never energises anything."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ class Stopped:
 def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
     """Quick-stop every drive of a bench file and wait until each confirms.
 
-    All drives are told before any is waited for. Raises ConnectionLost when a bus does not open.
+    All drives get the command before any is waited for. Raises ConnectionLost when a bus does not
+    open.
     """
     clock = clock or MonotonicClock()
     with ExitStack() as stack:

@@ -66,7 +66,7 @@ class Wired:
     metadata: Mapping[str, str]
 
     def disarm(self) -> None:
-        """Tell the drives that are at rest not to mind that the host's heartbeat ends.
+        """Switch off the host watchdog of the drives that are at rest.
 
         Any other keeps its watchdog, which stops it.
         """
@@ -165,7 +165,7 @@ def _resolution(axis: Cia402Axis, cable: CableMap) -> float:
 
 
 def _safe_length(profile: WinchProfile) -> float:
-    """Cable length (m) that leaves the last dead wraps on the drum, where the profile tells it."""
+    """Cable length (m) that leaves the last dead wraps on the drum, where the profile has it."""
     from winchkit.model.capacity import safe_lengths
 
     longest = safe_lengths(profile)[1] if profile.reference.wound_turns else math.inf

@@ -1,4 +1,4 @@
-"""Homing: a drive finds its zero by itself, or is told which cable length is the present one."""
+"""Homing: a drive finds its zero by itself, or gets the present cable length."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from winchkit.errors import DeviceRefused, DriveFault, NotPermitted, UsageError
 __all__ = ["homing"]
 
 _SHARE = 0.1
-"""Of the winch's speed limit, at which it searches unless told otherwise."""
+"""Of the winch's speed limit, at which it searches by default."""
 _SLOWER = 0.2
 """Of the search's speed, at which it approaches the zero."""
 _SHOWN = 3

@@ -60,7 +60,7 @@ def await_feedback(loop: ControlLoop, axes: Mapping[str, Cia402Axis], clock: Clo
 
 
 def await_sensors(sensors: Iterable[Sensor], clock: Clock) -> None:
-    """Give every sensor time for its first answer; a silent one is told when it matters."""
+    """Give every sensor time for its first answer; a silent one is reported when it matters."""
     deadline, waiting = clock.now() + _FIRST_READING, list(sensors)
     while any(item.latest is None and item.problem is None for item in waiting):
         if clock.now() > deadline:
@@ -156,7 +156,7 @@ def _reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
         # The proof of one is a silence towards all: each of them is set up anew.
         troubled = set(axes)
     lost = [name for name in axes if name in troubled]
-    # What a drive without its mapping said last stays: only commissioning tells how it is.
+    # The last feedback of a drive without its mapping stays: only commissioning reads anew.
     await_rest(loop, [name for name in axes if name not in lost], clock)
     for name in lost:
         axes[name].commission()
@@ -166,8 +166,10 @@ def _reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     await_feedback(loop, axes, clock)
     await_rest(loop, lost, clock)
     faults = {name: axis.fault_text for name, axis in axes.items() if axis.state is State.FAULT}
-    told = {trip.winch for trip in seen.tripped if trip.kind == "fault"}
-    cleared += [f"winch {name}: drive fault: {faults[name]}" for name in faults if name not in told]
+    reported = {trip.winch for trip in seen.tripped if trip.kind == "fault"}
+    cleared += [
+        f"winch {name}: drive fault: {faults[name]}" for name in faults if name not in reported
+    ]
     clear_faults(loop, clock)
     for axis in axes.values():
         axis.forget_alarms()

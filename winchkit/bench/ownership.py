@@ -147,7 +147,7 @@ def listen(spec: BenchSpec) -> tuple[socket.socket, Path]:
 
 
 def connect_to_owner(spec: BenchSpec) -> socket.socket | None:
-    """A connection to the process that owns the bench; None when nobody does."""
+    """A connection to the process that owns the bench; None without one."""
     if hasattr(socket, "AF_UNIX"):
         client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         address: str | tuple[str, int] = str(_folder() / f"{_key(spec)}.sock")

@@ -17,7 +17,7 @@ __all__ = ["Ask", "Progress", "earlier_runs", "run_programme"]
 Ask = Callable[[Step], None]
 """Asks the operator to do something; returns when it is done, raises when it is refused."""
 Progress = Callable[[int, int, Step], None]
-"""Told the repeat, the step's number and the step before it is executed."""
+"""Called with the repeat, the step's number and the step before it is executed."""
 
 _LEAD = 0.1
 """Logged at rest before the first and after the last motion of a run, s."""

@@ -55,7 +55,7 @@ class Winch:
 
     @property
     def tension(self) -> float:
-        """In the cable at the platform end, N; NaN where no instrument tells.
+        """In the cable at the platform end, N; NaN without an instrument.
 
         The load's instrument shows it; else the cell's reading, less what the effects of the
         profile put between the two. The bare reading is ``snapshot.tension``.

@@ -1,7 +1,7 @@
 """What the host does to a value of an instrument: a calibration, then a tare. The device keeps out.
 
-The device's own zero and tare live in the device, the calibration in a file, the host's tare here:
-three things, none of which touches another.
+The device's own zero and tare are in the device, the calibration is in a file, the host's tare is
+here: they are independent of each other.
 """
 
 from __future__ import annotations

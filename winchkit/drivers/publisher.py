@@ -47,7 +47,7 @@ class Publisher:
     def publish(
         self, value: float, gross: float, counts: float, quality: Quality, when: Sampled
     ) -> Reading:
-        """Make a reading of what the device says (SI), judge it and tell the listeners.
+        """Make a reading of what the device says (SI), judge it and publish it to the listeners.
 
         Without a value (NaN) or with a flag that makes it unusable it is NaN.
         """

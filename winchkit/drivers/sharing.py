@@ -13,7 +13,7 @@ __all__ = ["LineShare", "Polled", "fair_rates", "next_of"]
 _USE = 0.95
 """Of a line: the rest is for commands, retries and the machine's own jitter."""
 _TICK = 1e-6
-"""No clock tells less, s."""
+"""Resolution of the clocks, s."""
 _WATCHED = 32
 """Readings of an instrument whose median is what one takes: a machine that stood still is none."""
 

@@ -1,4 +1,4 @@
-"""Tells an instrument that hangs from one that is merely quiet, by its raw counts.
+"""Detects a stuck (frozen) instrument by its raw counts.
 
 Counts that stand still prove nothing by themselves: a good cell at rest shows the same number for
 minutes. They prove something where this very instrument, in this very state (at rest or moving),
@@ -66,7 +66,7 @@ class Stillness:
     def frozen(self, counts: float, conversions: float, moving: bool) -> bool:
         """Take in the next counts, ``conversions`` after the ones before them.
 
-        Several readings of one conversion count as one trial, conversions that nobody read not
+        Several readings of one conversion count as one trial, conversions that were not read not
         at all.
         """
         trial = min(1.0, conversions)

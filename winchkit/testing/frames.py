@@ -27,7 +27,7 @@ class Frame:
     data: bytes
     name: str
     """``sync``, ``nmt``, ``host.heartbeat``, ``A.rpdo1``, ``A.tpdo2``, ``A.sdo``,
-    ``A.emergency``, ``A.heartbeat``; empty where nobody declared it."""
+    ``A.emergency``, ``A.heartbeat``; empty where it is not declared."""
     words: str
     """What it says."""
     values: Mapping[str, int] = field(default_factory=dict)

@@ -194,7 +194,7 @@ class OpenedBench:
         known = self.bench.snapshot.winch[winch]
         assert arrived, (
             f"winch {winch}: its drive is in '{self.state(winch)}', not in '{state}', after "
-            f"{within:g} s (the bench believes '{known.state}', {known.phase.value})"
+            f"{within:g} s (the bench's state: '{known.state}', {known.phase.value})"
         )
 
     def assert_moved(self, winch: str, by: float, tolerance: float = 5e-3) -> None:

@@ -84,7 +84,7 @@ def test_no_zero_and_no_tare_while_the_winch_moves(bench: Bench, wiring: Path) -
     assert bench.winch["A"].moving, "nobody was disturbed"
 
 
-def test_a_task_that_nobody_knows_is_refused(bench: Bench) -> None:
+def test_an_unknown_task_is_refused(bench: Bench) -> None:
     station = attach(bench.spec)
     assert station is not None
     try:

@@ -72,7 +72,7 @@ def test_a_winch_that_goes_on_is_found() -> None:
 
 
 @pytest.mark.parametrize("independent", [True, False])
-def test_a_frame_that_no_drive_hears_is_heard_by_the_host(independent: bool) -> None:
+def test_a_frame_that_no_drive_receives_is_received_by_the_host(independent: bool) -> None:
     """A drive that is off the bus for 20 ms (case 172/138) stays operational; the host stops it."""
     kind = "stranger: NMT pre-operational"
     silence = Planned("drive silent", "A", 0.600, 0.02)

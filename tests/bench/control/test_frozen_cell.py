@@ -120,7 +120,7 @@ def test_noise_far_above_its_history_is_unstable() -> None:
     assert float(found[2]) == pytest.approx(0.03, rel=0.15)
 
 
-def test_a_device_that_says_it_is_unstable_at_rest_is_believed() -> None:
+def test_a_device_that_says_it_is_unstable_at_rest_is_accepted() -> None:
     test = FrozenCell(100.0)
     for k in range(700):
         now = k * 0.01

@@ -40,7 +40,7 @@ def test_a_trip_stands_in_the_next_process_until_it_is_cleared(tmp_path: Path) -
     assert opened(path)[1] == ()
 
 
-def test_a_trip_that_nobody_closed_stands_too(tmp_path: Path) -> None:
+def test_a_trip_that_was_not_closed_stands_too(tmp_path: Path) -> None:
     """As after SIGKILL: the record is whole without any closing."""
     path = tmp_path / "bench.trip.json"
     latch, _ = opened(path)

@@ -117,7 +117,7 @@ class SoftLine(StraightLine):
 
 
 @pytest.mark.parametrize("longer", [8e-3, -8e-3, 5e-5, 0.5])
-def test_a_trim_corrects_what_the_rope_became_on_the_way(longer: float) -> None:
+def test_a_trim_corrects_what_the_cable_became_on_the_way(longer: float) -> None:
     """Small corrections at rest; what is within 0.1 mm, or beyond belief, is left alone."""
     rig, line = Rig(LIMITS), SoftLine()
     move = Move(line, LIMITS, 3.0, trim=Trim(CableMap(line), 3.0, LIMITS))
@@ -147,7 +147,7 @@ def test_a_held_move_stays_enabled_until_stopped() -> None:
     assert rig.controller().phase is Phase.DISABLED
 
 
-def test_a_move_begun_during_a_jog_waits_for_rest_and_no_speed_jumps() -> None:
+def test_a_move_during_a_jog_waits_for_rest_and_no_speed_jumps() -> None:
     rig = Rig(LIMITS)
     jog(rig, 0.3, hold=1.0)
     rig.run(0.5)

@@ -128,7 +128,7 @@ def test_lost_targets_are_seen_once_the_dead_man_expires() -> None:
     assert rig.axes["A"].velocity == 0.0
 
 
-def test_a_sluggish_drive_is_not_taken_for_a_deaf_one() -> None:
+def test_a_sluggish_drive_is_not_taken_for_an_unresponsive_one() -> None:
     """A velocity loop whose time constant is just below half the response time."""
     rig = Rig(LIMITS, "A")
     axis = rig.axes["A"]

@@ -1,4 +1,4 @@
-"""A drive that hears no RPDO any more is stopped by SDO."""
+"""A drive that receives no RPDO any more is stopped by SDO."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def test_a_bench_names_its_files_beside_it(tmp_path: Path) -> None:
     assert copied.effect_files == (tmp_path / "mine.py",)
 
 
-def test_a_file_that_is_not_there_is_told_with_its_line(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_is_reported_with_its_line(tmp_path: Path) -> None:
     _, profile = write(tmp_path, MINE)
     path = bench_file(tmp_path, profile, 'effects = ["mine.py", "yours.py"]')
     with pytest.raises(FileError) as caught:

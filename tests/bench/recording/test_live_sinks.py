@@ -109,7 +109,7 @@ def test_a_target_that_is_none(target: str) -> None:
         UdpJson(target, lambda: 0.0)
 
 
-def test_a_host_that_nobody_knows() -> None:
+def test_an_unknown_host() -> None:
     with pytest.raises(ConnectionLost, match="cannot be reached"):
         UdpJson("no.such.host.invalid:9870", lambda: 0.0)
 

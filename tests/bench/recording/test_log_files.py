@@ -143,7 +143,7 @@ def test_a_part_that_is_there_already_is_left_alone(tmp_path: Path, suffix: str)
 
 @SUFFIXES
 @pytest.mark.parametrize("how", ["removed", "replaced", "cut off"])
-def test_a_log_that_is_taken_away_is_told(tmp_path: Path, suffix: str, how: str) -> None:
+def test_a_log_that_is_taken_away_is_reported(tmp_path: Path, suffix: str, how: str) -> None:
     path = tmp_path / f"lift.{suffix}"
     clock = SetClock()
     fed = Fed(clock, "A")

@@ -270,7 +270,9 @@ def test_the_rows_up_to_a_full_disk_can_be_read(tmp_path: Path, suffix: str) -> 
         assert path.read_bytes().endswith(b"\n")
 
 
-def test_an_event_is_told_when_a_log_ends(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_event_is_reported_when_a_log_ends(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     clock = SetClock()
     fed = Fed(clock)
     recorder = Recorder(tmp_path / "a.mcap", fed.sensors, clock, {})
@@ -286,7 +288,7 @@ def test_an_event_is_told_when_a_log_ends(tmp_path: Path, caplog: pytest.LogCapt
     recorder.close()
 
 
-def test_what_nobody_takes_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_not_taken_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("winchkit.bench.recording.feed._WAITING", 100)
     with recording(tmp_path / "a.mcap", "A") as (fed, recorder):
         while recorder.counters()["log"]["drops"] == 0:

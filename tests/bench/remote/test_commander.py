@@ -70,7 +70,7 @@ def test_whoever_owns_the_bench_is_a_client_as_any_other() -> None:
         rig.commanders.claim("A")
 
 
-def test_a_hand_over_ends_the_motion_and_is_told_to_the_one_who_lost_it() -> None:
+def test_a_hand_over_ends_the_motion_and_is_reported_to_the_one_who_lost_it() -> None:
     rig = Rig()
     rig.claim(FIRST)
     rig.take_over(SECOND)

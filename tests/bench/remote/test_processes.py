@@ -273,7 +273,7 @@ def test_who_is_overtaken_ends_with_5_and_by_whose_hand(served: Path) -> None:
     assert_stands_still(served)
 
 
-def test_a_killed_bench_process_is_missed_by_the_drive_and_told_to_its_clients(
+def test_a_killed_bench_process_is_missed_by_the_drive_and_reported_to_its_clients(
     served: Path,
 ) -> None:
     with jogging(served, way="--wind-in") as jog:

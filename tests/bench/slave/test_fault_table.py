@@ -154,7 +154,7 @@ def test_turning_while_disabled_is_a_latched_trip(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fault", ["velocity stuck", "position stuck", "status frozen"])
-def test_a_stuck_value_is_noticed_when_the_key_is_let_go(tmp_path: Path, fault: str) -> None:
+def test_a_stuck_value_is_noticed_when_the_key_is_released(tmp_path: Path, fault: str) -> None:
     rig = Rig(tmp_path)
     with rig.opened() as bench:
         key = jogging(rig, bench)
@@ -186,7 +186,7 @@ def test_the_dead_man_expires_into_a_fault(tmp_path: Path, fault: str) -> None:
         assert seen.rest <= expires + _WITHIN + seen.speed / _RAMP + _LAG
 
 
-def test_an_emergency_without_a_fault_is_told_and_trips_only_where_declared(
+def test_an_emergency_without_a_fault_is_reported_and_trips_only_where_declared(
     tmp_path: Path,
 ) -> None:
     rig = Rig(tmp_path)
@@ -290,7 +290,7 @@ def test_an_exception_in_the_control_loop_stops_the_drive_and_is_named(
         again.winch["A"].jog(pay_out=0.1)
 
 
-def test_a_drive_stopped_by_a_stranger_comes_back_with_a_reset(tmp_path: Path) -> None:
+def test_a_drive_stopped_by_another_master_comes_back_with_a_reset(tmp_path: Path) -> None:
     rig = Rig(tmp_path)
     with rig.opened() as bench:
         rig.from_stranger(0x000, b"\x02\x01")

@@ -99,7 +99,7 @@ def stopped(folder: Path, case: Case) -> None:
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.rung.name)
-def test_a_rung_stops_the_drive_that_hears_none_before(tmp_path: Path, case: Case) -> None:
+def test_a_rung_stops_the_drive_that_receives_none_before(tmp_path: Path, case: Case) -> None:
     stopped(tmp_path, case)
 
 

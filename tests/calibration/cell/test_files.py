@@ -61,7 +61,7 @@ def test_a_tare_in_kilograms_is_refused_at_its_place(tmp_path: Path) -> None:
         read_tares(path)
 
 
-def test_tares_stand_beside_the_wiring_file() -> None:
+def test_tares_are_kept_beside_the_bench_file() -> None:
     assert tare_book_path("lab/bench.toml") == "lab/bench.tares.toml"
 
 

@@ -73,7 +73,7 @@ def test_repeatability_is_the_spread_between_series() -> None:
     )
 
 
-def test_what_is_not_known_is_not_invented_but_told() -> None:
+def test_what_is_not_known_is_not_invented_but_reported() -> None:
     once = [CalibrationPoint(load, load) for load in LOADS[:4]]
     once[1] = CalibrationPoint(20.0, 20.1)
     fit = fit_cell(once)
@@ -91,13 +91,13 @@ def test_a_wrong_weight_is_pointed_at() -> None:
     assert any("150 N" in warning and "off" in warning for warning in fit_cell(measured).warnings)
 
 
-def test_a_cell_that_is_wired_the_wrong_way_round_is_told() -> None:
+def test_a_cell_that_is_wired_the_wrong_way_round_is_reported() -> None:
     turned = [CalibrationPoint(p.load, -p.indicated, 0.0, p.going, p.series) for p in points()]
     with pytest.raises(RunError, match="turn it round"):
         fit_cell(turned)
 
 
-def test_a_cell_that_does_not_carry_the_weights_is_told() -> None:
+def test_a_cell_that_does_not_carry_the_weights_is_reported() -> None:
     random = Random(8)
     elsewhere = [CalibrationPoint(p.load, 98 + random.gauss(0, 0.2)) for p in points()]
     with pytest.raises(RunError, match="does not follow the loads"):

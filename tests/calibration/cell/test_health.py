@@ -42,7 +42,7 @@ def remarks(health: Health) -> str:
     return " / ".join(health.remarks)
 
 
-def test_a_good_cell_is_told_in_numbers_and_without_remarks() -> None:
+def test_a_good_cell_is_reported_in_numbers_and_without_remarks() -> None:
     health = examine(made())
     assert health.rate == pytest.approx(RATE)
     assert health.noise == pytest.approx(0.5, rel=0.08)
@@ -87,7 +87,7 @@ def test_a_tone_at_half_the_rate_is_not_made_up() -> None:
     assert math.isnan(examine(made()).hum[1].amplitude)
 
 
-def test_creep_after_a_load_is_told_for_thirty_minutes() -> None:
+def test_creep_after_a_load_is_reported_for_thirty_minutes() -> None:
     """Of 200 N 0.4 N a unit of ln t: from 1 to 30 minutes 0.4 ln 30."""
     health = examine(made(seconds=40.0, noise=0.05, step=200.0, creep=0.4))
     assert health.creep is not None
@@ -103,7 +103,7 @@ def test_a_change_of_load_without_creep_is_not_called_creep() -> None:
     assert "creeps" not in remarks(health)
 
 
-def test_counts_that_never_change_are_told() -> None:
+def test_counts_that_never_change_are_reported() -> None:
     samples = made(noise=0.0)
     health = examine(samples)
     assert health.unique == 1
@@ -111,7 +111,7 @@ def test_counts_that_never_change_are_told() -> None:
     assert "frozen" in remarks(health)
 
 
-def test_readings_that_repeat_are_told() -> None:
+def test_readings_that_repeat_are_reported() -> None:
     samples = made()
     raw = np.repeat(samples.raw[::4], 4)[: len(samples.raw)]
     health = examine(Samples(samples.time, raw, raw * DIVISION, samples.usable, samples.saturated))

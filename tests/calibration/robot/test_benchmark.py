@@ -11,7 +11,7 @@ import ipanema3_poses
 import robot_tick
 
 
-def test_the_tick_benchmark_tells_figures_ratios_and_what_is_broken(
+def test_the_tick_benchmark_reports_figures_ratios_and_what_is_broken(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A short one: what it measures on a busy machine is no verdict here."""
@@ -39,7 +39,7 @@ def test_the_17_poses_as_json(
     assert answer["predicted_without_correction"]["correlation"] >= 0.97
 
 
-def test_both_tell_people_the_same(
+def test_both_print_the_same_text(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["ipanema3_poses.py"])

@@ -76,7 +76,7 @@ def test_noise_of_the_instruments_is_found_from_the_poses_alone(paper: Calibrate
     assert paper.weights.sigma["rope"] == pytest.approx(6e-6, rel=0.25)
 
 
-def test_a_bound_is_kept_and_told(paper: Calibrated) -> None:
+def test_a_bound_is_kept_and_reported(paper: Calibrated) -> None:
     # Three true winding radii are 59 mm, which is the bound in the robot's file.
     held_at = {name for name, e in paper.estimates.items() if e.bound}
     assert held_at <= {f"{i}.winding_radius" for i in (1, 2, 4)} | {"layer_growth"}
@@ -101,7 +101,7 @@ def test_starts_ten_millimetres_off_all_converge(seed: int) -> None:
     assert rms(found.validation_after.distance) < 3e-5
 
 
-def test_without_rotation_exit_and_anchor_points_are_told_to_be_one() -> None:
+def test_without_rotation_exit_and_anchor_points_are_reported_as_one() -> None:
     found = calibrate(robot(), measured(csv(rows(90, 3, tilt=0.0))), held())
     assert found.observed.rank == 41
     (words,) = found.observed.unobservable
@@ -111,7 +111,7 @@ def test_without_rotation_exit_and_anchor_points_are_told_to_be_one() -> None:
     assert spread > 2e-3
 
 
-def test_within_one_layer_growth_and_radii_are_told_to_be_one() -> None:
+def test_within_one_layer_growth_and_radii_are_reported_as_one() -> None:
     turns = replace(Truth(), turns=4.5)
     fit = measured(csv(rows(90, 1, box=0.03, truth=turns)))
     judged = measured(csv(rows(20, 2, box=0.03, truth=turns, noise=EXACT)))
@@ -190,7 +190,7 @@ def test_outliers_cost_a_robust_fit_little() -> None:
     assert errors["cauchy"] < 2e-5
 
 
-def test_a_hanging_platform_of_four_ropes_is_calibrated_too() -> None:
+def test_a_hanging_platform_of_four_cables_is_calibrated_too() -> None:
     """Four cables leave two degrees of freedom; with measured poses the fit is overdetermined."""
     profile = replace(robot().profile, line=robot().profile.line[:4], prior=NO_BOUNDS)
     full = measured(csv(rows(), angles=True))
@@ -208,7 +208,7 @@ def test_a_hanging_platform_of_four_ropes_is_calibrated_too() -> None:
     assert found.estimates["1.exit_point.x"].std < 5e-3 / 3
 
 
-def test_unmodelled_rope_noise_is_weighed_down() -> None:
+def test_unmodelled_cable_noise_gets_less_weight() -> None:
     fit = measured(csv(rows(90, 7, noise=Noise(rope=4e-4))))
     found = calibrate(robot(), fit, held())
     assert found.weights.sigma["rope"] == pytest.approx(4e-4, rel=0.3)

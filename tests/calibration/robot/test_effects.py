@@ -52,14 +52,14 @@ def test_hidden_elasticity_is_explained_by_the_effect_and_by_nothing_else(
 
 
 @pytest.mark.parametrize("law", ["quartic", "exponential"])
-def test_laws_that_bend_fit_a_straight_rope_too(
+def test_laws_that_bend_fit_a_straight_cable_too(
     elastic: tuple[Measured, Measured], law: str
 ) -> None:
     found = with_effects(elastic, f"cable-elongation-{law}")
     assert rms(found.validation_after.distance) < 3e-5
 
 
-def test_ropes_that_do_not_stretch_are_found_not_to() -> None:
+def test_cables_that_do_not_stretch_are_found_not_to() -> None:
     pulled = [replace(row, tension=tuple(30.0 + i for i in range(8))) for row in rows()]
     fit = measured(csv(pulled, tension=True))
     found = calibrate(robot(), fit, fit, Options(("cable-elongation-linear",)))
@@ -138,7 +138,7 @@ def small(spin: Array) -> Array:
     return np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
-def test_the_payload_is_weighed_by_the_ropes() -> None:
+def test_the_payload_is_weighed_by_the_cables() -> None:
     mass, centre = 3.6, (0.012, -0.008, 0.02)
     fit = measured(csv(balanced(mass, centre, 0.2), tension=True))
     found = calibrate(robot(), fit, held(), Options(("payload-mass", "payload-centre")))

@@ -145,7 +145,7 @@ def test_proposed_poses_are_such_that_it_rests_there() -> None:
         np.testing.assert_allclose(free.T @ rise, 0.0, atol=1e-6)
 
 
-def test_motor_angles_alone_are_not_enough_for_four_ropes() -> None:
+def test_motor_angles_alone_are_not_enough_for_four_cables() -> None:
     believed, measured = hanging()
     blind = replace(
         measured,

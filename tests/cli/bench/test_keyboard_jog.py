@@ -144,7 +144,7 @@ def test_a_key_that_is_held_is_one_tap_and_the_other_arrow_another(
 
 
 @pytest.mark.parametrize("phase", ["enabling", "moving", "running down", "stopping"])
-def test_a_tap_before_the_last_step_has_ended_is_ignored_and_told(
+def test_a_tap_before_the_last_step_has_ended_is_ignored_and_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], phase: str
 ) -> None:
     station = Station()

@@ -188,7 +188,7 @@ def test_a_calibration_that_is_not_accepted_writes_nothing(cell: Served, tmp_pat
     assert read_calibration(tmp_path / "A-cell.toml").device == "laumas-tlb"
 
 
-def test_a_serial_number_can_be_told_and_weights_need_no_points(
+def test_a_serial_number_can_be_given_and_weights_need_no_points(
     cell: Served, tmp_path: Path
 ) -> None:
     points = tmp_path / "points.csv"
@@ -237,7 +237,7 @@ def test_a_bench_that_somebody_owns_is_left_alone(cell: Served, tmp_path: Path) 
     run("info", "-b", bench)
 
 
-def test_a_cell_that_is_switched_off_is_told(tmp_path: Path) -> None:
+def test_a_cell_that_is_switched_off_is_reported(tmp_path: Path) -> None:
     with Served("laumas-tlb") as served:
         bench = served.bench(tmp_path)
         served.cell.inject("silence")

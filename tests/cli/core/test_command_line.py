@@ -152,7 +152,7 @@ def test_an_error_becomes_an_exit_code(
     assert "Traceback" not in result.stderr
 
 
-def test_a_bad_file_is_told_fault_by_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bad_file_is_reported_fault_by_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     def body() -> None:
         raise FileError([Fault("first", "a.toml", 3, "x.y"), Fault("second", "a.toml", 5)])
 

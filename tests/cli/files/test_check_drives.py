@@ -63,7 +63,7 @@ def test_every_device_that_we_ship_is_in_order(name: str) -> None:
         (("", ""), ("[606C]", "[606D]"), "modes = ", "606Ch is not in the EDS"),
     ],
 )
-def test_what_does_not_fit_is_told_with_its_line(
+def test_what_does_not_fit_is_reported_with_its_line(
     tmp_path: Path, device: tuple[str, str], eds: tuple[str, str], place: str, said: str
 ) -> None:
     if eds[0]:
@@ -124,7 +124,7 @@ def bench_of(folder: Path) -> Path:
     return path
 
 
-def test_a_bench_is_told_the_faults_of_its_device_files(tmp_path: Path) -> None:
+def test_check_of_a_bench_reports_the_faults_of_its_device_files(tmp_path: Path) -> None:
     device = drive(tmp_path, device=('"0x6041", ', '"0x605A", '))
     code, output = check(bench_of(tmp_path))
     assert code == 3
@@ -133,7 +133,7 @@ def test_a_bench_is_told_the_faults_of_its_device_files(tmp_path: Path) -> None:
     assert told[0].startswith(f"{device}:{line_of(device, '0x605A')}: ")
 
 
-def test_a_bench_is_told_how_each_drive_notices_a_dead_host(tmp_path: Path) -> None:
+def test_check_of_a_bench_reports_how_each_drive_notices_a_dead_host(tmp_path: Path) -> None:
     drive(tmp_path)
     code, output = check(bench_of(tmp_path))
     assert code == 0
@@ -157,7 +157,7 @@ def test_a_bench_is_refused_where_a_drive_notices_no_dead_host(tmp_path: Path) -
     assert check(path)[0] == 0, "hardware may stop it: that is the bench file's to say"
 
 
-def test_an_option_code_that_the_eds_lacks_is_told(tmp_path: Path) -> None:
+def test_an_option_code_that_the_eds_lacks_is_reported(tmp_path: Path) -> None:
     path = drive(tmp_path, eds=(_between("[605D]", "[605E]"), ""))
     path.write_text(path.read_text(encoding="utf-8") + "[servo.options]\nhalt = 1\n")
     code, output = check(path)

@@ -123,7 +123,7 @@ def test_without_a_position_there_is_no_position_error(tmp_path: Path) -> None:
     assert any("measure positions" in words for words in found["unobservable"])
 
 
-def test_one_coordinate_of_the_position_is_used_and_told(run: Path, tmp_path: Path) -> None:
+def test_one_coordinate_of_the_position_is_used_and_reported(run: Path, tmp_path: Path) -> None:
     head, *lines = (line.split(",") for line in run.read_text().splitlines())
     height = tmp_path / "height.csv"
     at = [k for k, name in enumerate(head) if not name.startswith(("platform_x", "platform_y"))]
@@ -138,7 +138,7 @@ def test_one_coordinate_of_the_position_is_used_and_told(run: Path, tmp_path: Pa
     assert found["validation"]["rms_after"] < found["validation"]["rms_before"] / 5
 
 
-def test_gross_errors_are_named_and_poses_of_another_robot_doubted(
+def test_gross_errors_are_named_and_poses_of_another_robot_rejected(
     run: Path, tmp_path: Path
 ) -> None:
     found = answer("ipanema3", run, "-o", tmp_path / "new.toml")
@@ -156,7 +156,7 @@ def test_gross_errors_are_named_and_poses_of_another_robot_doubted(
     assert not any("gross" in text for text in found["warnings"])
 
 
-def test_nominal_values_that_their_bounds_exclude_are_told(run: Path, tmp_path: Path) -> None:
+def test_nominal_values_that_their_bounds_exclude_are_reported(run: Path, tmp_path: Path) -> None:
     text = find("profiles", "cabtive").read_text()
     odd = tmp_path / "odd.toml"
     odd.write_text(text.replace('bounds = ["59 mm", "61 mm"]', 'bounds = ["60.1 mm", "62 mm"]'))

@@ -37,7 +37,7 @@ def fat(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [path for n in names for path in recorded(read_programme(find("sim", n)), folder, 0)]
 
 
-def test_the_plan_is_a_programme_that_tells_them_apart(fat: list[Path], tmp_path: Path) -> None:
+def test_the_plan_is_a_programme_that_distinguishes_them(fat: list[Path], tmp_path: Path) -> None:
     before = answer("diagnose", *fat, "-p", "bench-spiral")
     (step,) = before["steps"]
     assert "drum-radius" in step["effects"]
@@ -63,7 +63,7 @@ def test_the_plan_is_a_programme_that_tells_them_apart(fat: list[Path], tmp_path
     assert [s["effects"] for s in after["steps"]] == [["drum-radius"]]
 
 
-def test_where_nothing_is_to_be_told_apart_it_shows_something_new(tmp_path: Path) -> None:
+def test_where_nothing_is_to_be_distinguished_it_shows_something_new(tmp_path: Path) -> None:
     runs = record_files(tmp_path)
     told = answer("plan", *runs, "-p", "bench-spiral")
     assert told["programme"] is None
@@ -77,7 +77,7 @@ def test_where_nothing_is_to_be_told_apart_it_shows_something_new(tmp_path: Path
     assert minutes["full stroke, warmed up by 15 K"] > 40
     assert minutes["full stroke, one load"] < 2
     text = invoke("plan", *runs, "-p", "bench-spiral").stdout
-    assert text.startswith("what to run next (nothing to tell apart")
+    assert text.startswith("what to run next (nothing to distinguish")
     for offer in told["offers"]:
         assert f"\n  {offer['kind']}  " in text
 

@@ -42,7 +42,9 @@ def test_the_curve_is_offered_added_and_marked(cornered: list[Path], tmp_path: P
     assert "Cause unknown" in invoke("effects", table.id).stdout
 
 
-def test_a_file_begun_from_the_runs_explains_them(cornered: list[Path], tmp_path: Path) -> None:
+def test_a_file_with_initial_values_from_the_runs_explains_them(
+    cornered: list[Path], tmp_path: Path
+) -> None:
     mine = tmp_path / "my_drum.py"
     assert invoke("effects", "new", mine, "-p", "bench-spiral", "--fit", *cornered).exit_code == 0
     found = answer("diagnose", *cornered, "-p", "bench-spiral", "--effects", mine)

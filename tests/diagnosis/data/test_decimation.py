@@ -121,7 +121,7 @@ def true_terms() -> tuple[Term, ...]:
     )
 
 
-def test_thinned_by_twenty_the_same_values_are_found() -> None:
+def test_decimated_by_twenty_the_same_values_are_found() -> None:
     """The torque's sign turns within milliseconds: taken after thinning it would be off."""
     run = long_run()
     dataset = assemble([run], GROOVED, Filtering(decimation=Decimation(20, 12.5)))

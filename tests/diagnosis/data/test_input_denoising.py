@@ -48,7 +48,7 @@ def test_what_repeats_agree_on_stays_and_what_they_do_not_goes() -> None:
         assert rms(left) < 0.35
 
 
-def test_what_has_no_partner_is_not_believed() -> None:
+def test_what_has_no_partner_is_not_accepted() -> None:
     wave = np.sin(2 * np.pi * np.arange(COUNT) / 200)
     rows = [np.arange(100, COUNT), np.arange(COUNT - 100)]
     first, second = shared_by_repeats([wave, wave[100:]], rows)

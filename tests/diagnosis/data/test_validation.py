@@ -138,7 +138,7 @@ def test_a_small_stroke_is_not_taken_for_another_winch() -> None:
     assert validate_runs([creeping], GROOVED) == []
 
 
-def test_another_winch_is_told_by_its_length_and_not_by_its_name() -> None:
+def test_another_winch_is_recognised_by_its_length_and_not_by_its_name() -> None:
     renamed = replace(GOOD, metadata={**GOOD.metadata, "profile": "older-name"})
     assert validate_runs([renamed], GROOVED) == [
         f"{GOOD.name}: recorded with profile 'older-name', compared with 'grooved'"

@@ -130,7 +130,7 @@ def test_one_speed_is_said() -> None:
     assert said(given) == {"one speed"}
 
 
-def test_a_note_tells_what_to_do() -> None:
+def test_a_note_reports_what_to_do() -> None:
     (note,) = missing_excitation(TimeSeriesRegression(prepare(runs(repeats=1), GROOVED)))
     assert "outside the catalogue cannot be excluded" in note
     assert "record one programme twice" in note

@@ -59,7 +59,7 @@ def test_nothing_to_separate_needs_no_run() -> None:
     assert next_runs(TimeSeriesRegression(dataset()), [], NOISE) == ()
 
 
-def test_rope_and_frame_are_told_apart_by_loads_over_the_stroke() -> None:
+def test_cable_and_frame_are_distinguished_by_loads_over_the_stroke() -> None:
     found = offers("cable-elongation-linear", "frame-compliance")
     assert found
     for offer in found:
@@ -97,7 +97,7 @@ def test_less_noise_is_more_power() -> None:
     assert best[-1] < 0.9
 
 
-def test_warmth_is_told_apart_by_warming_up_and_by_waiting() -> None:
+def test_warmth_is_distinguished_by_warming_up_and_by_waiting() -> None:
     sizes = {output: 0.05 * size for output, size in NOISE.items()}
     pair = _usual("cable-thermal"), _usual("cable-creep")
     regression = TimeSeriesRegression(dataset(warm=True))
@@ -129,7 +129,7 @@ def test_runs_so_far_and_runs_to_come_say_what_both_say_at_once(first: str, seco
     assert known.residual_ss + grown >= known.residual_ss + separation(coming, *pair, sizes) - 1e-6
 
 
-def test_a_run_that_shows_nothing_of_a_rival_tells_it_apart_too() -> None:
+def test_a_run_that_shows_nothing_of_a_rival_distinguishes_it_too() -> None:
     """What was taken for creep must creep again: by itself such a run could be without it."""
     time = np.arange(0.0, 60.0, 0.1)
     drift = np.linspace(20.0, 26.0, len(time))

@@ -63,7 +63,7 @@ def test_a_level_of_one_winch_follows_the_winch() -> None:
     assert found["winch"].outlying == ("C",)
 
 
-def test_winches_that_all_differ_name_nobody() -> None:
+def test_winches_that_all_differ_name_none() -> None:
     found = told({name: (-1.0) ** i for i, name in enumerate(NAMES)})
     assert found["direction"].share > 0.95
     assert found["direction"].common < 0.01

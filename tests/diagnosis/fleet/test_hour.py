@@ -45,7 +45,7 @@ def answer(tmp_path_factory: pytest.TempPathFactory, heard: list[tuple[str, floa
     return found
 
 
-def test_it_is_thinned_and_says_so(answer: WinchAnswer) -> None:
+def test_it_is_decimated_and_says_so(answer: WinchAnswer) -> None:
     (note,) = (note for note in answer.diagnosis.notes if "sample of the runs" in note)
     factor = int("".join(filter(str.isdigit, note.split()[1])))
     assert 5 < factor < 50

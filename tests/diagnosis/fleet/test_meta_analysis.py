@@ -169,7 +169,7 @@ def test_who_has_it_by_another_law_is_not_without_it() -> None:
     assert one.unsure == ("B",)
 
 
-def test_what_all_have_narrows_what_each_cannot_tell() -> None:
+def test_a_common_effect_narrows_each_equivalence_set() -> None:
     found = {
         "A": said(step(["drum-radius", "gear-ratio"], radius_error=(1e-3, 1e-5))),
         "B": said(step(["gear-ratio"], ratio_error=(0.02, 1e-4))),
@@ -198,7 +198,7 @@ def test_cogging_of_two_orders_is_two_effects() -> None:
     assert "order 12" in effect_text(both)
 
 
-def test_text_tells_each_winch_in_a_line_and_then_what_is_common() -> None:
+def test_text_reports_each_winch_in_a_line_and_then_what_is_common() -> None:
     found = {name: said(step([RUBS], torque=(0.08 + 0.02 * (name == "H"), 1e-4))) for name in NAMES}
     text = shared_effects_text(found, shared_effects(found, CATALOGUE), {})
     lines = text.splitlines()

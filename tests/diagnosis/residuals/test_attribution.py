@@ -35,7 +35,7 @@ def first_followed(*physics: str) -> dict[str, str]:
     return out
 
 
-def test_what_rubs_at_one_place_is_located_by_place_and_direction() -> None:
+def test_friction_at_one_place_is_located_by_place_and_direction() -> None:
     first = first_followed("sticky place")
     assert first["tension"] == "directed_length"
     assert first["motor_torque"] == "directed_length"
@@ -44,11 +44,13 @@ def test_what_rubs_at_one_place_is_located_by_place_and_direction() -> None:
 @pytest.mark.parametrize(
     ("physics", "output"), [("sticky pulleys", "tension"), ("motor drag", "motor_torque")]
 )
-def test_what_turns_with_the_direction_alone_is_told_by_it(physics: str, output: str) -> None:
+def test_what_changes_with_the_direction_alone_is_attributed_to_it(
+    physics: str, output: str
+) -> None:
     assert first_followed(physics)[output] == "direction"
 
 
-def test_what_grows_with_the_length_is_not_told_by_direction_too() -> None:
+def test_what_grows_with_the_length_is_not_attributed_to_direction_too() -> None:
     assert first_followed("fat drum")["cable_length"] != "directed_length"
 
 
@@ -65,7 +67,7 @@ def test_what_grows_with_the_length_is_not_told_by_direction_too() -> None:
         ([Told("time", 0.4), Told("speed", 0.41)], ["speed", "time"]),
     ],
 )
-def test_two_variables_at_once_must_tell_clearly_more(
+def test_two_variables_at_once_must_explain_clearly_more(
     found: Sequence[Told], kept: Sequence[str]
 ) -> None:
     assert [item.variable for item in ranked(found)] == kept

@@ -159,7 +159,7 @@ def test_one_lines_home_length_is_taken_out_of_the_table_of_all(tmp_path: Path) 
     assert "home-length/1, home-length/2" in result.output
 
 
-def test_bad_input_is_told_with_the_reason(tmp_path: Path) -> None:
+def test_bad_input_is_reported_with_the_reason(tmp_path: Path) -> None:
     profile, run = files(tmp_path, "none", count=14, repeats=0)
     lines = run.read_text().splitlines()
     few = tmp_path / "few.csv"

@@ -58,7 +58,7 @@ def planned(flat: tuple[Path, Path]) -> tuple[dict[str, Any], Path]:
     return json.loads(result.stdout), out
 
 
-def test_points_that_only_turning_tells_apart_are_told_apart_by_turning(
+def test_points_that_only_turning_distinguishes_are_distinguished_by_turning(
     planned: tuple[dict[str, Any], Path],
 ) -> None:
     offers = {offer["kind"]: offer["separates"][0] for offer in planned[0]["offers"]}
@@ -110,14 +110,14 @@ def test_the_power_is_that_of_all_rows_at_once(flat: tuple[Path, Path]) -> None:
     assert "turned by up to" in run_offered["programme"]
 
 
-def test_what_no_poses_tell_apart_is_said_with_what_does(tmp_path: Path) -> None:
+def test_what_no_poses_distinguish_is_said_with_what_does(tmp_path: Path) -> None:
     """On half a turn of a drum its radius and its gear ratio are one."""
     profile = tmp_path / "robot.toml"
     profile.write_text(profile_text())
     case = next(case for case in CASES if case.name == "drum radius")
     run, out = record(case, tmp_path, "poses.csv", count=30, repeats=12), tmp_path / "next.csv"
     result = call("plan", run, "-p", profile, "-o", out)
-    assert "no such poses tell them apart" in result.stdout
+    assert "no such poses distinguish them" in result.stdout
     assert "An encoder on the drum" in " ".join(result.stdout.split())
     assert not out.exists()
     assert max(map(len, result.stdout.splitlines())) <= 80

@@ -118,7 +118,7 @@ def rope(force_scale: float) -> Diagnosis:
 
 
 @pytest.mark.parametrize("force_scale", [100.0, 200.0, 400.0])
-def test_laws_of_a_curved_rope_are_told_together(force_scale: float) -> None:
+def test_laws_of_a_curved_cable_are_reported_together(force_scale: float) -> None:
     """Four loads show that it is curved, not by which formula; a straight one is out."""
     (step,) = rope(force_scale).steps
     assert set(step.effects) == {"cable-elongation-exponential", "cable-elongation-quartic"}
@@ -128,7 +128,7 @@ def test_laws_of_a_curved_rope_are_told_together(force_scale: float) -> None:
             assert ends.low < estimate.value < ends.high, (law, name)
 
 
-def test_a_bend_that_the_data_lean_to_is_not_denied() -> None:
+def test_a_curvature_significant_at_five_percent_is_not_denied() -> None:
     """Between a clear bend and one below the noise, the linear and the curved law form a set."""
     sets = [set(rope(scale).steps[0].effects) for scale in (400.0, *BENDS, 1e6)]
     straight = "cable-elongation-linear"
@@ -152,7 +152,7 @@ def guided(offset: float, mismatch: float) -> Diagnosis:
     return diagnose(runs, GUIDED).diagnosis
 
 
-def test_a_guide_whose_detour_is_straight_stands_beside_a_wrong_ratio() -> None:
+def test_a_guide_whose_detour_is_straight_is_equivalent_to_a_wrong_ratio() -> None:
     (step,) = guided(0.1, 3e-4).steps
     assert {"guide-offset", "gear-ratio", "drum-radius"} == set(step.effects)
 

@@ -193,7 +193,7 @@ def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
     assert 0.95 * refitted.chi_square < without.chi_square <= refitted.chi_square * (1 + 1e-9)
 
 
-def test_curves_are_sought_only_where_the_names_act() -> None:
+def test_curves_are_searched_only_where_the_named_effects_act() -> None:
     engine, result = rubbed()
     partial = SpecificationTest(engine, result).partial([0])
     curve = best_curve(engine.regression, partial, ["motor_torque"], engine.penalty_per_parameter)

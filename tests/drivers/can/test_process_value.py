@@ -128,7 +128,7 @@ def test_overload_and_a_broken_sensor_are_no_numbers(
         until(lambda: bool(instrument.latest and instrument.latest.quality.usable))
 
 
-def test_a_silent_node_is_told_and_set_up_again(
+def test_a_silent_node_is_reported_and_set_up_again(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, _ = read

@@ -54,7 +54,7 @@ def test_every_fault_has_its_counter() -> None:
 
 @pytest.mark.parametrize("rtu", LINES)
 @pytest.mark.parametrize("device", DEVICES)
-def test_each_fault_is_counted_and_tells_no_wrong_number(device: str, rtu: bool) -> None:
+def test_each_fault_is_counted_and_reports_no_wrong_number(device: str, rtu: bool) -> None:
     modbus = spec_of(device).modbus
     assert modbus is not None
     share = 0.2 if modbus.status_read is None else 0.1
@@ -97,7 +97,7 @@ def test_an_overload_is_flagged_and_is_no_number(device: str) -> None:
 
 @pytest.mark.parametrize("rtu", LINES)
 @pytest.mark.parametrize("device", DEVICES)
-def test_a_word_order_that_is_wrong_in_the_file_is_told(device: str, rtu: bool) -> None:
+def test_a_word_order_that_is_wrong_in_the_file_is_reported(device: str, rtu: bool) -> None:
     modbus = spec_of(device).modbus
     assert modbus is not None
     if all(item.type in ("u16", "i16") for item in modbus.field):
@@ -110,7 +110,7 @@ def test_a_word_order_that_is_wrong_in_the_file_is_told(device: str, rtu: bool) 
 
 @pytest.mark.parametrize("largest", [3, 15, 100])
 @pytest.mark.parametrize("device", DEVICES)
-def test_a_wrong_word_order_tells_no_number_of_an_empty_cell(device: str, largest: int) -> None:
+def test_a_wrong_word_order_reports_no_number_of_an_empty_cell(device: str, largest: int) -> None:
     """Few counts with their words turned are many, and within what the device can show."""
     modbus = spec_of(device).modbus
     assert modbus is not None
@@ -126,11 +126,11 @@ def test_a_wrong_word_order_tells_no_number_of_an_empty_cell(device: str, larges
     assert right.numbers == right.readings > 60
 
 
-def test_a_large_number_is_believed_once_the_order_is_known() -> None:
+def test_a_large_number_is_accepted_once_the_order_is_known() -> None:
     """655 363 counts turned are 196 618: either may be, until another number has told."""
     decoder = Decoder(spec_of("laumas-tlb"))
     told = {
-        counts: decoder.order_told([0, *(counts >> 16, counts & 0xFFFF) * 2, 0, 0])
+        counts: decoder.word_order([0, *(counts >> 16, counts & 0xFFFF) * 2, 0, 0])
         for counts in (0, 7, 9_817, 196_618, 655_363, 999_999)
     }
     assert told == {0: None, 7: None, 9_817: True, 196_618: None, 655_363: False, 999_999: True}
@@ -141,7 +141,7 @@ def test_a_large_number_is_believed_once_the_order_is_known() -> None:
     assert trust.take(True, told[655_363]) is True
 
 
-def test_random_sequences_tell_no_wrong_number() -> None:
+def test_random_sequences_give_no_wrong_number() -> None:
     """A small share of ``benchmarks/cell_faults.py --cases 10000``."""
     outcomes = [play(plan) for plan in plans(84, seed=2)]
     assert [o.wrong[0] for o in outcomes if o.wrong] == []

@@ -135,7 +135,7 @@ def test_a_device_that_refuses_longer_blocks_is_read_without_them() -> None:
     assert instrument.counters.exceptions == 0
 
 
-def test_an_exception_is_counted_and_told() -> None:
+def test_an_exception_is_counted_and_reported() -> None:
     instrument = cell()
     with Peer(end=5) as peer, polled(peer, instrument):
         until(lambda: instrument.counters.exceptions >= 1)
@@ -176,7 +176,7 @@ def test_a_lost_connection_is_opened_again() -> None:
     assert {reading.raw for reading in readings} == {1000}
 
 
-def test_nobody_listens() -> None:
+def test_no_server_listens() -> None:
     instrument = cell()
     with Peer() as peer:
         pass
@@ -205,7 +205,7 @@ def test_commands_reach_the_device_between_polls_and_are_seen_obeyed() -> None:
                 slow.command(instrument, "weigh")
 
 
-def test_a_command_that_is_taken_and_not_obeyed_is_told() -> None:
+def test_a_command_that_is_taken_and_not_obeyed_is_reported() -> None:
     instrument = cell()
     with Peer() as peer:
         weigh(peer, 1000)

@@ -83,7 +83,7 @@ def test_a_dsc_with_its_load_cell_torn_off() -> None:
     assert math.isnan(seen.value)
 
 
-def test_a_generic_transmitter_tells_its_decimals() -> None:
+def test_a_generic_transmitter_reports_its_decimals() -> None:
     """Two decimals in the lowest bits of its status; weight and net as signed pairs."""
     seen = decoder("generic-rs485").decode(words("00003039 ffffcfc7"), words("0002"))
     assert seen.gross == pytest.approx(123.45)

@@ -71,7 +71,7 @@ def test_silence_is_a_problem_and_ends_by_itself(name: str) -> None:
     assert rig.instrument.problem is None
 
 
-def test_damage_on_the_line_is_told_apart_from_silence() -> None:
+def test_damage_on_the_line_is_distinguished_from_silence() -> None:
     rig = Rig(device("laumas-tlb-ascii"))
     rig.run(1.0)
     rig.sim.inject("bad checksum")
@@ -254,7 +254,7 @@ def test_an_instrument_that_sends_by_itself_must_be_alone() -> None:
         Rig(device("laumas-tlb-ascii"), device("flintec-ldu"))
 
 
-def test_a_power_cycled_device_is_told_again_what_to_send() -> None:
+def test_a_power_cycled_device_gets_its_start_command_again() -> None:
     rig = Rig(device("hbm-aed-ascii"))
     rig.run(1.0)
     before = rig.sent.count(b"MSV?0;")
@@ -264,7 +264,7 @@ def test_a_power_cycled_device_is_told_again_what_to_send() -> None:
     assert rig.sent.count(b"MSV?0;") == before + 1
 
 
-def test_one_that_sends_is_told_to_stop_at_the_end() -> None:
+def test_an_instrument_that_sends_gets_its_stop_command_at_the_end() -> None:
     rig = Rig(device("hbm-aed-ascii"))
     rig.run(0.5)
     rig.line.close()

@@ -59,7 +59,7 @@ def radius_at(kind: str, wound_angle: Array) -> Array:
 
 
 @pytest.mark.parametrize("kind", DRUMS)
-def test_rope_wound_is_the_integral_of_the_radius(kind: str) -> None:
+def test_cable_wound_is_the_integral_of_the_radius(kind: str) -> None:
     robot = with_drum(kind)
     poses = near(robot, 1, 6, 0.3)
     angles, lengths = robot.motor_angles(poses), robot.lengths(poses)
@@ -89,7 +89,7 @@ def test_home_is_the_reference() -> None:
     np.testing.assert_allclose(robot.motor_angles(robot.home)[0], 0.3 * np.arange(8), atol=1e-12)
 
 
-def test_a_rope_that_stretches_is_wound_in_by_its_elongation() -> None:
+def test_a_cable_that_stretches_is_wound_in_by_its_elongation() -> None:
     robot = shipped("ipanema3")
     poses = near(robot, 3, 4)
     strain = np.linspace(1e-4, 1e-3, 8)

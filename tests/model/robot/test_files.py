@@ -83,7 +83,7 @@ def test_ipanema3_is_table_1() -> None:
     np.testing.assert_allclose(robot.geometry.anchor_point.sum(axis=0), 0.0, atol=1e-12)
 
 
-def test_the_winding_devices_robot_hangs_on_eight_ropes() -> None:
+def test_the_winding_devices_robot_hangs_on_eight_cables() -> None:
     robot = shipped("winding-device-8")
     found = quadratic(
         robot.structure(robot.home)[0], robot.weight(robot.home)[0], ForceLimits(10.0, 1000.0)
@@ -117,7 +117,7 @@ def test_every_fault_of_the_file_with_its_line(tmp_path: Path) -> None:
     assert set(wanted) <= numbered
 
 
-def test_an_exit_point_that_is_anothers_is_told_on_its_own_line(tmp_path: Path) -> None:
+def test_an_exit_point_that_is_anothers_is_reported_on_its_own_line(tmp_path: Path) -> None:
     text = FOUR + line("5", -1, -1, side=0.2)
     file = tmp_path / "twice.toml"
     file.write_text(text)
@@ -127,7 +127,7 @@ def test_an_exit_point_that_is_anothers_is_told_on_its_own_line(tmp_path: Path) 
     assert caught.value.faults[0].line == len(text.splitlines()) - 2
 
 
-def test_home_where_ropes_would_have_to_push(check: object) -> None:
+def test_home_where_cables_would_have_to_push(check: object) -> None:
     eight = FOUR + "".join(
         line(str(n + 5), 0.9 * x, 1.1 * y, side=-0.1) for n, (x, y) in enumerate(CORNERS)
     )
@@ -169,7 +169,7 @@ def test_a_hanging_platform_without_mass(check: object) -> None:
     )
 
 
-def test_without_mass_nothing_keeps_the_ropes_of_a_suspended_robot_taut(check: object) -> None:
+def test_without_mass_nothing_keeps_the_cables_of_a_suspended_robot_taut(check: object) -> None:
     eight = FOUR + "".join(
         line(str(n + 5), 0.9 * x, 1.1 * y, side=-0.1) for n, (x, y) in enumerate(CORNERS)
     )

@@ -112,7 +112,7 @@ def compare_with_slsqp(structure: Array, wrench: Array) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(seeds)
-def test_with_seven_ropes_the_margin_is_that_of_an_interval(seed: int) -> None:
+def test_with_seven_cables_the_margin_is_that_of_an_interval(seed: int) -> None:
     """One freedom is left: f = f_0 + t n, and the best t lies where two limits are equally far."""
     structure = matrix_of(seed, 7)
     assume(np.linalg.cond(structure) < 100)
@@ -149,7 +149,7 @@ def test_limits_may_differ_from_line_to_line_and_be_infinite() -> None:
         closed_form(structure, weight, ForceLimits(10.0, 10.0))
 
 
-def test_a_wrench_that_ropes_from_above_cannot_hold() -> None:
+def test_a_wrench_that_cables_from_above_cannot_hold() -> None:
     robot = shipped("winding-device-8")
     structure = robot.structure(robot.home)[0]
     lift = np.array([0, 0, 500.0, 0, 0, 0])

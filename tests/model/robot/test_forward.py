@@ -76,7 +76,7 @@ def test_lengths_that_disagree_give_the_pose_of_least_squares(seed: int) -> None
 
 
 @pytest.mark.parametrize("count", [6, 7, 12])
-def test_any_number_of_ropes(count: int) -> None:
+def test_any_number_of_cables(count: int) -> None:
     geometry = random_geometry(5, count)
     pose = Pose(np.full((1, 3), 0.02), rotation_by(np.array([[0.02, -0.01, 0.03]])))
     found = forward(geometry, lengths(geometry, pose.position, pose.rotation), LEVEL)
@@ -103,7 +103,7 @@ def test_what_cannot_be_found_is_nan_and_said() -> None:
         assert np.isfinite(part[[0, 2]]).all()
 
 
-def test_ropes_that_leave_a_freedom_give_no_pose() -> None:
+def test_cables_that_leave_a_degree_of_freedom_give_no_pose() -> None:
     """All anchors in one point: lengths say nothing of the rotation."""
     geometry = replace(random_geometry(6), anchor_point=np.zeros((8, 3)))
     given_lengths = lengths(geometry, np.full((1, 3), 0.1), np.eye(3)[None])
@@ -150,7 +150,7 @@ def test_a_hanging_platform_rests_where_its_weight_is_lowest(seed: int, count: i
     assert others.min() > height - 1e-10
 
 
-def test_three_ropes_to_one_point_hold_it_and_the_platform_hangs_below() -> None:
+def test_three_cables_to_one_point_hold_it_and_the_platform_hangs_below() -> None:
     geometry = replace(suspended(3), anchor_point=np.zeros((3, 3)), swivel_radius=np.zeros(3))
     place = np.array([[0.2, -0.1, 1.0]])
     given_lengths = np.linalg.norm(geometry.exit_point - place, axis=1)[None]

@@ -35,7 +35,7 @@ def map_over(known: Compared, output: str, over: tuple[str, str]) -> ResidualMap
     return next(m for m in maps if m.output == output and m.over == over)
 
 
-def test_an_elastic_rope_is_drawn_by_length_and_load() -> None:
+def test_an_elastic_cable_is_drawn_by_length_and_load() -> None:
     drawn = map_over(held("demo-elastic-rope"), "cable_length", ("cable_length", "load"))
     length, load = (edges[:-1] + np.diff(edges) / 2 for edges in drawn.edges)
     dead = PROFILE.cable.dead_length
@@ -61,7 +61,7 @@ def test_noise_follows_no_pair() -> None:
     assert attributions(known.regression, noise) == []
 
 
-def test_the_largest_cell_is_told() -> None:
+def test_the_largest_cell_is_reported() -> None:
     drawn = map_over(held("demo-elastic-rope"), "cable_length", ("cable_length", "load"))
     mean = np.full(drawn.mean.shape, 1e-4)
     mean[3, 2] = -2e-3

@@ -90,7 +90,7 @@ def test_the_commands_make_the_profile_and_go_on_with_it() -> None:
         assert command in page().text
 
 
-def test_values_of_all_effects_are_told() -> None:
+def test_values_of_all_effects_are_reported() -> None:
     known = grown()
     ((term, values),) = known.addition.terms
     friction = Term(load_catalogue()["pulley-coulomb"], {"friction": 0.015})
@@ -128,7 +128,7 @@ def test_an_addition_without_a_smaller_error_is_reported_so() -> None:
         assert chip in Page(addition_html(said, "x")).text
 
 
-def test_an_effect_of_the_user_is_told_by_its_name() -> None:
+def test_an_effect_of_the_user_is_reported_by_its_name() -> None:
     own = replace(load_catalogue()[ELASTIC], id="my-spring", what="A spring of mine.")
     term = Term(own, {"axial_stiffness": 1.0})
     said = replace(

@@ -77,7 +77,7 @@ def test_the_curves_are_the_residual_of_the_figures() -> None:
         assert error.rms <= 1.001 * np.sqrt(np.mean(values**2))
 
 
-def test_every_output_gets_its_sentence_and_the_offset_is_told() -> None:
+def test_every_output_gets_its_sentence_and_the_offset_is_reported() -> None:
     known = held_against("demo-elastic-rope").comparison
     text = page_of("demo-elastic-rope").text
     assert "Above the noise" in text

@@ -165,7 +165,7 @@ def test_the_ladder_begins_and_ends_at_the_figures() -> None:
     assert ladder.last[name]["cable_length"] == fit.heldout_rms_before
 
 
-def test_a_confusion_set_is_told_with_angles() -> None:
+def test_a_confusion_set_is_reported_with_angles() -> None:
     answer = answer_of("demo-elastic-rope")
     said = replace(answer.diagnosis, steps=(FRICTION,))
     page = Page(report_html(WinchAnswer(answer.engine, answer.result, said), "x"))
@@ -189,7 +189,7 @@ def test_partly_without_a_name_shows_what_is_left() -> None:
     assert "31 % of the residual variance above the noise floor remains" in page.text
 
 
-def test_story_truth_and_commands_are_told() -> None:
+def test_story_truth_and_commands_are_reported() -> None:
     page = Page(
         report_html(
             answer_of("demo-elastic-rope"),

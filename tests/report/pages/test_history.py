@@ -51,7 +51,7 @@ def test_a_step_that_was_not_judged_has_a_dash() -> None:
     assert "− mine" in page.text
 
 
-def test_an_interval_is_told_to_the_digits_that_it_has() -> None:
+def test_an_interval_is_reported_to_the_digits_that_it_has() -> None:
     told = interval_text("axial_stiffness", Estimate(247.4e3, 6.1e3, "N", (236e3, 259e3)))
     assert told == "95 %: 236 to 259 kN"
     assert interval_text("axial_stiffness", Estimate(1.0, 1.0, "N")) == ""

@@ -94,7 +94,9 @@ def test_candidates_have_errors_in_the_units_of_the_outputs(drum: dict[str, Any]
         assert own["heldout_rms"][name] == pytest.approx(output["heldout_rms_after"], rel=0.02)
 
 
-def test_a_rest_is_located_drawn_and_told_within_eighty_columns(unknown: dict[str, Any]) -> None:
+def test_a_rest_is_located_drawn_and_reported_within_eighty_columns(
+    unknown: dict[str, Any],
+) -> None:
     text, page = unknown["text"], Page(unknown["html"])
     assert text.startswith("UNKNOWN")
     assert "as a function of platform x" in text
@@ -127,7 +129,7 @@ def test_hostile_names_are_text_and_nothing_else(drum: dict[str, Any], tmp_path:
     assert parsed.count("img") == 0
 
 
-def test_a_geometry_off_as_a_whole_is_told_so_and_calibrated(
+def test_a_geometry_off_as_a_whole_is_reported_so_and_calibrated(
     drum: dict[str, Any], tmp_path: Path
 ) -> None:
     page = tmp_path / "out.html"

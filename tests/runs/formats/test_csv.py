@@ -95,7 +95,7 @@ def test_holes_are_counted_and_never_filled(file: Path) -> None:
     assert summary.text == "5 rows, 8 s at 1 Hz, 1 gap, NaN: motor_angle 2, tension 2"
 
 
-def test_constant_channels_are_told(file: Path) -> None:
+def test_constant_channels_are_reported(file: Path) -> None:
     run = run_of(file, PLAIN.replace(",11", ",10").replace(",12", ",10"))
     assert summary_of(run).constant == ("tension",)
 

@@ -32,7 +32,7 @@ def test_every_row_is_there_in_its_order(tmp_path: Path) -> None:
     np.testing.assert_array_equal(run["remark"], number)
 
 
-def test_a_wrong_cell_far_down_is_told_with_its_line(tmp_path: Path) -> None:
+def test_a_wrong_cell_far_down_is_reported_with_its_line(tmp_path: Path) -> None:
     rows = lines()
     rows[4095] = "4.095,x,1,1,1"
     rows[12_345] = "12.345,1,y,1,1"
@@ -49,7 +49,7 @@ def test_text_far_down_makes_an_unknown_column_text(tmp_path: Path) -> None:
     assert any("'remark' contains text" in note for note in run.notes)
 
 
-def test_a_file_cut_off_far_down_is_told_so(tmp_path: Path) -> None:
+def test_a_file_cut_off_far_down_is_reported_so(tmp_path: Path) -> None:
     with pytest.raises(RunError) as told:
         read_csv(saved(tmp_path / "cut.csv", [*lines(), "30.0,1"]))
     (fault,) = told.value.faults

@@ -260,7 +260,7 @@ except FileError as error:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a tmpfs of its own")
 @pytest.mark.parametrize("suffix", ["csv", "mcap"])
-def test_a_full_disk_is_told_and_keeps_what_was_flushed(tmp_path: Path, suffix: str) -> None:
+def test_a_full_disk_is_reported_and_keeps_what_was_flushed(tmp_path: Path, suffix: str) -> None:
     done = run_on_small_disk(tmp_path, FULL.format(suffix=suffix), "64k")
     assert os.strerror(errno.ENOSPC) in done.stdout, done.stderr
     run = read_run(tmp_path / f"a.{suffix}")

@@ -76,7 +76,7 @@ def test_parts_by_size(tmp_path: Path) -> None:
     assert np.diff(sources[DRIVE].times) == pytest.approx(4e-3, abs=1e-6)
 
 
-def test_a_last_part_that_was_never_begun_is_left_out(tmp_path: Path) -> None:
+def test_a_last_part_that_was_never_started_is_left_out(tmp_path: Path) -> None:
     for suffix, bare in (("mcap", b"\x89MCAP0\r\n\x01\x18"), ("csv", b"# a: b\ntime [s],x")):
         parts = written(tmp_path / f"many.{suffix}", 2.5, SECOND)
         whole = read_run(tmp_path / f"many.{suffix}")

@@ -230,7 +230,7 @@ def test_what_would_be_a_guess_is_refused(
         assert said in fault.message
 
 
-def test_all_faults_of_a_file_are_told_at_once(tmp_path: Path) -> None:
+def test_all_faults_of_a_file_are_reported_at_once(tmp_path: Path) -> None:
     text = GOOD.replace("DataType=0x0004", "DataType=x").replace("ObjectType=0x9", "ObjectType=y")
     with pytest.raises(FileError) as refused:
         read_eds(written(tmp_path, text), 5)

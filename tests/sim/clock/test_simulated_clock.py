@@ -76,7 +76,7 @@ def test_waiting_for_nothing_is_an_error() -> None:
         SimulatedClock().event().wait()
 
 
-def test_a_callback_that_fails_is_told_to_the_owner() -> None:
+def test_a_callback_that_fails_is_reported_to_the_owner() -> None:
     clock = SimulatedClock()
     clock.call_at(clock.now() + 0.1, lambda: {}["nothing"])
     with pytest.raises(KeyError):

@@ -83,7 +83,7 @@ def test_a_lost_host_is_one_that_is_no_longer_heard() -> None:
     assert rig.status & 0x4F == 0x40
 
 
-def test_a_lost_map_leaves_the_drive_without_pdos_and_tells_nobody() -> None:
+def test_a_lost_map_leaves_the_drive_without_pdos_and_without_a_report() -> None:
     rig = moving()
     rig.send(0x080, b"")
     assert rig.sent(TPDO1)
@@ -152,7 +152,7 @@ def test_an_aborting_sdo_aborts_everything_until_it_recovers() -> None:
     assert rig.status & 0x6F == 0x27
 
 
-def test_a_storm_of_emergencies_harms_nobody() -> None:
+def test_a_storm_of_emergencies_does_no_harm() -> None:
     rig = moving()
     rig.drive.inject("emergency storm")
     rig.run(0.2)

@@ -185,7 +185,7 @@ def test_a_lost_heartbeat_follows_6007(option: int, end: int) -> None:
     assert rig.read(0x603F) == (0x8130 if option == 1 else 0)
 
 
-def test_a_lost_heartbeat_leaves_operational_and_its_return_is_told() -> None:
+def test_a_lost_heartbeat_leaves_operational_and_its_return_is_reported() -> None:
     rig = moving()
     rig.node.nmt.send_command(0x01)
     rig.write(0x1017, 0, 10)

@@ -159,7 +159,7 @@ def test_each_sign_of_torque_has_its_own_limit() -> None:
     assert rig.shaft.command.torque_band == pytest.approx((-0.05 * RATED, 0.1 * RATED))
 
 
-def test_a_torque_demand_beyond_the_limit_is_told() -> None:
+def test_a_torque_demand_beyond_the_limit_is_reported() -> None:
     rig, needed = held(CST)
     rig.write(0x6072, 0, round(needed / RATED * 1000) + 10)
     rig.run(0.01)

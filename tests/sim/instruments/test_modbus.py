@@ -69,7 +69,9 @@ def test_counts_are_the_nearest_of_the_scale(value: float, scale: float) -> None
     ("kind", "value", "counts"),
     [("u16", -1.0, 0), ("u16", 7e4, 65535), ("i16", -4e4, -32768), ("u32", 5e9, 2**32 - 1)],
 )
-def test_a_value_beyond_the_type_is_clipped_and_told(kind: Any, value: float, counts: int) -> None:
+def test_a_value_beyond_the_type_is_clipped_and_reported(
+    kind: Any, value: float, counts: int
+) -> None:
     assert counts_of(FieldSpec("x", 0, kind), value) == (counts, True)
 
 

@@ -108,7 +108,7 @@ def test_a_profile_beside_the_declaration_is_found_from_elsewhere(tmp_path: Path
     assert read_bench(path).winch["A"].profile == str((here / "own.toml").resolve())
 
 
-def test_what_turns_the_motor_moves_the_rope_and_the_instruments(
+def test_what_turns_the_motor_moves_the_cable_and_the_instruments(
     live: LiveBench, master: Master
 ) -> None:
     before, angle = master.length(), master.node.sdo[0x6064].raw
@@ -218,7 +218,7 @@ def test_lines_are_obeyed_and_wrong_ones_explained(live: LiveBench) -> None:
             obey(live, line)
 
 
-def test_another_process_finds_the_simulation_beside_its_wiring_file(
+def test_another_process_finds_the_simulation_beside_its_bench_file(
     live: LiveBench, tmp_path: Path
 ) -> None:
     path = live.write_bench_file(tmp_path / "bench.toml")
@@ -238,7 +238,7 @@ def test_another_process_finds_the_simulation_beside_its_wiring_file(
         send(path, "status")
 
 
-def test_a_machine_without_a_multicast_route_is_told_how_to_get_one(
+def test_a_machine_without_a_multicast_route_gets_the_command_for_one(
     declared: SimBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(**_: object) -> None:

@@ -83,7 +83,7 @@ def test_creep_follows_its_exponential() -> None:
         assert winch.cable_length - 4.0 == pytest.approx(strain * 5.5, rel=1e-6)
 
 
-def test_heat_lengthens_the_stressed_rope() -> None:
+def test_heat_lengthens_the_stressed_cable() -> None:
     winch = plant(GROOVED, hide("warm rope", expansion="1e-5 1/K"), temperature=25, drift=3600)
     cruise(winch, 0.0, 3.0)
     assert winch.temperature == pytest.approx(28.0)

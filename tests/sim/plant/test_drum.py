@@ -102,6 +102,6 @@ def test_a_missing_reference_length_is_named() -> None:
         Kinematics.of(lacking)
 
 
-def test_more_rope_than_the_drum_has_is_refused() -> None:
+def test_more_cable_than_the_drum_has_is_refused() -> None:
     with pytest.raises(UsageError, match="no angle winds"):
         law("squared").angle(-1e6)

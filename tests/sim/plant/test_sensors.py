@@ -66,7 +66,7 @@ def test_seeds_and_instruments_differ() -> None:
     assert abs(np.corrcoef(differences, load)[0, 1]) < 0.35
 
 
-def test_without_noise_the_instruments_tell_the_truth() -> None:
+def test_without_noise_the_instruments_measure_the_truth() -> None:
     winch = WinchPlant(GROOVED, WinchTruth(), seed=1)
     winch.advance(0.5, DriveCommand(speed=30.0))
     read = winch.measure()

@@ -105,7 +105,7 @@ def test_times_are_the_kernels_and_not_those_of_the_reading(bus: CanBus) -> None
         ("20000040#0000000000000000", BusState.OFF, "bus_off"),
     ],
 )
-def test_error_frames_are_counted_and_told(
+def test_error_frames_are_counted_and_reported(
     bus: CanBus, frame: str, state: BusState, count: str
 ) -> None:
     cansend(frame)
@@ -165,7 +165,7 @@ def test_an_interface_that_goes_down_is_a_fault_and_comes_back_by_reopening(bus:
     assert bus.health.reopened >= 1
 
 
-def test_an_interface_that_does_not_exist_is_told(bus: CanBus) -> None:
+def test_an_interface_that_does_not_exist_is_reported(bus: CanBus) -> None:
     nowhere = BusSpec("can", interface="socketcan", channel="vcan9")
     with pytest.raises(ConnectionLost, match="vcan9"):
         CanBus(nowhere, "can", bus.clock)

@@ -49,9 +49,9 @@ def do(desk: CellDesk, task: str, name: str, *arguments: Any) -> dict[str, Any]:
     return TASKS[task](desk, full_name(desk.spec, name), *arguments)
 
 
-def readings_of(told: Mapping[str, Any]) -> list[Reading]:
-    """The readings that the task "watch" tells."""
-    return [Reading(**{**row, "quality": Quality(row["quality"])}) for row in told["readings"]]
+def readings_of(reply: Mapping[str, Any]) -> list[Reading]:
+    """Readings in a reply of the task "watch"."""
+    return [Reading(**{**row, "quality": Quality(row["quality"])}) for row in reply["readings"]]
 
 
 def _identify(desk: CellDesk, name: str) -> dict[str, Any]:

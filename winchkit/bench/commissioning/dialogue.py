@@ -23,8 +23,8 @@ class Dialogue(Protocol):
     source: str
     """For the record: ``typed``, or the file of answers."""
 
-    def tell(self, text: str) -> None:
-        """Say something that needs no answer."""
+    def show(self, text: str) -> None:
+        """Show a text that needs no answer."""
 
     def ask(self, key: str, question: str) -> str:
         """The answer to a question; ``key`` names it in a file of answers."""
@@ -37,12 +37,12 @@ class TypedAnswers:
 
     def __init__(self, say: Callable[[str], None], read: Callable[[], str]) -> None:
         """``read`` returns a line with its end, and nothing when the input has ended."""
-        self.tell, self._read = say, read
+        self.show, self._read = say, read
 
     def ask(self, key: str, question: str) -> str:
         """Ask until something is answered; raises NotPermitted when the input ends."""
         while True:
-            self.tell(question)
+            self.show(question)
             line = self._read()
             if not line:
                 raise NotPermitted(f"the input ended at the question '{key}'; nothing was recorded")
@@ -51,11 +51,11 @@ class TypedAnswers:
 
 
 class AnswerFile:
-    """Answers by key from a TOML file, for tests and benches that nobody stands at."""
+    """Answers by key from a TOML file, for tests and benches without an operator."""
 
     def __init__(self, path: str | Path, say: Callable[[str], None]) -> None:
         """Raise FileError for a file that cannot be used."""
-        self.tell = say
+        self.show = say
         found = hash_of(path)
         self.source = f"{found.path} sha256 {found.sha256}"
         self._path = str(path)
@@ -72,7 +72,7 @@ class AnswerFile:
         if found is None or isinstance(found, dict):
             raise UsageError(f"{self._path}: no answer '{key}' to: {question}")
         answer = str(found).strip()
-        self.tell(f"{question} {answer}")
+        self.show(f"{question} {answer}")
         return answer
 
 

@@ -1,4 +1,4 @@
-"""Winches that only hardware stops when the host dies: told at every start."""
+"""Winches that only hardware stops when the host dies, for the warning at every start."""
 
 from __future__ import annotations
 

@@ -70,14 +70,14 @@ def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> Recor
     confirm(
         dialogue,
         "safety.area",
-        "Nobody stands where a cable, a load or a drum may move, and a load that falls harms "
-        "nobody?",
+        "Is the area clear: no person where a cable, a load or a drum may move, or where a load "
+        "may fall?",
     )
     hashed = hash_of(spec.path)
     steps = {name: _Steps(spec, name, dialogue) for name in spec.winch}
     ownership = own(spec, client_name(_COMMAND))
     with ExitStack() as stack:
-        # Held from the first trial to the last motion: nobody else comes in between.
+        # Held from the first trial to the last motion: no other process comes in between.
         stack.callback(ownership.close)
         with Trials(spec, clock) as trials:
             for step in steps.values():
@@ -123,10 +123,10 @@ class _Steps:
         axis, name = trials.axes[self._name], self._name
         self._drive = drive_record(axis)
         numbers = ", ".join(f"{key} {value}" for key, value in vars(self._drive).items())
-        self._dialogue.tell(f"winch {name}: {numbers}")
+        self._dialogue.show(f"winch {name}: {numbers}")
         if not self._drive.serial:
-            self._dialogue.tell(
-                f"winch {name}: the drive tells no serial number (1018h:4); another drive of the "
+            self._dialogue.show(
+                f"winch {name}: the drive has no serial number (1018h:4); another drive of the "
                 "same type in its place cannot be recognised"
             )
         self._brake(trials)
@@ -168,7 +168,7 @@ class _Steps:
         return hash_of(device), hash_of(eds)
 
     def record(self) -> WinchRecord:
-        """What stands in the record."""
+        """The record of this winch."""
         device, eds = self._hashes
         return WinchRecord(
             drive=self._drive,
@@ -244,7 +244,7 @@ class _Steps:
         self._stops_on_nmt = seen.stopped
         verb = "leaves" if seen.stopped else "does not leave"
         text = f"winch {self._name}: on NMT stopped the drive {verb} operation enabled"
-        self._dialogue.tell(f"{text} ({seen.state}).")
+        self._dialogue.show(f"{text} ({seen.state}).")
         self._note("NMT stopped", text, "measured", after=seen.after)
 
     def _direction(self, motions: Motions) -> None:

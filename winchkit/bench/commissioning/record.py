@@ -1,6 +1,6 @@
 """The commissioning record: what was tried on a bench, what was confirmed, and by whom.
 
-It stands beside the bench file (``bench.toml`` -> ``bench.commissioned.json``) and holds the
+It is a file beside the bench file (``bench.toml`` -> ``bench.commissioned.json``) and holds the
 identity of each drive, SHA-256 of the files that decide how it moves, and the measured times.
 """
 
@@ -58,7 +58,7 @@ class HostLossRecord:
 
     mechanism: str
     limit: float
-    """What the drive was told to tolerate."""
+    """Set time-out of the drive, s."""
     noticed_after: float | None = None
     """On the disabled drive; None where it shows nothing then."""
     stopped_after: float | None = None

@@ -181,7 +181,7 @@ class Trials:
             self._cycle(axis, Wish.ENABLE)
             if self._clock.now() > deadline:
                 raise NotPermitted(
-                    f"{axis.name}: still {axis.state} {_ENABLE_TIME:g} s after it was told to "
+                    f"{axis.name}: still {axis.state} {_ENABLE_TIME:g} s after the command to "
                     f"enable: {axis.fault_text}; look at its enable input, supply and errors"
                 )
         self._hold = _angle(axis)

@@ -170,7 +170,7 @@ def _kernel() -> tuple[Item, ...]:
 
 
 def _preemption() -> str:
-    """Preemption model of the running kernel; empty where nothing tells it."""
+    """Preemption model of the running kernel; empty where it is not known."""
     release = os.uname()
     if "PREEMPT_RT" in release.version:
         return "PREEMPT_RT"

@@ -219,7 +219,7 @@ CONDITIONS: tuple[Condition, ...] = (
         lambda item, own, _memory: (
             f"the drive does not slow down as commanded: {item.winding_speed:.3f} m/s, commanded "
             f"{item.target_speed:.3f} m/s, within {own.limits.response_time:g} s "
-            "(limits.response_time); it does not hear its targets, or they do not act"
+            "(limits.response_time); it does not receive its targets, or they have no effect"
         ),
     ),
     Condition(
@@ -457,7 +457,7 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
     ),
     BenchCondition("target", "targets against the range of the drive's objects", "within it"),
     BenchCondition(
-        "deaf", "stops that the drive does not heed", "none", "silence (see Ways to stop a drive)"
+        "deaf", "stops that the drive does not obey", "none", "silence (see Ways to stop a drive)"
     ),
     BenchCondition("latch file", "reading and writing of the latch file", "possible"),
     BenchCondition(

@@ -87,7 +87,7 @@ class AxisPort(Protocol):
 
     @property
     def sdo_state(self) -> State | None:
-        """Power state that it told by SDO since that stop began."""
+        """Power state read by SDO since that stop began."""
 
     def stop_by_sdo(self) -> None:
         """Quick stop by SDO; without waiting."""
@@ -126,7 +126,7 @@ class _Order:
     gate: StartGate | None
 
     def may_start(self, time: float) -> bool:
-        """Whether nobody has to be waited for in this cycle."""
+        """Whether no other drive has to be waited for in this cycle."""
         return self.gate is None or self.gate.open(time)
 
 
@@ -164,15 +164,15 @@ class Controller:
         self._down = RunDown(cable, limits)
         self._angle = 0.0
         self._held: float | None = None
-        self._told = True
+        self._reported = True
         self._since = self._time = 0.0
         self._word = 0
         self._sync = self._stop_sync = 0
 
     def new_failure(self) -> str:
-        """Why the drive could not go on, told once; empty where it could."""
-        told, self._told = self._told, True
-        return "" if told else self.failure
+        """Why the drive could not go on, returned once; empty where it could."""
+        reported, self._reported = self._reported, True
+        return "" if reported else self.failure
 
     def begin(self, source: MotionSource, gate: StartGate | None = None) -> None:
         """Start a source, enabling the drive first where needed; replaces the one before.
@@ -213,7 +213,7 @@ class Controller:
 
     @property
     def pending(self) -> bool:
-        """Whether a motion was ordered that has not begun."""
+        """Whether a motion was ordered that has not started."""
         return self._wanted is not None
 
     @property
@@ -233,7 +233,7 @@ class Controller:
         return self._velocity * arm, 0.0
 
     def take_uncommanded(self) -> str:
-        """What the drive did unasked, told once."""
+        """What the drive did without a command, returned once."""
         words, self.uncommanded = self.uncommanded, ""
         return words
 
@@ -325,7 +325,7 @@ class Controller:
             self.done = self._wanted is None
 
     def _fail(self, reason: str, now: float) -> None:
-        self.failure, self._told = reason, False
+        self.failure, self._reported = reason, False
         self._enter(Phase.STOPPING, now)
 
     def _stay_disabled(self, now: float, feedback: AxisFeedback) -> None:
@@ -428,8 +428,8 @@ class Controller:
         axis = self.axis
         fresh = feedback.sync > self._stop_sync and feedback.sync >= self._sync - _FRESH_SYNCS
         left = fresh and _has_left(feedback.state)
-        told = axis.sdo_state
-        left = left or (told is not None and _has_left(told))
+        by_sdo = axis.sdo_state
+        left = left or (by_sdo is not None and _has_left(by_sdo))
         if self.escalation.rung is Rung.NMT:
             left = left or not heard_by_sdo(axis.nmt_text)
         answers = heard_by_sdo(axis.nmt_text) and not axis.sdo_refused

@@ -174,7 +174,7 @@ class FrozenCell:
         self._noise = _Noise()
         self._predictions: deque[tuple[float, float]] = deque()
         self._last: Reading | None = None
-        self._begun: Reading | None = None
+        self._start: Reading | None = None
         self._expected: tuple[float, float] | None = None
         """Least of the upper and largest of the lower ends of the predictions of the run, N."""
         self._stopped = nan
@@ -216,7 +216,7 @@ class FrozenCell:
 
     def _take(self, reading: Reading, last: Reading | None, calm: bool) -> None:
         known = isfinite(reading.raw) and not reading.quality & ~_KEEPS_COUNTING
-        if not known or last is None or self._begun is None:
+        if not known or last is None or self._start is None:
             self._begin(reading if known else None)
             return
         trial = min(1.0, (reading.t_receive - last.t_receive) * self._rate)
@@ -230,11 +230,11 @@ class FrozenCell:
         noise = trial * self._quiet() if self._run > _LONGER * self._noise.longest else 0.0
         self._sum += max(noise, drift * min(1.0, since / self._independent))
         if self._sum >= self._threshold:
-            duration = reading.t_receive - self._begun.t_receive
+            duration = reading.t_receive - self._start.t_receive
             self.finding = Frozen(reading.raw, duration, self._run, predicted if drift else nan)
 
     def _begin(self, reading: Reading | None) -> None:
-        self._begun, self.finding = reading, None
+        self._start, self.finding = reading, None
         self._run = self._sum = self._rest = 0.0
         self._expected = None
         if reading is not None and not isfinite(self._step):
@@ -262,7 +262,7 @@ class FrozenCell:
         unit = self._per_count * self._step
         return (
             f"noise at rest of {noise[-1] * unit:.2g} N, so far {median(noise) * unit:.2g} N; "
-            "check cable and shield, and what shakes the load"
+            "check cable and shield, and what makes the load oscillate"
         )
 
     def _quiet(self) -> float:
@@ -272,11 +272,11 @@ class FrozenCell:
 
     def _drift(self, reading: Reading) -> tuple[float, float]:
         """Predicted change since the last one of the count (N), and -ln p of a repeat by it."""
-        high, begun = self._highest(), self._begun
-        if begun is None or reading.t_sample < begun.t_receive + 2 * _SETTLING:
+        high, start = self._highest(), self._start
+        if start is None or reading.t_sample < start.t_receive + 2 * _SETTLING:
             return nan, 0.0
         if self._expected is None:
-            self._expect(*self._range(begun, later=True))
+            self._expect(*self._range(start, later=True))
         low, top = self._range(reading)
         self._expect(low, top)
         if self._expected is None or not all(map(isfinite, (high, self._per_count, self._step))):

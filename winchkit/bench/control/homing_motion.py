@@ -25,13 +25,13 @@ class HomingRequest:
     method: int | None = None
     """6098h; None searches nothing."""
     at: float | None = None
-    """Cable length (m) at the zero that is found, or at the present place where none is sought."""
+    """Cable length (m) at the zero to be found; at the present place without a search."""
     speed: float | None = None
     """Of the cable while searching, m/s."""
 
 
 class HomingAxis(Protocol):
-    """What tells how far a homing is; ``Cia402Axis`` is one."""
+    """Progress of a homing; implemented by ``Cia402Axis``."""
 
     @property
     def homing(self) -> Homing:

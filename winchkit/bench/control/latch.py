@@ -1,6 +1,6 @@
 """The latch file: trips that outlive the process that latched them.
 
-It stands beside the bench file (``bench.toml`` -> ``bench.trip.json``) from opening on. Its record
+It is kept beside the bench file (``bench.toml`` -> ``bench.trip.json``) from opening on. Its record
 has a fixed size and is overwritten in place, so that a full disk, a missing directory entry or a
 short write cannot lose a trip: what cannot be read counts as latched. A bench that was closed
 without a trip leaves no file.

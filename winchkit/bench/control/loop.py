@@ -27,7 +27,7 @@ Callback = Callable[[BenchSnapshot], Mapping[str, float] | None]
 _LOGGER = logging.getLogger(__name__)
 _STOPPED = (Phase.DISABLED, Phase.STOPPING, Phase.RESETTING)
 _DEAF = (
-    "the drive does not heed the stop, neither by RPDO nor by SDO; the host's heartbeat is "
+    "the drive does not obey the stop, neither by RPDO nor by SDO; the host's heartbeat is "
     "withheld, so that the watchdogs of all drives stop them; look at the drive before the reset"
 )
 _DRIVES_NOTICE = 1.25
@@ -92,7 +92,7 @@ class ControlLoop:
         self.beating = True
         """Whether the host's heartbeat is sent."""
         self.listening = True
-        """Whether it ends where a drive heeds no stop; not while drives are set up anew."""
+        """Whether the heartbeat ends where a drive obeys no stop; not while drives are set up."""
         self._sync_watched = False
         """Whether a drive that is to notice the silence does so by the loss of SYNC."""
         self._stop_together = stop_together
@@ -178,7 +178,7 @@ class ControlLoop:
         gap, self._before = now - self._before, now
         late = gap > _LATE * self.cycle
         if late and now > self._catching_up + _ANEW:
-            # Frames that came meanwhile are read first: until then nobody's silence is judged.
+            # Frames that came meanwhile are read first: until then no silence is judged.
             self._catching_up = now + _LATE * self.cycle
         if not (gap > self._longest_gap or gap < 0):
             return
@@ -224,7 +224,7 @@ class ControlLoop:
         self._warnings.clear()
 
     def _listen_for_stops(self) -> None:
-        """Fall silent where a drive does not heed a stop: its own watchdog is what is left."""
+        """End the heartbeat where a drive does not obey a stop: only its watchdog is left."""
         if not (self.beating and self.listening):
             return
         for name, parts in self.winches.items():

@@ -34,7 +34,7 @@ _CLOSE = 1e-4
 """Of cable, within which nothing is corrected, m."""
 _TRIES = 3
 _MOST = 0.1
-"""Of cable, beyond which the profile's effects are not to be believed, m."""
+"""Of cable, beyond which the profile's effects are not valid, m."""
 _SPEED, _ACCELERATION, _JERK = 0.05, 0.2, 1.0
 """Of a correction, m/s, m/s^2, m/s^3, where the winch's own are not lower."""
 
@@ -332,8 +332,8 @@ def _within(name: str, asked: float | None, limit: float, unit: str) -> float:
 class StartGate:
     """Opens for all members at once, in the first cycle in which each of them is ready.
 
-    The members ask one after another within a cycle while feedback keeps coming in; they are all
-    told what the first of them was told.
+    The members ask one after another within a cycle while feedback keeps coming in; all get
+    the result of the first.
     """
 
     def __init__(self, ready: Sequence[Callable[[], bool]]) -> None:

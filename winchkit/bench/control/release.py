@@ -17,7 +17,7 @@ class NotReleased(NotPermitted):
 
 
 class ReleaseGuard:
-    """Tells a new held command from one that was held already when everything stopped."""
+    """Distinguishes a new held command from one held already when everything stopped."""
 
     def __init__(self) -> None:
         """Nothing was stopped yet."""
@@ -28,13 +28,13 @@ class ReleaseGuard:
         """From now on these winches want a release first: they were stopped or reset."""
         self._closed |= winches
 
-    def resume(self, begun: float, ended: float) -> None:
+    def resume(self, start: float, ended: float) -> None:
         """What was held when a reset began (s) is held when it has ended, unless it is released.
 
         Whoever resets may be the one who holds, and asks for nothing meanwhile.
         """
         for winch, last in self._asked.items():
-            if begun - last < _RELEASE:
+            if start - last < _RELEASE:
                 self._asked[winch] = max(last, ended)
 
     def ask(self, winch: str, now: float) -> None:

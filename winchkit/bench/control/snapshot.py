@@ -82,11 +82,11 @@ class WinchSnapshot(NamedTuple):
     turns_known: bool = True
     """Whether the motor angle counts every turn; if not, the cable length is NaN until homed."""
     commander: str = ""
-    """Who commands it, by name; empty for nobody."""
+    """Name of its commander; empty where it has none."""
 
 
 class WinchSnapshots(Mapping[str, WinchSnapshot]):
-    """The winches of a cycle by name, made when somebody looks first: in most cycles nobody does.
+    """The winches of a cycle by name, made at the first access: most cycles have none.
 
     ``make`` has what the cycle knew; it gives the same whenever and however often it is called.
     """

@@ -83,7 +83,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     heartbeat, operational = axis.heartbeat, axis.operational
     alarms = () if fault else axis.alarms
     missed = sync if feedback is None else sync - 1 - feedback.sync
-    # What a silent drive said last must not be compared with what it is told now.
+    # The last feedback of a silent drive must not be compared with its present command.
     follows = controller.follows and missed <= _ANSWERED
     target_speed, following_error = math.nan, 0.0
     if follows and feedback is not None:

@@ -153,7 +153,7 @@ def declared_drive(spec: BenchSpec, who: str | None) -> DeclaredDrive:
 
 @contextmanager
 def free_bus(spec: BenchSpec, clock: Clock | None = None) -> Iterator[CanBus]:
-    """The only CAN bus of a bench that nobody owns; raises NotPermitted where somebody does."""
+    """The only CAN bus of a bench without owner; raises NotPermitted where it has one."""
     names = _can_buses(spec)
     if len(names) != 1:
         raise UsageError(

@@ -53,7 +53,7 @@ class Feed:
         """Listen to winches with their sensors by role from ``opened`` (s) on."""
         prefix = {name: f"{name}." if len(sensors) > 1 else "" for name in sensors}
         self.lost = 0
-        """Cycles and readings that were dropped because nobody took them in time."""
+        """Cycles and readings that were dropped because they were not taken in time."""
         self._snapshots: deque[BenchSnapshot] = deque(maxlen=_WAITING)
         self._readings: dict[str, deque[Reading]] = {}
         self._listening: list[tuple[Sensor, Callable[[Reading], None]]] = []
@@ -99,7 +99,7 @@ class Feed:
                 instrument.listeners.remove(listener)
 
     def abandon(self) -> None:
-        """Stop listening and drop what nobody will take."""
+        """Stop listening and drop what is left."""
         self.close()
         self._snapshots.clear()
         for waiting in self._readings.values():

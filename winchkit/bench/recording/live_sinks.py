@@ -40,7 +40,7 @@ class UdpJson:
     This is what PlotJuggler's UDP server reads with the protocol JSON: it names a number after the
     keys that lead to it (``/A/tension``), and leaves the time stamps of a stream for good once one
     datagram has none. The time is that of the picture, not of its sending: the bench's clock,
-    brought to UTC by the first picture. Nobody needs to listen; a picture that does not get out is
+    brought to UTC by the first picture. A receiver is not needed; a picture that cannot be sent is
     counted in ``dropped``.
     """
 

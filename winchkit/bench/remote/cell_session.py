@@ -23,7 +23,7 @@ __all__ = ["at_cells"]
 def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[Cells]:
     """The instruments of a bench, by its owner or as its owner.
 
-    Raises FileError, ConnectionLost, and NotPermitted where the owner lets nobody in.
+    Raises FileError, ConnectionLost, and NotPermitted where the owner accepts no client.
     """
     from winchkit.schema.read import read_bench
 

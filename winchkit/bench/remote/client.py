@@ -36,7 +36,7 @@ def attach(
     name: str = "",
     observer: bool = False,
 ) -> RemoteStation | None:
-    """A station at the bench's owner; None when nobody owns it.
+    """A station at the bench's owner; None when no process owns it.
 
     ``patience`` (s) is how long it waits for an answer, ``name`` what others see of this client;
     an ``observer`` never keeps another program from owning the bench. Raises ConnectionLost when
@@ -63,7 +63,7 @@ class RemoteStation:
         name: str = "",
         observer: bool = False,
     ) -> None:
-        """Take a place at the owner; raises ConnectionLost where it takes nobody in."""
+        """Take a place at the owner; raises ConnectionLost where it accepts no client."""
         connection.settimeout(patience)
         self._patience = patience
         self._connection = connection
@@ -71,15 +71,15 @@ class RemoteStation:
         self._lock = threading.Lock()
         self._gone = self._owed = False
         try:
-            told = self._call("introduce", name or client_name(), observer)
+            reply = self._call("introduce", name or client_name(), observer)
         except BaseException:
             self._hang_up()
             raise
-        self.owner = str(told["owner"])
+        self.owner = str(reply["owner"])
         """Name of the process that owns the bench."""
-        self.lends = bool(told["lends"])
+        self.lends = bool(reply["lends"])
         """Whether the owner is a bench process, which ends with its last client."""
-        self.digest = str(told["digest"])
+        self.digest = str(reply["digest"])
         """Of the files that the owner opened the bench with."""
 
     def __enter__(self) -> Self:

@@ -32,7 +32,7 @@ class Commanded(Protocol):
     """A winch as far as its commander goes."""
 
     commander: str
-    """Name of the client that commands it; empty for nobody."""
+    """Name of the client that commands it; empty where there is none."""
 
 
 class Commanders:
@@ -73,7 +73,7 @@ class Commanders:
             self._actor.reset(token)
 
     def holder(self, winch: str) -> Client | None:
-        """Who commands a winch; None for nobody."""
+        """Client that commands a winch; None without one."""
         return self._holders.get(winch)
 
     def held_by(self, client: Client) -> set[str]:
@@ -107,7 +107,7 @@ class Commanders:
 
     @contextmanager
     def claimed(self, winch: str) -> Iterator[None]:
-        """Command a winch, and let nobody take it over while this lasts; raises as ``require``."""
+        """Command a winch, without handover while this lasts; raises as ``require``."""
         with self._lock:
             self.require(winch)
             self._give(winch, self.actor)

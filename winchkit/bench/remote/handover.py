@@ -15,7 +15,7 @@ __all__ = ["own", "own_or_find"]
 _PATIENCE = 10.0
 """For a bench process to disable its drives and end, s."""
 _CLOSING = 2.0
-"""For an owner that lets nobody in any more, s."""
+"""For an owner that accepts no client any more, s."""
 _OPENING = 8.0
 """For an owner that is opening the bench, s."""
 _POLL = 0.02
@@ -42,7 +42,7 @@ def own(spec: BenchSpec, name: str) -> Ownership:
 def own_or_find(spec: BenchSpec, name: str) -> Ownership | None:
     """Own a bench as ``name``; None where somebody else does and takes clients in.
 
-    Raises NotPermitted, naming the owner, where it takes nobody in.
+    Raises NotPermitted, naming the owner, where it accepts no client.
     """
     deadline = time.monotonic() + _OPENING
     while True:

@@ -82,10 +82,10 @@ def _spawned(spec: BenchSpec, line: bytes) -> Spawned:
     if not line:
         message = f"the bench process ended without opening the bench; see {log_path(spec)}"
         return Spawned(error=ConnectionLost(message))
-    told = json.loads(line)
-    if "error" in told:
-        return Spawned(error=getattr(errors, told["error"], WinchkitError)(told["message"]))
-    return Spawned(owned=told.get(_OWNED, False))
+    reply = json.loads(line)
+    if "error" in reply:
+        return Spawned(error=getattr(errors, reply["error"], WinchkitError)(reply["message"]))
+    return Spawned(owned=reply.get(_OWNED, False))
 
 
 def main() -> None:
@@ -127,7 +127,7 @@ def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:
 
 
 def _serve(bench: Bench) -> None:
-    """Wait until nobody needs the bench any more; raises what ended the control loop."""
+    """Wait until no client needs the bench any more; raises what ended the control loop."""
     left, patience = time.monotonic(), _FIRST
     while not bench.stations.handed_to and bench.loop.alive:
         now = time.monotonic()
@@ -150,12 +150,12 @@ def _words_of(error: WinchkitError) -> dict[str, object]:
     return {"error": next(known), "message": str(error)}
 
 
-def _report(report: TextIO, told: dict[str, object]) -> None:
-    """Say the first line, once."""
+def _report(report: TextIO, reply: dict[str, object]) -> None:
+    """Write the first line, once."""
     if report.closed:
         return
     with suppress(OSError), report:  # the client that waited may have gone
-        report.write(json.dumps(told) + "\n")
+        report.write(json.dumps(reply) + "\n")
 
 
 if __name__ == "__main__":

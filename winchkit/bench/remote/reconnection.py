@@ -29,7 +29,7 @@ def watch(
 ) -> _Result:
     """Call ``use`` with a station that only looks on, and again with a new one after each loss.
 
-    ``lost`` is told, in words, when an owner has gone. Returns what ``use`` returns. Raises the
+    ``lost`` is called with a text when an owner has gone. Returns what ``use`` returns. Raises the
     errors of ``at_station`` where the bench cannot be reached any more.
     """
     while True:

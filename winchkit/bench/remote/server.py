@@ -59,10 +59,10 @@ class StationServer:
 
     def __init__(self, bench: Bench) -> None:
         self.may_hand_over = False
-        """Whether the owner gives the bench to a program that wants to own it, while nobody but
-        observers is there: a bench process does."""
+        """Whether the owner gives the bench to a program that wants to own it, while only
+        observers are attached: a bench process does."""
         self.handed_to = ""
-        """Name of the program that the bench is given to; empty while it is to nobody."""
+        """Name of the program that the bench is given to; empty while there is none."""
         self.digest = digest_of(bench.spec)
         """Of what the bench file says, for clients that read it again."""
         self._bench = bench
@@ -79,11 +79,11 @@ class StationServer:
         return tuple(seat.station.client for seat in tuple(self._seats))
 
     def close_door(self) -> bool:
-        """Take nobody in any more, unless somebody is there; whether it is so."""
+        """Accept no client any more, unless one is attached; whether this was done."""
         with self._lock:
             if self.clients:
                 return False
-            self.handed_to = self.handed_to or "nobody; it ends"
+            self.handed_to = self.handed_to or "no program; it ends"
             return True
 
     def close(self) -> None:
@@ -101,8 +101,8 @@ class StationServer:
                 client, _ = self._socket.accept()
             except OSError:
                 return
-            nameless = Client("a client without a name", life=LifeSign())
-            seat = _Seat(client, LocalStation(self._bench, nameless))
+            unnamed = Client("a client without a name", life=LifeSign())
+            seat = _Seat(client, LocalStation(self._bench, unnamed))
             self._seats.add(seat)
             threading.Thread(target=self._serve, args=(seat,), name="station", daemon=True).start()
 
@@ -148,7 +148,7 @@ class StationServer:
             return {"error": "UsageError", "message": words}, left
 
     def _introduce(self, seat: _Seat, name: str, observer: bool) -> dict[str, Any]:
-        """Take a client's name; tells who owns the bench, and whether it may be had."""
+        """Take a client's name; returns who owns the bench, and whether it is handed over."""
         with self._lock:
             if self.handed_to:
                 raise ConnectionLost(f"the bench is being handed over to {self.handed_to}")

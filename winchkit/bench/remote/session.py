@@ -57,7 +57,7 @@ def attach(
     ConnectionLost
         A bus, a device or the owner of the bench does not answer.
     NotPermitted
-        The bench is on the interface ``virtual``, and nobody in this process owns it.
+        The bench is on the interface ``virtual``, and this process does not own it.
     """
     from winchkit.schema.read import read_bench
 
@@ -66,8 +66,8 @@ def attach(
     station = _attached(spec, files, name or client_name(), observer=observer)
     if station is None:
         raise NotPermitted(
-            f"bench '{spec.name}' is owned by nobody, and no process can be started for it (a bus "
-            "of the interface 'virtual' lives in one process); own it with open_bench"
+            f"bench '{spec.name}' has no owner, and no process can be started for it (a bus "
+            "of the interface 'virtual' is within one process); own it with open_bench"
         )
     return station
 
@@ -80,7 +80,7 @@ def at_station(
     client: str = "",
     observer: bool = False,
 ) -> Iterator[Station]:
-    """A station at the bench for a command: attached, or owning it where nobody else can.
+    """A station at the bench for a command: attached, or owning it where no bench process can.
 
     ``effects`` are files with effects of the user's own, ``client`` is the command's name. Raises
     FileError, ConnectionLost, NotPermitted, UsageError for effects that come too late.
@@ -133,7 +133,7 @@ def _attached(
                 raise problem
         if late:
             raise problem or ConnectionLost(
-                f"bench '{spec.name}': its owner takes nobody in for {_PATIENCE:g} s"
+                f"bench '{spec.name}': its owner has accepted no client for {_PATIENCE:g} s"
             )
         time.sleep(_POLL)
 
@@ -141,7 +141,7 @@ def _attached(
 def _owner(
     spec: BenchSpec, name: str, *, observer: bool
 ) -> tuple[RemoteStation | None, ConnectionLost | None]:
-    """A station at whoever owns the bench, or why its owner takes nobody in."""
+    """A station at whoever owns the bench, or why its owner accepts no client."""
     try:
         return attach_to_owner(spec, name=name, observer=observer), None
     except ConnectionLost as error:
@@ -151,7 +151,7 @@ def _owner(
 def _serves(
     station: RemoteStation, spec: BenchSpec, effects: Sequence[str], *, observer: bool
 ) -> bool:
-    """Whether the owner has the bench as it is asked for; else it was told to end, or it raises.
+    """Whether the owner has the bench as it is asked for; else it was asked to end, or it raises.
 
     A bench process that opened the bench before its files were changed is started anew.
     """

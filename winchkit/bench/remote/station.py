@@ -99,7 +99,7 @@ class LocalStation:
     """A station in the process that owns the bench."""
 
     def __init__(self, bench: Bench, client: Client | None = None) -> None:
-        """A place for ``client``; without one for a nameless station of this process."""
+        """A place for ``client``; without one for an unnamed station of this process."""
         self.client = client or Client(client_name("station"))
         self._bench = bench
         self._recorder: Recorder | None = None
@@ -245,7 +245,7 @@ class LocalStation:
     def close(self) -> None:
         """Ramp down what this station set in motion, finish its log; returns at rest.
 
-        With it stop the winches that nobody commands, unless ``stop_together`` is false.
+        With it stop the winches without commander, unless ``stop_together`` is false.
         """
         commanders = self._bench.commanders
         moved = [name for name in commanders.held_by(self.client) if self._bench.winch[name].moving]

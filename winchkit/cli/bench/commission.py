@@ -19,7 +19,7 @@ __all__ = ["command"]
     "--answers",
     metavar="FILE",
     type=click.Path(exists=True, dir_okay=False),
-    help="Answers by key (TOML), for tests; the record says that nobody typed them.",
+    help="Answers by key (TOML), for tests; the record says that they were not typed.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the record as JSON.")
 def command(*, bench: str, answers: str | None, as_json: bool) -> None:

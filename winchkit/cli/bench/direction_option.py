@@ -73,6 +73,6 @@ def magnitude(option: str, text: str, kind: str) -> float:
     value = quantity(text, kind)
     if not 0 < value < float("inf"):
         raise UsageError(
-            f"{option} {text}: must be above zero; --pay-out and --wind-in tell the direction"
+            f"{option} {text}: must be above zero; --pay-out and --wind-in give the direction"
         )
     return value

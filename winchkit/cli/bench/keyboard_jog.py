@@ -42,7 +42,7 @@ class Keys(Protocol):
 
 
 class HeldKey:
-    """Tells a key that is held, and repeats, from one that was pressed once.
+    """Distinguishes a key that is held, and repeats, from one that was pressed once.
 
     A terminal shows no release: the first press holds for longer, since repeats start late, and
     each repeat for as long as a dead-man may.

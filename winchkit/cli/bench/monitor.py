@@ -57,7 +57,7 @@ def _print_lines(bench: str, pause: float, end: float | None) -> None:
 
 
 def _show_table(bench: str, pause: float, end: float | None) -> None:
-    """A live table; empty while nobody owns the bench."""
+    """A live table; empty while no process owns the bench."""
     from rich.console import Console
     from rich.live import Live
     from rich.text import Text

@@ -55,7 +55,7 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
 
 
 def _show(spec: BenchSpec, *, as_json: bool) -> None:
-    """What goes to the drives themselves where nobody owns the bench."""
+    """Frames to the drives themselves where no process owns the bench."""
     from winchkit.cli.core.dry_run import nodes_of, show_frames, writes
     from winchkit.drivers.can.cia402.state_machine import QUICK_STOP
 

@@ -36,7 +36,7 @@ _MEANINGS = {
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Watch CELL and report rate, noise, drift, frozen or repeated counts, hum and creep.
 
-    Leave the load alone, or change it once: then creep is told as well. Exit 1 where something
+    Leave the load alone, or change it once: then creep is reported as well. Exit 1 where something
     is wrong with the readings themselves.
     """
     from winchkit.bench.cells.tasks import readings_of
@@ -53,9 +53,9 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
         _tell_unusable(name, len(readings), flags, counters, as_json)
     health = examine(_samples(readings))
     if as_json:
-        told = {"cell": name, "unit": unit, **dataclasses.asdict(health)}
-        told |= {"flags": flags, "counters": counters}
-        echo_json({"schema": 1, **told})
+        record = {"cell": name, "unit": unit, **dataclasses.asdict(health)}
+        record |= {"flags": flags, "counters": counters}
+        echo_json({"schema": 1, **record})
     else:
         click.echo(f"{name}, {seconds:g} s:")
         for line in _lines(health, unit):
@@ -80,8 +80,8 @@ def _tell_unusable(
 ) -> NoReturn:
     """Say why there is nothing to examine, and end with 1."""
     if as_json:
-        told = {"cell": name, "readings": count, "flags": flags, "counters": counters}
-        echo_json({"schema": 1, **told})
+        record = {"cell": name, "readings": count, "flags": flags, "counters": counters}
+        echo_json({"schema": 1, **record})
     else:
         listed = ", ".join(f"{flag} {number}" for flag, number in flags.items())
         click.echo(f"{name}: most of {count} readings are no measurements: {listed}")
@@ -125,13 +125,13 @@ def _lines(health: Health, unit: str) -> list[str]:
         f"drift: {health.drift * 60:+.3g} ± {health.drift_std * 60:.2g} {unit} a minute",
     ]
     for hum in health.hum:
-        told = (
-            "cannot be told at this rate"
+        found = (
+            "cannot be measured at this rate"
             if math.isnan(hum.amplitude)
             else f"{hum.amplitude:.3g} ± {hum.std:.2g} {unit}"
             + ("" if hum.there else " (within the noise)")
         )
-        lines.append(f"hum at {hum.frequency:g} Hz: {told}")
+        lines.append(f"hum at {hum.frequency:g} Hz: {found}")
     if health.creep is None:
         lines.append("creep: no change of load was seen")
     else:

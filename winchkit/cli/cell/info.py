@@ -33,7 +33,7 @@ def _lines(facts: dict[str, Any], unit: str) -> list[str]:
         f"{facts['cell']}: {device['maker']} {device['model']}",
         f"  device file  {device['name']} (trust: {device['trust']}; {device['source']})",
         f"  identity     {identity or 'the device file does not say how to ask'}",
-        f"  calibration  {facts['calibration'] or 'none; the device is believed as it is'}",
+        f"  calibration  {facts['calibration'] or 'none; the values of the device are used'}",
         f"  tare         host {shown(tare['host'], unit)}, device "
         + {True: "on", False: "off", None: "unknown"}[tare["device"]],
         f"  reading      {shown(reading['value'], unit, 6)} net, "

@@ -140,7 +140,7 @@ def _decimals(value: float | None, digits: int = 3) -> str:
 
 @contextmanager
 def progress_bar() -> Iterator[Callable[[str, float], None]]:
-    """Gives a function that is told what is begun and which share (0 to 1) is done."""
+    """Gives a function to call with the present task and the share (0 to 1) that is done."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -156,10 +156,10 @@ def progress_bar() -> Iterator[Callable[[str, float], None]]:
     ) as bar:
         task = bar.add_task("reading", total=1.0)
 
-        def told(what: str, share: float) -> None:
+        def update(what: str, share: float) -> None:
             bar.update(task, description=one_line(what), completed=share)
 
-        yield told
+        yield update
 
 
 @contextmanager

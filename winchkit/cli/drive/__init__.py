@@ -1,4 +1,4 @@
 """Commands for CANopen nodes: scan, info, config, LSS and bus load.
 
-They work on a bus that nobody owns, or through the owner of the bench.
+They work on a bus without owner, or through the owner of the bench.
 """

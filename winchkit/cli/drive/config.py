@@ -28,7 +28,7 @@ _yes = click.option("-y", "--yes", is_flag=True, help="Do not ask.")
 
 @dataclass(frozen=True)
 class Asking:
-    """How something that cannot be undone is asked for and told."""
+    """Confirmation and report of what cannot be undone."""
 
     what: str
     yes: bool

@@ -50,10 +50,10 @@ def _lines(node: Node, info: DriveInfo) -> Iterator[str]:
     fits = info.device or "none of the shipped ones"
     yield f"  device file: {node.device.name} is used, {fits} fits the identity"
     yield f"  state: {info.state}, mode {info.mode}"
-    yield f"  modes: {', '.join(info.modes) or 'none told (6502h)'}"
+    yield f"  modes: {', '.join(info.modes) or 'not reported (6502h)'}"
     if node.wiring is not None:
         yield f"  brake: {'declared' if node.wiring.brake else 'none declared'}"
-    register = "not told" if info.error_register is None else f"{info.error_register:02X}h"
+    register = "not reported" if info.error_register is None else f"{info.error_register:02X}h"
     yield f"  error register: {register}"
     for code, words in info.errors:
         yield f"  error history: {code:04X}h {words}"

@@ -92,8 +92,8 @@ def _identity_options(function: Callable[..., Any]) -> Callable[..., Any]:
 def command() -> None:
     """Layer setting services (CiA 305), for drives that have no node number yet.
 
-    A device is named by its identity, object 1018h, as `scan` and `lss list` show it. Nobody may
-    own the bench meanwhile, and no drive may move.
+    A device is named by its identity, object 1018h, as `scan` and `lss list` show it. No process
+    may own the bench meanwhile, and no drive may move.
     """
 
 

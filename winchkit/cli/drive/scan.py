@@ -24,7 +24,7 @@ def command(*, as_json: bool, **bus: Any) -> None:
 
     Asks each node number for its device type and listens for heartbeats; writes nothing. Every
     node is listed, also one that refuses, falls silent or shares its number with another. Ends
-    with 4 when nobody answers.
+    with 4 when no node answers.
     """
     from winchkit.bench.drives.node_access import nodes_on
 

@@ -61,10 +61,10 @@ def command(
 ) -> None:
     """Check files of any kind: profiles, benches, programmes, devices (.toml), runs (.csv, .mcap).
 
-    Of a drive's EDS or DCF it tells what matters for winchkit; of a device file and of a bench
+    Of a drive's EDS or DCF it reports what matters for winchkit; of a device file and of a bench
     whether the drives do it by their EDS, and how each notices a dead host. Every fault of
-    a file is told with its line. Exits with 3 when a file has one. ``--computer`` says what this
-    computer permits a control loop (docs/realtime.md).
+    a file is reported with its line. Exits with 3 when a file has one. ``--computer`` reports
+    what this computer permits a control loop (docs/realtime.md).
     """
     if not files and not computer:
         raise click.UsageError("Missing argument 'FILE...'; or --computer.", ctx)
@@ -74,8 +74,8 @@ def command(
         for warning in verdict.warnings:
             click.echo(f"{warning} (warning)", err=True)
     if as_json:
-        told = {"computer": lines} if computer else {}
-        echo_json({"schema": 1, "files": [_entry(verdict) for verdict in verdicts], **told})
+        extra = {"computer": lines} if computer else {}
+        echo_json({"schema": 1, "files": [_entry(verdict) for verdict in verdicts], **extra})
     else:
         for line in lines:
             click.echo(line)

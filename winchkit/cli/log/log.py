@@ -139,7 +139,7 @@ class _Log:
         click.echo("ending the log", err=True)
 
     def lose(self, words: str) -> None:
-        """Tell that an owner has gone."""
+        """Report that an owner has gone."""
         goes_on = f"; the log goes on in {self._next()}" if self._output else ""
         click.echo(f"winchkit: {words}{goes_on}", err=True)
 

@@ -46,8 +46,8 @@ def command(
     """Name the physical effect that the model lacks, with its size and what it would buy.
 
     Two runs of one programme and load are the measure of the noise: record everything twice.
-    Long runs are thinned out as far as their signals allow; --winch all takes each by itself
-    and tells what they have in common.
+    Long runs are decimated as far as their signals allow; --winch all diagnoses each by
+    itself and reports what they have in common.
     """
     from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.schema.profiles.robot import RobotProfile

@@ -132,15 +132,18 @@ def new(
         order = _order_of_drum(found)
         if order is not None:
             write_wave_on_drum(order, name, Path(file))
-            _tell(file, name, f"a wave of {order} periods per drum turn")
+            _report(file, name, f"a wave of {order} periods per drum turn")
             return
         curve = found.empirical[0]
     _write_curve(curve, name, Path(file), data)
-    _tell(file, name, curve)
+    _report(file, name, curve)
 
 
-def _tell(file: str, name: str, start: str) -> None:
-    click.echo(f"written: {file}; it holds the effect '{name}', begun from {start}", err=True)
+def _report(file: str, name: str, start: str) -> None:
+    click.echo(
+        f"written: {file}; it holds the effect '{name}', with its initial values from {start}",
+        err=True,
+    )
 
 
 def _write_curve(curve: str, name: str, file: Path, data: _Data) -> None:

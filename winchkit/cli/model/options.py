@@ -49,7 +49,7 @@ ALL = "all"
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 _MODEL_OPTIONS = (
     click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
-    click.option("--winch", help="Which winch of runs with several; 'all' where each is told."),
+    click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
     click.option(
         "--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects."
     ),
@@ -180,7 +180,7 @@ def _of_winch(run: Run, winch: str | None) -> Run:
         if len(known) > 1:
             raise UsageError(
                 f"{run.path}: has the winches {', '.join(known)}; choose one with --winch, "
-                "or have each told by compare and diagnose with --winch all"
+                "or use compare or diagnose with --winch all for each by itself"
             )
         return run.of_winch(known[0])
     if known != [""] and winch not in known:
@@ -237,10 +237,10 @@ def page_title(profile: str, runs: Sequence[str], effect: str = "") -> str:
     """``bench-spiral: a.csv, b.csv``, or ``bench-spiral: 12 runs, a.csv to l.csv``."""
     added = f" with {effect}" if effect else ""
     names = [Path(run).name for run in runs]
-    told = ", ".join(names)
+    named = ", ".join(names)
     if len(names) > _RUNS_NAMED:
-        told = f"{len(names)} runs, {names[0]} to {names[-1]}"
-    return f"{profile}{added}: {told}"
+        named = f"{len(names)} runs, {names[0]} to {names[-1]}"
+    return f"{profile}{added}: {named}"
 
 
 def _may_be_replaced(target: Path) -> bool:
@@ -274,8 +274,8 @@ def refuse_curves(declared: WinchProfile | RobotProfile) -> None:
 
     if isinstance(declared, RobotProfile):
         raise UsageError(
-            f"'{declared.name}' is a robot: there is no curve to begin from along its poses. "
-            "'winchkit diagnose' says over what the rest lives; write the effect by hand, as "
+            f"'{declared.name}' is a robot: there is no initial curve along its poses. "
+            "'winchkit diagnose' reports what explains the residual; write the effect by hand, as "
             "examples/my_effect.py, with on_robot, and give it with --effects"
         )
 

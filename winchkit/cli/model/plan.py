@@ -60,7 +60,7 @@ def tell_poses(
         write_run(plan.run(best), output)
         click.echo(f"written: {output}", err=True)
     elif output:
-        click.echo(f"nothing written to {output}: no such poses tell more", err=True)
+        click.echo(f"nothing written to {output}: no such poses show more", err=True)
     if as_json:
         echo_json({**plan.to_json(), "written": output if best is not None else None})
     else:
@@ -76,11 +76,13 @@ def _poses_text(plan: PosePlan) -> str:
     from winchkit.report.words.numbers import percent
 
     if not plan.offers:
-        return "nothing to tell apart, and these poses would have shown every effect of usual size"
+        return (
+            "nothing to distinguish, and every effect of usual size is detectable with these poses"
+        )
     letters = ascii_uppercase[: len(plan.pairs)]
-    head = ["what poses to take next (nothing to tell apart: what they would show besides)"]
+    head = ["poses to record next (nothing to distinguish: what else they would show)"]
     if plan.pairs:
-        head = ["what poses to take next, with the chance (power) that they tell apart"]
+        head = ["poses to record next, with the power to distinguish"]
         head += [
             f"  {letter}: {a.effect.id} / {b.effect.id}"
             for letter, (a, b) in zip(letters, plan.pairs, strict=False)
@@ -90,15 +92,15 @@ def _poses_text(plan: PosePlan) -> str:
         away, turned = reach(offer)
         powers = [percent(power) for power in plan.of_pairs(offer)]
         shown = plan.shows(offer)
-        told = ", ".join(shown[:_FEW]) or "—"
-        told += f" and {len(shown) - _FEW} more" if len(shown) > _FEW else ""
+        listed = ", ".join(shown[:_FEW]) or "—"
+        listed += f" and {len(shown) - _FEW} more" if len(shown) > _FEW else ""
         far = [f"{away * 1e3:.0f} mm", f"{degrees(turned):.0f}°"]
-        rows.append([f"{len(offer.pose.position)} {offer.kind.name}", *far, *powers, told])
+        rows.append([f"{len(offer.pose.position)} {offer.kind.name}", *far, *powers, listed])
     return "\n".join([*head, *hanging(rows), *_indistinguishable(plan), *_listed(plan)])
 
 
 def _indistinguishable(plan: PosePlan) -> list[str]:
-    """What no poses tell apart, and what does."""
+    """What no poses distinguish, and what does."""
     from winchkit.diagnosis.robot.pose_design import LEAST_POWER
     from winchkit.effects.effect import told_apart
     from winchkit.report.words.columns import paragraph
@@ -108,7 +110,7 @@ def _indistinguishable(plan: PosePlan) -> list[str]:
         if max(offer.powers[index] for offer in plan.offers) < LEAST_POWER:
             names = f"{first.effect.id} / {second.effect.id}"
             what = told_apart(first.effect, second.effect)
-            lines += paragraph(f"{names}: no such poses tell them apart. What does: {what}")
+            lines += paragraph(f"{names}: no such poses distinguish them. What does: {what}")
     if plan.best is None and not plan.pairs:
         hidden = ", ".join(term.effect.id for term in plan.hidden)
         lines += paragraph(f"No such poses would show what these did not: {hidden}.")
@@ -133,8 +135,8 @@ def _listed(plan: PosePlan) -> list[str]:
         cells = [f"{v * 1e3:.0f}" for v in place]
         cells += [f"{round(degrees(v), 1) + 0.0:.1f}" for v in angles]
         rows.append([str(number), *cells])
-    told = f"the poses '{offer.kind.name}', in this order; -o FILE.csv writes them"
-    return ["", told, *aligned(rows)]
+    head = f"the poses '{offer.kind.name}', in this order; -o FILE.csv writes them"
+    return ["", head, *aligned(rows)]
 
 
 _FEW = 2
@@ -156,10 +158,10 @@ _FEW = 2
 def command(
     runs: Sequence[str], output: str | None, bench: str | None, asked: Asked, as_json: bool
 ) -> None:
-    """Propose what to run next, by what it tells apart and shows per minute.
+    """Propose motion programmes by what they distinguish and show per minute.
 
     Kinds of programmes are tried on the model with the noise of the RUNs: those that separate
-    the effects that these runs cannot tell apart come first, else those that show what these
+    the effects that these runs cannot distinguish come first, else those that show what these
     could not. Run the file with 'winchkit run NEXT.toml --bench B' and diagnose again.
     For a robot's profile the plan is a list of poses, and NEXT.csv a run of them to measure at.
     """
@@ -220,7 +222,7 @@ def _limits(bench: str, winch: str | None) -> LimitSpec:
 
 
 def _silent(found: Plan, *, widened: bool) -> list[str]:
-    """What none of these programmes tells apart, and what does."""
+    """What none of these programmes distinguishes, and what does."""
     from winchkit.effects.effect import told_apart
 
     lines, operating_range = [], found.operating_range
@@ -228,7 +230,7 @@ def _silent(found: Plan, *, widened: bool) -> list[str]:
         names = f"{first.effect.id} / {second.effect.id}"
         lines.append(
             f"{names}: no such motion within {operating_range.low:.2f} m to "
-            f"{operating_range.high:.2f} m tells them apart. What does: "
+            f"{operating_range.high:.2f} m distinguishes them. What does: "
             f"{told_apart(first.effect, second.effect)}"
         )
     if lines and not widened:
@@ -244,7 +246,7 @@ def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], *, named: 
     if not pairs:
         rows = [["programme", "minutes", "shows besides"]]
         rows += [[o.kind.name, f"{o.minutes:.1f}", _shown(o, _FEW)] for o in found]
-        said = "what to run next (nothing to tell apart: what it would show besides)"
+        said = "what to run next (nothing to distinguish: what else it would show)"
         return "\n".join([said, *hanging(rows)])
     letters = ascii_uppercase[: len(pairs)]
     table = [["programme", "minutes", *letters]]
@@ -252,7 +254,7 @@ def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], *, named: 
         powers = [percent(power) for power in offer.powers[: len(letters)]]
         table.append([offer.kind.name, f"{offer.minutes:.1f}", *powers])
     what = "" if named else " what came closest (none is named yet)"
-    head = [f"what to run next, with the chance (power) that it tells apart{what}"]
+    head = [f"what to run next, with the power to distinguish{what}"]
     head += [
         f"  {letter}: {a.effect.id} / {b.effect.id}"
         for letter, (a, b) in zip(letters, pairs, strict=False)
@@ -263,6 +265,6 @@ def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], *, named: 
 
 def _shown(offer: Offer, most: int | None = None) -> str:
     """Effects that a programme would show and the runs so far do not."""
-    told = ", ".join(offer.shows[:most]) or "—"
+    listed = ", ".join(offer.shows[:most]) or "—"
     left = len(offer.shows) - len(offer.shows[:most])
-    return f"{told} and {left} more" if left else told
+    return f"{listed} and {left} more" if left else listed

@@ -149,7 +149,7 @@ class ProcessInstrument(Publishing):
         """The error that says so."""
         return NoReply(
             f"{self.name}: no process value for {self.max_age:g} s; check power, wiring, node id "
-            "and that nobody has stopped the node"
+            "and that the node has not been stopped"
         )
 
     def command(self, name: str) -> None:

@@ -31,7 +31,7 @@ __all__ = ["ModbusClient"]
 
 _NEVER = 1 << 30
 _KEPT = 256
-"""Events of a unit that nobody asks for, e.g. of another master's devices."""
+"""Events kept of a unit that is not read, e.g. of another master's devices."""
 _LAST_TRANSACTION = 65_000
 """The library begins again at 1 after it."""
 _ACKNOWLEDGE, _BUSY = 5, 6

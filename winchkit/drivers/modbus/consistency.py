@@ -1,10 +1,10 @@
-"""Whether the numbers of a device make sense beside its status, before any of them is believed.
+"""Consistency of a device's values with its status, before any value is accepted.
 
-Words in the wrong order make huge, tiny or jumping numbers, of which a few look sound by chance.
-One that contradicts its status therefore spoils those after it, and floats, of which one in six
-passes by chance, are believed only after several that made sense. Integers near zero make numbers
-that are merely large: where both orders are possible the smaller number is believed, the larger
-one only once a reading has told that the order is right.
+Words in the wrong order give very large, very small or jumping values; one float in six of them is
+plausible by chance. A value that contradicts the status therefore also invalidates those after it,
+and floats are accepted only after several consistent readings. Integers near zero give large values
+in the wrong order: where both orders are possible the smaller value is accepted, and the larger one
+only after a reading has shown that the order is right.
 """
 
 from __future__ import annotations
@@ -14,41 +14,54 @@ from dataclasses import dataclass
 __all__ = ["Consistency"]
 
 _AFTER_CONTRADICTION = 20
+"""Consistent readings in a row that are required after a contradiction."""
 _FLOATS_AT_FIRST = 5
-_DOUBTFUL_AT_MOST = 5
+"""Consistent readings in a row that are required of floats at the start: by chance in 1 of 7800."""
+_UNDECIDED_AT_MOST = 5
+"""Readings of undecided order without a result; the next ones are flagged."""
 
 
 @dataclass(slots=True)
 class Consistency:
-    """Counts readings in good order."""
+    """Counts consistent readings."""
 
     floats: bool
     order_known: bool = False
-    """Whether a reading has told that the order is right."""
-    _doubtful: int = 0
-    _wanting: int = 0
+    """Whether a reading has shown that the order is right."""
+    _undecided: int = 0
+    _required: int = 0
     _contradicted: bool = False
-    _begun: bool = False
+    _started: bool = False
 
     def take(self, sound: bool, order: bool | None) -> bool | None:
-        """Take in the next reading: True to believe it, False not to, None to wait in silence.
+        """Evaluate the next reading.
 
-        ``order`` is True where only this order makes a possible number, False where the other one
-        makes a smaller number, None where nothing is told.
+        Parameters
+        ----------
+        sound : bool
+            Whether the value agrees with the status.
+        order : bool, optional
+            True where only this word order gives a possible value, False where the other one gives
+            a smaller value, None where both are alike.
+
+        Returns
+        -------
+        bool or None
+            True: the value is accepted; False: it is flagged; None: not decided yet, no reading.
         """
         self.order_known |= sound and order is True
         if order is False and not self.order_known:
-            self._doubtful += 1
-            if self._doubtful <= _DOUBTFUL_AT_MOST:
+            self._undecided += 1
+            if self._undecided <= _UNDECIDED_AT_MOST:
                 return None
             sound = False
-        if not self._begun:
-            self._begun, self._wanting = True, _FLOATS_AT_FIRST if self.floats else 0
+        if not self._started:
+            self._started, self._required = True, _FLOATS_AT_FIRST if self.floats else 0
         if not sound:
-            self._wanting, self._contradicted = _AFTER_CONTRADICTION, True
-        elif self._wanting:
-            self._wanting -= 1
-        if not self._wanting:
+            self._required, self._contradicted = _AFTER_CONTRADICTION, True
+        elif self._required:
+            self._required -= 1
+        if not self._required:
             self._contradicted = False
             return True
         return False if self._contradicted else None

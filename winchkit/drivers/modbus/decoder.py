@@ -76,9 +76,9 @@ class Decoder:
             status,
         )
 
-    def order_told(self, registers: Sequence[int]) -> bool | None:
-        """Whether the words stand in the right order, as far as these tell; see ``Consistency``."""
-        words, told = _placed(self.spec.read, registers), list[bool | None]()
+    def word_order(self, registers: Sequence[int]) -> bool | None:
+        """Whether the words are in the right order, as far as these show; see ``Consistency``."""
+        words, orders = _placed(self.spec.read, registers), list[bool | None]()
         for item in (self.field, self._gross):
             other, limit = _TURNED.get(item.order), item.limit
             if other is None or limit is None or item.type not in ("u32", "i32"):
@@ -87,8 +87,10 @@ class Decoder:
                 abs(number_of(item.type, order, words, item.register))
                 for order in (item.order, other)
             )
-            told.append(True if turned > limit else False if number > turned else None)
-        return None if not told else False if False in told else True if True in told else None
+            orders.append(True if turned > limit else False if number > turned else None)
+        return (
+            None if not orders else False if False in orders else True if True in orders else None
+        )
 
     def _doubt(self, counts: float, gross: float, status: int) -> Quality:
         """What the numbers say against themselves, or against a status that finds them good."""

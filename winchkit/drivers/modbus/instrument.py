@@ -33,7 +33,7 @@ _TOO_LONG = (2, 3)
 
 
 class _Withheld(NoReply):
-    """The answer could not be told from a reply that is outstanding, so nothing is asked."""
+    """An outstanding reply could not be distinguished from the answer: nothing is asked."""
 
 
 class Instrument(Publishing):
@@ -155,7 +155,7 @@ class Instrument(Publishing):
         if not count:
             wait = self._late.until - self._clock.now()
             raise _Withheld(
-                f"{self.name}: a reply is outstanding that could not be told from the next "
+                f"{self.name}: an outstanding reply could not be distinguished from the next "
                 f"answer; nothing is asked for {wait:.1f} s"
             )
         asked = self._clock.now()
@@ -171,7 +171,7 @@ class Instrument(Publishing):
             raise
         self._late.answered(block, count)
         if (took := self._clock.now() - asked) > self._timeout + _STALLED:
-            # This computer stood still: the answer lay there, nobody knows how long.
+            # This computer stood still: the age of the answer is unknown.
             self.publisher.tally.late += 1
             raise NoReply(
                 f"{self.name}: an answer was taken {took:.2f} s after its request, later than its "
@@ -257,13 +257,13 @@ class Instrument(Publishing):
         if self._late.discards():
             self.publisher.publish(nan, nan, nan, quality | Quality.AMBIGUOUS, sampled)
             return
-        told = True if self._consistency.order_known else None
-        if told is None and decoded.quality.usable:
-            told = self.decoder.order_told(registers)
-        believed = self._consistency.take(not quality & Quality.MISMATCH, told)
-        if believed is None:
+        order = True if self._consistency.order_known else None
+        if order is None and decoded.quality.usable:
+            order = self.decoder.word_order(registers)
+        accepted = self._consistency.take(not quality & Quality.MISMATCH, order)
+        if accepted is None:
             return
-        if not believed:
+        if not accepted:
             quality |= Quality.MISMATCH
         self.publisher.publish(decoded.value, decoded.gross, decoded.counts, quality, sampled)
 

@@ -6,11 +6,11 @@ remembered until no reply to it can come any more, and until then
 
 - the unit is left alone for the device's longest reply time after the time-out,
 - no request is sent whose answer would have the length of an outstanding one, and no two requests
-  in a row for the same block have the same length, so that a reply is told by its length,
+  in a row for the same block have the same length, so that the length identifies a reply,
 - where the device answers one length only (or every length is outstanding) nothing is asked until
   the horizon, and the first exchange after it is discarded: its reading is NaN and ``ambiguous``.
 
-Over TCP the transaction tells replies apart. There the same is done against a gateway that takes
+Over TCP the transaction identifies a reply. There the same is done against a gateway that takes
 the late reply of its serial line for the answer to its next query, except for a device of one
 length: that one is left alone for the longest reply time only.
 """
@@ -84,7 +84,7 @@ class LateReplies:
         return chosen
 
     def alike(self, block: ReadBlock) -> bool:
-        """Whether two answers in a row cannot be told apart."""
+        """Whether two answers in a row cannot be distinguished."""
         return not self.tagged and len(self._lengths(block)) == 1
 
     def answered(self, block: ReadBlock, count: int) -> None:

@@ -110,13 +110,13 @@ class ModbusLine:
         return max(instrument.due, self._next_probe) if instrument.dead else instrument.due
 
     async def _poll(self, instrument: Instrument) -> None:
-        probe, begun = instrument.dead, self._clock.now()
+        probe, start = instrument.dead, self._clock.now()
         answered = await instrument.poll(self._client)
         if probe:
             self._next_probe = self._clock.now() + _PROBE_SHARE * self._spec.timeout
         if self._silence:
             await asyncio.sleep(self._silence)
-        if answered and self._share.took(self._place(instrument), self._clock.now() - begun):
+        if answered and self._share.took(self._place(instrument), self._clock.now() - start):
             self._share_out()
 
     async def _connect(self) -> bool:
@@ -135,7 +135,7 @@ class ModbusLine:
         return True
 
     def _share_out(self) -> None:
-        """Tell every instrument the rate that is to be expected."""
+        """Give every instrument the rate that is to be expected."""
         for item, rate in zip(self.sensors, self._share.rates, strict=True):
             item.on_line(
                 1 / rate,

@@ -56,10 +56,10 @@ class Conversation:
         return self.port.latency
 
     def close(self, instruments: tuple[StreamInstrument, ...] = ()) -> None:
-        """Let the port go; instruments that were told to send are told to stop."""
+        """Release the port; instruments that send by themselves get the command to stop."""
         for instrument in instruments:
             if instrument.started and instrument.spec.stop:
-                # A line that is lost already cannot be told, and need not be.
+                # A line that is lost already takes no command, and needs none.
                 with suppress(ConnectionLost):
                     self.port.write(instrument.text(instrument.spec.stop))
         self.port.close()
@@ -81,13 +81,13 @@ class Conversation:
         return await self.port.read(until)
 
     async def start(self, instrument: StreamInstrument) -> None:
-        """Tell an instrument what to send."""
+        """Send the start command of an instrument."""
         await self._hush(instrument)
         for ask in instrument.spec.start:
             await self._exchange(instrument, ask, self._spec.timeout)
         instrument.started = True
 
-    async def hear(self, instrument: StreamInstrument, until: float) -> bool:
+    async def receive(self, instrument: StreamInstrument, until: float) -> bool:
         """Publish what an instrument sends by itself; whether anything came."""
         chunk = await self.port.read(until)
         if chunk is None:
@@ -165,7 +165,7 @@ class Conversation:
                 return
 
     async def _select(self, instrument: StreamInstrument) -> None:
-        """Address the instrument where a line has to be told."""
+        """Address the instrument where the line needs it."""
         select = instrument.spec.select
         if select is None or instrument.address is None or self._selected is instrument:
             return
@@ -249,8 +249,8 @@ def _instead(seen: Counters) -> str:
         "answers of another form": seen.malformed,
         "bytes that begin no frame": seen.resynchronised,
     }
-    told = [f"{count} {what}" for what, count in came.items() if count]
-    return f"; there were {', '.join(told)}" if told else ""
+    counts = [f"{count} {what}" for what, count in came.items() if count]
+    return f"; there were {', '.join(counts)}" if counts else ""
 
 
 def _byte_time(bus: BusSpec) -> float:

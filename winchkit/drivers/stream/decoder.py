@@ -206,7 +206,7 @@ class Decoder:
 def check_sum(spec: ChecksumSpec, text: str, digits: int) -> int:
     """Check sum (one byte) of a line that ends with, or has between its marks, its digits.
 
-    Source: the manuals; Laumas XORs what stands between ``&`` and ``\\``, both excluded.
+    Source: the manuals; Laumas XORs the characters between ``&`` and ``\\``, both excluded.
     """
     start = text.find(spec.after) + 1 if spec.after else 0
     end = text.rfind(spec.before) if spec.before else len(text) - digits

@@ -75,7 +75,7 @@ class StreamInstrument(Publishing):
         """Why there is no new reading, while there is none."""
         self.due = self.asked = clock.now()
         self.started = False
-        """Whether it was told what to send."""
+        """Whether it has got its start command."""
         self._clock = clock
         self._failures = 0
         self._outstanding = False

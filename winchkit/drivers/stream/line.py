@@ -81,7 +81,7 @@ class StreamLine:
         return next(k for k, item in enumerate(self.sensors) if item is sensor)
 
     def _share_out(self) -> None:
-        """Tell every instrument that is polled the rate that is to be expected."""
+        """Give every polled instrument the rate that is to be expected."""
         for one, rate in zip(self.sensors, self._share.rates, strict=True):
             if one.spec.mode == "polled":
                 one.on_line(1.0 / rate)
@@ -152,8 +152,8 @@ class StreamLine:
                 if await talk.idle(min(instrument.due, now + _LISTEN), instrument):
                     instrument.overheard()
                 return
-            instrument.asked = begun = self._clock.now()
-            instrument.due = max(instrument.due + 1 / instrument.wanted_rate, begun)
+            instrument.asked = start = self._clock.now()
+            instrument.due = max(instrument.due + 1 / instrument.wanted_rate, start)
             before = instrument.publisher.tally.readings
             try:
                 await talk.poll(instrument)
@@ -164,18 +164,18 @@ class StreamLine:
                 if talk.came_late:
                     instrument.overheard()
             if instrument.publisher.tally.readings > before:
-                took = self._clock.now() - begun
+                took = self._clock.now() - start
                 if self._share.took(self._place(instrument), took):
                     self._share_out()
 
     async def _listen(self, talk: Conversation, instrument: StreamInstrument) -> None:
-        """Hear what the instrument sends in the next moments."""
+        """Receive what the instrument sends in the next moments."""
         async with self._lock:
             try:
                 if not instrument.started:
                     await talk.start(instrument)
                     self._heard_at = self._clock.now()
-                if await talk.hear(instrument, self._clock.now() + _LISTEN):
+                if await talk.receive(instrument, self._clock.now() + _LISTEN):
                     self._heard_at = self._clock.now()
                 elif self._clock.now() - self._heard_at > instrument.max_age:
                     self._heard_at = self._clock.now()

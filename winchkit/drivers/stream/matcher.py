@@ -35,7 +35,7 @@ class Matcher:
     def match(self, line: str) -> Match | None:
         """Fit the whole line or, where the template begins with a literal, its last frame.
 
-        What stands before that literal is garbage: a half frame, a byte of noise.
+        Characters before that literal are garbage: a half frame, a byte of noise.
         """
         found = self._pattern.fullmatch(line)
         start = 0

@@ -66,7 +66,7 @@ class StreamParser:
     def begin(self, *, sure: bool = True) -> None:
         """Forget what is half; ``sure`` where a frame begins with the next byte.
 
-        After a request it does; a line that listens must first hear one end.
+        After a request it does; a line that listens must first receive the end of one.
         """
         self._framing.begin(sure=sure)
         self._count_skipped()

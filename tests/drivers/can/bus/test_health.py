@@ -126,7 +126,7 @@ def test_frames_of_a_can_socket() -> None:
 
 
 @pytest.mark.parametrize("identifier", [0x80000181, 0x40000181, 0xC0000181])
-def test_long_identifiers_and_remote_frames_are_nobody_s(identifier: int) -> None:
+def test_long_identifiers_and_remote_frames_have_no_receiver(identifier: int) -> None:
     raw = struct.pack("=IB3x8s", identifier, 0, bytes(8))
     assert parse_socketcan(raw, []) == (None, None)
     assert parse_socketcan(raw[:9], []) == (None, None)
@@ -282,7 +282,7 @@ def test_a_controller_s_own_word_counts_where_it_gives_one(
     "trouble",
     [can.CanOperationError("gone", 100), OSError(19, "No such device"), ValueError("closed")],
 )
-def test_an_unplugged_adapter_is_told_and_replaced(
+def test_an_unplugged_adapter_is_reported_and_replaced(
     bus: CanBus, interfaces: list[Interface], trouble: Exception
 ) -> None:
     heard: list[bytes] = []
@@ -304,7 +304,7 @@ def test_an_unplugged_adapter_is_told_and_replaced(
     assert (bus.health.reopened, bus.health.state) == (1, BusState.ACTIVE)
 
 
-def test_an_interface_that_stays_away_is_told_each_time(
+def test_an_interface_that_stays_away_is_reported_each_time(
     bus: CanBus, interfaces: list[Interface], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def gone(*_: object) -> Interface:

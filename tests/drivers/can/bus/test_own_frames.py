@@ -77,7 +77,7 @@ def group() -> BusSpec:
     return BusSpec("can", interface="udp_multicast", channel=_GROUP, port=port)
 
 
-def test_over_multicast_only_the_stranger_is_heard(group: BusSpec) -> None:
+def test_over_multicast_only_foreign_frames_are_received(group: BusSpec) -> None:
     """Frames of the loop, of the SDO client and NMT from three threads, and one of a stranger."""
     bus, heard, seen = CanBus(group, "can", MonotonicClock()), list[bytes](), list[int]()
     stranger = can.Bus(interface="udp_multicast", channel=_GROUP, port=group.port)

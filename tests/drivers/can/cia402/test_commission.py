@@ -124,7 +124,7 @@ def test_a_mode_that_the_drive_lacks_is_refused(rig: Rig) -> None:
         axis_on(bus).commission()
 
 
-def test_nobody_there_is_told_with_the_node(rig: Rig) -> None:
+def test_an_absent_drive_is_reported_with_the_node(rig: Rig) -> None:
     with pytest.raises(NoReply, match=r"node 9 1000h.*check power"):
         axis_on(rig[1], node=9).commission()
 
@@ -139,7 +139,7 @@ def test_an_abort_carries_its_text_and_its_object(rig: Rig) -> None:
     assert node.read_if_there(0x5FFF) is None
 
 
-def test_an_axis_moves_and_tells_si(rig: Rig) -> None:
+def test_an_axis_moves_and_reports_si(rig: Rig) -> None:
     drive, bus = rig
     axis = axis_on(bus)
     axis.commission()

@@ -247,7 +247,7 @@ def test_8_one_node_s_silence_does_not_hold_up_another(rig: Rig) -> None:
     assert values == [402] * 5
 
 
-def test_8_aborts_are_told_in_words(rig: Rig) -> None:
+def test_8_aborts_are_reported_in_words(rig: Rig) -> None:
     node = node_on(rig[1])
     with pytest.raises(DeviceRefused, match=r"refused to write 1 to it: Code 0x06010002, .*read"):
         node.write(0x6041, 0, 1)

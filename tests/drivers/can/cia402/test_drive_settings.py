@@ -69,7 +69,7 @@ def test_a_brake_does_not_replace_the_watchdog(code: int) -> None:
         set_options(Objects({**CODES, 0x6007: code}), OptionSpec(), brake=True)  # type: ignore[arg-type]
 
 
-def test_codes_that_a_drive_lacks_are_told_and_accepted() -> None:
+def test_codes_that_a_drive_lacks_are_reported_and_accepted() -> None:
     objects = Objects({0x6007: 3})
     assert read_options(objects)["halt"].value is None  # type: ignore[arg-type]
     set_options(objects, OptionSpec(), brake=False)  # type: ignore[arg-type]
@@ -123,7 +123,7 @@ def test_limits_that_are_not_declared_are_left_alone() -> None:
     assert kept.speed == pytest.approx(500.0)
 
 
-def test_a_limit_without_an_object_is_refused_rather_than_believed() -> None:
+def test_a_limit_without_an_object_is_refused() -> None:
     objects = Objects({key: value for key, value in LIMITS.items() if key != 0x6072})
     with pytest.raises(NotPermitted, match="6072h:0: the drive has no such limit"):
         set_limits(objects, SCALE, LimitsAtShaft(torque=1.0))  # type: ignore[arg-type]

@@ -169,7 +169,7 @@ def test_a_ramp_is_not_kept_up_on_old_words() -> None:
     assert words == [0x0F] * 6 + [0x02] * 3, "nor taken up again after a quick stop"
 
 
-def test_what_a_drive_said_long_ago_is_not_believed() -> None:
+def test_what_a_drive_said_long_ago_is_not_accepted() -> None:
     made = HandMade()
     made.answer(ENABLED)
     made.begin()
@@ -252,7 +252,7 @@ def test_the_moment_of_sampling_lies_between_sync_and_answer() -> None:
         ),
     ],
 )
-def test_mappings_that_cannot_tell_how_it_stands_are_refused(
+def test_mappings_without_state_or_position_are_refused(
     tpdo: tuple[object, ...], words: str
 ) -> None:
     with pytest.raises(FileError, match=words):

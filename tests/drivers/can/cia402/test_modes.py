@@ -140,7 +140,7 @@ def test_interpolated_position_sets_bit_4_while_it_follows() -> None:
     assert made.axis.send(Wish.DISABLE) == 0x02
 
 
-def test_homing_starts_by_bit_4_when_it_is_told_to() -> None:
+def test_homing_starts_by_bit_4_on_command() -> None:
     made = HandMade("HM", rpdo=(RPDO[0],))
     for start, word in ((False, 0x0F), (True, 0x1F), (True, 0x1F)):
         made.answer(ENABLED, mode=6)

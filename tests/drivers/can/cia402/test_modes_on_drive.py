@@ -191,7 +191,7 @@ def test_homing_here_sets_the_zero(rig_in: Callable[..., Rig], method: int) -> N
     assert rig.axis.feedback.velocity == pytest.approx(0.0, abs=0.1), "no jump back to the old zero"
 
 
-def test_a_homing_method_that_the_drive_lacks_is_told(rig_in: Callable[..., Rig]) -> None:
+def test_a_homing_method_that_the_drive_lacks_is_reported(rig_in: Callable[..., Rig]) -> None:
     rig = rig_in("CSV")
     rig.run(Wish.DISABLE, 3)
     with pytest.raises(DeviceRefused, match="6098h"):

@@ -91,7 +91,7 @@ def test_an_si_unit_at_the_shaft_counts_through_the_gear() -> None:
     assert scale_of(Units(gear=5.0, velocity=0x00B44700), SERVO).velocity == pytest.approx(5 * RPM)
 
 
-def test_a_linear_unit_tells_nothing_and_the_file_counts() -> None:
+def test_a_linear_unit_reports_nothing_and_the_file_counts() -> None:
     units = Units(position=0xFD010000, velocity=0xFD010300, rated_current=1.0)
     assert scale_of(units, SERVO) == scale_of(Units(rated_current=1.0), SERVO)
 

@@ -84,7 +84,7 @@ def test_a_drive_that_only_says_that_it_watches_is_refused(rig: Rig) -> None:
     axis_on(bus, prove=False).commission()
 
 
-def test_the_proof_disturbs_nobody_else_on_the_bus() -> None:
+def test_the_proof_disturbs_no_other_node_on_the_bus() -> None:
     """Another drive, armed on the host whose heartbeat goes on meanwhile, notices nothing."""
     spec, over = bus_spec(), threading.Event()
     with DriveOnBus(spec, 1) as first, DriveOnBus(spec, 2) as second:

@@ -83,7 +83,7 @@ def test_a_node_that_boots_up_meanwhile_is_asked_again() -> None:
     assert (found[1].device_type, found[1].problem) == (0x20192, "")
 
 
-def test_two_nodes_of_one_number_are_told() -> None:
+def test_two_nodes_of_one_number_are_reported() -> None:
     with opened(generic(1), generic(2)) as (bus, rig):
         rig.inject("two nodes with one number", slave=0)
         found = scanned(bus)
@@ -91,7 +91,7 @@ def test_two_nodes_of_one_number_are_told() -> None:
     assert found[2].problem == ""
 
 
-def test_two_nodes_whose_answers_are_one_frame_are_told_by_their_serial_numbers() -> None:
+def test_two_nodes_whose_answers_are_one_frame_are_distinguished_by_their_serial_numbers() -> None:
     """Equal frames in the same instant are one on the wire; the serial numbers differ."""
     with opened(generic(1)) as (bus, rig):
         rig.inject("two nodes with one number")
@@ -103,7 +103,7 @@ def test_two_nodes_whose_answers_are_one_frame_are_told_by_their_serial_numbers(
     assert "two nodes have this number: 2 answers to one request (1018h:4)" in found[1].problem
 
 
-def test_a_drive_that_a_stranger_has_stopped_is_brought_back() -> None:
+def test_a_drive_stopped_by_another_master_is_brought_back() -> None:
     with opened(generic(1)) as (bus, rig):
         time.sleep(0.1)
         rig.inject("stopped by a stranger")
@@ -126,7 +126,7 @@ def test_a_drive_that_stays_stopped_is_named_as_such() -> None:
             axis_on(bus).commission()
 
 
-def test_a_drive_that_produces_sync_is_told_and_stops_producing() -> None:
+def test_a_drive_that_produces_sync_is_reported_and_stops_producing() -> None:
     slave = generic(1)
     slave.objects.declare(0x1005, 0, 0x07, 0x40000080)
     slave.objects.declare(0x1014, 0, 0x07, 0x80000081)

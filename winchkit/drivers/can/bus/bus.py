@@ -37,7 +37,7 @@ __all__ = [
 _DRIFT = 2e-4
 """At most by how much two clocks run apart."""
 _LATE = 0.02
-"""A frame that was read later than this tells nothing of the offset, s."""
+"""Delay of reading from which a frame is not used for the offset, s."""
 _SET = 0.25
 """When all frames of so long come late, one of the clocks was set, s."""
 _OLDEST = 0.1
@@ -199,7 +199,7 @@ class CanBus:
 
     @property
     def foreign_sync(self) -> str:
-        """That somebody else sends SYNC, in words; empty where nobody does."""
+        """Report of a second SYNC producer; empty without one."""
         count = self.foreign_syncs
         if not count:
             return ""
@@ -370,7 +370,7 @@ class CanBus:
             self.network.notify(frame.identifier, bytearray(frame.data), now)
 
     def _take_error(self, frame: Frame) -> None:
-        """A bus-off is a fault: until the controller restarts nobody hears what is sent."""
+        """A bus-off is a fault: until the controller restarts no frame is sent."""
         before = self._errors.state
         self._errors.take(frame.identifier, frame.data)
         state = self._errors.state

@@ -36,7 +36,7 @@ class BusHealth:
     """Times that the controller left the bus."""
     error_passive: int = 0
     overruns: int = 0
-    """Frames that the controller or its driver lost because nobody took them in time."""
+    """Frames that the controller or its driver lost because they were not read in time."""
     dropped: int = 0
     """Frames that the socket's queue had no room for."""
     unsent: int = 0
@@ -102,7 +102,7 @@ class ErrorTally:
             self.enter(BusState.ACTIVE)
 
     def enter(self, state: BusState) -> None:
-        """Take a state of the controller, however it was told."""
+        """Take a state of the controller, from whichever source."""
         if state is self.state:
             return
         self.state = state

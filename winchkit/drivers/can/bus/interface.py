@@ -1,7 +1,7 @@
 """The interface under a bus: python-can's, and on SocketCAN the socket itself.
 
-python-can's own reader cannot tell how many frames a full socket dropped: with SO_RXQ_OVFL set, it
-takes the count for a protocol error. So the socket is read here.
+python-can's own reader does not report how many frames a full socket dropped: with SO_RXQ_OVFL
+set, it takes the count for a protocol error. So the socket is read here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tells frames that were sent here from those of somebody else, where the interface does not.
+"""Distinguishes frames sent by this host from those of others, where the interface does not.
 
 Most interfaces hand back nothing that was sent through them, or mark it
 (:mod:`winchkit.drivers.can.bus.interface` drops that). UDP multicast hands every frame back,

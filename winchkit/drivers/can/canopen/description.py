@@ -192,8 +192,12 @@ def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
 
 def _modes(dictionary: Any) -> Iterator[str]:
     """Modes whose objects are there and which 6502h does not deny."""
-    told = declared(dictionary, 0x6502)
-    claimed = modes_of(told.default) if told is not None and told.default else tuple(NEEDED)
+    supported = declared(dictionary, 0x6502)
+    claimed = (
+        modes_of(supported.default)
+        if supported is not None and supported.default
+        else tuple(NEEDED)
+    )
     for mode, needed in NEEDED.items():
         if mode in claimed and all(index in dictionary for index in needed):
             yield mode
@@ -267,7 +271,7 @@ def _differences(
             )
     error = declared(dictionary, 0x603F)
     if error is not None and unmappable(error, receive=False):
-        yield "603Fh (error code) cannot be mapped: leave it out of the TPDOs, EMCY tells it"
+        yield "603Fh (error code) cannot be mapped: leave it out of the TPDOs, EMCY reports it"
     if 0x607C not in dictionary:
         yield (
             "607Ch (home offset) is missing: `winchkit home --here` needs the maker's own object, "

@@ -17,7 +17,7 @@ _GENERIC = "generic-cia402"
 
 @dataclass(frozen=True)
 class Identity:
-    """Object 1018h; 0 for a part that the device does not tell."""
+    """Object 1018h; 0 for a part that the device does not have."""
 
     vendor: int = 0
     product: int = 0

@@ -1,4 +1,4 @@
-"""Heartbeats: those we listen to and the one we send, both told the time by their caller."""
+"""Heartbeats: those received and the one sent; the caller gives the time to both."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ from winchkit.schema.devices.device import DeviceSpec
 __all__ = ["AxisFeedback", "Cia402Axis"]
 
 _STALE_SYNCS, _STALE_BEATS = 5, 2
-"""Feedback that is older than both of these tells nothing of the drive's state any more."""
+"""Feedback that is older than both of these does not show the drive's state any more."""
 _NMT_STOP = 0x02
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
@@ -44,7 +44,7 @@ class Cia402Axis:
     """One drive on a CAN bus.
 
     ``commission``, ``switch_mode``, ``prepare_homing`` and ``set_profile`` talk SDO and may take
-    a second; ``send`` and ``feedback`` are for the control loop. ``begin_cycle`` tells it the
+    a second; ``send`` and ``feedback`` are for the control loop. ``begin_cycle`` gives it the
     number and time of each SYNC. The axis outlives its bus: after ``CanBus.reopen`` it is
     commissioned again.
     """
@@ -150,7 +150,7 @@ class Cia402Axis:
 
     @property
     def sdo_state(self) -> State | None:
-        """Power state that it told by SDO since the stop by SDO began."""
+        """Power state read by SDO since the stop by SDO began."""
         return self._sdo_stop.state
 
     @property
@@ -197,7 +197,7 @@ class Cia402Axis:
         return self._others.heard
 
     def forget_second_master(self) -> None:
-        """A reset begins; what somebody else commands from now on is told again."""
+        """A reset begins; another master's commands from now on are reported again."""
         self._others.forget()
 
     def disarm(self) -> None:
@@ -317,7 +317,7 @@ class Cia402Axis:
         position-controlled axis holds where it is; a drive that is not enabled gets zero and its
         actual position, so that it starts from rest. To run down is to halt where the drive makes
         the motion itself (PP, HM), and to quick-stop under a torque. ``start`` starts a homing
-        (HM). Nothing is enabled before the host's heartbeat has begun. Raises NotPermitted for
+        (HM). Nothing is enabled before the host's heartbeat runs. Raises NotPermitted for
         targets beyond the drive's range, ConnectionLost.
         """
         commander, feedback = self._commander, self.feedback
@@ -326,7 +326,7 @@ class Cia402Axis:
         if wish in (Wish.RUN_DOWN, Wish.HALT) and not MODES[self.mode].can_run_down:
             wish = Wish.STOP
         if wish is Wish.ENABLE and not self._watched:
-            # The drive's watchdog arms on the first life sign that it hears.
+            # The drive's watchdog arms on the first life sign that it receives.
             wish = Wish.DISABLE
         word = control_word(
             self.state,
@@ -404,7 +404,7 @@ class Cia402Axis:
         return self.drive
 
     def _listen(self, drive: Commissioned) -> Gathering:
-        """Hear the drive's TPDOs, put together anew."""
+        """Receive the drive's TPDOs with a new decoder."""
         check_feedback(self.name, drive.tpdo)
         gathering = Gathering(drive.tpdo, drive.scale, self._watch.cycle, self._position.counter)
         for codec in drive.tpdo:

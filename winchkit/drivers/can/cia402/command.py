@@ -96,7 +96,7 @@ class Commander:
         mode: str,
         counter: PositionCounter | None = None,
     ) -> None:
-        """Raise FileError where the device file maps too little, or what nobody fills."""
+        """Raise FileError where the device file maps too little, or an object without a source."""
         self._name, self._drive, self._mode = name, drive, MODES[mode]
         self.counter = counter or PositionCounter(*counter_range(drive.tpdo))
         self._set_point = SetPoint()

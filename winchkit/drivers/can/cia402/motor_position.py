@@ -23,7 +23,7 @@ class MotorPosition:
         self._boot_ups = 0
 
     def begin(self, drive: Commissioned, boot_ups: int) -> PositionCounter:
-        """The counter of a drive that has been set up; after a boot-up it has begun anew."""
+        """The counter of a drive that has been set up; a boot-up has reset it."""
         counter = self.counter
         if counter is None:
             low, high = self._wraps or counter_range(drive.tpdo)

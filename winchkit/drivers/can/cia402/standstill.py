@@ -1,6 +1,6 @@
 """Whether a motor stands still: by the resolution of 606Ch, confirmed by 6064h.
 
-The reported speed alone does not tell it. A drive that reports whole revolutions a minute shows
+The reported speed alone does not show it. A drive that reports whole revolutions a minute shows
 ±1 rpm (0.105 rad/s) of noise at rest, one of fine resolution shows many counts. So the speed has to
 be within its resolution, and the position has to stay where it is for a while.
 """
@@ -55,7 +55,7 @@ class Standstill:
 
 
 class PolledStandstill:
-    """Judges a drive that is asked by SDO, before its PDOs run or while nobody owns it."""
+    """Judges a drive that is read by SDO, before its PDOs run or while it has no owner."""
 
     def __init__(self, node: SdoNode, servo: ServoSpec, clock: Clock) -> None:
         """Read the drive's units; raises NoReply, DeviceRefused."""

@@ -34,7 +34,7 @@ class Scale:
     torque: float
     """N m; a per mille of the rated torque."""
     current: float = nan
-    """A; a per mille of the rated current, NaN where the drive does not tell it."""
+    """A; a per mille of the rated current, NaN where the drive does not report it."""
 
     @property
     def rated_torque(self) -> float:

@@ -85,7 +85,7 @@ class Mechanism:
         self.node, self.terms, self.clock = node, terms, clock
         self._rpdo, self._mode = rpdo, mode
         self.limit = terms.limit
-        """What the drive is told to tolerate, s."""
+        """Set time-out of the drive, s."""
 
     def require(self) -> str:
         """What the drive lacks for it, in words; empty where it lacks nothing."""
@@ -130,7 +130,7 @@ class Heartbeat(Mechanism):
         self.node.write_verified(0x1016, 1, consumer_entry(self.terms.host, self.limit))
 
     def withhold(self) -> float:
-        """One heartbeat of a node id that nobody has: no other drive is touched by its absence."""
+        """One heartbeat of a node id that is not in use: its absence affects no other drive."""
         limit = min(self.limit, _PROOF_TIME)
         stranger = self._free_node()
         self.node.write_verified(0x1016, 1, consumer_entry(stranger, limit))
@@ -142,7 +142,7 @@ class Heartbeat(Mechanism):
         self.set_up()
 
     def disarm(self) -> None:
-        """Watch nobody."""
+        """Watch no node."""
         self.node.write(0x1016, 1, 0)
 
     def _free_node(self) -> int:

@@ -40,7 +40,7 @@ class Proof:
     delay: float
     """From the last life sign to its answer, s."""
     limit: float
-    """What it had been told to tolerate, s."""
+    """Its set time-out, s."""
     fault: bool = False
     """Whether it went into the state fault, in which no drive stays enabled."""
     noticed: bool = True

@@ -70,7 +70,7 @@ class Config:
     values: Mapping[Key, Value]
     """By index and sub-index."""
     refused: tuple[str, ...] = field(default=(), compare=False)
-    """Objects that the drive would not tell, with its reason."""
+    """Objects that the drive refused to read, with its reason."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def settings(dictionary: Any) -> dict[Key, ODVariable]:
 
 
 def read_config(objects: Objects) -> Config:
-    """Read every setting; raises NoReply. What the drive refuses to tell is noted."""
+    """Read every setting; raises NoReply. What the drive refuses is noted."""
     values: dict[Key, Value] = {}
     refused = []
     for key, variable in settings(objects.dictionary).items():

@@ -127,7 +127,7 @@ def _noted(objects: Objects, index: int, sub: int, what: str) -> Noted:
 
 def _mode(shown: int | None) -> str:
     if shown is None:
-        return "not told"
+        return "not reported"
     return "none" if shown == 0 else mode_named(shown)
 
 

@@ -134,7 +134,7 @@ class _Ear:
 
     def __init__(self, bus: CanBus, node: int, clock: Clock, listen: float) -> None:
         self.bus, self.node, self.clock = bus, node, clock
-        self.begun = clock.now()
+        self.start = clock.now()
         self.watch = HeartbeatWatch(listen)
         self.beats = 0
         self.replies: Counter[bytes] = Counter()
@@ -158,7 +158,7 @@ class _Ear:
 
 
 def _reported(ear: _Ear) -> Found:
-    """A node that nobody here drives, with what is wrong with it."""
+    """A node that this host does not drive, with what is wrong with it."""
     if not ear.replies:
         # It may have been booting when it was asked.
         ear.bus.send(_SDO_REQUEST + ear.node, _UPLOAD_DEVICE_TYPE)
@@ -190,7 +190,7 @@ def _twins(ear: _Ear, port: ObjectPort, answers: int) -> str:
     if not said and ear.replies[_SERIAL] > 1:
         said = f"{ear.replies[_SERIAL]} answers to one request (1018h:4)"
     if not said and (period := _safely(port, 0x1017) or 0):
-        due = (ear.clock.now() - ear.begun) * 1e3 / period
+        due = (ear.clock.now() - ear.start) * 1e3 / period
         if ear.beats > _TOO_MANY * due + 2:
             said = f"{ear.beats} heartbeats where 1017h ({period} ms) makes {due:.0f}"
     return f"two nodes have this number: {said}; switch one off and give it another" if said else ""
