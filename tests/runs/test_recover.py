@@ -23,10 +23,16 @@ def data(tmp_path: Path) -> bytes:
 
 def test_recover_never_fails_on_a_cut_log(tmp_path: Path, data: bytes) -> None:
     path, saved = tmp_path / "cut.mcap", tmp_path / "saved.mcap"
-    kept = -1
-    for length in [*range(0, 300), *range(300, len(data), 131), len(data)]:
+    kept = 0
+    for length in [*range(1, 300), *range(300, len(data), 131), len(data)]:
         path.write_bytes(data[:length])
-        found = recover(path, saved, replace=True)
+        try:
+            found = recover(path, saved, replace=True)
+        except RunError as error:
+            assert "nothing to recover" in str(error)
+            assert not kept, "a longer file has as much"
+            assert not saved.exists()
+            continue
         assert found.kept >= kept, "a longer file has as much"
         assert found.dropped_pieces == 0
         assert found.was_whole is (length == len(data))
@@ -90,9 +96,14 @@ def test_rows_of_text_are_recovered(tmp_path: Path) -> None:
     data = path.read_bytes()
     for length in range(len(data) + 1):
         path.write_bytes(data[:length])
+        rows = max(data[:length].count(b"\n") - 3, 0)
+        if not rows:
+            with pytest.raises(RunError, match="nothing to recover"):
+                recover(path, replace=True)
+            continue
         found = recover(path, replace=True)
         assert found.dropped_pieces == 0
-        assert found.kept == max(data[:length].count(b"\n") - 3, 0)
+        assert found.kept == rows
         assert found.dropped_bytes == length - data[:length].rfind(b"\n") - 1
         if found.kept > 1:
             run = read_run(found.output)

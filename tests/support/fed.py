@@ -48,6 +48,7 @@ class Fed:
             for name in winches
         }
         self.phase, self.tripped, self.cycle = Phase.MOVING, (), 0
+        self.commander = ""
 
     def run(self, recorder: Recorder, duration: float) -> None:
         """So many seconds, at once."""
@@ -73,6 +74,7 @@ class Fed:
             motor_torque=2.0,
             cable_length=3.0,
             cable_speed=-0.1,
+            commander=self.commander,
         )
         return BenchSnapshot(
             self.clock.time, self.cycle, dict.fromkeys(self.sensors, winch), self.tripped

@@ -109,7 +109,7 @@ def _tares(event: Mapping[str, Any]) -> Mapping[str, str]:
 
 def _commanders(event: Mapping[str, Any]) -> Mapping[str, str]:
     winches = event.get("winch", {}).items()
-    return {name: str(item.get("commander") or "nobody") for name, item in winches}
+    return {name: str(item.get("commander") or "none") for name, item in winches}
 
 
 def _changes(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.formats.csv_read import read_bytes, read_csv
+from winchkit.runs.formats.csv_read import read_bytes, read_csv, read_events
 from winchkit.runs.log import Log, aligned, joined, log_of_run
 from winchkit.runs.recording.rotation import parts_beside
 from winchkit.runs.run import Run
@@ -101,7 +102,8 @@ def _read_run(path: Path) -> Run:
 
 def _read_log(path: Path, *, is_part: bool) -> Log:
     if _format_of(path) == ".csv":
-        return log_of_run(read_csv(path, is_part=is_part), closed=None)
+        log = log_of_run(read_csv(path, is_part=is_part), closed=None)
+        return replace(log, events=read_events(path))
     from winchkit.runs.formats.mcap_read import read_mcap_log
 
     return read_mcap_log(path)

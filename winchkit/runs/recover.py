@@ -11,6 +11,7 @@ from pathlib import Path
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.files import write_whole
 from winchkit.runs.formats.csv_read import read_bytes
+from winchkit.runs.formats.csv_write import EVENT_MARK
 from winchkit.runs.formats.mcap_file import MARK, PROFILE, McapFile
 from winchkit.runs.formats.mcap_records import (
     Body,
@@ -72,7 +73,7 @@ def recover(
     Raises
     ------
     RunError
-        For a file that is neither MCAP nor CSV.
+        For a file that is neither MCAP nor CSV, and one without a complete sample.
     FileError
         Where the output cannot be written.
     UsageError
@@ -95,6 +96,9 @@ def recover(
         saved, found = _csv(data, target)
     else:
         raise RunError(Fault(f"'{suffix}' is no format of a log; use .mcap or .csv", str(path)))
+    if not found.kept:
+        message = "holds no complete sample; there is nothing to recover"
+        raise RunError(Fault(message, str(path)))
     write_whole(target, saved)
     return found
 
@@ -207,6 +211,9 @@ def _csv(data: bytes, target: Path) -> tuple[bytes, Recovered]:
             if text and not text.startswith(b"#"):
                 header = text.split(b",")
                 time_at = next((n for n, c in enumerate(header) if c.startswith(b"time")), -1)
+            kept.append(line)
+            continue
+        if text.startswith(EVENT_MARK.encode()) and b"\0" not in text:
             kept.append(line)
             continue
         numbers = _numbers(text, len(header))

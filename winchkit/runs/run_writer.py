@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import Any, BinaryIO, Self
 
 from winchkit.errors import UsageError
 from winchkit.runs.files import abandoned
@@ -87,6 +87,10 @@ class RunWriter(ABC):
         now = self._clock()
         if now - self._flushed >= self.flush_interval:
             self.flush()
+
+    def add_event(self, time: float, event: Mapping[str, Any]) -> None:
+        """Add an event at a time of the run (s), where the format has a place for it."""
+        return
 
     def require_in_place(self) -> None:
         """Raise FileError where the file was removed, replaced or truncated."""

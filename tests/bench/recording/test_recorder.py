@@ -21,6 +21,7 @@ from winchkit.bench.recording.recorder import Recorder
 from winchkit.drivers.reading import Quality
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import read_run
+from winchkit.runs.info import info_of
 from winchkit.runs.read import read_log
 from winchkit.runs.recording.rotation import Rotation
 
@@ -112,6 +113,31 @@ def test_a_log_by_channels_loses_nothing(tmp_path: Path) -> None:
     ]
     assert log.counters[-1].value["log"]["drops"] == 0
     assert set(log.counters[-1].value) >= {"A.cell", "B.temperature"}
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mcap"])
+@pytest.mark.parametrize("rotation", [None, Rotation(size=8_000)])
+def test_every_log_has_its_trips_and_who_commanded_each_winch_when(
+    tmp_path: Path, suffix: str, rotation: Rotation | None
+) -> None:
+    path = tmp_path / f"a.{suffix}"
+    with recording(path, "A", rotation=rotation) as (fed, recorder):
+        for name in ("jog of anna", "move of ben", ""):
+            fed.commander = name
+            fed.run(recorder, 1.0)
+            written = recorder.rows
+            while recorder.rows < written + 30:
+                recorder.check()
+                os.sched_yield()
+        fed.trip("tension 900 N above 800 N")
+        fed.run(recorder, 0.5)
+    assert len(recorder.parts) > 1 or rotation is None
+    info = info_of(read_log(path if rotation is None else recorder.parts))
+    texts = [re.sub(r"\d\.\d+ s", "T", text) for text in info.commanders]
+    assert texts == ["A: jog of anna", "A from T on: move of ben", "A from T on: none"]
+    times = [float(text.split()[2]) for text in info.commanders[1:]]
+    assert times == pytest.approx([1.0, 2.0], abs=0.1)
+    assert info.events == ("winch A: tension 900 N above 800 N",)
 
 
 def test_torque_is_unknown_while_the_drive_is_unpowered(tmp_path: Path) -> None:

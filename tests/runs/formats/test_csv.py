@@ -258,3 +258,16 @@ def test_no_damage_brings_the_reader_down(place: int, what: bytes, tmp_path: Pat
         run = run_of(tmp_path / "d.csv", data[:place] + what + data[place + 1 :])
         assert (np.diff(run.time) > 0).all()
         assert len(run["motor_angle"]) == len(run.time)
+
+
+def test_comments_between_the_rows_are_no_rows(tmp_path: Path) -> None:
+    path = tmp_path / "other.csv"
+    path.write_text(
+        "time [s],motor_angle [rad],remark\n0,0,#1\n# stopped here, by hand, twice, at once\n"
+        "1,2,#2\n# end\n",
+        encoding="utf-8",
+    )
+    run = read_run(path)
+    assert run["motor_angle"].tolist() == [0.0, 2.0]
+    path.write_text("note,time [s],motor_angle [rad]\n#7,0,0\n#8,1,2\n", encoding="utf-8")
+    assert read_run(path)["motor_angle"].tolist() == [0.0, 2.0]

@@ -91,7 +91,8 @@ def test_a_last_part_cut_anywhere_costs_nothing_but_itself(tmp_path: Path) -> No
     before = sum(len(read_run(part)) for part in others)
     for length in range(0, len(data), 41):
         last.write_bytes(data[:length])
-        rows = max(data[:length].count(b"\n") - data.count(b"#") - 1, 0)
+        whole = data[: data[:length].rfind(b"\n") + 1].splitlines()
+        rows = max(sum(not line.startswith(b"#") for line in whole) - 1, 0)
         assert len(read_run(tmp_path / "many.csv")) == before + rows
 
 

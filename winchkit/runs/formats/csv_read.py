@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import codecs
 import csv
+import json
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,8 @@ from winchkit.errors import Fault, RunError
 from winchkit.regular_file import regular
 from winchkit.runs.assemble import Recording, assemble, refuse
 from winchkit.runs.columns import column_dimension, header_of
-from winchkit.runs.formats.csv_write import CSV_MARK
+from winchkit.runs.formats.csv_write import CSV_MARK, EVENT_MARK
+from winchkit.runs.log import Note
 from winchkit.runs.recording.log_file import is_written
 from winchkit.runs.run import Run
 
@@ -24,6 +27,7 @@ __all__ = [
     "cut_off",
     "read_bytes",
     "read_csv",
+    "read_events",
     "read_lines",
 ]
 
@@ -141,7 +145,7 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
     number = len(above) + 1
     header = _header(name, first or "", number)
     table, notes = _Table(name, header), _Notes(name, is_own=is_own)
-    for rows, numbers in _blocks(name, notes.whole(lines, len(header)), number):
+    for rows, numbers in _blocks(name, notes.whole(lines, len(header)), number, len(header)):
         table.add(rows, numbers)
     refuse(table.ragged())
     return assemble(
@@ -158,6 +162,23 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
             is_part,
         )
     )
+
+
+def read_events(path: str | Path) -> tuple[Note, ...]:
+    """Events of a log of winchkit, which are comments between its rows; raises RunError.
+
+    An event that was cut off or edited is not a JSON object any more, and is left out.
+    """
+    events = []
+    for line in read_lines(Path(path)):
+        if not line.startswith(EVENT_MARK):
+            continue
+        time, _, text = line.removeprefix(EVENT_MARK).partition(" s: ")
+        with suppress(ValueError):
+            value = json.loads(text)
+            if isinstance(value, dict):
+                events.append(Note(float(time), value))
+    return tuple(events)
 
 
 class _Notes:
@@ -326,14 +347,26 @@ def _header(path: str, line: str, number: int) -> list[tuple[str, str]]:
     return [read for _, read in header if read is not None]
 
 
-def _blocks(path: str, lines: Iterator[str], start: int) -> Iterator[tuple[Rows, list[int]]]:
-    """Cells and lines of all rows that are not blank, in blocks."""
+def _is_row(cells: Sequence[str], width: int) -> bool:
+    """Whether a line has a row: it is neither blank nor a comment between the rows."""
+    if not cells or (len(cells) == 1 and not cells[0].strip()):
+        return False
+    if cells[0].startswith(EVENT_MARK):
+        return False
+    # A full row may start with a text such as "#7".
+    return not (cells[0].lstrip().startswith("#") and len(cells) != width)
+
+
+def _blocks(
+    path: str, lines: Iterator[str], start: int, width: int
+) -> Iterator[tuple[Rows, list[int]]]:
+    """Cells and lines of all rows, in blocks; ``width`` is that of the header."""
     rows: Rows = []
     numbers: list[int] = []
     reader = csv.reader(lines)
     try:
         for row in reader:
-            if row and (len(row) > 1 or row[0].strip()):
+            if _is_row(row, width):
                 rows.append(row)
                 numbers.append(start + reader.line_num)
             if len(rows) == _BLOCK:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from winchkit.runs.run_writer import RunWriter
 
-__all__ = ["CSV_MARK", "CsvWriter"]
+__all__ = ["CSV_MARK", "EVENT_MARK", "CsvWriter"]
 
 CSV_MARK = "# written by winchkit"
 """First line of a CSV file of winchkit, each of whose lines ends with a line feed.
 
 A run without metadata that is written at once starts with its header instead.
 """
+EVENT_MARK = "# event"
+"""Start of a comment between the rows: the time of an event (s), a colon, a JSON object."""
 
 
 class CsvWriter(RunWriter):
@@ -31,6 +35,10 @@ class CsvWriter(RunWriter):
         if metadata or self.is_streamed:
             lines.insert(0, f"{CSV_MARK}\n")
         self._stream.write("".join([*lines, header.getvalue()]).encode())
+
+    def add_event(self, time: float, event: Mapping[str, Any]) -> None:
+        """Add an event at a time of the run (s) as a comment between the rows."""
+        self._waiting.append(f"{EVENT_MARK} {time:.6f} s: {json.dumps(event)}\n")
 
     def _row(self, values: Sequence[float]) -> None:
         # NaN is the only number that differs from itself.

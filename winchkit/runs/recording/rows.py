@@ -26,6 +26,8 @@ class RowLog(LogWriter):
 
     def __init__(self, path: Path, layout: Layout, *others: Any, replace: bool) -> None:
         self._aligner, self._newest = Aligner(layout), layout.rule.opened
+        self._events: list[tuple[float, Mapping[str, Any]]] = []
+        self._event: tuple[float, Mapping[str, Any]] | None = None
         super().__init__(path, layout, *others, replace=replace)
 
     def _open_part(self, path: Path, stream: BinaryIO, about: Mapping[str, str]) -> None:
@@ -33,6 +35,15 @@ class RowLog(LogWriter):
         columns = self._layout.columns()
         self._writer = kind_for(path)(path, columns, metadata, time.monotonic, lambda: stream)
         self._watch(self._writer.descriptor)
+        self._events = [self._event] if self._event else []
+
+    def tell(self, time: float, event: Mapping[str, Any]) -> None:
+        """Keep an event at a moment (s); it is written as soon as the time of the first row is set.
+
+        The last event is repeated at the start of the next part.
+        """
+        self._event = time, event
+        self._events.append(self._event)
 
     def _put(self, pieces: Mapping[str, Samples], now: float) -> None:
         for topic, samples in pieces.items():
@@ -43,6 +54,10 @@ class RowLog(LogWriter):
     def _append(self, rows: NDArray[np.float64]) -> None:
         for row in rows.tolist():
             self._writer.append_values(row)
+        if self._aligner.start is not None:
+            for moment, event in self._events:
+                self._writer.add_event(moment - self._aligner.start, event)
+            self._events.clear()
         self._writer.flush()
         self.rows += len(rows)
 
