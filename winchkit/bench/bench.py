@@ -46,11 +46,9 @@ from winchkit.errors import (
     LimitTripped,
     MotionError,
     NotPermitted,
-    UsageError,
 )
 from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
-from winchkit.units import suggest
 
 __all__ = ["Bench", "Stations"]
 
@@ -389,13 +387,7 @@ class Bench:
 
     def named(self, name: str | None) -> Winch:
         """A winch by name, or the only one; raises UsageError."""
-        if name is None and len(self.winch) == 1:
-            return next(iter(self.winch.values()))
-        known = list(self.winch)
-        if name not in self.winch:
-            what = f"no winch '{name}'" if name else "which winch?"
-            raise UsageError(f"{what}; it has {', '.join(known)}" + suggest(name or "", known))
-        return self.winch[name]
+        return self.winch[self.spec.winch_named(name)]
 
     def _urgent_threads(self) -> list[int]:
         """Native ids of the control thread and the receive threads, as far as they run."""

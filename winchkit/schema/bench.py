@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
+from winchkit.errors import UsageError
 from winchkit.schema.devices.servo import OptionSpec
 from winchkit.schema.quantity import (
     Flag,
@@ -25,6 +26,7 @@ from winchkit.schema.quantity import (
     WholeNumber,
 )
 from winchkit.schema.table import Rule, Table
+from winchkit.units import suggest
 
 __all__ = ["BenchSpec", "BusSpec", "DeviceRef", "LimitSpec", "WinchWiring"]
 
@@ -196,6 +198,16 @@ class BenchSpec(Table):
     def effect_files(self) -> tuple[Path, ...]:
         """The files of ``effects``; relative paths start at the folder of the bench file."""
         return tuple(Path(self.path).parent / file for file in self.effects)
+
+    def winch_named(self, name: str | None) -> str:
+        """The name of a winch, or of the only one for None; raises UsageError."""
+        if name is None and len(self.winch) == 1:
+            return next(iter(self.winch))
+        if name is None or name not in self.winch:
+            what = f"no winch '{name}'" if name else "which winch?"
+            known = list(self.winch)
+            raise UsageError(f"{what}; it has {', '.join(known)}" + suggest(name or "", known))
+        return name
 
     def with_effects(self, files: Iterable[str | Path]) -> BenchSpec:
         """The bench with further files of effects; relative paths start at the working folder."""

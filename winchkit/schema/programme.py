@@ -22,11 +22,14 @@ from winchkit.schema.table import Rule, Table
 from winchkit.units import format_quantity
 
 __all__ = [
+    "ALL",
     "Programme",
     "Step",
     "write_programme",
 ]
 
+ALL = "all"
+"""Name that stands for all winches of a bench, in programmes and commands."""
 _RUN_UP = 0.1
 """Distance over which the first position of a programme is approached, m."""
 STEP_ACTIONS = ("to", "by", "hold", "ask")
@@ -36,7 +39,7 @@ STEP_ACTIONS = ("to", "by", "hold", "ask")
 class Step(Table):
     """One step: exactly one of ``to``, ``by``, ``hold`` and ``ask`` is given."""
 
-    winch: str = "all"
+    winch: str = ALL
     to: Annotated[float, Quantity("length", 0.0, why="a cable length is at least 0")] | None = None
     """Cable length to go to, m."""
     by: Length | None = None
@@ -107,7 +110,7 @@ class Programme(Table):
         here: float | None = None
         before: float | None = None
         for step in self.step:
-            if step.winch not in ("all", winch) or (step.to is None and step.by is None):
+            if step.winch not in (ALL, winch) or (step.to is None and step.by is None):
                 continue
             goal = step.to if step.to is not None else None
             if goal is None and here is not None:
@@ -170,7 +173,7 @@ def write_programme(programme: Programme, path: Path) -> None:
 
 
 def _written(step: Step) -> dict[str, Any]:
-    out: dict[str, Any] = {} if step.winch == "all" else {"winch": step.winch}
+    out: dict[str, Any] = {} if step.winch == ALL else {"winch": step.winch}
     for key in _ORDER:
         value = getattr(step, key)
         if value is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from winchkit.errors import Fault, FileError
 from winchkit.schema.bench import LimitSpec
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import ALL, Programme, Step
 from winchkit.sim.plant.trajectory import SCurve, plan
 from winchkit.units import suggest
 
@@ -167,7 +167,7 @@ def schedule(
 
 
 def _winches(step: Step, limits: Mapping[str, LimitSpec]) -> list[str]:
-    return list(limits) if step.winch == "all" else [step.winch]
+    return list(limits) if step.winch == ALL else [step.winch]
 
 
 def _check_names(programme: Programme, known: list[str]) -> None:
@@ -179,7 +179,7 @@ def _check_names(programme: Programme, known: list[str]) -> None:
             key=f"step[{index}].winch",
         )
         for index, step in enumerate(programme.step)
-        if step.winch != "all" and step.winch not in known
+        if step.winch != ALL and step.winch not in known
     ]
     if faults:
         raise FileError(faults)

@@ -234,3 +234,29 @@ def test_stop_says_in_json_who_has_confirmed(bench: Served) -> None:
     told = {item["winch"]: item for item in json.loads(alone.stdout)["stopped"]}
     assert set(told) == {"A", "B"}
     assert all(item["confirmed"] for item in told.values())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("move", "C", "--to", "1 m"),
+        ("jog", "C", "--pay-out", "10 mm"),
+        ("home", "C", "--here", "1 m"),
+        ("tare", "C"),
+    ],
+)
+def test_a_wrong_winch_is_refused_before_its_bus_is_opened(
+    tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    file = tmp_path / "bench.toml"
+    file.write_text(
+        'schema = 1\nkind = "bench"\nname = "away"\n'
+        '[bus.can]\nkind = "can"\ninterface = "socketcan"\nchannel = "absent0"\n'
+        '[winch.A]\nprofile = "bench-spiral"\n'
+        'servo = { device = "generic-cia402", bus = "can", node = 1 }\n'
+        'limits = { speed = "0.1 m/s", acceleration = "0.1 m/s^2" }\n',
+        encoding="utf-8",
+    )
+    result = invoke(*arguments, "-b", str(file))
+    assert result.exit_code == 2, result.output
+    assert "no winch 'C'" in result.stderr

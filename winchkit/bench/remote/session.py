@@ -74,7 +74,7 @@ def attach(
 
 @contextmanager
 def at_station(
-    bench_file: str | Path,
+    bench: str | Path | BenchSpec,
     effects: Sequence[str] = (),
     *,
     client: str = "",
@@ -87,7 +87,8 @@ def at_station(
     """
     from winchkit.schema.read import read_bench
 
-    spec, name = read_bench(bench_file), client_name(client or None)
+    spec = bench if isinstance(bench, BenchSpec) else read_bench(bench)
+    name = client_name(client or None)
     remote = _attached(spec, effects, name, observer=observer)
     if remote is not None:
         # The process that opened it may have no terminal.
@@ -98,8 +99,8 @@ def at_station(
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
 
-    with open_bench(spec, effects=effects, name=name, realtime="try") as bench:
-        station = LocalStation(bench, Client(name, observer=observer))
+    with open_bench(spec, effects=effects, name=name, realtime="try") as opened:
+        station = LocalStation(opened, Client(name, observer=observer))
         try:
             yield station
         finally:

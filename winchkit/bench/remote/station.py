@@ -15,11 +15,9 @@ from winchkit.bench.recording.recorder import Recorder, counters_of
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.winch import Winch
 from winchkit.errors import UsageError
+from winchkit.schema.programme import ALL
 
-__all__ = ["ALL", "LocalStation", "Station"]
-
-ALL = "all"
-"""Stands for every winch, as in a motion programme."""
+__all__ = ["LocalStation", "Station"]
 
 
 class Station(Protocol):

@@ -68,7 +68,7 @@ def command(
         raise UsageError("--at belongs to --method; --here names the length already")
     length = optional(here if here is not None else at, "length")
     with station_for(
-        bench, client="home", dry_run=dry_run, as_json=as_json, effects=effects
+        bench, client="home", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
     ) as station:
         if take_over:
             station.take_over(winch)

@@ -84,7 +84,7 @@ def command(
     if asked.direction is None and (dry_run or not sys.stdin.isatty()):
         raise UsageError(f"there is no terminal to hold a key on: {_HOW}")
     with station_for(
-        bench, client="jog", dry_run=dry_run, as_json=as_json, effects=effects
+        bench, client="jog", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
     ) as station:
         if reset:
             station.reset()

@@ -71,7 +71,7 @@ def command(
     change = None if direction is None else direction.change
     fastest, ramp = optional(speed, "speed"), optional(acceleration, "acceleration")
     with station_for(
-        bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects
+        bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
     ) as station:
         if take_over:
             station.take_over(winch)

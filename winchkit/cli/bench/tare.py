@@ -21,9 +21,11 @@ def command(winch: str | None, bench: str, as_json: bool) -> None:
     --clear` takes away. Nothing is written into its EEPROM.
     """
     from winchkit.bench.remote.session import at_station
+    from winchkit.schema.read import read_bench
 
-    with at_station(bench, client="tare") as station:
-        name = winch if winch is not None or len(station.names()) > 1 else station.names()[0]
+    spec = read_bench(bench)
+    name = spec.winch_named(winch)
+    with at_station(spec, client="tare") as station:
         tension = station.tare(name)
     if as_json:
         echo_json({"schema": 1, "winch": name, "tension": tension})

@@ -17,6 +17,7 @@ import click
 
 from winchkit.cli.core.output import echo_json
 from winchkit.drivers.clock import Clock
+from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
     from winchkit.bench.remote.station import Station
@@ -56,20 +57,24 @@ def station_for(
     dry_run: bool,
     as_json: bool = False,
     effects: Sequence[str] = (),
+    winch: str | None = ALL,
 ) -> Iterator[Station]:
     """A station at the bench or, for a dry run, at a rehearsal whose frames are then shown.
 
-    ``client`` is the command's name, as other clients of the bench see it.
+    ``client`` is the command's name, as other clients of the bench see it. A ``winch`` that the
+    bench lacks is refused before anything is opened.
     """
     from winchkit.bench.remote.session import at_station
-
-    if not dry_run:
-        with at_station(bench, effects, client=client) as station:
-            yield station
-        return
     from winchkit.schema.read import read_bench
 
-    spec = read_bench(bench).with_effects(effects)
+    spec = read_bench(bench)
+    if winch != ALL:
+        spec.winch_named(winch)
+    if not dry_run:
+        with at_station(spec, effects, client=client) as station:
+            yield station
+        return
+    spec = spec.with_effects(effects)
     frames: list[Frame] = []
     with _rehearsal(spec, frames) as station:
         yield station

@@ -14,7 +14,7 @@ from types import TracebackType
 
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec, BusSpec
-from winchkit.schema.programme import Step
+from winchkit.schema.programme import ALL, Step
 from winchkit.schema.simbench import FaultSpec, SimBench
 from winchkit.sim.bench import hiding, profiles_of
 from winchkit.sim.clock.can_bus import SimulatedCanBus
@@ -123,7 +123,7 @@ class LiveBench:
 
     def answer(self, step: Step) -> None:
         """Execute an operator request of a programme: its ``load_mass``, its ``temperature``."""
-        for name in self.winches if step.winch == "all" else [step.winch]:
+        for name in self.winches if step.winch == ALL else [step.winch]:
             if step.load_mass is not None:
                 self.hang(name, step.load_mass)
             if step.temperature is not None:

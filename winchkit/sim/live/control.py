@@ -9,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 
 from winchkit.errors import FileError, UsageError, WinchkitError
+from winchkit.schema.programme import ALL
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.client import REFUSED, address_file
 from winchkit.units import parse, suggest
@@ -43,12 +44,12 @@ def obey(live: LiveBench, line: str) -> str:
     first, _, more = rest.strip().partition(" ")
     if word == "load":
         mass = parse(more, "mass")
-        for name in live.winches if first == "all" else [first]:
+        for name in live.winches if first == ALL else [first]:
             live.hang(name, mass)
         return f"{more} on {first}"
     if word == "warm":
         temperature = parse(more, "temperature")
-        for name in live.winches if first == "all" else [first]:
+        for name in live.winches if first == ALL else [first]:
             live.warm(name, temperature)
         return f"{more} on {first}"
     if word == "fault":
