@@ -29,7 +29,7 @@ def test_recover_never_fails_on_a_cut_log(tmp_path: Path, data: bytes) -> None:
         try:
             found = recover(path, saved, replace=True)
         except RunError as error:
-            assert "nothing to recover" in str(error)
+            assert "nothing to recover" in str(error)  # noqa: PT017 - of some lengths
             assert not kept, "a longer file has as much"
             assert not saved.exists()
             continue

@@ -8,6 +8,7 @@ import os
 import socket
 import sys
 import tempfile
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -22,20 +23,44 @@ _CONNECT_TIME = 2.0
 
 
 def digest_of(spec: BenchSpec) -> str:
-    """Changes with everything that the bench's files say: wiring, profiles, devices, effects."""
+    """SHA-1 of the bench file and of every file that it names: a changed one changes it.
+
+    These are profiles, device files, EDS, calibrations and effects; a missing one counts as empty.
+    """
     absolute = replace(spec, path=os.path.abspath(spec.path), latch_file="")
-    parts = [repr(absolute).encode()]
-    for winch in spec.winch.values():
-        with suppress(WinchkitError, OSError):
-            parts.append(catalog.find("profiles", winch.profile, spec.path or None).read_bytes())
-        with suppress(WinchkitError, OSError):
-            parts.append(
-                catalog.find("devices", winch.servo.device, spec.path or None).read_bytes()
-            )
-    for file in spec.effect_files:
+    digest = hashlib.sha1(repr(absolute).encode(), usedforsecurity=False)
+    for file in dict.fromkeys(_files_of(spec)):
+        digest.update(b"\0")
         with suppress(OSError):
-            parts.append(file.read_bytes())
-    return hashlib.sha1(b"\0".join(parts), usedforsecurity=False).hexdigest()
+            digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def _files_of(spec: BenchSpec) -> Iterator[Path]:
+    """Files that a bench file names, in its order; names that are not found are left out."""
+    beside = spec.path or None
+    for winch in spec.winch.values():
+        with suppress(WinchkitError):
+            yield catalog.find("profiles", winch.profile, beside)
+        for ref in (winch.servo, winch.cell, winch.load, winch.length, winch.temperature):
+            if ref is None:
+                continue
+            with suppress(WinchkitError):
+                device = catalog.find("devices", ref.device, beside)
+                yield device
+                if ref is winch.servo:
+                    yield from _eds_of(device)
+            if ref.calibration is not None:
+                yield Path(spec.path).parent / ref.calibration
+    yield from spec.effect_files
+
+
+def _eds_of(device: Path) -> tuple[Path, ...]:
+    """EDS of a servo's device file; raises FileError for one that cannot be read."""
+    from winchkit.schema.read import read_device
+
+    servo = read_device(device).servo
+    return () if servo is None else (device.parent / servo.eds,)
 
 
 def log_path(spec: BenchSpec) -> Path:

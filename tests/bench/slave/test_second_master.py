@@ -6,13 +6,14 @@ back within a cycle, or it is a target that counts from the next SYNC on.
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from slave import Slave, State
 from slave.held_key import jogging, observe, since
-from slave.rig import CYCLE, Rig
+from slave.rig import CYCLE, Rig, bench_text
 from slave.wire import GENERIC
 from winchkit.errors import LimitTripped
 
@@ -132,6 +133,27 @@ def test_at_rest_it_is_a_trip_too_and_the_reset_sets_the_drive_up_anew(tmp_path:
             bench.winch["A"].jog(pay_out=0.1)
         bench.reset()
         assert objects.get(0x1016, 1) == watched
+
+
+def test_an_rpdo_that_cannot_be_switched_off_is_listened_to(tmp_path: Path) -> None:
+    device = tmp_path / "fixed-rpdo"
+    shutil.copytree(GENERIC.parent, device)
+    eds = device / GENERIC.name
+    text = eds.read_text(encoding="utf-8")
+    head, place, rest = text.partition("[1402sub1]")
+    rest = rest.replace("AccessType=rw", "AccessType=ro", 1)
+    rest = rest.replace("$NODEID+0x80000400", "$NODEID+0x400", 1)
+    eds.write_text(head + place + rest, encoding="utf-8")
+    rig = Rig(tmp_path, [Slave.from_file(eds, 1)])
+    with rig.opened(bench_text(rig.channel, device=str(device / "device.toml"))) as bench:
+        key = jogging(rig, bench)
+        start = rig.time
+        rig.from_stranger(0x401, bytes(8))
+        rig.wait(0.5)
+        seen = observe(rig, key, start)
+        assert "RPDO 3 to node 1" in seen.cause
+        key.release()
+    assert seen.left <= _WITHIN
 
 
 def test_a_master_that_goes_on_keeps_a_reset_from_succeeding(tmp_path: Path) -> None:

@@ -95,6 +95,7 @@ class Cia402Axis:
         self.heartbeat.forget()
         await_booted(self._node, self.servo.boot_time, self._clock, self.heartbeat)
         self._others.hear_further_servers(self._node)
+        self._others.hear_further_rpdos(self._node)
         # Only a boot-up after this one takes away what is set up now.
         self._boot_ups = self.heartbeat.boot_ups
         self._beats = self._bus.beats[self._watch.host]

@@ -17,6 +17,7 @@ __all__ = ["SecondMaster"]
 
 _NMT, _SDO_REQUEST, _HEARTBEAT = 0x000, 0x600, 0x700
 _FURTHER_SERVERS = range(0x1201, 0x1280)
+_RPDOS = range(0x1400, 0x1600)
 _INVALID, _IDENTIFIER = 1 << 31, 0x7FF
 _DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6
 """Command specifiers of requests (CiA 301); a block download begins where bit 0 is 0."""
@@ -47,7 +48,8 @@ class SecondMaster:
         self.heard = ""
         """The first command that was not sent here, in words; empty where there was none."""
         self._bus, self._node = bus, node
-        for number in rpdos:
+        self._rpdos = set(rpdos)
+        for number in self._rpdos:
             bus.on_foreign(cob_id("rpdo", number, node), partial(self._take_rpdo, number))
         bus.on_foreign(_SDO_REQUEST + node, self._take_sdo)
         bus.on_foreign(_NMT, self._take_nmt)
@@ -60,6 +62,17 @@ class SecondMaster:
                 identifier = node.read_if_there(record, 1)
                 if identifier is not None and not identifier & _INVALID:
                     self._bus.on_foreign(identifier & _IDENTIFIER, self._take_sdo)
+
+    def hear_further_rpdos(self, node: SdoNode) -> None:
+        """Listen to the RPDOs that could not be switched off; raises NoReply, DeviceRefused."""
+        for record in _RPDOS:
+            number = record - _RPDOS.start + 1
+            if number in self._rpdos or record not in node.dictionary or node.writes(record, 1):
+                continue
+            identifier = node.read_if_there(record, 1)
+            if identifier is not None and not identifier & _INVALID:
+                self._rpdos.add(number)
+                self._bus.on_foreign(identifier & _IDENTIFIER, partial(self._take_rpdo, number))
 
     def forget(self) -> None:
         """A reset has shown it."""
