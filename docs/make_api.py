@@ -15,7 +15,10 @@ SECTIONS = {
         *("find", "read_profile", "read_robot", "read_bench", "read_programme", "read_simbench"),
         *("read_run", "read_poses", "write_run", "open_writer", "Run"),
     ),
-    "Diagnosis": ("compare", "diagnose", "plan", "add", "load_catalogue", "Effect", "Parameter"),
+    "Diagnosis": (
+        *("compare", "diagnose", "plan", "add", "write_addition"),
+        *("load_catalogue", "Effect", "Parameter"),
+    ),
     "Cable robots": ("robot_of", "Robot", "Pose", "RobotCycle", "ForceLimits", "calibrate"),
     "Estimators": ("DahlEstimator", "identify_dahl", "ElongationCorrection"),
     "Errors": (

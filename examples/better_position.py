@@ -25,8 +25,8 @@ from winchkit import (
     read_programme,
     read_simbench,
     simulate,
+    write_addition,
 )
-from winchkit.cli.model.add import write_addition
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.simbench import SimBench
 

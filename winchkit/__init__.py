@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.compare import compare
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.plan import plan
+    from winchkit.diagnosis.write import write_addition
     from winchkit.effects.catalogue import load_catalogue
     from winchkit.effects.effect import Effect, Parameter
     from winchkit.errors import (
@@ -108,6 +109,7 @@ __all__ = [
     "read_simbench",
     "robot_of",
     "simulate",
+    "write_addition",
     "write_run",
 ]
 
@@ -122,6 +124,7 @@ _NAMES = {
     "winchkit.diagnosis.compare": ("compare",),
     "winchkit.diagnosis.diagnose": ("diagnose",),
     "winchkit.diagnosis.plan": ("plan",),
+    "winchkit.diagnosis.write": ("write_addition",),
     "winchkit.effects.catalogue": ("load_catalogue",),
     "winchkit.effects.effect": (
         "Effect",

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
     from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["command", "write_addition"]
+__all__ = ["command"]
 
 
 @click.command(cls=ManyValues)
@@ -44,6 +44,7 @@ def command(
     """
     from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.add import grow
+    from winchkit.diagnosis.write import write_addition
     from winchkit.schema.profiles.robot import RobotProfile
 
     declared, catalogue = declared_profile(asked.source), asked.catalogue
@@ -74,6 +75,7 @@ def _to_robot(
 ) -> None:
     """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
     from winchkit.diagnosis.robot.add import grow_robot
+    from winchkit.diagnosis.write import write_addition
 
     name, _, place = effect.partition("/")
     line = asked.winch or place or None
@@ -97,12 +99,3 @@ def _tell(addition: Addition, output: str, as_json: bool) -> None:
     from winchkit.report.text import addition_text
 
     click.echo(addition_text(addition))
-
-
-def write_addition(source: Path, addition: Addition, runs: Sequence[str], out: Path) -> None:
-    """Write a fitted addition into a copy of a profile, with its provenance."""
-    from winchkit.cli.model.options import provenance
-    from winchkit.profile_edit.fitted import write_fitted
-
-    fitted, judged = provenance(addition.terms, addition.outputs, runs)
-    write_fitted(source, fitted, out, judged)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -12,19 +12,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.errors import Fault, FileError, UsageError
+from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
-    from winchkit.diagnosis.results import Estimate, OutputFit
     from winchkit.effects.catalogue import Catalogue
-    from winchkit.effects.term import Term
-    from winchkit.profile_edit.fitted import Fitted
-    from winchkit.profile_edit.ledger import Judged
     from winchkit.runs.run import Run
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = [
-    "ALL",
     "Asked",
     "ManyValues",
     "declared_profile",
@@ -33,7 +29,6 @@ __all__ = [
     "model_options",
     "page_title",
     "pages_beside",
-    "provenance",
     "read_all",
     "read_each",
     "read_runs",
@@ -42,9 +37,6 @@ __all__ = [
     "save_page",
     "write_page",
 ]
-
-ALL = "all"
-"""Said to ``--winch``: every winch of the runs by itself."""
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 _MODEL_OPTIONS = (
@@ -278,27 +270,3 @@ def refuse_curves(declared: WinchProfile | RobotProfile) -> None:
             "'winchkit diagnose' reports what explains the residual; write the effect by hand, as "
             "examples/my_effect.py, with on_robot, and give it with --effects"
         )
-
-
-def provenance(
-    terms: Sequence[tuple[Term, Mapping[str, Estimate]]],
-    outputs: Mapping[str, OutputFit],
-    runs: Sequence[str],
-) -> tuple[list[Fitted], Judged]:
-    """Fitted terms and the ledger's figures, dated today."""
-    from datetime import UTC, datetime
-
-    from winchkit.profile_edit.fitted import Fitted
-    from winchkit.profile_edit.ledger import Judged
-
-    today = datetime.now(UTC).date()
-    fitted = [Fitted(t, {n: e.std for n, e in v.items()}, runs, today) for t, v in terms]
-    judged = Judged(
-        today,
-        runs,
-        {name: o.unit for name, o in outputs.items()},
-        {name: o.heldout_rms_before for name, o in outputs.items()},
-        {name: o.heldout_rms_after for name, o in outputs.items()},
-        {name: o.noise_rms for name, o in outputs.items() if o.noise_rms is not None},
-    )
-    return fitted, judged

@@ -31,6 +31,7 @@ def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json
     """
     from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.add import remove
+    from winchkit.diagnosis.write import write_removal
     from winchkit.schema.profiles.robot import RobotProfile
 
     declared, removal = declared_profile(asked.source), None
@@ -43,20 +44,10 @@ def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json
             removal = remove_from_robot(effect, read_all(runs), declared, asked.catalogue)
     elif runs:
         removal = remove(effect, asked.runs(runs), declared, asked.catalogue, asked.band)
-    _write(asked.source, effect, removal, runs, Path(output))
+    names = [Path(run).name for run in runs]
+    write_removal(asked.source, effect, removal, names, output)
     click.echo(f"written: {output}", err=True)
     _tell(effect, removal, as_json)
-
-
-def _write(
-    source: Path, effect: str, removal: Removal | None, runs: Sequence[str], out: Path
-) -> None:
-    from winchkit.cli.model.options import provenance
-    from winchkit.profile_edit.fitted import write_without
-
-    terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
-    fitted, judged = provenance(terms, outputs, [Path(run).name for run in runs])
-    write_without(source, effect, fitted, out, judged)
 
 
 def _tell(effect: str, removal: Removal | None, as_json: bool) -> None:

@@ -109,9 +109,9 @@ def record(bench: SimBench, seed: int, folder: Path, report: ProgressCallback) -
 
 def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
     """Diagnose recorded runs, add the named effect to a copy of the profile, and fit it."""
-    from winchkit.cli.model.add import write_addition
     from winchkit.diagnosis.add import add
     from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.diagnosis.write import write_addition
     from winchkit.schema.read import read_profile
 
     source = find("profiles", profile_name)

@@ -1,0 +1,69 @@
+"""Writes the result of ``add`` or ``remove`` into a copy of a profile, with its origin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from winchkit.diagnosis.add import Addition, Removal
+from winchkit.diagnosis.results import Estimate, OutputFit
+from winchkit.effects.term import Term
+from winchkit.profile_edit.fitted import Fitted, write_fitted, write_without
+from winchkit.profile_edit.ledger import Judged
+
+__all__ = ["write_addition", "write_removal"]
+
+
+def write_addition(
+    source: str | Path, addition: Addition, runs: Sequence[str], out: str | Path
+) -> None:
+    """Write a fitted addition into a copy of a profile, and an entry into its ledger.
+
+    Parameters
+    ----------
+    source, out : str or Path
+        The profile file, and its copy.
+    addition : Addition
+        Result of ``add``.
+    runs : sequence of str
+        Names of the runs that it was fitted to.
+
+    Raises
+    ------
+    FileError
+        Where a file cannot be read or written.
+    """
+    fitted, judged = _provenance(addition.terms, addition.outputs, runs)
+    write_fitted(Path(source), fitted, Path(out), judged)
+
+
+def write_removal(
+    source: str | Path, effect: str, removal: Removal | None, runs: Sequence[str], out: str | Path
+) -> None:
+    """Write a profile without an effect, with the others refitted where there were runs.
+
+    Parameters and errors are those of :func:`write_addition`; ``removal`` is None without runs.
+    """
+    terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
+    fitted, judged = _provenance(terms, outputs, runs)
+    write_without(Path(source), effect, fitted, Path(out), judged)
+
+
+def _provenance(
+    terms: Sequence[tuple[Term, Mapping[str, Estimate]]],
+    outputs: Mapping[str, OutputFit],
+    runs: Sequence[str],
+) -> tuple[list[Fitted], Judged]:
+    """Fitted terms and the ledger's figures, dated today."""
+    today = datetime.now(UTC).date()
+    fitted = [Fitted(t, {n: e.std for n, e in v.items()}, runs, today) for t, v in terms]
+    judged = Judged(
+        today,
+        runs,
+        {name: o.unit for name, o in outputs.items()},
+        {name: o.heldout_rms_before for name, o in outputs.items()},
+        {name: o.heldout_rms_after for name, o in outputs.items()},
+        {name: o.noise_rms for name, o in outputs.items() if o.noise_rms is not None},
+    )
+    return fitted, judged
