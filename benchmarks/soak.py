@@ -42,7 +42,9 @@ _WARM_UP = 0.2
 """Share of the time, at least 30 s."""
 _MISSED = 2.05
 """A longer gap, in cycles, holds a cycle that was left out."""
-_ROTATE = "64MB"
+_ROTATE = "60 s"
+"""A part has an index in memory, 0.3 kB a chunk, until it is closed: parts shorter than the samples
+of the memory keep it out of the growth."""
 _PERIOD, _SPEED = 20.0, 0.1
 _LOSSES = ("samples_lost", "cell_drops", "feedback_missed", "missed_unreported", "trips")
 
@@ -186,7 +188,7 @@ def run(duration: float, *, realtime: bool = False) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         drives, host = str(folder / "drives"), str(folder / "host")
-        arguments = (theirs, len(_WINCHES), drives, host)
+        arguments = (theirs, len(_WINCHES), drives, host, realtime)
         devices = context.Process(target=serve, args=arguments, daemon=True)
         devices.start()
         try:

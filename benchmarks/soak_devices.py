@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import select
 import socket
 import sys
@@ -25,6 +26,7 @@ __all__ = ["Wire", "serve"]
 
 _EDS = Path(__file__).parents[1] / "devices" / "generic-cia402" / "generic-cia402.eds"
 _STEP = 2e-3
+_PRIORITY = 60
 _TENSION = 100.0
 
 
@@ -58,11 +60,15 @@ class Wire:
         self._socket.close()
 
 
-def serve(ours: Connection, winches: int, path: str, host: str) -> None:
+def serve(ours: Connection, winches: int, path: str, host: str, realtime: bool) -> None:
     """Serve until told to end; first says at which port the cells are.
 
-    ``path`` is the datagram socket of the drives, ``host`` the bench's.
+    ``path`` is the datagram socket of the drives, ``host`` the bench's. In ``realtime`` the drives
+    have a priority above the bench's, where it is permitted: hardware is not late.
     """
+    if realtime:
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     sys.setswitchinterval(5e-4)  # the cells' server is a thread beside the drives
     device = read_device(find("devices", "laumas-tlb"))
     assert device.modbus is not None

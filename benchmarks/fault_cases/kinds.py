@@ -209,8 +209,17 @@ def _recorder(world: World, winch: str) -> None:
 
 
 _MASTER = ("second master", "state")
-_WIRES = ("nmt", "boot-up", "heartbeat", "feedback", "state", "fault", "deaf")
-_LOST = ("feedback", "heartbeat", "state", "fault", "nmt", "slowing down", "deviation", "deaf")
+_WIRES = ("nmt", "boot-up", "heartbeat", "feedback", "state", "fault", "unresponsive")
+_LOST = (
+    "feedback",
+    "heartbeat",
+    "state",
+    "fault",
+    "nmt",
+    "slowing down",
+    "deviation",
+    "unresponsive",
+)
 
 _ROWS = (
     Kind("enable input open", _drive("enable input open"), ("state",), least=0.0, part="servo"),

@@ -64,7 +64,7 @@ def test_it_is_enabled_without_its_host(name: str) -> None:
     assert wire.slave.power.state is State.ENABLED
 
 
-@pytest.mark.parametrize("name", ["quick stop ignored", "control word unheeded", "deaf"])
+@pytest.mark.parametrize("name", ["quick stop ignored", "control word unheeded", "unresponsive"])
 def test_a_quick_stop_changes_nothing(name: str) -> None:
     wire = moving()
     wire.slave.inject(name)
@@ -78,7 +78,7 @@ def test_an_unresponsive_slave_ignores_a_lost_heartbeat() -> None:
     wire = moving()
     wire.write(0x1016, 1, 0x007F0064, 4)
     wire.send(0x77F, "05")
-    wire.slave.inject("deaf")
+    wire.slave.inject("unresponsive")
     wire.wait(1.0)
     assert wire.slave.network.state is Nmt.OPERATIONAL
 

@@ -110,7 +110,7 @@ _UNHEARD = (
     "nmt",
     "mode",
     "feedback",
-    "deaf",
+    "unresponsive",
     "computer",
     "bus",
     "second master",

@@ -25,7 +25,7 @@ def unheeded(bench: SlaveBench, opened: Bench) -> None:
     bench.slave.inject("nmt unheard")
     opened.stop_now(wait=False)
     bench.rig.until(lambda: bench.slave.power.state is not State.ENABLED, within=1.0)
-    assert any(trip.kind == "deaf" for trip in opened.snapshot.tripped)
+    assert any(trip.kind == "unresponsive" for trip in opened.snapshot.tripped)
 
 
 @pytest.mark.parametrize("mechanism", ["guarding", "rpdo-timeout"])

@@ -102,7 +102,7 @@ CASES = (
     Case("computer", _stall),
     Case("loop", _raise_in_loop, within=0.02),
     Case("target", _target_out_of_range, within=0.02),
-    Case("deaf", _heed_nothing, within=0.3),
+    Case("unresponsive", _heed_nothing, within=0.3),
     Case("latch file", _lose_the_latch_file, within=0.02),
     Case("sync", _speak_over, stops=False),
     Case("recorder", _fail_to_record, stops=False),

@@ -36,7 +36,7 @@ _MOVE = 4.0
 _HOME = 3.0
 _ENABLED_BY_OTHERS = ("second master enables", "enables itself")
 _BLOCKS_STOPS = ("quick stop ignored", "control word unheeded", "status frozen")
-_NOTHING_HELPS = ("deaf", "turns while disabled", "monitoring fails")
+_NOTHING_HELPS = ("unresponsive", "turns while disabled", "monitoring fails")
 _TRIPS_ALWAYS = (
     "reboots",
     "reset by a stranger",

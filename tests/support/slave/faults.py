@@ -159,7 +159,7 @@ _ROWS = (
         unsent=_EVERYTHING | {"tpdo", "emergency"},
     ),
     Fault(
-        "deaf",
+        "unresponsive",
         "SYNC alone is heard, nothing is obeyed and nothing monitored",
         unheard=_EVERYTHING - {"sync"},
         unwatched=True,

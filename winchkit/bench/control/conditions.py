@@ -215,7 +215,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "slowing down",
         "measured cable speed while the commanded speed falls",
         "the fastest commanded within limits.response_time, and 5 %",
-        lambda item, _own, memory: item.follows and memory.deaf,
+        lambda item, _own, memory: item.follows and memory.unresponsive,
         lambda item, own, _memory: (
             f"the drive does not slow down as commanded: {item.winding_speed:.3f} m/s, commanded "
             f"{item.target_speed:.3f} m/s, within {own.limits.response_time:g} s "
@@ -457,7 +457,10 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
     ),
     BenchCondition("target", "targets against the range of the drive's objects", "within it"),
     BenchCondition(
-        "deaf", "stops that the drive does not obey", "none", "silence (see Ways to stop a drive)"
+        "unresponsive",
+        "stops that the drive does not obey",
+        "none",
+        "silence (see Ways to stop a drive)",
     ),
     BenchCondition("latch file", "reading and writing of the latch file", "possible"),
     BenchCondition(

@@ -26,7 +26,7 @@ Callback = Callable[[BenchSnapshot], Mapping[str, float] | None]
 
 _LOGGER = logging.getLogger(__name__)
 _STOPPED = (Phase.DISABLED, Phase.STOPPING, Phase.RESETTING)
-_DEAF = (
+_UNRESPONSIVE = (
     "the drive does not obey the stop, neither by RPDO nor by SDO; the host's heartbeat is "
     "withheld, so that the watchdogs of all drives stop them; look at the drive before the reset"
 )
@@ -230,7 +230,7 @@ class ControlLoop:
         for name, parts in self.winches.items():
             if parts.controller.silent:
                 self._fall_silent()
-                self.supervisor.latch(Trip("deaf", name, _DEAF, latches=True))
+                self.supervisor.latch(Trip("unresponsive", name, _UNRESPONSIVE, latches=True))
 
     def _fall_silent(self) -> None:
         """End every life sign that a drive watches."""

@@ -178,7 +178,7 @@ class Memory:
     A tare neither hides an overload nor makes the cable slack."""
     tension_rate: float = 0.0
     """N/s, over at least 50 ms."""
-    deaf: bool = False
+    unresponsive: bool = False
     """Whether the drive did not slow down as it was commanded."""
     slip: float = 0.0
     """Change of the length sensor less that by the motor since the motion began, m."""
@@ -225,7 +225,7 @@ class Memory:
         exp(-t/T): with T below half the response time it is never faster than that, while a drive
         whose targets do not reach it keeps its speed, and soon is.
         """
-        self.deaf = False
+        self.unresponsive = False
         target, track, own = item.target_speed, self._track, self.own
         if math.isnan(target):
             if track:
@@ -244,7 +244,7 @@ class Memory:
         if sign * target >= fastest:
             return
         margin = max(own.ripple, _OVERSHOOT * fastest)
-        self.deaf = sign * speed > max(0.0, fastest) + margin
+        self.unresponsive = sign * speed > max(0.0, fastest) + margin
 
     def _follow_length(self, item: WinchInput) -> None:
         if not item.moving or self._began is None:

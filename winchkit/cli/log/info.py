@@ -41,8 +41,8 @@ def _lines(info: LogInfo) -> list[str]:
     from winchkit.cli.core.terminal import HEADS, counter_rows
 
     closed = {True: "closed", False: "not closed", None: "CSV, which has no end mark"}[info.closed]
-    begun = f"begun {info.begun}, " if info.begun else ""
-    lines = [f"{info.path}: {begun}{info.duration:.6g} s, {closed}"]
+    started = f"started {info.begun}, " if info.begun else ""
+    lines = [f"{info.path}: {started}{info.duration:.6g} s, {closed}"]
     lines += [f"  {note}" for note in info.notes]
     lines += [f"  {_source(item)}" for item in info.sources]
     lines += [f"  trip: {text}" for text in info.events]
