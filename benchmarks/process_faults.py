@@ -287,6 +287,9 @@ def main() -> None:
     if options.owner:
         owner(options.owner, options.disk)
         return
+    # A job in the background ignores them, and so would every command that it starts.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     chance = random.Random(options.seed)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("", 0))
