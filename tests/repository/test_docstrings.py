@@ -1,82 +1,69 @@
-"""Docstrings in NumPy style name the arguments that a function has."""
+"""Docstrings of the public interface have NumPy's sections."""
 
 from __future__ import annotations
 
 import ast
-import importlib
-import re
-from collections.abc import Iterator
-from pathlib import Path
+import dataclasses
+import inspect
+from collections.abc import Callable, Iterator
+from typing import Any
 
-from snippets import ROOT
+import pytest
 
-_SECTION = re.compile(r"Parameters\n-+\n(.*?)(?:\n\n\w+\n-+|\Z)", re.DOTALL)
+import winchkit
+from winchkit.bench.recording.recorder import Recorder
+from winchkit.bench.remote.client import RemoteStation
+from winchkit.bench.winch import Winch
 
-
-def described(docstring: str) -> list[str]:
-    """Names in the section on parameters."""
-    section = _SECTION.search(docstring)
-    heads = [line for line in section[1].splitlines() if line[:1].strip()] if section else []
-    return [name.strip(" *") for head in heads for name in head.split(" : ")[0].split(",")]
-
-
-def arguments(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
-    own = function.args
-    every = [*own.posonlyargs, *own.args, *own.kwonlyargs, own.vararg, own.kwarg]
-    return [a.arg for a in every if a is not None and a.arg not in {"self", "cls"}]
+PUBLIC = [getattr(winchkit, name) for name in winchkit.__all__ if name != "__version__"]
+CLASSES = [
+    *(item for item in PUBLIC if inspect.isclass(item) and not issubclass(item, Exception)),
+    *(Winch, RemoteStation, Recorder),
+]
+"""Public classes, and those of what a public function returns."""
 
 
-def wrong(path: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            names = described(ast.get_docstring(node) or "")
-            if names and set(names) != set(arguments(node)):
-                place = path.relative_to(ROOT).as_posix()
-                yield f"{place}: {node.name}({', '.join(arguments(node))}) describes {names}"
+def callables() -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Public functions and the public methods of public classes, by name."""
+    yield from ((item.__name__, item) for item in PUBLIC if inspect.isfunction(item))
+    for owner in CLASSES:
+        for name, member in vars(owner).items():
+            function = getattr(member, "__func__", member)
+            if inspect.isfunction(function) and not name.startswith("_"):
+                yield f"{owner.__name__}.{name}", function
 
 
-def test_described_parameters_are_the_arguments() -> None:
-    paths = sorted((ROOT / "winchkit").rglob("*.py"))
-    assert not [fault for path in paths for fault in wrong(path)]
+@pytest.mark.parametrize(("name", "function"), [*callables()], ids=lambda item: str(item)[:40])
+def test_a_public_function_describes_its_parameters_and_its_result(
+    name: str, function: Callable[..., Any]
+) -> None:
+    text = inspect.getdoc(function) or ""
+    signature = inspect.signature(function)
+    parameters = [p for p in signature.parameters if p not in ("self", "cls")]
+    assert text, f"{name} has no docstring"
+    if not parameters:
+        return
+    assert "Parameters\n----------" in text, name
+    if signature.return_annotation != "None":
+        assert "Returns\n-------" in text or "Yields\n------" in text, name
 
 
-def test_parameters_of_a_docstring_are_found() -> None:
-    head = "One.\n\nParameters\n----------\na, b : (n,) arrays\n    Two.\nc\n    Three."
-    text = head + "\n\nReturns\n-------\nx"
-    assert described(text) == ["a", "b", "c"]
-    assert described("One.") == []
-
-
-_REFERENCE = re.compile(r":(?:class|func|mod|meth|attr|data):`~?(winchkit\.[^`]+)`")
-
-
-def resolves(name: str) -> bool:
-    """Whether a dotted name is a module, or a name in one."""
-    parts = name.split(".")
-    for count in range(len(parts), 0, -1):
-        try:
-            found: object = importlib.import_module(".".join(parts[:count]))
-        except ModuleNotFoundError:
-            continue
-        for part in parts[count:]:
-            if part in getattr(found, "__annotations__", {}):
-                return True
-            if not hasattr(found, part):
-                return False
-            found = getattr(found, part)
-        return True
-    return False
-
-
-def test_references_of_docstrings_exist() -> None:
-    texts = {path: path.read_text(encoding="utf-8") for path in (ROOT / "winchkit").rglob("*.py")}
-    named = {(path, name) for path, text in texts.items() for name in _REFERENCE.findall(text)}
-    assert named
-    missing = [f"{path.relative_to(ROOT)}: {name}" for path, name in named if not resolves(name)]
-    assert not missing
-
-
-def test_a_reference_that_leads_nowhere_is_recognised() -> None:
-    assert resolves("winchkit.drivers.can.cia402.axis.Cia402Axis")
-    assert not resolves("winchkit.drivers.can.cia402.axis.Axis")
-    assert not resolves("winchkit.nowhere")
+@pytest.mark.parametrize("owner", CLASSES)
+def test_every_field_of_a_public_dataclass_is_described(owner: type) -> None:
+    if not dataclasses.is_dataclass(owner):
+        return
+    tree = ast.parse(inspect.getsource(owner)).body[0]
+    assert isinstance(tree, ast.ClassDef)
+    described = set()
+    for before, after in zip(tree.body, tree.body[1:], strict=False):
+        if isinstance(before, ast.AnnAssign) and isinstance(before.target, ast.Name):
+            is_text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            if is_text:
+                described.add(before.target.id)
+    text = inspect.getdoc(owner) or ""
+    missing = [
+        field.name
+        for field in dataclasses.fields(owner)
+        if not field.name.startswith("_") and field.name not in described | set(text.split())
+    ]
+    assert not missing, f"{owner.__name__}: {missing}"

@@ -195,6 +195,16 @@ class Bench:
         It may return a ``winding_speed`` (m/s, positive winds in) by winch, which moves it for
         as long as it keeps returning one. Should it raise, everything stops and the exception
         comes out of the ``with`` block. Returns a function that takes it off again.
+
+        Parameters
+        ----------
+        callback : callable
+            Takes a BenchSnapshot; returns None or winding speeds by winch.
+
+        Returns
+        -------
+        callable
+            Removes the callback.
         """
         self.loop.callbacks.append(callback)
 
@@ -205,11 +215,25 @@ class Bench:
         return remove
 
     def stop(self, *, wait: bool = True) -> None:
-        """Ramp every winch to rest, then disable. Always allowed."""
+        """Ramp every winch to rest, then disable. Always allowed.
+
+        Parameters
+        ----------
+        wait : bool
+            Return when the winches are disabled and stand still.
+        """
         self._run_down(self.winch, wait=wait)
 
     def stop_with(self, name: str, *, wait: bool = True) -> None:
-        """Ramp this winch to rest, and with it all others unless ``stop_together`` is false."""
+        """Ramp this winch to rest, and with it all others unless ``stop_together`` is false.
+
+        Parameters
+        ----------
+        name : str
+            Winch.
+        wait : bool
+            Return when the winches are disabled and stand still.
+        """
         self._run_down(self.winch if self.spec.stop_together else (name,), wait=wait)
 
     def stop_commanded(self, names: Collection[str], *, wait: bool = True) -> None:
@@ -217,13 +241,26 @@ class Bench:
 
         The others stop with them unless ``stop_together`` is false, or another client commands
         them.
+
+        Parameters
+        ----------
+        names : collection of str
+            Winches of the client.
+        wait : bool
+            Return when the winches are disabled and stand still.
         """
         held = self.commanders.holder
         others = [name for name in self.winch if held(name) is None or name in names]
         self._run_down(others if self.spec.stop_together else names, wait=wait)
 
     def stop_now(self, *, wait: bool = True) -> None:
-        """Quick-stop every winch. A jog that is held must be released before the next one."""
+        """Quick-stop every winch. A jog that is held must be released before the next one.
+
+        Parameters
+        ----------
+        wait : bool
+            Return when the winches are disabled and stand still.
+        """
         self._release.close(set(self.winch))
         self.stopped_by = self.commanders.actor.name
         with self.loop.ordering:
@@ -245,6 +282,17 @@ class Bench:
 
         They start in the same control cycle, once every drive is enabled, and the shorter moves
         are stretched to last as long as the longest. Else as :meth:`Winch.move_to`.
+
+        Parameters
+        ----------
+        lengths : mapping of str to float
+            Cable length by winch, m.
+        speed, acceleration : float, optional
+            Of the longest move, m/s and m/s²; by default the limits of the winches.
+        wait : bool
+            Return when all stand still.
+        hold : bool
+            Keep the drives enabled at the end.
         """
         targets = {self.named(name): length for name, length in lengths.items()}
         begin_together(self.loop, targets, speed, acceleration, hold=hold)
@@ -292,6 +340,22 @@ class Bench:
         With ``rotate`` (``"100MB"`` or ``"10min"``) it goes on in ``lift.002.csv`` and so on. An
         earlier log of that name is removed with ``replace`` only. Raises UsageError for one that is
         there without ``replace``, or that is being written; FileError.
+
+        Parameters
+        ----------
+        path : str or Path
+            File, ``.csv`` or ``.mcap``.
+        metadata : mapping, optional
+            Further metadata, keys and texts.
+        rotate : str, optional
+            Size or duration of a part.
+        replace : bool
+            Remove an earlier log of that name.
+
+        Returns
+        -------
+        Recorder
+            The log; its ``close``, or the end of its ``with`` block, ends it.
         """
         recorder = Recorder(
             path,
@@ -323,6 +387,15 @@ class Bench:
         """Raise what forbids this motion to who asks now; returns when it is allowed.
 
         ``held``: the command is repeated for as long as somebody holds on (a jog).
+
+        Parameters
+        ----------
+        winch : str
+            Winch that is to move.
+        direction : Direction
+            Of the motion.
+        held : bool
+            Whether the command is one of a series that goes on while a key is held.
         """
         self.commanders.require(winch)
         if not direction:
@@ -374,7 +447,13 @@ class Bench:
             )
 
     def wait_at_rest(self, names: Iterable[str]) -> None:
-        """Return when these winches are disabled and stand still; raises MotionError if not."""
+        """Return when these winches are disabled and stand still; raises MotionError if not.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Winches.
+        """
         await_rest(self.loop, names, self.clock)
 
     def homing(self, winch: str, request: HomingRequest) -> Generator[None]:
@@ -382,11 +461,34 @@ class Bench:
 
         Raises UsageError, NotPermitted, DeviceRefused for a method that the drive lacks, DriveFault
         where the homing fails, LimitTripped.
+
+        Parameters
+        ----------
+        winch : str
+            Winch.
+        request : HomingRequest
+            Method, length and speed.
+
+        Returns
+        -------
+        generator
+            Yields until the homing has ended.
         """
         return homing(self, self.winch[winch], request)
 
     def named(self, name: str | None) -> Winch:
-        """A winch by name, or the only one; raises UsageError."""
+        """A winch by name, or the only one; raises UsageError.
+
+        Parameters
+        ----------
+        name : str or None
+            Winch; None for the only one.
+
+        Returns
+        -------
+        Winch
+            The winch.
+        """
         return self.winch[self.spec.winch_named(name)]
 
     def _urgent_threads(self) -> list[int]:

@@ -68,11 +68,33 @@ class Winch:
         return self._parts.cable
 
     def length_at(self, motor_angle: float) -> float:
-        """Cable length (m) at a motor angle (rad) under the present tension, by the profile."""
+        """Cable length (m) at a motor angle (rad) under the present tension, by the profile.
+
+        Parameters
+        ----------
+        motor_angle : float
+            rad.
+
+        Returns
+        -------
+        float
+            Cable length, m.
+        """
         return self._parts.cable.cable_length(motor_angle)
 
     def motor_angle_at(self, length: float) -> float:
-        """Motor angle (rad) at a cable length (m) under the present tension, by the profile."""
+        """Motor angle (rad) at a cable length (m) under the present tension, by the profile.
+
+        Parameters
+        ----------
+        length : float
+            Cable length, m.
+
+        Returns
+        -------
+        float
+            Motor angle, rad.
+        """
         return self._parts.cable.motor_angle(length)
 
     @property
@@ -105,6 +127,15 @@ class Winch:
         disables. With ``duration`` it does so itself for that many seconds and returns at rest.
         Raises TypeError for a speed without a name, UsageError, NotPermitted, LimitTripped,
         DriveFault.
+
+        Parameters
+        ----------
+        pay_out, wind_in : float
+            Cable speed, m/s, positive; exactly one is given.
+        duration : float, optional
+            Time of the jog, s.
+        hold : float
+            Time of motion without another call, s, at most 1.
         """
         no_positional("jog", "m/s", unnamed)
         winding_speed = -paid_out("jog", pay_out, wind_in)
@@ -130,6 +161,15 @@ class Winch:
         What stations and ``on_cycle`` callbacks call; for a person :meth:`jog` names the
         direction. Raises as that does. ``held``: the call is one of those that go on while
         somebody holds on, and has to cease for a moment after a stop.
+
+        Parameters
+        ----------
+        winding_speed : float
+            m/s, positive winds in.
+        hold : float
+            Time of motion without another call, s, at most 1.
+        held : bool
+            Whether the call is one of a series.
         """
         if not math.isfinite(winding_speed) or not 0 < hold <= 1:
             raise UsageError(f"a jog at {winding_speed} m/s held for {hold} s cannot be meant")
@@ -154,6 +194,17 @@ class Winch:
 
         With ``hold`` the drive stays enabled there until ``stop``. Raises NotPermitted,
         LimitTripped, DriveFault.
+
+        Parameters
+        ----------
+        length : float
+            Cable length, m.
+        speed, acceleration : float, optional
+            m/s and m/s²; by default the limits of the winch.
+        wait : bool
+            Return when the winch stands still.
+        hold : bool
+            Keep the drive enabled at the end.
         """
         self.begin(self.planned(length, speed, acceleration, hold=hold))
         if wait:
@@ -171,6 +222,17 @@ class Winch:
         """Pay out or wind in a length (m, positive) of cable; else as :meth:`move_to`.
 
         Raises TypeError for a length without a name, UsageError unless exactly one is given.
+
+        Parameters
+        ----------
+        pay_out, wind_in : float
+            Length, m, positive; exactly one is given.
+        speed : float, optional
+            m/s; by default the limit of the winch.
+        wait : bool
+            Return when the winch stands still.
+        hold : bool
+            Keep the drive enabled at the end.
         """
         no_positional("move_by", "m", unnamed)
         change = paid_out("move_by", pay_out, wind_in)
@@ -183,6 +245,15 @@ class Winch:
 
         ``at`` is the cable length (m) at that zero; without a method it is the present one, and
         nothing moves. Raises UsageError, NotPermitted, DeviceRefused, DriveFault, LimitTripped.
+
+        Parameters
+        ----------
+        method : int, optional
+            Homing method of CiA 402 (6098h).
+        at : float, optional
+            Cable length, m.
+        speed : float, optional
+            Speed of the search, m/s.
         """
         for _ in self._bench.homing(self.name, HomingRequest(method, at, speed)):
             self._bench.clock.sleep(_POLL)
@@ -191,6 +262,11 @@ class Winch:
         """Ramp to rest, then disable. Always allowed.
 
         The bench's other winches stop with it, unless its ``stop_together`` is false.
+
+        Parameters
+        ----------
+        wait : bool
+            Return when it is disabled and stands still.
         """
         self._bench.stop_with(self.name, wait=wait)
 
@@ -215,7 +291,22 @@ class Winch:
         *,
         hold: bool = False,
     ) -> Move:
-        """The move that ``move_to`` would make; nothing begins. Raises as that does."""
+        """The move that ``move_to`` would make; nothing begins. Raises as that does.
+
+        Parameters
+        ----------
+        length : float
+            Cable length, m.
+        speed, acceleration : float, optional
+            m/s and m/s²; by default the limits of the winch.
+        hold : bool
+            Keep the drive enabled at the end.
+
+        Returns
+        -------
+        Move
+            The move, for :meth:`begin`.
+        """
         self._require_length()
         cable = self._parts.cable
         move = Move(
@@ -234,13 +325,32 @@ class Winch:
         return move
 
     def begin(self, source: MotionSource, gate: StartGate | None = None) -> None:
-        """Begin a planned motion; with a gate not before that opens."""
+        """Begin a planned motion; with a gate not before that opens.
+
+        Parameters
+        ----------
+        source : MotionSource
+            The motion, e.g. of :meth:`planned`.
+        gate : StartGate, optional
+            Common start with other winches.
+        """
         with self._bench.commanders.claimed(self.name):
             self._jog = None
             self._controller.begin(source, gate)
 
     def ready_for(self, move: Move) -> bool:
-        """Whether the drive is enabled and waits for nothing but this move's gate."""
+        """Whether the drive is enabled and waits for nothing but this move's gate.
+
+        Parameters
+        ----------
+        move : Move
+            A move that has begun.
+
+        Returns
+        -------
+        bool
+            Whether it waits for its gate only.
+        """
         return self._controller.ready_for(move)
 
     def run_down(self) -> None:

@@ -13,7 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.errors import UsageError
 from winchkit.model.stages import ROBOT_STAGES, At, Stage
+from winchkit.units import suggest
 
 __all__ = [
     "MOTOR_ORDERS",
@@ -136,11 +138,40 @@ class Effect:
         return ""
 
     def parameter(self, name: str) -> Parameter:
-        """A parameter by name."""
-        return next(p for p in self.parameters if p.name == name)
+        """A parameter by name.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+
+        Returns
+        -------
+        Parameter
+            The parameter; raises UsageError for a name that the effect lacks.
+        """
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        known = [parameter.name for parameter in self.parameters]
+        there = f"it has {', '.join(known)}" if known else "it has none"
+        raise UsageError(
+            f"effect '{self.id}' has no parameter '{name}'; {there}" + suggest(name, known)
+        )
 
     def nested_with(self, other: Effect) -> bool:
-        """Whether one of the two laws is a special case of the other."""
+        """Whether one of the two laws is a special case of the other.
+
+        Parameters
+        ----------
+        other : Effect
+            Another effect.
+
+        Returns
+        -------
+        bool
+            Whether the models are nested.
+        """
         return other.id in self.contains or self.id in other.contains
 
     @property

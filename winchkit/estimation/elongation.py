@@ -151,6 +151,11 @@ class ElongationCorrection:
         ------
         UsageError
             Where a stiffness is missing.
+
+        Returns
+        -------
+        ElongationCorrection
+            Its :meth:`update` is for the control cycle.
         """
         laws = []
         for line, winch in zip(robot.profile.line, robot.winches, strict=True):
@@ -169,6 +174,16 @@ class ElongationCorrection:
         """Elongation at a pose of twelve floats (position, rotation by rows).
 
         Where it cannot be computed, the last good one is returned, so that a command never jumps.
+
+        Parameters
+        ----------
+        pose : (12,) sequence of float
+            Position, m, and rotation matrix by rows.
+
+        Returns
+        -------
+        Stretch
+            Elongation of each line; ``good`` is false for a repeated one.
         """
         found = self._stretch(pose)
         if found is None:

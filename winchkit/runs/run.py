@@ -112,7 +112,18 @@ class Run:
         return prefixes or [""]
 
     def of_winch(self, winch: str) -> Run:
-        """The run of one winch: its columns without prefix, the shared ones kept."""
+        """The run of one winch: its columns without prefix, the shared ones kept.
+
+        Parameters
+        ----------
+        winch : str
+            Name; empty for the whole run.
+
+        Returns
+        -------
+        Run
+            Its channels; raises RunError for a name that the run lacks.
+        """
         if not winch:
             return self
         if winch not in self.winches():

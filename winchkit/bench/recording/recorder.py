@@ -103,7 +103,13 @@ class Recorder:
         return tuple(self._log.parts)
 
     def feed(self, snapshot: BenchSnapshot) -> None:
-        """Take a cycle; cheap, for the control thread. Raises what has ended the writing."""
+        """Take a cycle; cheap, for the control thread. Raises what has ended the writing.
+
+        Parameters
+        ----------
+        snapshot : BenchSnapshot
+            Of the newest cycle.
+        """
         self.check()
         self._feed.give(snapshot)
 

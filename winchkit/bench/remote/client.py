@@ -98,7 +98,13 @@ class RemoteStation:
         return str(self._call("hand_over"))
 
     def take_over(self, winch: str | None) -> None:
-        """Command a winch that another client commands."""
+        """Command a winch that another client commands.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch, "all", or None for the only one.
+        """
         self._call("take_over", winch)
 
     def names(self) -> list[str]:
@@ -110,11 +116,31 @@ class RemoteStation:
         return dict(self._call("status"))
 
     def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
-        """Keep moving for ``hold`` seconds."""
+        """Keep moving for ``hold`` seconds.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch; None for the only one.
+        winding_speed : float
+            m/s, positive winds in.
+        hold : float
+            Time of motion without another call, s.
+        """
         self._call("jog", winch, winding_speed, hold)
 
     def step(self, winch: str | None, change: float, speed: float | None) -> None:
-        """Start to change the cable length."""
+        """Start to change the cable length.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch; None for the only one.
+        change : float
+            Change of the cable length, m, positive pays out.
+        speed : float or None
+            m/s; by default the limit of the winch.
+        """
         self._call("step", winch, change, speed)
 
     def move(
@@ -125,11 +151,36 @@ class RemoteStation:
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> None:
-        """Start a move to a cable length, or by a change of it."""
+        """Start a move to a cable length, or by a change of it.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch, "all", or None for the only one.
+        to : float or None
+            Cable length, m.
+        by : float or None
+            Change of the cable length, m, positive pays out; one of the two is given.
+        speed, acceleration : float, optional
+            m/s and m/s²; by default the limits of the winch.
+        """
         self._call("move", winch, to, by, speed, acceleration)
 
     def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
-        """Bytes of an object of a drive."""
+        """Bytes of an object of a drive.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch; None for the only one.
+        index, sub : int
+            Object of the drive.
+
+        Returns
+        -------
+        bytes or None
+            Its value, little-endian; None for an object that the drive lacks.
+        """
         found = self._call("read_object", winch, index, sub)
         return None if found is None else bytes.fromhex(found)
 
@@ -144,13 +195,36 @@ class RemoteStation:
         ]
 
     def moving(self, winch: str | None) -> bool:
-        """Whether a motion is under way."""
+        """Whether a motion is under way.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch, "all", or None for the only one.
+
+        Returns
+        -------
+        bool
+            Whether a motion is under way; raises what stopped it.
+        """
         return bool(self._call("moving", winch))
 
     def home(
         self, winch: str | None, method: int | None, at: float | None, speed: float | None
     ) -> None:
-        """Start to home a winch."""
+        """Start to home a winch.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch; None for the only one.
+        method : int or None
+            Homing method of CiA 402 (6098h); None moves nothing.
+        at : float or None
+            Cable length at the zero, m.
+        speed : float or None
+            Speed of the search, m/s.
+        """
         self._call("home", winch, method, at, speed)
 
     def homing(self) -> bool:
@@ -166,11 +240,32 @@ class RemoteStation:
         return [str(item) for item in self._call("reset")]
 
     def tare(self, winch: str | None) -> float:
-        """Tare a load cell."""
+        """Tare a load cell.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch; None for the only one.
+
+        Returns
+        -------
+        float
+            Tension after it, N.
+        """
         return float(self._call("tare", winch))
 
     def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
-        """Log to a file in the owner's process."""
+        """Log to a file in the owner's process.
+
+        Parameters
+        ----------
+        path : str
+            File, absolute.
+        rotate : str, optional
+            Size or duration of a part.
+        replace : bool
+            Remove an earlier log of that name.
+        """
         self._call("start_log", path, rotate, replace)
 
     def log_rows(self) -> int:
@@ -186,7 +281,22 @@ class RemoteStation:
         return dict(self._call("counters"))
 
     def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-        """Something with an instrument, e.g. "zero"; ``arguments`` are times (s), or words."""
+        """Something with an instrument, e.g. "zero"; ``arguments`` are times (s), or words.
+
+        Parameters
+        ----------
+        task : str
+            One of ``winchkit.bench.cells.tasks.TASKS``.
+        name : str
+            Instrument, e.g. ``A.cell``.
+        *arguments
+            Of the task.
+
+        Returns
+        -------
+        dict
+            Result of the task, as JSON has it.
+        """
         watched = sum(item for item in arguments if isinstance(item, float))
         self._connection.settimeout(_CELL_TIME + 3 * watched)
         try:

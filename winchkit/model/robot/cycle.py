@@ -128,5 +128,11 @@ class RobotCycle:
         return pose
 
     def start_from(self, pose: Any) -> None:
-        """Set the pose (12) from which :meth:`pose_at` starts."""
+        """Set the pose (12) from which :meth:`pose_at` starts.
+
+        Parameters
+        ----------
+        pose : (12,) array
+            Position, m, and rotation matrix by rows.
+        """
         self._pose = self._kernels.array(np.asarray(pose, dtype=float).tolist())

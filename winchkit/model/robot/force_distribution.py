@@ -39,7 +39,18 @@ class ForceLimits:
     """N."""
 
     def spread(self, count: int) -> tuple[Array, Array]:
-        """Both limits per line; raises UsageError where low is not below high."""
+        """Both limits per line; raises UsageError where low is not below high.
+
+        Parameters
+        ----------
+        count : int
+            Number of lines.
+
+        Returns
+        -------
+        tuple of two (count,) arrays
+            Lower and upper limits, N.
+        """
         low = np.broadcast_to(np.asarray(self.low, dtype=float), (count,))
         high = np.broadcast_to(np.asarray(self.high, dtype=float), (count,))
         if not np.all(low < high):
@@ -47,7 +58,18 @@ class ForceLimits:
         return low, high
 
     def between(self, count: int) -> tuple[Array, Array]:
-        """Both limits per line; raises UsageError where one is infinite."""
+        """Both limits per line; raises UsageError where one is infinite.
+
+        Parameters
+        ----------
+        count : int
+            Number of lines.
+
+        Returns
+        -------
+        tuple of two (count,) arrays
+            Lower and upper limits, N.
+        """
         low, high = self.spread(count)
         if not np.all(np.isfinite(low) & np.isfinite(high)):
             raise UsageError("force limits must be finite: the forces aim at their middle")

@@ -83,15 +83,48 @@ class Robot:
         return np.array([winch.cable.dead_length for winch in self.winches])
 
     def lengths(self, pose: Pose) -> Array:
-        """Geometric cable lengths, arcs included, (p, n), m."""
+        """Geometric cable lengths, arcs included, (p, n), m.
+
+        Parameters
+        ----------
+        pose : Pose
+            The p poses.
+
+        Returns
+        -------
+        (p, n) array
+            m.
+        """
         return lengths(self.geometry, pose.position, pose.rotation)
 
     def structure(self, pose: Pose) -> Array:
-        """Structure matrices Aᵀ, (p, 6, n)."""
+        """Structure matrices Aᵀ, (p, 6, n).
+
+        Parameters
+        ----------
+        pose : Pose
+            The p poses.
+
+        Returns
+        -------
+        (p, 6, n) array
+            Wrench per unit of cable force: 1 and m.
+        """
         return structure_matrix(self.geometry, pose.position, pose.rotation)
 
     def weight(self, pose: Pose) -> Array:
-        """Wrench of the platform's weight, (p, 6)."""
+        """Wrench of the platform's weight, (p, 6).
+
+        Parameters
+        ----------
+        pose : Pose
+            The p poses.
+
+        Returns
+        -------
+        (p, 6) array
+            Force and torque about the platform frame's origin, N and N m.
+        """
         return gravity_wrench(self.platform, pose.rotation)
 
     def motor_angles(
@@ -170,7 +203,24 @@ class Robot:
         tension: Array | float = 0.0,
         temperature: Array | float = 20.0,
     ) -> Found:
-        """Forward kinematics of motor angles (p, n), rad, from ``start``, else from home."""
+        """Forward kinematics of motor angles (p, n), rad, from ``start``, else from home.
+
+        Parameters
+        ----------
+        motor_angles : (p, n) array
+            rad.
+        start : Pose, optional
+            Start of the iteration; the home pose by default.
+        tension : float, (n,) or (p, n) array
+            Cable forces, N.
+        temperature : float, (n,) or (p, n) array
+            Of the cables, degrees Celsius.
+
+        Returns
+        -------
+        Found
+            Poses, and which of them have converged.
+        """
         given = self.lengths_at(motor_angles, tension, temperature)
         return forward(self.geometry, given, start or self.home, self.platform)
 

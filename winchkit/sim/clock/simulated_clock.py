@@ -71,20 +71,39 @@ class SimulatedClock:
         return self._time
 
     def sleep(self, duration: float) -> None:
-        """Return after ``duration`` seconds of simulated time; at once when it is not positive."""
+        """Return after ``duration`` seconds of simulated time; at once when it is not positive.
+
+        Parameters
+        ----------
+        duration : float
+            s.
+        """
         if duration > 0:
             waiter = self._waiter()
             self._push(self._time + duration, waiter)
             self._wait(waiter)
 
     def call_at(self, time: float, callback: Callable[[], None]) -> None:
-        """Call a function at a time (s), between the threads; it must not wait."""
+        """Call a function at a time (s), between the threads; it must not wait.
+
+        Parameters
+        ----------
+        time : float
+            On this clock, s; one in the past is the present.
+        callback : callable
+            Called without arguments.
+        """
         self._push(max(time, self._time), callback)
 
     def stall(self, duration: float) -> None:
         """Suspend the threads of the host computer for ``duration`` s.
 
         Callbacks and threads of devices continue.
+
+        Parameters
+        ----------
+        duration : float
+            s.
         """
         self._stalled_until = max(self._stalled_until, self._time + duration)
 
@@ -96,6 +115,20 @@ class SimulatedClock:
         """A thread in simulated time, not yet started.
 
         ``device`` threads belong to simulated devices: a stall of the host does not suspend them.
+
+        Parameters
+        ----------
+        target : callable
+            Called without arguments.
+        name : str
+            Of the thread.
+        device : bool
+            Whether it belongs to a simulated device.
+
+        Returns
+        -------
+        SimulatedThread
+            Used like ``threading.Thread``.
         """
         return SimulatedThread(self, target, name, device=device)
 
@@ -116,31 +149,83 @@ class SimulatedClock:
     # Lines into the simulation.
 
     def serve_can(self, channel: str, connect: Callable[[], Any]) -> None:
-        """Register a simulated CAN bus by its channel."""
+        """Register a simulated CAN bus by its channel.
+
+        Parameters
+        ----------
+        channel : str
+            Channel in the bench file.
+        connect : callable
+            Returns a new port of the bus.
+        """
         self._can[channel] = connect
 
     def serve_serial(self, port: str, connect: Callable[[], Any]) -> None:
-        """Register a simulated serial line by the name of its port."""
+        """Register a simulated serial line by the name of its port.
+
+        Parameters
+        ----------
+        port : str
+            Port in the bench file.
+        connect : callable
+            Returns the line.
+        """
         self._serial[port] = connect
 
     def can_port(self, channel: str) -> Any | None:
-        """A new connection to the simulated CAN bus of a channel; None where there is none."""
+        """A new connection to the simulated CAN bus of a channel; None where there is none.
+
+        Parameters
+        ----------
+        channel : str
+            Channel in the bench file.
+
+        Returns
+        -------
+        object or None
+            A port with ``transmit``, ``receive``, ``send`` and ``close``.
+        """
         connect = self._can.get(channel)
         return None if connect is None else connect()
 
     def serial_port(self, port: str) -> Any | None:
-        """The simulated serial line behind a port; None where there is none."""
+        """The simulated serial line behind a port; None where there is none.
+
+        Parameters
+        ----------
+        port : str
+            Port in the bench file.
+
+        Returns
+        -------
+        object or None
+            The line.
+        """
         connect = self._serial.get(port)
         return None if connect is None else connect()
 
     # How threads take turns.
 
     def wake(self, waiter: _Waiter) -> None:
-        """Resume a waiting thread after all events that are due already."""
+        """Resume a waiting thread after all events that are due already.
+
+        Parameters
+        ----------
+        waiter
+            Handle of :meth:`wait`.
+        """
         self._push(self._time, waiter)
 
     def wait(self, timeout: float | None, register: Callable[[_Waiter], None]) -> None:
-        """Wait until woken or for ``timeout`` s; ``register`` takes the handle of the wait."""
+        """Wait until woken or for ``timeout`` s; ``register`` takes the handle of the wait.
+
+        Parameters
+        ----------
+        timeout : float or None
+            s; None waits without limit.
+        register : callable
+            Takes the handle, for :meth:`wake`.
+        """
         waiter = self._waiter()
         register(waiter)
         if timeout is not None:
@@ -148,7 +233,13 @@ class SimulatedClock:
         self._wait(waiter)
 
     def enter(self, *, device: bool) -> None:
-        """Add the calling thread; for :class:`SimulatedThread`."""
+        """Add the calling thread; for :class:`SimulatedThread`.
+
+        Parameters
+        ----------
+        device : bool
+            Whether the thread belongs to a simulated device.
+        """
         self._members.add(threading.get_ident())
         if device:
             self._device_threads.add(threading.get_ident())

@@ -118,11 +118,28 @@ class LiveBench:
     # Interface for the user.
 
     def write_bench_file(self, path: str | Path) -> Path:
-        """Write the bench file of this run; returns its path."""
+        """Write the bench file of this run; returns its path.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         return write_bench(self.bench_spec, Path(path))
 
     def answer(self, step: Step) -> None:
-        """Execute an operator request of a programme: its ``load_mass``, its ``temperature``."""
+        """Execute an operator request of a programme: its ``load_mass``, its ``temperature``.
+
+        Parameters
+        ----------
+        step : Step
+            A step with ``ask``.
+        """
         for name in self.winches if step.winch == ALL else [step.winch]:
             if step.load_mass is not None:
                 self.hang(name, step.load_mass)
@@ -130,23 +147,58 @@ class LiveBench:
                 self.warm(name, step.temperature)
 
     def hang(self, winch: str, mass: float) -> None:
-        """Attach a load (kg) to a winch; NotPermitted while it moves."""
+        """Attach a load (kg) to a winch; NotPermitted while it moves.
+
+        Parameters
+        ----------
+        winch : str
+            Winch.
+        mass : float
+            kg.
+        """
         with self.up_to_date():
             self._winch(winch).hang(mass)
 
     def warm(self, winch: str, temperature: float) -> None:
-        """Set the temperature (degC) of a winch; NotPermitted while it moves."""
+        """Set the temperature (degC) of a winch; NotPermitted while it moves.
+
+        Parameters
+        ----------
+        winch : str
+            Winch.
+        temperature : float
+            degC.
+        """
         with self.up_to_date():
             self._winch(winch).warm(temperature)
 
     def inject(self, target: str, kind: str) -> None:
-        """Inject a fault into ``WINCH.ROLE``, e.g. ``A.servo`` or ``A.cell``."""
+        """Inject a fault into ``WINCH.ROLE``, e.g. ``A.servo`` or ``A.cell``.
+
+        Parameters
+        ----------
+        target : str
+            ``WINCH.ROLE``.
+        kind : str
+            Fault, e.g. ``silence``; an unknown one is refused with the list of all.
+        """
         winch, _, role = target.partition(".")
         with self.up_to_date():
             self._winch(winch).inject(role, kind)
 
     def temperature(self, winch: str) -> float:
-        """True temperature at a winch, degC."""
+        """True temperature at a winch, degC.
+
+        Parameters
+        ----------
+        winch : str
+            Winch.
+
+        Returns
+        -------
+        float
+            degC.
+        """
         with self.up_to_date():
             return self._winch(winch).plant.temperature
 
