@@ -47,7 +47,7 @@ def summary(outcomes: list[Outcome], seconds: float) -> dict[str, object]:
 
 
 def main() -> int:
-    """Exit 1 where a single wrong number was told."""
+    """Exit 1 where a single wrong number was published."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)

@@ -4,7 +4,7 @@
 estimator over three pulleys, with its standard deviation, in plain Python and compiled; a million
 samples at a constant limit with 1000 reversals and at a limit that changes; and how far the exact
 step and Euler's are off at coarse steps. Promised: 20 us and 2 us a sample, 60 ms and 20 ms a
-million at a constant limit. What is compiled is told where numba is installed (the ``fast`` extra);
+million at a constant limit. The compiled one is shown with numba (the ``fast`` extra);
 exits with 1 when a promise is broken.
 """
 

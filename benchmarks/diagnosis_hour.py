@@ -5,7 +5,7 @@ and its repeat, load measured. Every winch has an elastic cable and Coulomb fric
 simulated by the campaign's own physics. The promise is 60 s after reading and 4 GB; exits 1 when it
 is not kept or an effect is not named. ``--minutes 4 --winches 1`` is small enough for CI;
 ``--full`` diagnoses the first winch a second time with every sample, to compare; ``--csv FOLDER``
-writes the recording, reads it back and tells what reading costs.
+writes the recording, reads it back and times the reading.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 faults at random moments of jogs, moves and programmes, on one winch and on eight. Each case is
 judged from the truth: the speed, tension and drive state of the simulation, never from what
 winchkit says. With ``--realtime-share`` that share of the cases runs in real time. ``--case 1/17``
-plays one case again and tells it. ``--jobs 2`` plays them in as many processes, with the same
+plays one case again and prints it. ``--jobs 2`` plays them in as many processes, with the same
 result. One JSON object on stdout, failures on stderr; exit 1 where a case failed, 130 after Ctrl-C.
 See benchmarks/README.md.
 """
@@ -91,7 +91,7 @@ def chosen(arguments: argparse.Namespace) -> list[Case]:
 
 
 def judged(case: Case) -> tuple[Case, Verdict, str]:
-    """Play a case; also what ``--case`` tells."""
+    """Play a case; also what ``--case`` prints."""
     record = play(case)
     told = f"{case} {record.trips} {record.early_reset} {record.late_reset}"
     return case, judge(record), told

@@ -1,4 +1,4 @@
-"""Feeds every parser with what nobody would send; prints JSON, exits 1 when one of them fails.
+"""Feeds every parser with random input; prints JSON, exits 1 when one of them fails.
 
 ``python benchmarks/fuzz_parsers.py --minutes 60``: serial instruments (every device file), Modbus
 registers (every device file) and frames, declarations, object dictionaries, quantities, runs, logs,

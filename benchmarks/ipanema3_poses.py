@@ -83,7 +83,7 @@ def predicted(middle_force: float = MIDDLE_FORCE, per_metre: bool = True) -> Out
 
 
 def figures() -> dict[str, object]:
-    """All that is told."""
+    """All that is printed."""
     before, after = TABLE_2[:, 3], TABLE_2[:, 4]
     outcome = predicted()
     ours = outcome.deviation * 1e3

@@ -54,7 +54,7 @@ CASES = (
     Case("laumas-tlb", "tlb", "tcp", 0.01),
     Case("pt113", "pt113", "tcp", 0.1),
     Case("generic-length", "generic", "tcp", 1e-5),
-    # Over TCP nothing but its length tells an old answer that a gateway passes off as a new one.
+    # Over TCP only its length shows an old answer that a gateway passes off as a new one.
     Case("mantracourt-dsc", "dsc", "tcp", 1.0, ("retag",)),
     Case("laumas-tlb", "tlb", "rtu", 0.01),
     Case("generic-modbus", "generic", "rtu", 0.01),

@@ -93,7 +93,7 @@ class Stop:
 
 
 def owner(bench_file: str, disk: str = "") -> None:
-    """Jog until told otherwise: SIGUSR1 lets the control loop hang, SIGUSR2 ends the repeats.
+    """Jog until a signal: SIGUSR1 lets the control loop hang, SIGUSR2 ends the repeats.
 
     With a ``disk`` it logs there, SIGUSR1 fills the disk, and stdout gets the warnings.
     """

@@ -7,7 +7,7 @@ Poses are made by robot_poses, which shares no code with winchkit. The profile h
 geometry; "calibrated" cases give the CABTIVE robot's nominal numbers to ``winchkit calibrate``
 first, as a user would, with the elasticity hidden from it. At the end: how often the answer was
 right, how often a single wrong effect was named, and how often 95 % intervals held the truth.
-``--intervals`` asks the latter alone, quicker: ``winchkit add`` is told what is hidden.
+``--intervals`` asks the latter alone, quicker: ``winchkit add`` gets what is hidden.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _called(arguments: list[str]) -> str:
 
 
 def named(found: dict[str, Any]) -> list[str]:
-    """Effects with their lines, a set of them that the data cannot tell apart joined by |."""
+    """Effects with their lines, a set of them that the data cannot distinguish joined by |."""
     return ["|".join(_members(step)) for step in found["steps"]]
 
 

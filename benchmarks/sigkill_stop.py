@@ -2,7 +2,7 @@
 
     python benchmarks/sigkill_stop.py --times 100
 
-The simulated drive lives in this process, the bench's owner (``winchkit jog``) in another one,
+The simulated drive is in this process, the bench's owner (``winchkit jog``) in another one,
 which is killed with SIGKILL at a random moment of its jog. CAN between them is UDP multicast.
 A drive must stand still no later than the time after which it misses the host's heartbeat, plus
 the ramp of its quick stop from the speed that it had. Prints one JSON object; exits 1 where one
@@ -149,7 +149,7 @@ class Bench:
 def trials(times: int, seed: int) -> tuple[list[Stop], int]:
     """Kill that many owners, half of them while they wind in.
 
-    Also tells how many more had stopped by themselves before, on a machine that is busy.
+    Also counts how many more had stopped by themselves before, on a machine that is busy.
     """
     moments = random.Random(seed)
     declared = read_simbench(find("sim", "spiral-bench"))

@@ -1,4 +1,4 @@
-"""Eight winches at 250 Hz for a long time: memory, lost samples, missed cycles that nobody told.
+"""Eight winches at 250 Hz for a long time: memory, lost samples, unreported missed cycles.
 
 ``python benchmarks/soak.py --minutes 30 --json``. The drives (the slaves of
 ``tests/support/slave``, over a pair of datagram sockets) and the load cells (Modbus TCP) run in a

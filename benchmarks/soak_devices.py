@@ -47,7 +47,7 @@ class Wire:
         return int.from_bytes(data[:2], "little"), data[2:]
 
     def transmit(self, identifier: int, data: bytes) -> None:
-        """Send a frame; nobody hears it where the other end is not there."""
+        """Send a frame; it is lost where the other end is not there."""
         with suppress(FileNotFoundError, ConnectionRefusedError):
             self._socket.sendto(identifier.to_bytes(2, "little") + data, self._other)
 
@@ -61,7 +61,7 @@ class Wire:
 
 
 def serve(ours: Connection, winches: int, path: str, host: str, realtime: bool) -> None:
-    """Serve until told to end; first says at which port the cells are.
+    """Serve until asked to end; first says at which port the cells are.
 
     ``path`` is the datagram socket of the drives, ``host`` the bench's. In ``realtime`` the drives
     have a priority above the bench's, where it is permitted: hardware is not late.

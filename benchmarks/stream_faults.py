@@ -1,7 +1,7 @@
 """Random sequences of faults against every serial device file, in simulated time.
 
 ``python benchmarks/stream_faults.py --cases 10000 --seed 1``: wrong numbers must be 0; prints JSON,
-exits 1 where one was told. Each case is a fault of up to a second and what comes after it; the
+exits 1 where one was published. Each case is a fault of up to a second and what comes after it; the
 sequences go on without a break, a hundred cases long. The line, its faults and the simulated
 instrument are those of tests/support.
 """
@@ -24,7 +24,7 @@ LENGTH = 100
 
 
 def main() -> int:
-    """Exit 1 where a wrong number was told."""
+    """Exit 1 where a wrong number was published."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=1000, help="faults over all devices")
     parser.add_argument("--seed", default="1")

@@ -115,7 +115,7 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """A failure in real time beside a stall of this computer decides nothing: a skip, with it.
 
-    A failure without a stall stays a failure, and so does a test that hangs.
+    A failure without a stall stays a failure, and a test that hangs is one.
     """
     report = yield
     watch = item.stash.get(_WATCH, None)

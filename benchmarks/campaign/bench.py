@@ -27,7 +27,7 @@ class Bench:
     """Which programme each run follows."""
     scene: Scene
     load: str
-    """How the load is told: ``load`` (a channel), ``mass`` (metadata) or ``cell`` (not at all)."""
+    """How the load is given: ``load`` (a channel), ``mass`` (metadata) or ``cell`` (not at all)."""
     repeats: str
     """``perfect``, ``imperfect`` (another clock, length and temperature) or ``none``."""
     warms: bool

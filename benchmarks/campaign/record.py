@@ -54,7 +54,7 @@ def record_several(
 def _shown(
     random: Random, bench: Bench, index: int, hidden: Hidden, offset: float
 ) -> dict[str, Array]:
-    """What one winch's instruments tell of a run."""
+    """Measurements of one winch in a run."""
     run = bench.situations[index]
     ideal, channels = show(bench.winch, run, hidden), {"motor_angle": run.motor_angle[:: run.every]}
     count = len(channels["motor_angle"])

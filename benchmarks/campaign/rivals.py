@@ -46,7 +46,7 @@ class Regression:
 
 
 def regression_of(engine: TimeSeriesSelection) -> Regression:
-    """The regression of an inquiry before anything is added, thinned to what solvers bear."""
+    """The regression of an inquiry before anything is added, decimated to what solvers bear."""
     regression = engine.regression
     # Each output by its own size: metres and newtons on one scale.
     known = regression.nuisance_columns

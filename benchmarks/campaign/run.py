@@ -64,7 +64,7 @@ def run_cases(
 def _told(
     answers: Iterable[tuple[tuple[int, Plan, str | None], Score | None]], log: Path | None
 ) -> Iterator[Score]:
-    """Answers as they come, each told and kept at once."""
+    """Answers as they come, each reported and kept at once."""
     for job, got in answers:
         if got is None:
             print(f"none {job[0]} cannot be made: {job[1]}", file=sys.stderr)

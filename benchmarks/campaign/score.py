@@ -129,7 +129,7 @@ def _intervals(hidden: Hidden, steps: Sequence[dict[str, Any]]) -> Iterator[Inte
                     continue
                 value = float(estimate["value"])
                 low, high = estimate.get("interval") or (value - 1.96 * std, value + 1.96 * std)
-                # The same truth, told as near the value as its symmetries allow.
+                # The same truth, expressed as near the value as its symmetries allow.
                 near = value - _apart(effect, name, value, true)
                 yield Interval(effect, name, near, value, low, high, (value - near) / std)
 

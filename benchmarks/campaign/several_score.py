@@ -69,7 +69,7 @@ class SeveralScore:
 
     @property
     def shared_right(self) -> bool:
-        """Whether what is told of all together is what is true: who has it, and that alike."""
+        """Whether the report on all together is true: who has it, and that alike."""
         own = [
             s for s in self.shared if any(t in s["effects"] for t in self.truth[s["winches"][0]])
         ]

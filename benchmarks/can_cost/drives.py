@@ -24,7 +24,7 @@ _PERIOD_OF_BEATS = 12
 
 @dataclass
 class Idle:
-    """A motor that nobody moves."""
+    """A motor at rest."""
 
     motor_angle: float = 0.0
     motor_velocity: float = 0.0

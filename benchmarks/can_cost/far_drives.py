@@ -64,7 +64,7 @@ class FarDrives:
 
 
 def _serve(end: int, first: int, last: int, cycle: float) -> None:
-    """Commissionable drives until told to run, then drives of frames alone."""
+    """Commissionable drives until the command to run, then drives of frames alone."""
     import threading
 
     from can_cost.drives import Commissionable, Drives

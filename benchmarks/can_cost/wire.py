@@ -1,7 +1,7 @@
 """What carries frames between a bench and its drives: python-can's `virtual` bus, or a socket.
 
 The socket is a pair whose packets are Linux's ``struct can_frame``; the bench reads and writes it
-by winchkit's own SocketCAN code, and the drives may live in another process.
+by winchkit's own SocketCAN code, and the drives may be in another process.
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ def spec_of(name: str) -> DeviceSpec:
 
 def play(plan: Plan) -> Outcome:
     """Run one sequence in simulated time."""
-    # The library tells every fault at length; here there are thousands.
+    # The library describes every fault at length; here there are thousands.
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
     loop = WarpLoop()
     try:

@@ -1,4 +1,4 @@
-"""The far end of a line: answers queries, and does to the answers what it is told to."""
+"""The far end of a line: answers queries, and changes the answers as it is set to."""
 
 from __future__ import annotations
 

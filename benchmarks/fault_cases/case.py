@@ -24,7 +24,7 @@ class Planned:
     kind: str
     winch: str
     at: float
-    """After the motion has begun, s."""
+    """After the motion has started, s."""
     span: float | None
     """s; None lasts until everything is mended."""
 

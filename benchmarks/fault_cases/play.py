@@ -37,9 +37,9 @@ class Record:
     onsets: list[tuple[Planned, float]] = field(default_factory=list)
     """Faults that came to be, and when, s."""
     unheard: list[Planned] = field(default_factory=list)
-    """Frames of strangers that the drive did not hear; the host hears them and stops it."""
+    """Foreign frames that the drive did not receive; the host receives them and stops it."""
     frames: list[tuple[tuple[Planned, float], Strange]] = field(default_factory=list)
-    """The stranger's frame of a fault that is one."""
+    """The foreign frame of a fault that is one."""
     recoveries: list[tuple[str, str, float]] = field(default_factory=list)
     """Part, winch and moment of each end of a fault before the mending, s."""
     mended: float = 0.0
@@ -84,7 +84,7 @@ def play(case: Case) -> Record:
                 record.truth = world.truth
         except KeyboardInterrupt:
             raise
-        except BaseException as error:  # noqa: BLE001 - a case that breaks is told as one
+        except BaseException as error:  # noqa: BLE001 - a case that breaks is reported as one
             known = record.failure is not None and error is record.failure
             record.error = "" if known else f"{type(error).__name__}: {error}"
         _read_log(record, Path(folder))
@@ -129,7 +129,7 @@ def _play(world: World, record: Record) -> None:
     record.logged_from = _first_row(recorder)
     try:
         recorder.close()
-    except Exception as error:  # noqa: BLE001 - a full disk is told here
+    except Exception as error:  # noqa: BLE001 - a full disk is reported here
         record.log_error = str(error)
     world.sample()
     for onset, frame in record.frames:

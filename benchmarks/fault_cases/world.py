@@ -59,7 +59,7 @@ class Sample:
 
 @dataclass
 class Strange:
-    """A frame of a stranger to one winch's drive."""
+    """A foreign frame to one winch's drive."""
 
     winch: str
     identifier: int
@@ -78,7 +78,7 @@ class World:
     bench: Bench
     truth: dict[str, list[Sample]] = field(default_factory=dict)
     strange: list[Strange] = field(default_factory=list)
-    """Frames of strangers, in their order."""
+    """Foreign frames, in their order."""
     _later: list[tuple[float, int, Callable[[], None]]] = field(default_factory=list)
     _order: count[int] = field(default_factory=count)
     _stopping: threading.Event = field(default_factory=threading.Event)
@@ -102,7 +102,7 @@ class World:
             heappush(self._later, (moment, next(self._order), function))
 
     def inject_frame(self, winch: str, identifier: int, data: bytes) -> None:
-        """A stranger on the bus sends a frame to the drive of a winch."""
+        """Another host on the bus sends a frame to the drive of a winch."""
         self.strange.append(Strange(winch, identifier, data))
         wire = self.live.wire["can"]
         if self._note_heard not in wire.taps:
@@ -142,7 +142,7 @@ class World:
                 )
 
     def _note_heard(self, carried: Carried) -> None:
-        """A frame arrives: where it is a stranger's, note whether the drive takes it."""
+        """A frame arrives: where it is a foreign one, note whether the drive takes it."""
         for one in self.strange:
             same = (one.identifier, one.data) == (carried.identifier, carried.data)
             if one.heard is None and same and not carried.from_drive:

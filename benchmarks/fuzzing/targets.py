@@ -114,7 +114,7 @@ def recovered(path: str | Path) -> None:
 
 
 def gate_targets() -> Iterator[Target]:
-    """What tells the answer from everything else on a Modbus line: on a serial one, over TCP."""
+    """What distinguishes the answer from all else on a Modbus line: on a serial one, over TCP."""
     body = bytes((1, 3, 0, 5, 0, 4))
     answer = bytes((1, 3, 8)) + bytes(range(8))
     yield gate_target("rtu", body + crc16(body), answer + crc16(answer))

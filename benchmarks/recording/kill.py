@@ -1,4 +1,4 @@
-"""Kills a recording at a moment, and tells what was lost."""
+"""Kills a recording at a moment, and reports what was lost."""
 
 from __future__ import annotations
 

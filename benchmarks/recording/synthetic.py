@@ -36,7 +36,7 @@ WINCHES, CYCLE, EVERY = 8, 1e-3, 10
 
 @dataclass
 class Cell:
-    """A load cell that says what it is told to."""
+    """A load cell that says what it is set to."""
 
     name: str
     period: float = CYCLE * EVERY

@@ -39,12 +39,12 @@ def _waves(line: int, row: Row) -> float:
 
 
 def _joint(line: int, row: Row) -> float:
-    """Line 4 hangs on a joint that gives way above 45 N."""
+    """Line 4 hangs on a joint that yields above 45 N."""
     return -2e-5 * max(0.0, row.tension[3] - 45.0) if line == 3 else 0.0
 
 
 def _bends(line: int, row: Row) -> float:
-    """A platform that bends: its upper anchors give way along z with all that pulls at them."""
+    """A platform that bends: its upper anchors yield along z with all that pulls at them."""
     if line >= UPPER:
         return 0.0
     place, rotation = row.position, turn(*row.angles)

@@ -221,7 +221,7 @@ def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None
 def test_a_log_of_a_station_that_cannot_go_on_disturbs_no_other(
     bench: Bench, tmp_path: Path
 ) -> None:
-    """The folder vanishes, the next part cannot be begun; a thread that raises fails this test."""
+    """The folder vanishes, the next part cannot start; a thread that raises fails this test."""
     station = attach(bench.spec)
     assert station is not None
     folder = tmp_path / "gone"

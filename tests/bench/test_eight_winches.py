@@ -87,7 +87,7 @@ def bench(live: LiveBench, clock: SimulatedClock) -> Iterator[Bench]:
 
 
 def nodes_at_first(cycles: list[dict[int, tuple[int, int]]], word: int) -> set[int]:
-    """Nodes that are first told this word, in the cycle in which the first of them is."""
+    """Nodes that first get this word, in the cycle in which the first of them gets it."""
     for cycle in cycles:
         told = {node for node, (control, _) in cycle.items() if control == word}
         if told:

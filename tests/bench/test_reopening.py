@@ -36,7 +36,7 @@ def test_a_reset_opens_a_bus_that_went_down(monkeypatch: pytest.MonkeyPatch) -> 
         monkeypatch.setattr(bus._port, "send", unplugged)
         with pytest.raises(LimitTripped, match="No such device"):
             bench.winch["A"].wait()
-        # The drive, which no longer hears the host, stops by itself.
+        # The drive, which no longer receives the host, stops by itself.
         while abs(live.winches["A"].plant.motor_velocity) > 0.1:
             clock.sleep(0.05)
         with pytest.raises((LimitTripped, ConnectionLost)):

@@ -16,7 +16,7 @@ from winchkit.errors import DriveFault, LimitTripped
 pytestmark = pytest.mark.realtime
 
 ARM = 0.06 / 20.4
-"""Of bench-spiral, first turn: rope per motor angle, m/rad."""
+"""Of bench-spiral, first turn: cable per motor angle, m/rad."""
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_jog_moves_and_ends_by_its_dead_man(rig: Rig, bench: Bench) -> None:
     assert peak < 0
     falls = len(sent) - 1 - sent[::-1].index(peak)
     until_falling = [frame for frame in frames if frame.time <= commands(frames)[falls].time]
-    # Nobody refreshes it any more: it ends after the dead-man's time, looked at once a cycle.
+    # It is not refreshed any more: it ends after the dead-man's time, looked at once a cycle.
     assert syncs_after(until_falling, begin) <= DEAD_MAN / rig.transport.cycle + 2
     assert all(later >= earlier for earlier, later in itertools.pairwise(sent[falls:]))
     # The drum's growth adds a thousandth a turn.

@@ -31,7 +31,7 @@ BITS = {"PP": 0, "PV": 2, "PT": 3, "HM": 5, "IP": 6, "CSP": 7, "CSV": 8, "CST": 
 
 
 class Wheel:
-    """Turns as it is told."""
+    """Turns as commanded."""
 
     motor_angle = motor_velocity = motor_torque = 0.0
 

@@ -1,7 +1,7 @@
 """Words that winchkit does not use: one word for one thing, and none that is a metaphor.
 
-``GONE`` must not come back in any docstring, comment or text of the package. What to write instead
-is in docs/glossary.md.
+``GONE`` must not come back in any text of the package, nor in a docstring, a comment or the name of
+a test elsewhere. What to write instead is in docs/glossary.md.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import pytest
 from snippets import ROOT
 from texts_of import Text, texts_of
 
-PACKAGE = ROOT / "winchkit"
 GONE = {
     r"wiring files?": "bench file",
     r"in disguise": "shape parameter at its bound",
@@ -46,7 +45,7 @@ GONE = {
     r"unseen": "below the noise",
     r"strangers?": "unknown device",
     r"(gives?|gave|given) way": "yields, is compliant, is replaced by",
-    r"(?<!wire )(?<!elastic )(?<!creeping )(?<!lagging )(?<!warm )(?<!heavy )ropes?": "cable "
+    r"(?<!wire )(?<!elastic[ -])(?<!creeping )(?<!lagging )(?<!warm )(?<!heavy )ropes?": "cable "
     "(a title, a steel wire rope and five names of simulated physics keep the word)",
     r"nobody": "name what is missing",
     r"told": "reported, given, known",
@@ -72,11 +71,16 @@ GONE = {
 
 @cache
 def texts() -> tuple[tuple[str, Text], ...]:
-    """File and text of every text of the package."""
-    paths = sorted(PACKAGE.rglob("*.py"))
-    return tuple(
-        (path.relative_to(ROOT).as_posix(), text) for path in paths for text in texts_of(path)
-    )
+    """File and text: every text of the package, docstrings and comments of the other folders."""
+    found = [
+        (path, text)
+        for folder in ("winchkit", "benchmarks", "docs", "examples", "tests")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        if path != Path(__file__)
+        for text in texts_of(path)
+        if folder == "winchkit" or text.about_code
+    ]
+    return tuple((path.relative_to(ROOT).as_posix(), text) for path, text in found)
 
 
 @pytest.mark.parametrize("word", GONE)

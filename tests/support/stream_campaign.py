@@ -11,7 +11,7 @@ from winchkit.drivers.reading import Reading
 __all__ = ["KINDS", "Outcome", "campaign"]
 
 RAMP = 0.5
-"""Of the truth, N/s: a value tells when it was true."""
+"""Of the truth, N/s: a value identifies its time."""
 KINDS = (
     "silence",
     "late reply",

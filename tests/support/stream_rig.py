@@ -55,7 +55,7 @@ def stream(name: str) -> StreamSpec:
 
 
 class Time:
-    """A clock that moves when it is told to."""
+    """A clock that moves when it is set."""
 
     def __init__(self) -> None:
         self.time = 100.0

@@ -123,7 +123,7 @@ def test_dropped_frames_never_arrive(sim: OpenedBench) -> None:
 
 
 def test_delayed_frames_come_late(sim: OpenedBench) -> None:
-    """The status word tells of the fault within a cycle, the emergency after the delay."""
+    """The status word shows the fault within a cycle, the emergency after the delay."""
     late = 0.05
     begin = sim.clock.now()
     sim.delay("A.emergency", late)
@@ -224,7 +224,7 @@ def test_nothing_is_left_running(sim_bench: SimBench) -> None:
 
 
 def test_the_plugin_is_registered_and_light() -> None:
-    """A session that does not use it pays for an import of a file and of pytest, nothing else."""
+    """A session that does not use it imports one file and pytest, nothing else."""
     code = (
         "import sys, winchkit.testing.plugin\n"
         "heavy = {'numpy', 'scipy', 'can', 'canopen', 'pymodbus', 'pydantic', 'tomlkit', 'rich'}\n"

@@ -15,7 +15,7 @@ from winchkit.errors import MotionError, NotPermitted
 
 
 def unheeded(bench: SlaveBench, opened: Bench) -> None:
-    """Stop a winch whose drive heeds no control word: silence is what is left."""
+    """Stop a winch whose drive obeys no control word: only silence is left."""
     opened.winch["A"].keep_jogging(-0.05)
     for _ in range(40):
         opened.winch["A"].keep_jogging(-0.05)

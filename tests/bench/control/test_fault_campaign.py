@@ -87,7 +87,7 @@ def test_a_frame_that_no_drive_receives_is_received_by_the_host(independent: boo
 
 
 def test_a_case_is_the_same_whenever_it_is_played() -> None:
-    """With cells that lose connections, whose transactions are otherwise drawn anew each time."""
+    """With cells that lose connections, whose transactions start at a number of the loop's time."""
     again = case("cell: short", independent=True)
     first, second = play(again), play(again)
     assert first.truth == second.truth

@@ -73,7 +73,7 @@ def test_live_cells_stay_below_the_levels(name: str) -> None:
 
 
 def test_a_cell_that_froze_before_it_was_opened_is_seen_in_the_first_motion() -> None:
-    """One count ever, with 0.01 N a count declared: nothing but the prediction can tell."""
+    """One count ever, with 0.01 N a count declared: only the prediction shows it."""
     test, found = FrozenCell(100.0, per_count=0.01), math.nan
     for k in range(400):
         now = k * 0.01

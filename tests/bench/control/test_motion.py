@@ -108,7 +108,7 @@ def test_a_move_arrives(target: float, position_mode: bool) -> None:
 
 
 class SoftLine(StraightLine):
-    """The same, and the rope is longer once the winch has come to where it was sent."""
+    """The same, and the cable is longer once the winch has come to where it was sent."""
 
     longer = 0.0
 

@@ -151,7 +151,7 @@ def test_a_profile_with_an_unknown_effect_says_what_to_do(
 def test_an_effect_that_fails_under_way_ramps_the_winch_down(
     tmp_path: Path, body: str, said: str
 ) -> None:
-    """It works until the winch moves fast; then everything ramps down, and its place is told."""
+    """It works until the winch moves fast; then all ramps down, and its place is reported."""
     own = OWN.replace(
         "def yields(length, at, values):\n",
         f"def yields(length, at, values):\n    if at.speed[-1] > 0.3:\n        {body}\n",

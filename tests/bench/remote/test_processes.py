@@ -85,7 +85,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 def state(served: Path) -> tuple[float, str]:
-    """True cable length, m, and the drive's state, as the simulation tells."""
+    """True cable length, m, and the drive's state, by the simulation."""
     found = re.match(r"A: ([\d.]+) m, .* kg, ([a-z ]+)", send(served, "status"))
     assert found is not None
     return float(found[1]), found[2]

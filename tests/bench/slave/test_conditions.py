@@ -110,7 +110,7 @@ CASES = (
 
 
 def happens(folder: Path, case: Case) -> None:
-    """The condition on a winch that pays out: what is told, and what the drive does."""
+    """The condition on a winch that pays out: the report, and what the drive does."""
     rig = Rig(folder)
     bench = rig.open()
     try:

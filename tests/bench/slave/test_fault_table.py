@@ -40,7 +40,7 @@ class Row:
     fault: str
     value: Any = None
     cause: str = "."
-    """Regular expression of what the person is told first."""
+    """Regular expression of the first message."""
     without_torque: bool = False
     """The drive loses its torque at once: the brake stops the shaft."""
     within: float = _WITHIN

@@ -39,7 +39,7 @@ Change = Callable[[float], State]
 
 
 def well(now: float, change: State) -> WinchInput:
-    """A winch that winds in as it is told, apart from a change."""
+    """A winch that winds in as commanded, apart from a change."""
     tension = change.get("tension", 100.0)
     cell = Instrumented(
         value=change.get("value", tension),
@@ -85,7 +85,7 @@ class Case:
 
     kind: str
     variable: str
-    """Tells rows of one kind apart."""
+    """Distinguishes rows of one kind."""
     beyond: Change
     within: Change
     """Just within the limit, for a second."""

@@ -263,7 +263,7 @@ class NoMotionWithoutCommand(RuleBasedStateMachine):
         if alone and self._must_trip(name, powered, commanded=commanded):
             self.must = min(self.must, self.rig.time + _NOTICED)
         if name in _ENABLED_BY_OTHERS:
-            # Without a process nobody is there to stop it.
+            # Without a process there is no client to stop it.
             self.oracle.unasked(FIRST_STOP if self.bench is not None else 1e6)
 
     @rule()

@@ -177,7 +177,7 @@ def test_a_master_that_goes_on_keeps_a_reset_from_succeeding(tmp_path: Path) -> 
 
 
 def test_frames_of_two_benches_on_one_bus_are_those_of_their_own_drives(tmp_path: Path) -> None:
-    """What is sent to the winch beside this one, by its own bench, concerns nobody here."""
+    """What is sent to the winch beside this one, by its own bench, is not a foreign command."""
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, number) for number in (1, 2)])
     with rig.opened() as bench:
         jogging(rig, bench, winch="A")

@@ -1,6 +1,6 @@
 """Each rung of the stop table is used when it is due, and only then; without it a test fails.
 
-A winch that pays out under a held key gets a quick stop while its drive does not hear what the
+A winch that pays out under a held key gets a quick stop while its drive does not receive what the
 rungs before say. Which rung stopped it is read from the bus.
 """
 

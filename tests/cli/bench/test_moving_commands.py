@@ -116,7 +116,7 @@ def test_home_here_defines_the_length_and_moves_nothing(bench: Served) -> None:
     shown = json.loads(done.stdout)["winch"]["B"]["cable_length"]
     assert shown == pytest.approx(2.5, abs=2e-3)
     assert length(bench, "B") == pytest.approx(before, abs=1e-3)
-    # The drive keeps it: the bench, opened anew, still sees it, and so does a move.
+    # The drive keeps it: the bench, opened anew, still sees it, and a move sees it too.
     assert invoke("move", "B", "--wind-in", "0.1 m", "-b", bench.file).exit_code == 0
     assert length(bench, "B") == pytest.approx(before - 0.1, abs=0.01)
 

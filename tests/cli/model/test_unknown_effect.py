@@ -1,4 +1,4 @@
-"""What no effect explains: a curve of it can be added, and a file for the physics begun."""
+"""What no effect explains: a curve of it can be added, and a file for the physics started."""
 
 from __future__ import annotations
 

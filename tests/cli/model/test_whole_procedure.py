@@ -67,7 +67,7 @@ class Case:
     physics: str
     first: str
     open: frozenset[str]
-    """What the first answer cannot tell apart, among others."""
+    """What the first answer cannot distinguish, among others."""
     name: str
     output: str
     """That the effect changes."""

@@ -127,7 +127,7 @@ def test_a_wrong_word_order_reports_no_number_of_an_empty_cell(device: str, larg
 
 
 def test_a_large_number_is_accepted_once_the_order_is_known() -> None:
-    """655 363 counts turned are 196 618: either may be, until another number has told."""
+    """655 363 counts turned are 196 618: either may be, until another number decides."""
     decoder = Decoder(spec_of("laumas-tlb"))
     told = {
         counts: decoder.word_order([0, *(counts >> 16, counts & 0xFFFF) * 2, 0, 0])

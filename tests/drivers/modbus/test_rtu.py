@@ -77,7 +77,7 @@ def device(behave: Behaviour) -> Iterator[str]:
 
 
 def poll(behave: Behaviour, until: Callable[[Instrument], bool]) -> tuple[Instrument, set[float]]:
-    """Poll until a condition holds; returns the instrument and every count it ever told."""
+    """Poll until a condition holds; returns the instrument and all its published counts."""
     seen: set[float] = set()
     cell = read_device(catalog.find("devices", "laumas-tlb"))
     instrument = Instrument("cell", cell, 1, CLOCK, rate=100.0, timeout=0.06)

@@ -82,7 +82,7 @@ def test_the_numbers_of_the_manuals(name: str, data: bytes, value: float, qualit
         # O-L in the middle of both places: T and P, the rest cancels out.
         ("laumas-tlb-ascii", b"&T  O-L P  O-L \\04\r", Quality.OVERLOAD),
         ("laumas-tlb-ascii", b"&T__O-F_P__O-F_\\04\r", Quality.FAULT),
-        # A text that nobody declared, but a right check sum: an alarm, and no number.
+        # A text that is not declared, but a right check sum: an alarm, and no number.
         ("laumas-tlb-ascii", b"&T EEPr P EEPr \\04\r", Quality.FAULT),
         ("hbm-aed-ascii", b"+1599999,01,001\r\n", Quality.OVERLOAD),
         ("hbm-aed-binary", b"\x7f\xff\xff\x04\r\n", Quality.OVERLOAD),

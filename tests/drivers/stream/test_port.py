@@ -185,7 +185,7 @@ def test_an_adapters_latency_timer_is_set(tmp_path: Path) -> None:
 
 @pytest.fixture
 def read_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody may write; the file's mode does not keep root from it."""
+    """No user may write; the file's mode does not keep root from it."""
 
     def refuse(*_: object, **__: object) -> int:
         raise PermissionError(13, "Permission denied")

@@ -27,7 +27,7 @@ HEARTBEAT = 0.2
 SERVER = Path(__file__).with_name("drive_server.py")
 _GROUP = "239.74.163.2"
 _MARK = 0x7DF
-"""An identifier that nobody else uses."""
+"""An identifier that no other node uses."""
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,7 @@ class FakeAxis:
         return word
 
     def stop_by_sdo(self) -> None:
-        """It takes the write in this cycle, and tells its state in the next."""
+        """It takes the write in this cycle, and reports its state in the next."""
         self.sdo_stops += 1
         if self.hears_sdos:
             if self.sdo_stops > 1:

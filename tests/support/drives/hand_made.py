@@ -53,7 +53,7 @@ def codec(number: int, *objects: int | tuple[int, int], transmission: int = 1) -
 
 
 class Clock:
-    """Stands still until it is told or slept on."""
+    """Stands still until it is set or slept on."""
 
     def __init__(self) -> None:
         self.time = 100.0
@@ -164,7 +164,7 @@ class HandMade:
         self.second(**values)
 
     def enable(self) -> None:
-        """An enabled drive that is told to stay so."""
+        """An enabled drive with the command to stay so."""
         self.answer(0x0237, mode=MODES[self.mode].number)
         self.axis.send(Wish.ENABLE)
         self.sent()

@@ -52,7 +52,7 @@ class Master:
         return State.UNKNOWN if self.axis.feedback is None else self.axis.feedback.state
 
     def commission(self) -> Commissioned:
-        """Commission the drive and hear its first feedback."""
+        """Commission the drive and receive its first feedback."""
         drive = self.axis.commission()
         self.cycles_silent(3)
         return drive

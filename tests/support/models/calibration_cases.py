@@ -42,7 +42,7 @@ ELASTIC = Truth(stiffness=2e4, home_tension=30.0)
 
 @lru_cache(maxsize=1)
 def robot() -> Robot:
-    """As its designers believed it to be."""
+    """As it was designed."""
     return robot_of(read_robot(find("profiles", "cabtive")))
 
 

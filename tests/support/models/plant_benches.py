@@ -63,7 +63,7 @@ def cruise(winch: WinchPlant, speed: float, duration: float) -> None:
 
 
 def bench(**changes: object) -> SimBench:
-    """One grooved winch with every instrument, without noise unless told."""
+    """One grooved winch with every instrument, without noise by default."""
     device = DeviceRef("x", "b", unit=1)
     wiring = WinchWiring(
         "grooved",

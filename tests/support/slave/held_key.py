@@ -49,7 +49,7 @@ class HeldKey:
         return self
 
     def release(self) -> None:
-        """Let go."""
+        """Release the key."""
         if self.held:
             self.held = False
             self.rig.each.remove(self._repeat)
@@ -86,7 +86,7 @@ class Outcome:
     rest: float
     """Until the shaft stood still for good."""
     cause: str
-    """What the person was told first."""
+    """The first message."""
     told: float
     """When."""
     speed: float

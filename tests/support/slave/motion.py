@@ -1,4 +1,4 @@
-"""The modes of operation PP, PV, HM, CSP and CSV: what the motor is told, and what is measured."""
+"""The modes of operation PP, PV, HM, CSP and CSV: commands to the motor, and measured values."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class _Profile:
 
 
 class Motion:
-    """What the motor is told, and what objects say of it; ``faults`` change both."""
+    """Commands to the motor, and their objects; ``faults`` change both."""
 
     def __init__(
         self,

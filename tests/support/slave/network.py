@@ -29,7 +29,7 @@ _COMMANDS = {0x01: Nmt.OPERATIONAL, 0x02: Nmt.STOPPED, 0x80: Nmt.PRE_OPERATIONAL
 class Network:
     """The NMT state of a node, and what watches it and the master.
 
-    ``on_state`` is told each change, ``on_reset`` the first and last object that a reset gives
+    ``on_state`` gets each change, ``on_reset`` the first and last object that a reset gives
     its power-on value, ``on_lost`` the code of a connection that was lost.
     """
 

@@ -27,13 +27,13 @@ _TURNS = 0.5
 
 @dataclass
 class Oracle:
-    """Watches one slave; the test tells it of commands, trips and faults."""
+    """Watches one slave; the test reports commands, trips and faults to it."""
 
     slave: Slave
     allowed: float = -math.inf
     """Until when it may be enabled, in the slave's time."""
     excused: bool = False
-    """A fault makes it turn or hear nothing, which no command can end."""
+    """A fault makes it turn or receive nothing, which no command can end."""
     wrongs: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:

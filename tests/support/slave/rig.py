@@ -94,7 +94,7 @@ class Rig:
     folder: Path
     slaves: list[Slave] = field(default_factory=lambda: [Slave.from_file(GENERIC, 1)])
     host_mute: Callable[[Frame], bool] = lambda _frame: False
-    """Frames of the host that are lost before anybody hears them."""
+    """Frames of the host that are lost before any node receives them."""
     each: list[Callable[[], None]] = field(default_factory=list)
     """Called every step of :meth:`wait`, e.g. by a person who holds a key."""
 

@@ -26,7 +26,7 @@ def main(folder: Path) -> int:
         "WINCHKIT_TEST_SEEN": str(folder / "seen.log"),
     }
     with (folder / "candump.log").open("wb") as log:
-        # -d tells of frames that it lost, -L is its log format.
+        # -d reports frames that it lost, -L is its log format.
         witness = subprocess.Popen(["candump", "-d", "-L", "-r", "4000000", CHANNEL], stdout=log)
         time.sleep(_WAKE)
         options = ["-q", "-rs", "-p", "no:cacheprovider", "-p", "no:xdist", "--durations=3"]

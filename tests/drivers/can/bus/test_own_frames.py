@@ -78,7 +78,7 @@ def group() -> BusSpec:
 
 
 def test_over_multicast_only_foreign_frames_are_received(group: BusSpec) -> None:
-    """Frames of the loop, of the SDO client and NMT from three threads, and one of a stranger."""
+    """Frames of the loop, of the SDO client and NMT from three threads, and one of another host."""
     bus, heard, seen = CanBus(group, "can", MonotonicClock()), list[bytes](), list[int]()
     stranger = can.Bus(interface="udp_multicast", channel=_GROUP, port=group.port)
     try:

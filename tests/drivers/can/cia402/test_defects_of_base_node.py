@@ -201,7 +201,7 @@ def test_8_sdo_of_four_threads_do_not_mix(rig: Rig) -> None:
 def test_8_a_write_that_is_not_answered_is_not_written_again(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It may have arrived: what a second one would do nobody knows."""
+    """It may have arrived: the effect of a second one is unknown."""
     drive, bus = rig
     monkeypatch.setattr(drive.drive, "_serve_sdo", lambda _data, _now: None)
     node = node_on(bus)

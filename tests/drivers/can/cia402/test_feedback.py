@@ -1,4 +1,4 @@
-"""Feedback from TPDOs: complete, of one SYNC, never believed beyond what was said."""
+"""Feedback from TPDOs: complete, of one SYNC, never extended beyond what was received."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ STATUS = st.sampled_from([ENABLED, 0x0233, READY, DISABLED, 0x0217, 0x0218]) | s
 def test_no_frames_make_a_drive_enabled_that_does_not_say_so(
     events: list[tuple[str, int, int]],
 ) -> None:
-    """It is believed enabled only by a status word that says so, in a whole answer since it
+    """It counts as enabled only by a status word that says so, in a whole answer since it
     booted; a ramp is kept up only by one of the last five SYNCs.
     """
     made, wish, said, booted = HandMade(), Wish.ENABLE, set[int](), False

@@ -33,7 +33,7 @@ ages = st.integers(0, 12)
 def test_no_stop_ever_energises(
     believed: State, true: State, wish: Wish, previous: int, age: int, at_rest: bool
 ) -> None:
-    """Not even when the drive is in another state than the host believes."""
+    """Not even when the drive is in another state than the host has received."""
     word = control_word(believed, wish, previous=previous, age=age, at_rest=at_rest)
     assert word & 0x0F != 0x07
     if word & 0x0F == 0x0F:

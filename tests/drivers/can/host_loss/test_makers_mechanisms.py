@@ -49,7 +49,7 @@ def device(file: str, host_loss: str) -> DeviceSpec:
 
 
 def drive(file: str) -> Slave:
-    """The slave of an EDS; 6502h is told by the drive, not by the file."""
+    """The slave of an EDS; 6502h is that of the drive, not of the file."""
     slave = Slave.from_file(FOLDER / file, 1, reactions=STOPS)
     if not slave.objects.get(0x6502):
         slave.objects.set(0x6502, 0, 0x3FF)

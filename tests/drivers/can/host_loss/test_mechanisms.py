@@ -228,7 +228,7 @@ def test_guarding_is_refused_where_the_adapter_sends_no_remote_frames(
         with pytest.raises(NotPermitted, match=r"remote frames \(RTR\).*sends none"):
             bench.axis(generic(host_loss="guarding")).commission()
     with rig(drive()) as bench:
-        # An adapter of which nobody knows it: the polls go nowhere.
+        # An adapter without a note of it: the polls go nowhere.
         monkeypatch.setattr(CanBus, "remote", lambda *_: None)
         with pytest.raises(NotPermitted, match=r"no guarding reply|no answer to 3 guarding polls"):
             bench.axis(generic(host_loss="guarding")).commission()
