@@ -344,7 +344,7 @@ class Winch:
         Parameters
         ----------
         move : Move
-            A move that has begun.
+            A move that was started.
 
         Returns
         -------
