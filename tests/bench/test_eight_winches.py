@@ -4,41 +4,20 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import replace
 
 import pytest
 
-from winchkit import catalog, open_bench
+from bare_winches import bare_winches
+from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Phase
 from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
-from winchkit.schema.read import read_simbench
-from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.buses import Carried, Wire
 
 NAMES = "ABCDEFGH"
 SYNC, RPDO = 0x080, 0x200
-
-
-def declared() -> SimBench:
-    """The shipped spiral bench eight times, without instruments, at 50 Hz."""
-    sim = read_simbench(catalog.find("sim", "spiral-bench"))
-    one = sim.bench.winch["A"]
-    winches = {
-        name: replace(
-            one,
-            servo=replace(one.servo, node=number),
-            cell=None,
-            length=None,
-            temperature=None,
-        )
-        for number, name in enumerate(NAMES, start=1)
-    }
-    bus = {"can": replace(sim.bench.bus["can"], heartbeat=0.2)}
-    bench = replace(sim.bench, winch=winches, bus=bus, cycle=0.02)
-    return replace(sim, bench=bench, truth=dict.fromkeys(winches, sim.truth["A"]))
 
 
 class Witness:
@@ -76,7 +55,9 @@ def clock() -> SimulatedClock:
 
 @pytest.fixture(scope="module")
 def live(clock: SimulatedClock) -> Iterator[LiveBench]:
-    with LiveBench(declared(), seed=1, simulated_time=clock) as running:
+    with LiveBench(
+        bare_winches(NAMES, cycle=0.02, heartbeat=0.2), seed=1, simulated_time=clock
+    ) as running:
         yield running
 
 

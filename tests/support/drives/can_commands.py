@@ -6,16 +6,15 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 
-from winchkit import catalog
+from bare_winches import bare_winches
 from winchkit.cli import main
-from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.paced_clock import PacedClock
@@ -64,22 +63,7 @@ def served(folder: Path, winches: str = "A", *, paced: bool = False) -> Iterator
     In simulated time, or ``paced``: for what waits outside the simulated clock, on a socket or for
     the reply to an SDO request.
     """
-    declared = read_simbench(catalog.find("sim", "spiral-bench"))
-    one = declared.bench.winch["A"]
-    bare = {
-        name: replace(
-            one,
-            servo=replace(one.servo, node=number),
-            cell=None,
-            length=None,
-            temperature=None,
-        )
-        for number, name in enumerate(winches, start=1)
-    }
-    bus = {"can": declared.bench.bus["can"]}
-    bench = replace(declared.bench, winch=bare, bus=bus, cycle=0.004 if len(bare) < 3 else 0.02)
-    truth = dict.fromkeys(bare, declared.truth["A"])
-    simulated = replace(declared, bench=bench, truth=truth)
+    simulated = bare_winches(winches, cycle=0.004 if len(winches) < 3 else 0.02)
     clock: PacedClock | SimulatedClock
     if paced:
         clock = PacedClock()
