@@ -111,6 +111,53 @@ def test_a_length_that_is_not_known_is_reported_and_no_move_goes_by_it(tmp_path:
         winch.move_to(3.88)
 
 
+@pytest.mark.parametrize("ends", ["closed", "killed"])
+def test_turns_that_an_earlier_process_counted_are_unknown_to_the_next_one(
+    tmp_path: Path, ends: str
+) -> None:
+    """The drive's count is then off by a whole range, which nothing in it shows."""
+    slave = Slave.from_file(GENERIC, 1, declared=Declared(counter_bits=20))
+    rig = Rig(tmp_path, [slave])
+    home = wrapping(tmp_path)
+    bench = rig.open(bench_text(rig.channel, device=str(home)))
+    key = HeldKey(rig, bench, pay_out=0.15).press()
+    rig.wait(4.0)
+    key.release()
+    rig.wait(1.0)
+    assert bench.winch["A"].snapshot.turns_known
+    if ends == "closed":
+        bench.close()
+    else:
+        rig.kill(bench)
+        rig.wait(1.0)
+    with rig.opened() as again:
+        winch = again.winch["A"]
+        assert not winch.snapshot.turns_known
+        assert math.isnan(winch.cable_length)
+        if again.snapshot.tripped:
+            again.reset()
+        with pytest.raises(NotPermitted, match="home first"):
+            winch.move_by(pay_out=0.01)
+        winch.home(at=3.9)
+        assert winch.cable_length == pytest.approx(3.9, abs=2e-3)
+    with rig.opened() as last:
+        assert last.winch["A"].snapshot.turns_known
+        latch = Path(last.spec.latch_file)
+    assert not latch.exists()
+
+
+def test_a_counter_within_its_range_is_known_to_the_next_process(tmp_path: Path) -> None:
+    slave = Slave.from_file(GENERIC, 1, declared=Declared(counter_bits=20))
+    rig = Rig(tmp_path, [slave])
+    with rig.opened(bench_text(rig.channel, device=str(wrapping(tmp_path)))) as bench:
+        bench.winch["A"].jog(pay_out=0.05, duration=0.5)
+        length = bench.winch["A"].cable_length
+        latch = Path(bench.spec.latch_file)
+    assert not latch.exists()
+    with rig.opened() as again:
+        assert again.winch["A"].cable_length == pytest.approx(length, abs=1e-3)
+
+
 @pytest.mark.parametrize("noise", [(0, 1, 0, -1), (1, -1), (1, 1, 0)])
 def test_one_rpm_of_noise_is_rest_where_whole_rpm_are_shown(noise: tuple[int, ...]) -> None:
     """606Ch in whole rpm: a count is 0.105 rad/s; the position stands still."""

@@ -96,6 +96,8 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> W
     )
     slow = SlowDevices(lines, clock)
     stack.callback(slow.close)
+    for name in latch.lost & axes.keys():
+        axes[name].lose_position()
     _commission(axes)
     tell_hardware(spec)
     _tell_notes(spec, axes, buses)

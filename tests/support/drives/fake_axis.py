@@ -81,6 +81,7 @@ class FakeAxis:
         return abs(self.velocity) < 0.05
 
     silent: bool = False
+    position_absolute: bool = True
 
     def fall_silent(self) -> bool:
         self.silent = True

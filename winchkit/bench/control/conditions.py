@@ -421,8 +421,8 @@ CONDITIONS: tuple[Condition, ...] = (
         "shorter",
         lambda item, _own, _memory: not item.turns_known,
         lambda *_: (
-            "the cable length is not known: 6064h may have wrapped while the drive was not "
-            "heard; home the winch"
+            "the cable length is not known: 6064h may have wrapped without feedback, or has "
+            "wrapped in an earlier process; home the winch"
         ),
         blocks=Direction.NONE,
         by_facts=True,

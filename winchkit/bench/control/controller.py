@@ -46,6 +46,10 @@ class AxisPort(Protocol):
         """Whether its PDOs run."""
 
     @property
+    def position_absolute(self) -> bool:
+        """Whether the drive's count alone is its position, for a later process too."""
+
+    @property
     def mode_kept(self) -> bool:
         """Whether it is still in its mode."""
 

@@ -1,9 +1,10 @@
-"""The latch file: trips that outlive the process that latched them.
+"""The latch file: trips and lost positions that outlive the process that found them.
 
 It is kept beside the bench file (``bench.toml`` -> ``bench.trip.json``) from opening on. Its record
 has a fixed size and is overwritten in place, so that a full disk, a missing directory entry or a
-short write cannot lose a trip: what cannot be read counts as latched. A bench that was closed
-without a trip leaves no file.
+short write cannot lose a trip: what cannot be read counts as latched. A position is lost to a later
+process where the drive's counter 6064h has left its range, or may have. A bench that was closed
+without a trip and with every position leaves no file.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import json
 import os
 import stat
 import threading
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -40,6 +41,8 @@ class LatchFile:
         self._descriptor: int | None = None
         self._since: dict[tuple[str, str], str] = {}
         self._latched = False
+        self.lost: frozenset[str] = frozenset()
+        """Winches whose position is not that of the drive's counter."""
 
     def open(self) -> tuple[Trip, ...]:
         """Trips that an earlier process latched; a file that cannot be used is one, too."""
@@ -59,12 +62,13 @@ class LatchFile:
         self._latched = bool(trips)
         return trips
 
-    def keep(self, trips: Sequence[Trip]) -> Trip | None:
-        """Write trips; returns a trip that says why where that is not possible.
+    def keep(self, trips: Sequence[Trip], lost: Collection[str] = ()) -> Trip | None:
+        """Write trips and lost positions; returns a trip with the reason where it cannot.
 
         Called on the control thread: one write of a fixed size into the page cache. The disk is
         waited for by a thread of its own.
         """
+        self.lost = frozenset(lost)
         if not self.path:
             return None
         self._latched = self._latched or bool(trips)
@@ -76,7 +80,10 @@ class LatchFile:
         return None
 
     def clear(self) -> None:
-        """Write that nothing is latched; raises NotPermitted where that is not possible."""
+        """Write that nothing is latched; raises NotPermitted where that is not possible.
+
+        Lost positions stay: only homing finds them.
+        """
         if not self.path:
             return
         self._since.clear()
@@ -92,11 +99,11 @@ class LatchFile:
         self._latched = False
 
     def close(self) -> None:
-        """Close the file; one without a trip is removed."""
+        """Close the file; one without a trip or a lost position is removed."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is None:
             return
-        if not self._latched:
+        if not self._latched and not self.lost:
             with suppress(OSError):
                 os.unlink(self.path)
         os.close(descriptor)
@@ -115,7 +122,7 @@ class LatchFile:
         draft = f"{self.path}.{os.getpid()}"
         descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | _FLAGS, 0o644)
         try:
-            if os.write(descriptor, _record(rows)) != _SIZE:
+            if os.write(descriptor, _record(rows, self.lost)) != _SIZE:
                 raise OSError(28, "no space left on the device")
             os.fsync(descriptor)
         finally:
@@ -136,7 +143,7 @@ class LatchFile:
             for trip in trips[:_MOST]
         ]
         os.lseek(self._descriptor, 0, os.SEEK_SET)
-        if os.write(self._descriptor, _record(rows)) != _SIZE:
+        if os.write(self._descriptor, _record(rows, self.lost)) != _SIZE:
             raise OSError(28, "no space left on the device")
         if not self._in_place():
             # Somebody removed or replaced the file: a later process reads what has its name.
@@ -149,6 +156,10 @@ class LatchFile:
         record = json.loads(data)
         if record["schema"] != 1 or len(data) != _SIZE:
             raise ValueError("unknown schema")
+        lost = record.get("positions_lost", [])
+        if not isinstance(lost, list):
+            raise TypeError("positions_lost is no list")
+        self.lost = frozenset(map(str, lost))
         trips = []
         for row in record["tripped"]:
             kind, winch, since = str(row["kind"]), str(row["winch"]), str(row["time"])
@@ -175,9 +186,10 @@ class LatchFile:
                 os.fsync(descriptor)
 
 
-def _record(rows: Sequence[dict[str, str]]) -> bytes:
+def _record(rows: Sequence[dict[str, str]], lost: Collection[str]) -> bytes:
     """A record of exactly ``_SIZE`` bytes; the first trips stay where not all fit."""
-    text = json.dumps({"schema": 1, "tripped": list(rows)}, indent=1).encode()
-    if len(text) >= _SIZE:
-        return _record(rows[:-1])
+    content = {"schema": 1, "tripped": list(rows), "positions_lost": sorted(lost)}
+    text = json.dumps(content, indent=1).encode()
+    if len(text) >= _SIZE and rows:
+        return _record(rows[:-1], lost)
     return text.ljust(_SIZE - 1) + b"\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -150,8 +150,9 @@ class ControlLoop:
             if self.supervisor.tripped or self.failure is not None or reason:
                 self._stop_all(reason)
             self._command(now)
-        if self.supervisor.tripped is not self._kept:
-            self._keep_trips()
+        lost = frozenset(n for n, p in self.winches.items() if not p.axis.position_absolute)
+        if self.supervisor.tripped is not self._kept or lost != self._latch.lost:
+            self._keep(lost)
         self._sample(snapshot)
         return snapshot
 
@@ -196,10 +197,10 @@ class ControlLoop:
                 )
             )
 
-    def _keep_trips(self) -> None:
-        """Write the latch to its file."""
+    def _keep(self, lost: Collection[str]) -> None:
+        """Write the latch and the lost positions to its file."""
         trips = self.supervisor.tripped
-        problem = self._latch.keep(trips)
+        problem = self._latch.keep(trips, lost)
         if problem is not None:
             self.supervisor.latch(problem)
         self._kept = self.supervisor.tripped
@@ -290,7 +291,7 @@ class ControlLoop:
                 latches=True,
             )
         )
-        _attempt(self._keep_trips)
+        _attempt(lambda: self._keep(self._latch.lost))
         self._show_trips()
 
     def stop_step(self, now: float) -> None:

@@ -201,6 +201,15 @@ class Cia402Axis:
         """A reset begins; another master's commands from now on are reported again."""
         self._others.forget()
 
+    @property
+    def position_absolute(self) -> bool:
+        """Whether the drive's count alone is its position: no range of 6064h was left or missed."""
+        return self._position.absolute
+
+    def lose_position(self) -> None:
+        """Take the position as unknown until the drive is homed; before it is commissioned."""
+        self._position.lose()
+
     def disarm(self) -> None:
         """Let the drive, at rest, stop watching the host; raises ConnectionLost."""
         self.host.disarm()

@@ -21,6 +21,16 @@ class MotorPosition:
         """Of its 6064h; None before it is commissioned."""
         self._standstill: Standstill | None = None
         self._boot_ups = 0
+        self._lost = False
+
+    @property
+    def absolute(self) -> bool:
+        """Whether the drive's count alone is the position, for a later process too."""
+        return not self._lost if self.counter is None else self.counter.absolute
+
+    def lose(self) -> None:
+        """An earlier process has lost count of the ranges, or has counted some."""
+        self._lost = True
 
     def begin(self, drive: Commissioned, boot_ups: int) -> PositionCounter:
         """The counter of a drive that has been set up; a boot-up has reset it."""
@@ -28,6 +38,7 @@ class MotorPosition:
         if counter is None:
             low, high = self._wraps or counter_range(drive.tpdo)
             counter = PositionCounter(low, high, self._fastest / drive.scale.angle)
+            counter.known = not self._lost
         counter.restart(forgotten=boot_ups != self._boot_ups)
         self.counter, self._boot_ups = counter, boot_ups
         self._standstill = Standstill(drive.scale)

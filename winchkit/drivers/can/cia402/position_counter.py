@@ -56,6 +56,14 @@ class PositionCounter:
         if self.time > -inf:
             self.known = False
 
+    @property
+    def absolute(self) -> bool:
+        """Whether the drive's count alone is the position, for a later process too.
+
+        A homing under way may fail, and then counts as none.
+        """
+        return self.known and self.offset == 0 and self._kept == (0, True)
+
     def restart(self, *, forgotten: bool) -> None:
         """Begin anew, with a drive that has forgotten its count or kept it.
 
@@ -74,6 +82,7 @@ class PositionCounter:
         """Unwrap again: from the new zero where one was found, else from where it was."""
         self.half = self.span // 2
         self.offset, self.known = (0, True) if homed else self._kept
+        self._kept = (0, True)
 
     def target(self, counts: int, name: str) -> int:
         """What the drive is to be sent for an unwrapped target; raises NotPermitted beyond its end.
