@@ -17,11 +17,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from winchkit.cli.model.add import write_addition
 from winchkit.diagnosis.add import Addition, add
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose, selection_engine
 from winchkit.diagnosis.results import Diagnosis
+from winchkit.diagnosis.write import write_addition
 from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.term import modifiers_of

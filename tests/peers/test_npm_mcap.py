@@ -42,7 +42,7 @@ def written(path: Path) -> Samples:
     for part in np.array_split(np.arange(COUNT), 10):
         piece = Samples(times[part], samples.received[part], samples.values[part])
         log.write({"/A/drive": piece}, float(times[part[-1]]))
-    log.tell(times[-1], {"tripped": ["winch A: tension above 800 N"]})
+    log.add_event(times[-1], {"tripped": ["winch A: tension above 800 N"]})
     log.close({})
     return samples
 

@@ -33,7 +33,7 @@ def callables() -> Iterator[tuple[str, Callable[..., Any]]]:
                 yield f"{owner.__name__}.{name}", function
 
 
-@pytest.mark.parametrize(("name", "function"), [*callables()], ids=lambda item: str(item)[:40])
+@pytest.mark.parametrize(("name", "function"), [*callables()], ids=[n for n, _ in callables()])
 def test_a_public_function_describes_its_parameters_and_its_result(
     name: str, function: Callable[..., Any]
 ) -> None:
@@ -48,7 +48,7 @@ def test_a_public_function_describes_its_parameters_and_its_result(
         assert "Returns\n-------" in text or "Yields\n------" in text, name
 
 
-@pytest.mark.parametrize("owner", CLASSES)
+@pytest.mark.parametrize("owner", CLASSES, ids=lambda owner: owner.__name__)
 def test_every_field_of_a_public_dataclass_is_described(owner: type) -> None:
     if not dataclasses.is_dataclass(owner):
         return

@@ -67,10 +67,10 @@ def written(
     """Record a log piece by piece, with counters and a trip; returns its files."""
     log = open_log(path, LAYOUT, METADATA, rotation)
     pieces = samples_until(OPENED + duration)
-    log.tell(OPENED, {"tripped": []})
+    log.add_event(OPENED, {"tripped": []})
     for begin in np.arange(OPENED, OPENED + duration, piece):
         log.count(begin, {"A.cell": {"readings": 3, "rate": float("nan")}})
         log.write(between(pieces, begin, begin + piece), begin + piece)
-    log.tell(OPENED + duration, {"tripped": ["winch A: tension above 800 N"]})
+    log.add_event(OPENED + duration, {"tripped": ["winch A: tension above 800 N"]})
     log.close({"clock_offset": "1 s"})
     return log.parts

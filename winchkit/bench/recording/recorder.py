@@ -187,7 +187,7 @@ class Recorder:
         if said == self._said:
             return
         self._said = said
-        self._log.tell(
+        self._log.add_event(
             snapshot.time,
             {
                 "winch": {

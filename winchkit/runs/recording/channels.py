@@ -49,7 +49,7 @@ class ChannelLog(LogWriter):
         self._pending: list[NDArray[np.float64]] = []
         super().__init__(path, layout, *others, replace=replace)
 
-    def tell(self, time: float, event: Mapping[str, Any]) -> None:
+    def add_event(self, time: float, event: Mapping[str, Any]) -> None:
         """Keep an event at a moment (s)."""
         self._note(EVENTS, time, event)
 

@@ -37,7 +37,7 @@ class RowLog(LogWriter):
         self._watch(self._writer.descriptor)
         self._events = [self._event] if self._event else []
 
-    def tell(self, time: float, event: Mapping[str, Any]) -> None:
+    def add_event(self, time: float, event: Mapping[str, Any]) -> None:
         """Keep an event at a moment (s); it is written as soon as the time of the first row is set.
 
         The last event is repeated at the start of the next part.

@@ -51,7 +51,7 @@ class LogWriter(ABC):
             self._next_part()
         self._put(pieces, now)
 
-    def tell(self, time: float, event: Mapping[str, Any]) -> None:
+    def add_event(self, time: float, event: Mapping[str, Any]) -> None:
         """Keep an event at a moment (s), where the format has a place for it."""
         return
 
