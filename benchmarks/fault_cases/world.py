@@ -8,19 +8,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
 from heapq import heappop, heappush
 from itertools import count
 from pathlib import Path
-from random import Random
-from unittest.mock import patch
 
 import can
 
 from fault_cases.independent_drive import IndependentDrive, replace_drives
 from winchkit.bench.bench import Bench
 from winchkit.bench.open import open_bench
-from winchkit.drivers.modbus import client
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.drive.drive import SimDrive
 from winchkit.sim.drive.nmt import NmtState
@@ -179,15 +175,6 @@ def _seen(drive: SimDrive | IndependentDrive, velocity: float) -> tuple[bool, bo
 
 
 @contextmanager
-def _drawn_alike(seed: int) -> Iterator[None]:
-    """Modbus clients draw their first transaction from the seed: a chance likeness of a reply's
-    bytes to a transaction breaks a connection, and a case must be the same whenever it is played.
-    """
-    with patch.object(client, "Random", partial(Random, seed)):
-        yield
-
-
-@contextmanager
 def opened_world(
     winches: int,
     seed: int | str,
@@ -214,7 +201,7 @@ def opened_world(
         if isinstance(clock, PacedClock)
         else LiveBench(bench, seed=number, simulated_time=clock)
     )
-    with live, _drawn_alike(number):
+    with live:
         if independent:
             replace_drives(live)
         opened = open_bench(live.bench_spec, clock)

@@ -5,8 +5,9 @@ the answer to the next request of the same length. Every request that was not an
 remembered until no reply to it can come any more, and until then
 
 - the unit is left alone for the device's longest reply time after the time-out,
-- no request is sent whose answer would have the length of an outstanding one, and no two requests
-  in a row for the same block have the same length, so that the length identifies a reply,
+- no request is sent whose answer would have the length of an outstanding one, and of three requests
+  in a row for the same block no two have the same length, so that the length identifies a reply: a
+  copy of an answer that a line hands over two requests later is not taken for a new one,
 - where the device answers one length only (or every length is outstanding) nothing is asked until
   the horizon, and the first exchange after it is discarded: its reading is NaN and ``ambiguous``.
 
@@ -50,8 +51,8 @@ class LateReplies:
     """Most registers that the device answers from a start address, as far as is known."""
     _answered: dict[int, int] = field(default_factory=dict)
     """Most registers that the device did answer from a start address."""
-    _last: dict[int, int] = field(default_factory=dict)
-    """Registers of the newest request by start address."""
+    _last: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    """Registers of the two newest requests by start address, the newest one last."""
 
     def clear(self) -> None:
         """Nothing old can come any more."""
@@ -78,9 +79,10 @@ class LateReplies:
             else:
                 self.until, self.ambiguous = min(ends), True
                 return 0
-        last = self._last.get(block.start)
-        chosen = next((count for count in free if count != last), free[0])
-        self._last[block.start] = chosen
+        last = self._last.get(block.start, ())
+        # The length that was used longest ago, if ever.
+        chosen = min(free, key=lambda count: last.index(count) + 1 if count in last else 0)
+        self._last[block.start] = (*last[-1:], chosen)
         return chosen
 
     def alike(self, block: ReadBlock) -> bool:
