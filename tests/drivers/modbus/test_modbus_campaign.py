@@ -25,7 +25,9 @@ pytestmark = [
 ]
 
 
+@pytest.mark.realtime
 def test_lines_that_fail_publish_no_wrong_number() -> None:
+    """In real time: a line process that is late delays a copy beyond what the test declares."""
     found: dict[str, Any] = play(3000, seed=11, share=0.1, seconds=10.0)
     assert found["wrong"] == []
     assert found["numbers"] > 200
@@ -34,6 +36,7 @@ def test_lines_that_fail_publish_no_wrong_number() -> None:
         assert case["numbers"] > 0, case
 
 
+@pytest.mark.realtime
 def test_the_campaign_sees_a_late_reply_that_is_taken_for_an_answer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
