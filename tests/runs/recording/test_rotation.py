@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs import CELL, DRIVE, written
+from logs import CELL, DRIVE, LAYOUT, OPENED, between, samples_until, written
 from winchkit.errors import RunError, UsageError
 from winchkit.runs import read_run
 from winchkit.runs.read import read_log
+from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recording.rotation import Rotation, part_path, parts_beside
 
 SECOND = Rotation(duration=1.05)
@@ -83,6 +84,21 @@ def test_a_last_part_that_was_never_started_is_left_out(tmp_path: Path) -> None:
         for data in (b"", bare):
             part_path(tmp_path / f"many.{suffix}", len(parts) + 1).write_bytes(data)
             assert len(read_run(tmp_path / f"many.{suffix}")) == len(whole)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mcap"])
+def test_events_that_wait_are_kept_where_a_part_ends(tmp_path: Path, suffix: str) -> None:
+    """Two events since the last write, in which the part becomes full."""
+    log = open_log(tmp_path / f"many.{suffix}", LAYOUT, {}, SECOND)
+    pieces = samples_until(OPENED + 2.0)
+    log.write(between(pieces, OPENED, OPENED + 1.0), OPENED + 1.0)
+    for number in (1, 2):
+        log.add_event(OPENED + 1.0 + number / 10, {"tripped": [str(number)]})
+    log.write(between(pieces, OPENED + 1.0, OPENED + 2.0), OPENED + 2.0)
+    log.close({})
+    events = read_log(log.parts).events
+    assert len(log.parts) == 2
+    assert [note.value["tripped"] for note in events] == [["1"], ["2"]]
 
 
 def test_a_last_part_cut_anywhere_costs_nothing_but_itself(tmp_path: Path) -> None:

@@ -35,7 +35,8 @@ class RowLog(LogWriter):
         columns = self._layout.columns()
         self._writer = kind_for(path)(path, columns, metadata, time.monotonic, lambda: stream)
         self._watch(self._writer.descriptor)
-        self._events = [self._event] if self._event else []
+        if self._event and not self._events:  # else the waiting ones end with it
+            self._events.append(self._event)
 
     def add_event(self, time: float, event: Mapping[str, Any]) -> None:
         """Keep an event at a moment (s); it is written as soon as the time of the first row is set.
