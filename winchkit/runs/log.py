@@ -14,7 +14,7 @@ from winchkit.runs.assemble import Recording, assemble
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
 from winchkit.runs.run import Run
 
-__all__ = ["Log", "Note", "aligned", "joined", "log_of_run"]
+__all__ = ["Log", "Note", "aligned", "joined", "known_event", "log_of_run", "tables_in"]
 
 _BRIDGED = 1.5
 
@@ -26,6 +26,26 @@ class Note:
     time: float
     """On the bench's clock, s."""
     value: Mapping[str, Any]
+
+
+def known_event(value: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries of an event that are of their type; empty ones for all others."""
+    known = ("winch", "tripped", "overruns", "warnings", "tare")
+    winches, trips, overruns, warnings, tares = (value.get(key) for key in known)
+    return {
+        "winch": tables_in(winches) if isinstance(winches, dict) else {},
+        "tripped": [str(text) for text in trips] if isinstance(trips, list) else [],
+        "overruns": overruns if isinstance(overruns, int) else 0,
+        "warnings": [str(text) for text in warnings] if isinstance(warnings, list) else [],
+        "tare": {str(name): str(text) for name, text in tares.items()}
+        if isinstance(tares, dict)
+        else {},
+    }
+
+
+def tables_in(value: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries that are tables."""
+    return {name: item for name, item in value.items() if isinstance(item, dict)}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from winchkit.errors import RunError
 from winchkit.runs import Run, read_run, write_csv
-from winchkit.runs.info import summary_of
+from winchkit.runs.info import info_of, summary_of
+from winchkit.runs.read import read_log
 
 PLAIN = "time [s],motor_angle [rad],tension [N]\n0,0,10\n0.1,1,11\n0.2,2,12\n"
 
@@ -271,3 +272,15 @@ def test_comments_between_the_rows_are_no_rows(tmp_path: Path) -> None:
     assert run["motor_angle"].tolist() == [0.0, 2.0]
     path.write_text("note,time [s],motor_angle [rad]\n#7,0,0\n#8,1,2\n", encoding="utf-8")
     assert read_run(path)["motor_angle"].tolist() == [0.0, 2.0]
+
+
+def test_an_edited_event_is_read_as_far_as_it_is_one(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "# written by winchkit\ntime [s],motor_angle [rad]\n"
+        '# event 0.5 s: {"winch": [1], "tare": 3, "tripped": 7}\n0,0\n# event x s: {}\n1,2\n',
+        encoding="utf-8",
+    )
+    log = read_log(path)
+    assert [note.time for note in log.events] == [0.5]
+    assert info_of(log).commanders == info_of(log).events == info_of(log).tares == ()

@@ -19,7 +19,7 @@ from winchkit.regular_file import regular
 from winchkit.runs.assemble import Recording, assemble, refuse
 from winchkit.runs.columns import column_dimension, header_of
 from winchkit.runs.formats.csv_write import CSV_MARK, EVENT_MARK
-from winchkit.runs.log import Note
+from winchkit.runs.log import Note, known_event
 from winchkit.runs.recording.log_file import is_written
 from winchkit.runs.run import Run
 
@@ -174,10 +174,10 @@ def read_events(path: str | Path) -> tuple[Note, ...]:
         if not line.startswith(EVENT_MARK):
             continue
         time, _, text = line.removeprefix(EVENT_MARK).partition(" s: ")
-        with suppress(ValueError):
+        with suppress(ValueError, RecursionError):
             value = json.loads(text)
             if isinstance(value, dict):
-                events.append(Note(float(time), value))
+                events.append(Note(float(time), known_event(value)))
     return tuple(events)
 
 

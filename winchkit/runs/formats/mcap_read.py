@@ -37,7 +37,7 @@ from winchkit.runs.formats.mcap_records import (
     records,
 )
 from winchkit.runs.layout import Layout, Samples, Source, read_layout
-from winchkit.runs.log import Log, Note, aligned, log_of_run
+from winchkit.runs.log import Log, Note, aligned, known_event, log_of_run, tables_in
 from winchkit.runs.run import Run
 
 __all__ = [
@@ -222,8 +222,8 @@ def _log(name: str, content: McapContent) -> Log:
         layout,
         samples,
         content.metadata.get(METADATA, {}),
-        _notes(content, EVENTS, layout.clock_offset, _event),
-        _notes(content, COUNTERS, layout.clock_offset, _tables),
+        _notes(content, EVENTS, layout.clock_offset, known_event),
+        _notes(content, COUNTERS, layout.clock_offset, tables_in),
         content.metadata.get(END, {}),
         content.complete,
         tuple(notes),
@@ -241,21 +241,3 @@ def _notes(
             if value is not None:
                 found.append(Note((stamp - offset) / 1e9, known(value)))
     return tuple(found)
-
-
-def _event(value: dict[str, Any]) -> dict[str, Any]:
-    known = ("winch", "tripped", "overruns", "warnings", "tare")
-    winches, trips, overruns, warnings, tares = (value.get(key) for key in known)
-    return {
-        "winch": _tables(winches) if isinstance(winches, dict) else {},
-        "tripped": [str(text) for text in trips] if isinstance(trips, list) else [],
-        "overruns": overruns if isinstance(overruns, int) else 0,
-        "warnings": [str(text) for text in warnings] if isinstance(warnings, list) else [],
-        "tare": {str(name): str(text) for name, text in tares.items()}
-        if isinstance(tares, dict)
-        else {},
-    }
-
-
-def _tables(value: dict[str, Any]) -> dict[str, Any]:
-    return {name: item for name, item in value.items() if isinstance(item, dict)}
