@@ -22,6 +22,8 @@ _SETTLES = 0.05
 _DEAD_MAN = 0.2
 _FLUSH = 0.05
 """What a closed log may lack at its end, s: the filter, conversion and poll of the load cell."""
+_SHOWN = 0.03
+"""From a tension to the supervisor that reads it, s: filter, conversion, poll of the load cell."""
 _NOISE = 15.0
 """Above the true tension at which the cell's noise may trip, and oscillations, N."""
 
@@ -109,15 +111,30 @@ def _bound(record: Record, start: float, bound: float) -> float:
 
 
 def _crossing(record: Record, planned: Planned, kind: Kind, onset: float) -> float | None:
-    """When the time begins to count."""
+    """When the time begins to count; None where nothing shows it."""
     if not kind.crosses:
         return onset
     for sample in record.truth[planned.winch]:
         high = kind.crosses == "high" and sample.tension > LIMITS["tension_high"]
         slack = kind.crosses == "slack" and sample.tension < LIMITS["tension_slack"]
         if sample.time > onset and (high or slack):
-            return sample.time
+            seen = _shown_from(record, planned.winch, sample.time)
+            return seen if math.isfinite(seen) else None
     return None
+
+
+def _shown_from(record: Record, winch: str, crossing: float) -> float:
+    """When a tension that crosses a limit is in the readings, s; infinity where it never is.
+
+    A load cell that froze before it read the crossing shows the tension of before. While the
+    predicted tension does not change either, nothing tells it from a live one (docs/safety.md).
+    """
+    for planned, onset in record.onsets:
+        hides = planned.kind == "cell frozen" and planned.winch == winch
+        end = onset + _span(record, planned, onset)
+        if hides and onset < crossing + _SHOWN < end:
+            return end
+    return crossing
 
 
 def _between(samples: Sequence[Sample], start: float, end: float) -> list[Sample]:
