@@ -127,7 +127,7 @@ def _shown_from(record: Record, winch: str, crossing: float) -> float:
     """When a tension that crosses a limit is in the readings, s; infinity where it never is.
 
     A load cell that froze before it read the crossing shows the tension of before. While the
-    predicted tension does not change either, nothing tells it from a live one (docs/safety.md).
+    predicted tension does not change either, it looks like a live one (docs/safety.md).
     """
     for planned, onset in record.onsets:
         hides = planned.kind == "cell frozen" and planned.winch == winch
