@@ -7,7 +7,7 @@ from random import Random
 
 from fault_cases.kinds import KINDS
 
-__all__ = ["Case", "Planned", "cases"]
+__all__ = ["NOISE_KNOWN", "Case", "Planned", "cases"]
 
 _MOTIONS = ("jog", "move", "programme")
 _SPANS = (0.02, 0.05, 0.12, 0.3, 0.8)
@@ -15,6 +15,9 @@ _INDEPENDENT = 0.4
 """Share of cases with the independent slave for a drive."""
 _EIGHT = 0.08
 """Share of cases with eight winches: they take eight times as long to compute."""
+NOISE_KNOWN = 4.0
+"""Rest after which the noise of a load cell is known, s: 1 s, 200 conversions at 100 Hz, and 1 s
+for the first reading to arrive. A quarter of the cases rests for so long."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Case:
     real_time: bool = False
     independent: bool = False
     """Whether the slaves of ``tests/support/slave`` are its drives."""
+    rest: float = 0.2
+    """Between the opening of the bench and the motion, s."""
 
 
 def cases(number: int, seed: int, *, real_time_share: float = 0.0) -> list[Case]:
@@ -95,4 +100,5 @@ def _case(seed: str, name: str, *, real_time: bool) -> Case:
         random.random() < 0.3,
         real_time,
         not real_time and random.random() < _INDEPENDENT,
+        random.choices((0.2, NOISE_KNOWN), (3, 1))[0],
     )

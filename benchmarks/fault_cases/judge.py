@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fault_cases.case import Planned
-from fault_cases.kinds import KINDS, STIFFNESS, Kind
+from fault_cases.case import NOISE_KNOWN, Planned
+from fault_cases.kinds import KINDS, READING_DELAY, STIFFNESS, Kind
 from fault_cases.play import Record
 from fault_cases.world import LIMITS, Sample
 
@@ -22,8 +22,6 @@ _SETTLES = 0.05
 _DEAD_MAN = 0.2
 _FLUSH = 0.05
 """What a closed log may lack at its end, s: the filter, conversion and poll of the load cell."""
-_SHOWN = 0.03
-"""From a tension to the supervisor that reads it, s: filter, conversion, poll of the load cell."""
 _NOISE = 15.0
 """Above the true tension at which the cell's noise may trip, and oscillations, N."""
 
@@ -126,13 +124,16 @@ def _crossing(record: Record, planned: Planned, kind: Kind, onset: float) -> flo
 def _shown_from(record: Record, winch: str, crossing: float) -> float:
     """When a tension that crosses a limit is in the readings, s; infinity where it never is.
 
-    A load cell that froze before it read the crossing shows the tension of before. While the
-    predicted tension does not change either, it looks like a live one (docs/safety.md).
+    A load cell that froze before it read the crossing shows an earlier tension. Where the
+    predicted tension does not change, only the cell's noise would show that, and the noise is not
+    known before the cell has been at rest for a time (docs/safety.md).
     """
+    if record.case.rest >= NOISE_KNOWN:
+        return crossing
     for planned, onset in record.onsets:
         hides = planned.kind == "cell frozen" and planned.winch == winch
         end = onset + _span(record, planned, onset)
-        if hides and onset < crossing + _SHOWN < end:
+        if hides and onset < crossing + READING_DELAY < end:
             return end
     return crossing
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from fault_cases.world import World
 
-__all__ = ["KINDS", "STIFFNESS", "Kind"]
+__all__ = ["KINDS", "READING_DELAY", "STIFFNESS", "Kind"]
 
 STIFFNESS = 3000.0
 """Of what a load snags on, N/m."""
@@ -21,7 +21,7 @@ Begin = Callable[[World, str], Callable[[], None] | None]
 _COMMUNICATION = 0.15
 _CELL_AGE = 0.4
 """The longest age of a reading, by the device file of the load cell, s."""
-_BYTES = 0.03
+READING_DELAY = 0.03
 """From a changed reading to the supervisor: filter, conversion, poll, s."""
 
 
@@ -249,13 +249,18 @@ _ROWS = (
         for kind in ("over-current", "over-temperature", "encoder", "following error")
     ),
     Kind(
-        "cell silent", _cell("silence"), ("cell stale",), _CELL_AGE + _BYTES, least=0.5, part="cell"
+        "cell silent",
+        _cell("silence"),
+        ("cell stale",),
+        _CELL_AGE + READING_DELAY,
+        least=0.5,
+        part="cell",
     ),
     Kind(
         "cell refuses",
         _cell("exception"),
         ("cell stale",),
-        _CELL_AGE + _BYTES,
+        _CELL_AGE + READING_DELAY,
         least=0.5,
         part="cell",
     ),
@@ -270,7 +275,7 @@ _ROWS = (
         "cell: wrong unit",
         _reply(lambda data: data[:6] + bytes((data[6] ^ 0x20,)) + data[7:]),
         ("cell stale", "cell"),
-        _CELL_AGE + _BYTES,
+        _CELL_AGE + READING_DELAY,
         least=0.5,
         real_time=False,
         part="line",
@@ -279,7 +284,7 @@ _ROWS = (
         "cell: wrong transaction",
         _reply(lambda data: bytes((data[0] ^ 0x55,)) + data[1:]),
         ("cell stale", "cell"),
-        _CELL_AGE + _BYTES,
+        _CELL_AGE + READING_DELAY,
         least=0.5,
         real_time=False,
         part="line",
@@ -288,7 +293,7 @@ _ROWS = (
         "cell: short",
         _reply(lambda data: data[:-3]),
         ("cell stale", "cell"),
-        _CELL_AGE + _BYTES,
+        _CELL_AGE + READING_DELAY,
         least=0.5,
         real_time=False,
         part="line",

@@ -95,7 +95,7 @@ def _play(world: World, record: Record) -> None:
     case, clock, bench = record.case, world.clock, world.bench
     recorder = bench.log(world.folder / "case.csv")
     bench.on_cycle(partial(_note_trip, record))
-    clock.sleep(0.2)
+    clock.sleep(case.rest)
     record.begun = world.now
     operator = Operator(world, case)
     ends: list[Callable[[], None]] = []

@@ -150,17 +150,15 @@ def logging(served: Path, log: Path) -> Iterator[subprocess.Popen[str]]:
                 logger.communicate()
 
 
-def until_written(log: Path, more: int = 20) -> None:
-    """Wait for so many more whole rows of a CSV log than it holds; events are not rows."""
+def until_written(log: Path) -> None:
+    """Wait for 20 more lines of a CSV log that are no comments: events are comments, rows not."""
 
-    def rows() -> int:
-        if not log.is_file():
-            return 0
-        whole, _, _ = log.read_text().rpartition("\n")
-        return sum(not line.startswith("#") for line in whole.splitlines())
+    def lines() -> int:
+        text = log.read_text() if log.is_file() else ""
+        return sum(not line.startswith("#") for line in text.splitlines())
 
-    before = rows()
-    until(lambda: rows() >= before + more, f"no {more} rows came to {log}")
+    before = lines()
+    until(lambda: lines() > before + 20, f"no 20 rows came to {log}")
 
 
 def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
