@@ -15,6 +15,7 @@ import argparse
 import json
 import math
 import multiprocessing
+import re
 import signal
 import sys
 import time
@@ -86,8 +87,23 @@ def chosen(arguments: argparse.Namespace) -> list[Case]:
     if arguments.case is None:
         found = cases(arguments.first + arguments.cases, arguments.seed, real_time_share=share)
         return found[arguments.first :]
-    seed, _, number = arguments.case.partition("/")
-    return [cases(int(number) + 1, int(seed), real_time_share=share)[-1]]
+    seed, number = arguments.case
+    return [cases(number + 1, seed, real_time_share=share)[-1]]
+
+
+def seed_and_number(text: str) -> tuple[int, int]:
+    """Seed and number of a case, of an argument ``SEED/NUMBER``."""
+    found = re.fullmatch(r"(\d+)/(\d+)", text, re.ASCII)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is no SEED/NUMBER, such as 1/17")
+    return int(found[1]), int(found[2])
+
+
+def at_least_one(text: str) -> int:
+    """A number of cases or processes."""
+    if not re.fullmatch(r"0*[1-9]\d*", text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number of at least 1")
+    return int(text)
 
 
 def judged(case: Case) -> tuple[Case, Verdict, str]:
@@ -113,13 +129,13 @@ def each(found: Sequence[Case], jobs: int) -> Iterator[tuple[Case, Verdict, str]
 def main() -> int:
     """Exit 1 where a case failed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=1000)
+    parser.add_argument("--cases", type=at_least_one, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
-    parser.add_argument("--case", help="play one case, SEED/NUMBER, and tell it")
+    parser.add_argument("--case", type=seed_and_number, help="SEED/NUMBER: play it and print it")
     parser.add_argument("--realtime-share", type=float, default=0.0)
     parser.add_argument("--limit", type=float, default=math.inf, help="end after so long, s")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--jobs", type=at_least_one, default=1, help="processes")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     begin = time.perf_counter()

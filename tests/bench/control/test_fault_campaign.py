@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import fault_campaign
-from fault_cases.case import Case, Planned, cases
+from fault_cases.case import NOISE_KNOWN, Case, Planned, cases
 from fault_cases.judge import judge
 from fault_cases.kinds import KINDS
 from fault_cases.play import play
@@ -99,6 +99,35 @@ def test_processes_give_the_same_verdicts_in_the_same_order() -> None:
     alone, together = list(fault_campaign.each(found, 1)), list(fault_campaign.each(found, 2))
     assert [repr(item) for item in together] == [repr(item) for item in alone]
     assert [item[0] for item in together] == found
+
+
+@pytest.mark.parametrize("rest", [0.2, NOISE_KNOWN])
+def test_a_cell_that_freezes_as_the_load_touches_down_is_detected_by_its_known_noise(
+    rest: float,
+) -> None:
+    slack, frozen = Planned("slack", "A", 0.6, None), Planned("cell frozen", "A", 0.67, None)
+    record = play(case("slack", faults=(slack, frozen), rest=rest))
+    assert judge(record).good, judge(record)
+    known = rest == NOISE_KNOWN
+    assert [kind for kind, _ in record.trips] == (["cell frozen"] if known else [])
+    if known:
+        assert record.tripped_at - record.onsets[1][1] < 0.15
+        return
+    record.case = replace(record.case, rest=NOISE_KNOWN)
+    assert "followed set-points" in judge(record).stopped, "no exemption where the noise is known"
+
+
+@pytest.mark.parametrize(
+    "words", [("--case", "203"), ("--case", "a/b"), ("--case", "1/-1"), ("--cases", "0")]
+)
+def test_a_wrong_argument_is_refused_in_words(
+    words: tuple[str, str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["fault_campaign.py", *words])
+    with pytest.raises(SystemExit) as ended:
+        fault_campaign.main()
+    assert ended.value.code == 2
+    assert f"argument {words[0]}: '{words[1]}' is no " in capsys.readouterr().err
 
 
 def running(group: int) -> int:
