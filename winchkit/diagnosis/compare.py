@@ -110,9 +110,9 @@ def compared(
             orders=tuple((f.variable, _order(f), f.share) for f in orders if f.output == output),
         )
     maps = tuple(residual_maps(regression, residual))
-    return Compared(
-        regression, residual, Comparison(outputs, offset, regression.dataset.notes, maps)
-    )
+    dataset = regression.dataset
+    comparison = Comparison(outputs, offset, dataset.notes, maps, used_share=dataset.used_share)
+    return Compared(regression, residual, comparison)
 
 
 def initial_hypothesis(

@@ -202,6 +202,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
             *missing_excitation(engine.regression),
             *judgement.notes,
         ),
+        used_share=engine.regression.dataset.used_share,
     )
     return WinchAnswer(engine, reported, diagnosis, sets, pairs)
 

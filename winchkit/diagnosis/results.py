@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 from winchkit.diagnosis.residuals.maps import ResidualMap
 from winchkit.effects.empirical import empirical_id
 from winchkit.effects.placement import HOME
+from winchkit.runs.sanity.finding import Finding
 
 __all__ = [
     "CandidateScore",
@@ -66,6 +67,12 @@ class Comparison:
     notes: tuple[str, ...] = ()
     maps: tuple[ResidualMap, ...] = field(default=(), compare=False)
     """Mean errors over two variables; per output the largest share first."""
+    sanity: tuple[Finding, ...] = ()
+    """Findings on the runs, made before any analysis."""
+    used_share: Mapping[str, float] = field(default_factory=dict)
+    """Share of the measured samples that is compared, by output."""
+    caveats: tuple[str, ...] = ()
+    """Codes of what these runs cannot exclude."""
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that ``winchkit compare --json`` prints."""
@@ -75,6 +82,9 @@ class Comparison:
             "outputs": outputs,
             "length_offset": self.offset,
             "maps": [drawn.to_json() for drawn in self.maps],
+            "sanity": [finding.to_json() for finding in self.sanity],
+            "used_share": dict(self.used_share),
+            "caveats": list(self.caveats),
             "notes": list(self.notes),
         }
 
@@ -194,6 +204,12 @@ class Diagnosis:
     where: tuple[Where, ...]
     next_runs: tuple[NextRun, ...]
     notes: tuple[str, ...] = ()
+    sanity: tuple[Finding, ...] = ()
+    """Findings on the runs, made before any analysis."""
+    used_share: Mapping[str, float] = field(default_factory=dict)
+    """Share of the measured samples that is compared, by output."""
+    caveats: tuple[str, ...] = ()
+    """Codes of what these runs cannot exclude; the verdict is one of four with or without them."""
 
     @property
     def empirical(self) -> tuple[str, ...]:
@@ -218,6 +234,9 @@ class Diagnosis:
             "next_runs": [
                 {**vars(run), "separates": list(run.separates)} for run in self.next_runs
             ],
+            "sanity": [finding.to_json() for finding in self.sanity],
+            "used_share": dict(self.used_share),
+            "caveats": list(self.caveats),
             "notes": list(self.notes),
         }
 

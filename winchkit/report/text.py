@@ -20,6 +20,7 @@ from winchkit.report.comparison_rows import (
 from winchkit.report.detectability import untestable, visible
 from winchkit.report.figures.unexplained import unexplained_curve
 from winchkit.report.figures.waterfall import waterfall_of
+from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.columns import aligned, hanging, paragraph
 from winchkit.report.words.numbers import Scale, grouped, percent, scale_for, significant
 from winchkit.report.words.sentence import changes_text, main_patterns, sentence, where_text
@@ -68,6 +69,7 @@ def report_text(answer: Answer) -> str:
         paragraph(changes_text(diagnosis)),
         _shown(answer),
         _candidates(answer),
+        *_data(diagnosis),
         _notes(diagnosis.notes),
     ]
     lines = [line for block in blocks if block for line in (*block, "")][:-1]
@@ -101,7 +103,7 @@ def compare_text(comparison: Comparison) -> str:
         blocks.append(["mean error over two variables", *maps])
     if comparison.offset is not None:
         blocks.append([offset_text(comparison.offset)])
-    blocks.append(_notes(comparison.notes))
+    blocks += [*_data(comparison), _notes(comparison.notes)]
     return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
 
 
@@ -257,6 +259,19 @@ def _candidates(answer: Answer) -> list[str]:
     rows = [[c.effect, grouped(c.score), clause(c.effect)] for c in best]
     head = f"highest evidence, each alone (1 % false-alarm threshold: {chance})"
     return [head, *hanging(rows)]
+
+
+def _data(result: Comparison | Diagnosis) -> list[list[str]]:
+    """Caveats, findings on the data, and the share of the samples that is compared."""
+    caveats = [caveat_text(code) for code in result.caveats]
+    findings = finding_texts(result.sanity)
+    used = used_text(result.used_share)
+    blocks = {"caveats": caveats, "data": [*findings, *([used] if used else [])]}
+    return [
+        [head, *(line for text in texts for line in paragraph(text, "  ", "    "))]
+        for head, texts in blocks.items()
+        if texts
+    ]
 
 
 def _notes(notes: tuple[str, ...]) -> list[str]:

@@ -92,6 +92,15 @@ class Dataset:
         return tuple(recording.raw.at for recording in self.recordings)
 
     @property
+    def used_share(self) -> dict[str, float]:
+        """Share of the samples that is compared, by output."""
+        out = {}
+        for output in self.outputs:
+            valid = [r.valid[output] for r in self.recordings if output in r.valid]
+            out[output] = float(np.mean(np.concatenate(valid)))
+        return out
+
+    @property
     def repeated(self) -> tuple[Repeats, ...]:
         """Sets of at least two repeats."""
         return tuple(group for group in self.repeats if len(group.runs) > 1)

@@ -9,7 +9,7 @@ from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.report.comparison_rows import HEAD, followed, offset_text, size_rows
 from winchkit.report.figures.plots import AT_NOISE
 from winchkit.report.html.markup import Markup, element, join, section, table
-from winchkit.report.pages.parts import bullets, lead
+from winchkit.report.pages.parts import bullets, data, lead
 from winchkit.report.reproducibility import Command, repeat
 from winchkit.report.words.numbers import percent, quantity, significant, unbroken
 from winchkit.report.words.sentence import capital, often_per_turn
@@ -35,6 +35,7 @@ def comparison_sections(
         [
             _lead(comparison, over),
             section("residuals", "Residuals", *figures),
+            section("data", "Data", data(comparison)),
             section("notes", "Notes", bullets(comparison.notes)),
             repeat(
                 command,

@@ -13,7 +13,7 @@ from winchkit.report.detectability import effects_of, smallest_shown
 from winchkit.report.figures.unexplained import unexplained_figures
 from winchkit.report.figures.waterfall import waterfall_of
 from winchkit.report.html.markup import Markup, element, join, section, table
-from winchkit.report.pages.parts import bullets, lead
+from winchkit.report.pages.parts import bullets, data, lead
 from winchkit.report.reproducibility import Command, repeat
 from winchkit.report.words.numbers import percent
 from winchkit.report.words.sentence import changes_text, sentence, where_text
@@ -57,6 +57,7 @@ def sections(
             ),
             section("unexplained", "Unexplained residual", _unexplained(answer)),
             section("next", "Next runs", _next(diagnosis)),
+            section("data", "Data", data(diagnosis)),
             section("notes", "Notes", bullets(diagnosis.notes)),
             section("truth", "Simulated effect", _truth(truth)),
             repeat(command, _commands(diagnosis, command), "diagnosis", report_json(answer)),

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.report.figures.plots import OutputPlots, Plot
 from winchkit.report.html.markup import Markup, element
+from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.numbers import unbroken
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 
-__all__ = ["bullets", "drawings", "lead"]
+__all__ = ["bullets", "data", "drawings", "lead"]
 
 
 def lead(chip: str, tone: str, sentences: Sequence[str], *inside: Markup) -> Markup:
@@ -34,6 +36,18 @@ def bullets(lines: Sequence[str]) -> Markup:
     """A list of sentences; empty without any."""
     items = [element("li", capital(line)) for line in lines]
     return element("ul", *items) if items else Markup("")
+
+
+def data(result: Comparison | Diagnosis) -> Markup:
+    """Caveats, findings on the runs, and the share of the samples that is compared."""
+    used = used_text(result.used_share)
+    return bullets(
+        [
+            *(caveat_text(code) for code in result.caveats),
+            *finding_texts(result.sanity),
+            *([used] if used else []),
+        ]
+    )
 
 
 def drawings(

@@ -1,0 +1,57 @@
+"""Caveats of a diagnosis in words: what a verdict cannot exclude with these data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from winchkit.report.words.numbers import percent
+from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.runs.sanity.finding import Finding
+
+__all__ = ["caveat_text", "finding_texts", "used_text"]
+
+_CAVEATS: dict[str, str] = {}
+"""Sentence, without a full stop, of every code of ``caveats``."""
+_SHOWN = 4
+
+
+def caveat_text(code: str) -> str:
+    """Sentence of a caveat; the code itself where it has none."""
+    return _CAVEATS.get(code, code)
+
+
+def finding_texts(findings: Sequence[Finding]) -> list[str]:
+    """Findings as lines, equal ones of several runs in one.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        In order of importance.
+
+    Returns
+    -------
+    list of str
+        One line per channel and text, with the runs that it applies to.
+    """
+    runs: dict[tuple[str, str], list[str]] = {}
+    for finding in findings:
+        runs.setdefault((finding.channel, finding.text), []).append(finding.run)
+    return [f"{_place(names, channel)}: {text}" for (channel, text), names in runs.items()]
+
+
+def used_text(used: Mapping[str, float]) -> str:
+    """Share of the samples that is compared, by output; empty where it is not known."""
+    shares = [f"{OUTPUT_NAMES.get(name, name)} {percent(share)}" for name, share in used.items()]
+    return f"compared samples: {', '.join(shares)}" if shares else ""
+
+
+def _place(runs: Sequence[str], channel: str) -> str:
+    named = [name for name in dict.fromkeys(runs) if name]
+    if not named:
+        return channel
+    few = (
+        ", ".join(named)
+        if len(named) <= _SHOWN
+        else f"{len(named)} runs, {named[0]} to {named[-1]}"
+    )
+    return f"{channel} of {few}"
