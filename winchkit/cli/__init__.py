@@ -23,42 +23,75 @@ __all__ = ["main"]
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
+SECTIONS: dict[str, dict[str, At]] = {
+    "Model and runs": {
+        "demo": At(
+            "winchkit.cli.sim.demo", "Find a hidden effect on a simulated bench, start to end."
+        ),
+        "compare": At(
+            "winchkit.cli.model.compare", "Compare runs with a model: where does it fail?"
+        ),
+        "diagnose": At(
+            "winchkit.cli.model.diagnose", "Name the physical effect that the model lacks."
+        ),
+        "add": At("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
+        "remove": At("winchkit.cli.model.remove", "Take an effect out of a profile."),
+        "undo": At("winchkit.cli.model.undo", "Take back the last step of a profile's ledger."),
+        "ledger": At("winchkit.cli.model.ledger", "Show how a profile grew, step by step."),
+        "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
+        "effects": At(
+            "winchkit.cli.model.effects", "List the physical effects, or show one's card."
+        ),
+        "size": At(
+            "winchkit.cli.model.size", "Size a winch: every requirement, its limit, the verdict."
+        ),
+        "calibrate": At(
+            "winchkit.cli.model.calibrate", "Calibrate a cable robot from measured poses."
+        ),
+    },
+    "Bench": {
+        "commission": At(
+            "winchkit.cli.bench.commission", "Commission a bench: try, confirm, record."
+        ),
+        "jog": At("winchkit.cli.bench.jog", "Move a winch by hand."),
+        "move": At("winchkit.cli.bench.move", "Move a winch, or all as one, to a cable length."),
+        "home": At(
+            "winchkit.cli.bench.home", "Find the drive's zero, or define the present length."
+        ),
+        "run": At("winchkit.cli.bench.run", "Execute a motion programme and log it."),
+        "stop": At("winchkit.cli.bench.stop", "Stop every winch of a bench, now."),
+        "reset": At(
+            "winchkit.cli.bench.reset", "Clear trips and drive faults; nothing is enabled."
+        ),
+        "monitor": At("winchkit.cli.bench.monitor", "Show a bench live."),
+        "log": At("winchkit.cli.log.log", "Log a bench; look into, recover, replay logs."),
+        "tare": At("winchkit.cli.bench.tare", "Tare a load cell."),
+    },
+    "Devices": {
+        "cell": At("winchkit.cli.cell.group", "Load cells: info, rate, diagnose, tare, calibrate."),
+        "scan": At("winchkit.cli.drive.scan", "Who is on the CAN bus?"),
+        "info": At("winchkit.cli.drive.info", "What a drive says of itself."),
+        "config": At(
+            "winchkit.cli.drive.config", "Drive settings: save, load, diff, store, restore."
+        ),
+        "lss": At("winchkit.cli.drive.lss", "Give a drive its node number and bit rate."),
+        "busload": At(
+            "winchkit.cli.drive.busload", "CAN load of a bench, and the fastest SYNC that fits."
+        ),
+    },
+    "Files and simulation": {
+        "check": At("winchkit.cli.files.check", "Check files of any kind and list every fault."),
+        "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
+        "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
+        "completion": At(
+            "winchkit.cli.files.completion", "Print the completion script of a shell."
+        ),
+    },
+}
+"""Commands by subject, as ``--help`` lists them."""
+
 COMMANDS: dict[str, At] = {
-    "demo": At("winchkit.cli.sim.demo", "Find a hidden effect on a simulated bench, start to end."),
-    "check": At("winchkit.cli.files.check", "Check files of any kind and list every fault."),
-    "size": At(
-        "winchkit.cli.model.size", "Size a winch: every requirement, its limit, the verdict."
-    ),
-    "effects": At("winchkit.cli.model.effects", "List the physical effects, or show one's card."),
-    "compare": At("winchkit.cli.model.compare", "Compare runs with a model: where does it fail?"),
-    "diagnose": At("winchkit.cli.model.diagnose", "Name the physical effect that the model lacks."),
-    "calibrate": At("winchkit.cli.model.calibrate", "Calibrate a cable robot from measured poses."),
-    "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
-    "add": At("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
-    "remove": At("winchkit.cli.model.remove", "Take an effect out of a profile."),
-    "undo": At("winchkit.cli.model.undo", "Take back the last step of a profile's ledger."),
-    "ledger": At("winchkit.cli.model.ledger", "Show how a profile grew, step by step."),
-    "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
-    "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
-    "jog": At("winchkit.cli.bench.jog", "Move a winch by hand."),
-    "commission": At("winchkit.cli.bench.commission", "Commission a bench: try, confirm, record."),
-    "move": At("winchkit.cli.bench.move", "Move a winch, or all as one, to a cable length."),
-    "home": At("winchkit.cli.bench.home", "Find the drive's zero, or define the present length."),
-    "run": At("winchkit.cli.bench.run", "Execute a motion programme and log it."),
-    "log": At("winchkit.cli.log.log", "Log a bench; look into, recover, replay logs."),
-    "monitor": At("winchkit.cli.bench.monitor", "Show a bench live."),
-    "stop": At("winchkit.cli.bench.stop", "Stop every winch of a bench, now."),
-    "reset": At("winchkit.cli.bench.reset", "Clear trips and drive faults; nothing is enabled."),
-    "scan": At("winchkit.cli.drive.scan", "Who is on the CAN bus?"),
-    "info": At("winchkit.cli.drive.info", "What a drive says of itself."),
-    "config": At("winchkit.cli.drive.config", "Drive settings: save, load, diff, store, restore."),
-    "lss": At("winchkit.cli.drive.lss", "Give a drive its node number and bit rate."),
-    "busload": At(
-        "winchkit.cli.drive.busload", "CAN load of a bench, and the fastest SYNC that fits."
-    ),
-    "tare": At("winchkit.cli.bench.tare", "Tare a load cell."),
-    "cell": At("winchkit.cli.cell.group", "Load cells: info, rate, diagnose, tare, calibrate."),
-    "completion": At("winchkit.cli.files.completion", "Print the completion script of a shell."),
+    name: entry for section in SECTIONS.values() for name, entry in section.items()
 }
 
 
@@ -74,6 +107,7 @@ class _Main(LazyGroup):
 @click.group(
     cls=_Main,
     table=COMMANDS,
+    sections=SECTIONS,
     context_settings={
         "auto_envvar_prefix": "WINCHKIT",
         "help_option_names": ["-h", "--help"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from winchkit.cli.core.options import bench_option
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
@@ -11,7 +12,7 @@ __all__ = ["command"]
 
 @click.command()
 @click.argument("winch", required=False)
-@click.option("-b", "--bench", required=True, metavar="FILE", help="Bench file of the bench.")
+@bench_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def command(winch: str | None, bench: str, as_json: bool) -> None:
     """Tare the load cell of WINCH, at rest (the only winch where there is one).

@@ -15,6 +15,11 @@ from winchkit.units import suggest
 __all__ = ["At", "LazyGroup"]
 
 
+_PROGRAM = "WINCHKIT"
+_SHARED = ("bench", "profile")
+"""Options with one further variable for all commands, such as WINCHKIT_BENCH."""
+
+
 class At(NamedTuple):
     """Where a command is found, and its help in one line."""
 
@@ -27,9 +32,16 @@ class At(NamedTuple):
 class LazyGroup(click.Group):
     """A group whose commands stand in a table until one of them is called."""
 
-    def __init__(self, *args: Any, table: Mapping[str, At], **options: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        table: Mapping[str, At],
+        sections: Mapping[str, Mapping[str, At]] | None = None,
+        **options: Any,
+    ) -> None:
         super().__init__(*args, **options)
         self.table = table
+        self.sections = sections or {"Commands": table}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of the table."""
@@ -57,9 +69,12 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands with the table's help, importing none."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, entry.help) for name, entry in self.table.items()])
+        """List the commands of every section with the table's help, importing none."""
+        width = max(map(len, self.table))
+        for title, entries in self.sections.items():
+            with formatter.section(title):
+                rows = [(name.ljust(width), entry.help) for name, entry in entries.items()]
+                formatter.write_dl(rows)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete a command's name, importing none."""
@@ -79,7 +94,9 @@ def _name_variables(command: click.Command, prefix: str) -> None:
     for option in command.params:
         if isinstance(option, click.Option) and option.envvar is None:
             typed = max(option.opts, key=len).lstrip("-")
-            option.envvar = _variable(f"{prefix}_{typed}")
+            own = _variable(f"{prefix}_{typed}")
+            shared = [f"{_PROGRAM}_{_variable(typed)}"] if typed in _SHARED else []
+            option.envvar = [own, *shared]
     if isinstance(command, click.Group):
         for name, inner in command.commands.items():
             _name_variables(inner, f"{prefix}_{name}")

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
 
 __all__ = [
+    "BENCH_VARIABLE",
     "BusChoice",
+    "bench_by_default",
     "bench_option",
     "bus_options",
     "complete_bench",
@@ -33,6 +35,7 @@ __all__ = [
 ]
 
 _KIND = re.compile(r'^kind\s*=\s*"([\w-]+)"', re.MULTILINE)
+BENCH_VARIABLE = "WINCHKIT_BENCH"
 _HEAD = 2000
 """Characters of a file in which its kind stands."""
 
@@ -116,13 +119,30 @@ def _kind(path: Path) -> str:
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
+
+def bench_by_default(ctx: click.Context, _param: click.Parameter, value: str | None) -> str | None:
+    """The bench that was given, else the one bench file of this folder.
+
+    Raises UsageError where the folder has none or several. The file that was chosen is reported
+    on stderr, since a command may move what it describes.
+    """
+    if value is not None or ctx.resilient_parsing:
+        return value
+    here = [str(path) for path in sorted(Path().glob("*.toml")) if _kind(path) == "bench"]
+    if len(here) == 1:
+        click.echo(f"bench: {here[0]}", err=True)
+        return here[0]
+    found = f"this folder has {', '.join(here)}" if here else "this folder has no bench file"
+    raise UsageError(f"which bench? {found}; give --bench FILE, or set {BENCH_VARIABLE}")
+
+
 bench_option: Decorator = click.option(
     "-b",
     "--bench",
-    required=True,
     metavar="FILE",
     shell_complete=complete_bench,
-    help="Bench file of the bench.",
+    callback=bench_by_default,
+    help="Bench file.  [default: the only one of this folder]",
 )
 effects_option: Decorator = click.option(
     "--effects",

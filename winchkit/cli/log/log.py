@@ -13,7 +13,7 @@ import click
 
 from winchkit.bench.remote.interruption import Terminated
 from winchkit.cli.core.lazy import At, LazyGroup
-from winchkit.cli.core.options import complete_bench, effects_option
+from winchkit.cli.core.options import bench_by_default, complete_bench, effects_option
 from winchkit.cli.core.output import echo_json
 from winchkit.errors import WinchkitError
 
@@ -73,8 +73,8 @@ def command(
     """
     if context.invoked_subcommand is not None:
         return
-    if bench is None:
-        raise click.UsageError("Missing option '-b' / '--bench'.")
+    bench = bench_by_default(context, context.command.params[0], bench)
+    assert bench is not None, "else UsageError"
     _refuse(output, rotate, jsonl=jsonl, udp=udp, as_json=as_json)
     _refuse_to_lose(None if replace else output)
     from winchkit.bench.remote.reconnection import watch

@@ -73,7 +73,7 @@ def command(
     # Bus and instruments share this interpreter; 5 ms, its default turn, is a whole cycle.
     sys.setswitchinterval(_TURN)
     declared = read_simbench(find("sim", bench))
-    path = bench_file or Path(f"{declared.name}-bench.toml")
+    path = bench_file or Path(f"{Path(bench).stem}-bench.toml")
     ended = threading.Event()
     with LiveBench(declared, seed=seed, hidden=hidden, interface=interface) as live:
         live.write_bench_file(path)
@@ -103,7 +103,8 @@ def _introduce(live: LiveBench, path: Path, *, as_json: bool) -> None:
         echo_json({"schema": 1, "bench": path, "ready": True})
     else:
         click.echo(path)
-    click.echo(f"{live.sim_bench.name} runs. From another terminal:", err=True)
+    name = path.name.removesuffix("-bench.toml").removesuffix(".toml")
+    click.echo(f"{name} runs. From another terminal:", err=True)
     click.echo(f"  winchkit monitor --bench {path}", err=True)
     click.echo(f"  winchkit jog {winch} --bench {path}", err=True)
     click.echo("Lines here: load, fault, recover, status, quit, help. Ctrl-C ends it.", err=True)

@@ -1,0 +1,80 @@
+"""Which bench and which profile a command takes where none is given."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from winchkit.cli import SECTIONS, main
+
+BENCH = """schema = 1
+kind = "bench"
+cycle = "4 ms"
+[bus.can]
+kind = "can"
+interface = "virtual"
+channel = "defaults"
+[winch.A]
+profile = "bench-spiral"
+servo = { device = "generic-cia402", bus = "can", node = 1 }
+[winch.A.limits]
+speed = "0.5 m/s"
+acceleration = "1 m/s^2"
+"""
+
+
+def stop(*arguments: str, **environment: str) -> Result:
+    """A command about a bench that opens nothing."""
+    return CliRunner().invoke(main, ["stop", "--dry-run", *arguments], env=environment)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_only_bench_file_of_the_folder(folder: Path) -> None:
+    (folder / "lab.toml").write_text(BENCH)
+    (folder / "other.toml").write_text('schema = 1\nkind = "programme"\n')
+    result = stop()
+    assert result.exit_code == 0, result.output
+    assert result.stderr.splitlines()[0] == "bench: lab.toml"
+
+
+def test_none_is_chosen_of_two(folder: Path) -> None:
+    for name in ("left.toml", "right.toml"):
+        (folder / name).write_text(BENCH)
+    result = stop()
+    assert result.exit_code == 2
+    assert "which bench? this folder has left.toml, right.toml" in result.stderr
+    assert "WINCHKIT_BENCH" in result.stderr
+
+
+def test_none_without_a_bench_file(folder: Path) -> None:
+    result = stop()
+    assert result.exit_code == 2
+    assert "this folder has no bench file" in result.stderr
+
+
+def test_the_variable_of_all_commands(folder: Path) -> None:
+    (folder / "there").mkdir()
+    (folder / "there" / "lab.toml").write_text(BENCH)
+    assert stop(WINCHKIT_BENCH="there/lab.toml").exit_code == 0
+    wrong = stop(WINCHKIT_BENCH="there/lab.toml", WINCHKIT_STOP_BENCH="nowhere.toml")
+    assert wrong.exit_code == 3, "the command's own variable comes first"
+    assert stop("--bench", "there/lab.toml", WINCHKIT_BENCH="nowhere.toml").exit_code == 0
+
+
+def test_the_variable_of_a_profile() -> None:
+    result = CliRunner().invoke(main, ["ledger"], env={"WINCHKIT_PROFILE": "bench-spiral"})
+    assert result.exit_code == 0
+    assert "bench-spiral" in result.stdout
+
+
+def test_help_groups_commands_by_subject() -> None:
+    lines = CliRunner().invoke(main, ["--help"]).stdout.splitlines()
+    at = [lines.index(f"{title}:") for title in SECTIONS]
+    assert at == sorted(at)
