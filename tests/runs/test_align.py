@@ -155,3 +155,19 @@ def test_the_end_of_a_log_waits_for_nothing_slower_than_its_rows() -> None:
     assert rest[:, 1] == pytest.approx(10 * times)
     assert np.isnan(rest[:, -1]).all(), "no temperature is invented"
     assert not len(aligner.rows(3.0, ends=True))
+
+
+def test_the_end_of_a_log_keeps_the_rows_of_a_source_that_fell_silent_before_it() -> None:
+    """An instrument that gave no reading in the last 0.2 s does not cost the others their rows."""
+    length = Source("/A/length", (Signal("length", "m", "cable_length"),), 0.1)
+    made = layout()
+    aligner = Aligner(Layout((*made.sources, length), made.rule))
+    aligner.add("/A/drive", *samples(250, 0.0))
+    aligner.add("/A/cell", *samples(100, 0.0, 2.99))
+    aligner.add("/A/length", np.arange(0.0, 2.8, 0.01), np.full((280, 1), 4.0))
+    before = aligner.rows(3.0)
+    assert before[-1, 0] <= 2.79, "a row that may still be complete waits"
+    rest = aligner.rows(3.0, ends=True)
+    assert rest[-1, 0] == pytest.approx(2.98), "every sample of the cell"
+    assert rest[:, 1] == pytest.approx(10 * rest[:, 0])
+    assert np.isnan(rest[:, -1]).all(), "no length is invented"

@@ -100,6 +100,11 @@ class Series:
         self._values: Array = np.empty((0, width))
 
     @property
+    def max_gap(self) -> float:
+        """Longest interval over which samples are interpolated, s."""
+        return self._max_gap
+
+    @property
     def last(self) -> float:
         """Time of the newest sample, s; minus infinity without any."""
         return float(self._times[-1]) if len(self._times) else -np.inf
@@ -153,14 +158,16 @@ class Aligner:
         """Rows that are complete by ``now``, time first, shape (n, columns).
 
         A row waits for every source with a sample within the last half second. Where the log
-        ``ends``, it does not wait for sources slower than the rows, whose values are then NaN. The
-        first row is the first complete one, or the first after half a second.
+        ``ends``, it waits neither for sources slower than the rows nor for one that has been
+        silent for longer than is interpolated; their values are then NaN. The first row is the
+        first complete one, or the first after half a second.
         """
         left = self._slower if ends else ()
         awaited = [
             item.last
             for topic, item in self._series.items()
-            if topic not in left and item.reaches(now - PATIENCE)
+            if topic not in left
+            and item.reaches(now - (min(PATIENCE, item.max_gap) if ends else PATIENCE))
         ]
         ready = self._moments <= min(awaited, default=np.inf)
         moments, self._moments = self._moments[ready], self._moments[~ready]

@@ -21,6 +21,7 @@ from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ExceptionResponse
 
+from winchkit.drivers.modbus import transactions
 from winchkit.drivers.modbus.frames import AnswerGate, Event
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
@@ -32,8 +33,6 @@ __all__ = ["ModbusClient"]
 _NEVER = 1 << 30
 _KEPT = 256
 """Events kept of a unit that is not read, e.g. of another master's devices."""
-_LAST_TRANSACTION = 65_000
-"""The library begins again at 1 after it."""
 _ACKNOWLEDGE, _BUSY = 5, 6
 _EXCEPTIONS = {
     1: "illegal function",
@@ -105,7 +104,7 @@ class ModbusClient:
         # request that a gateway hands over on the new connection answers nothing. The loop's time
         # is the seed, so that a bench in simulated time repeats.
         seed = asyncio.get_running_loop().time()
-        client.ctx.next_tid = Random(seed).randrange(1, _LAST_TRANSACTION)
+        client.ctx.next_tid = Random(seed).randrange(1, transactions.LAST)
 
     def close(self) -> None:
         """Close the line."""
@@ -143,11 +142,10 @@ class ModbusClient:
             await self._exchange(unit, client.write_register(register, words[0], device_id=unit))
 
     def _number(self, client: AsyncModbusTcpClient | AsyncModbusSerialClient) -> None:
-        """Leave transaction numbers out that the last answers resemble."""
+        """Let the library use a transaction number that the next answers are unlikely to hold."""
         gate, context = self._gate, client.ctx
         if isinstance(gate, TcpAnswerGate):
-            while gate.resembles(context.next_tid % _LAST_TRANSACTION + 1):
-                context.next_tid = context.next_tid % _LAST_TRANSACTION + 1
+            context.next_tid = gate.numbers.after(context.next_tid) - 1
 
     async def _exchange(self, unit: int, request: Awaitable[Any]) -> Any:
         waiting = asyncio.ensure_future(request)
@@ -175,7 +173,7 @@ class ModbusClient:
         old = self._gate
         if self._spec.kind != "modbus-tcp":
             return AnswerGate()
-        return TcpAnswerGate(old.transactions if isinstance(old, TcpAnswerGate) else ())
+        return TcpAnswerGate(old if isinstance(old, TcpAnswerGate) else None)
 
     def _trace(self, gate: AnswerGate | TcpAnswerGate, sending: bool, data: bytes) -> bytes:
         """Stand between pymodbus and the line; it hands over all that it has not used yet."""

@@ -11,9 +11,9 @@ Implementation Guide V1.0b, 3.1.3 and 4.2).
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
 
 from winchkit.drivers.modbus.frames import Event, Kind, Request, request_of
+from winchkit.drivers.modbus.transactions import Transactions
 
 __all__ = ["TcpAnswerGate"]
 
@@ -23,6 +23,10 @@ _LONGEST = 254
 """Unit and PDU at most, bytes."""
 _SHORTEST = 3
 """Unit, function and exception code."""
+_BODY = _HEAD + 2
+"""Place in an answer behind unit and function."""
+_BLOCK = slice(_HEAD, _HEAD + 4)
+"""Unit, function and start address of a request."""
 _REMEMBERED = 8
 """Requests whose transactions are looked for within a frame."""
 _SIGNATURE = 5
@@ -32,14 +36,18 @@ _SIGNATURE = 5
 class TcpAnswerGate:
     """Fed with what is sent and received on one connection, one request at a time."""
 
-    def __init__(self, transactions: Iterable[bytes] = ()) -> None:
-        """``transactions`` are those of requests on connections before this one."""
+    def __init__(self, before: TcpAnswerGate | None = None) -> None:
+        """``before`` is the one of the connection before this one."""
         self.broken = False
         """Whether something came that was not the answer; the connection is not used again."""
-        self.transactions = deque(transactions, maxlen=_REMEMBERED)
+        self.transactions: deque[bytes] = deque(maxlen=_REMEMBERED)
+        """Of the last requests, also on the connections before this one."""
+        self.numbers = Transactions()
+        if before is not None:
+            self.transactions.extend(before.transactions)
+            self.numbers = before.numbers
         self.lost = False
         """Whether it is unknown where the next frame begins: no answer can be taken any more."""
-        self._answers_before: dict[int, bytes] = {}
         self._request: Request | None = None
         self._unit = 0
         self._buffer = b""
@@ -54,14 +62,6 @@ class TcpAnswerGate:
         self._unit = self._request.unit
         self.transactions.append(packet[:2])
 
-    def resembles(self, transaction: int) -> bool:
-        """Whether the last answers hold the bytes of a transaction behind their head.
-
-        The next answers are likely to hold them again and would be taken for joined frames.
-        """
-        number = transaction.to_bytes(2, "big")
-        return any(number in frame[_HEAD + 2 :] for frame in self._answers_before.values())
-
     def received(self, data: bytes) -> bytes:
         """The whole answer once it is there, else nothing."""
         if self._buffer:
@@ -72,7 +72,6 @@ class TcpAnswerGate:
             joints, self._joints = self._joints, []
             if self._answers(frame, joints):
                 self._request = None
-                self._answers_before[self._unit] = frame
                 return frame
         if self._request is None and self._buffer:
             self._lose()
@@ -118,13 +117,15 @@ class TcpAnswerGate:
         if not (agrees or refused) or self._buffer or self._holds_a_head(frame, joints):
             self._lose()
             return False
+        if agrees:
+            self.numbers.note(request.packet[_BLOCK], frame[_BODY:])
         return True
 
     def _holds_a_head(self, frame: bytes, joints: list[int]) -> bool:
         """Whether the registers end with, or hold, the beginning of another frame's head."""
         for transaction in tuple(self.transactions):
             head = transaction + b"\0\0\0"
-            for at in range(_HEAD + 2, len(frame)):
+            for at in range(_BODY, len(frame)):
                 left = frame[at : at + _SIGNATURE]
                 # A single byte alike is chance, except where a piece of its own begins with it.
                 if (len(left) > 1 or at in joints) and head.startswith(left):
