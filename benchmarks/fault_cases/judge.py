@@ -1,8 +1,24 @@
-"""Judges a case from the truth: stopped in time, nothing moved again, tension, cause, log."""
+"""Judges a case from the truth: stopped in time, nothing moved again, tension, cause, log.
+
+Two bounds are those of two faults together:
+
+- A bound that ends while the computer stands still is that of the drives' own watchdogs: nobody
+  else can stop them in that time.
+- A drive that does not hear the stop of an earlier fault, because a communication fault began
+  before that stop was due and lasts, is stopped by what this second fault leaves (SDO, or its own
+  watchdog after withheld heartbeats). That takes the bound of a communication fault, counted from
+  the onset of the second fault.
+
+A cause must be named by a trip. One exception: a condition latches where it forbids a motion under
+way (docs/safety.md). A motion that came to its own end between the fault and the moment at which
+the condition is due is no longer under way, nothing has to be stopped, and nothing latches. The
+condition must then refuse the next command, in its own words.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,6 +36,7 @@ _MOVES = 0.004
 _SETTLES = 0.05
 """The brake and the drive's filters take this long beside v/a, s."""
 _DEAD_MAN = 0.2
+_NUMBER = re.compile(r"\d+(\.\d+)?")
 _FLUSH = 0.05
 """What a closed log may lack at its end, s: the filter, conversion and poll of the load cell."""
 _NOISE = 15.0
@@ -99,6 +116,16 @@ def _span(record: Record, planned: Planned, onset: float) -> float:
     return min([own, *ends])
 
 
+def _bound_of(record: Record, name: str, start: float, bound: float) -> float:
+    """The bound of a winch whose drive does not hear the stop is that of what deafens it."""
+    for planned, onset in record.onsets:
+        kind = KINDS[planned.kind]
+        deaf = kind.deafens == "bus" or (kind.deafens == "drive" and planned.winch == name)
+        if deaf and onset < start + bound < onset + _span(record, planned, onset):
+            bound = max(bound, onset + KINDS["cut wire"].bound - start)
+    return bound
+
+
 def _bound(record: Record, start: float, bound: float) -> float:
     """A bound that ends while the computer stands still is that of the drives' own watchdogs."""
     for planned, onset in record.onsets:
@@ -145,9 +172,10 @@ def _between(samples: Sequence[Sample], start: float, end: float) -> list[Sample
 def _judge_stop(record: Record, reference: tuple[float, float] | None) -> tuple[str, float]:
     if reference is None:
         return "", math.nan
-    onset, bound = reference
+    onset, least = reference
     reaction = 0.0
     for name, samples in record.truth.items():
+        bound = _bound_of(record, name, onset, least)
         later = _between(samples, onset, min(record.mended, record.reset))
         if not later:
             continue
@@ -182,10 +210,11 @@ def _judge_release(record: Record) -> str:
     return ""
 
 
-def _tripped_at(record: Record, reference: tuple[float, float] | None) -> float | None:
-    """From when on nothing may move, as the truth has it."""
+def _tripped_at(record: Record, name: str, reference: tuple[float, float] | None) -> float | None:
+    """From when on a winch may not move, as the truth has it."""
     if reference is not None:
         onset, bound = reference
+        bound = _bound_of(record, name, onset, bound)
         return onset + bound + LIMITS["speed"] / LIMITS["acceleration"] + _SETTLES
     if not math.isfinite(record.tripped_at):
         return None
@@ -195,11 +224,11 @@ def _tripped_at(record: Record, reference: tuple[float, float] | None) -> float 
 
 
 def _judge_rest(record: Record, reference: tuple[float, float] | None) -> str:
-    start = _tripped_at(record, reference)
-    if start is None:
-        return ""
     end = record.released if record.case.motion == "jog" else record.reset
     for name, samples in record.truth.items():
+        start = _tripped_at(record, name, reference)
+        if start is None:
+            return ""
         for sample in _between(samples, start, end):
             if sample.speed > _MOVES or sample.enabled:
                 what = "was enabled" if sample.enabled else f"moved at {sample.speed:.3f} m/s"
@@ -226,11 +255,26 @@ def _judge_cause(record: Record, reference: tuple[float, float] | None) -> str:
     if record.failure is not None:
         named.append("failure")
     if not named:
-        return "nothing was told" if reference is not None and _enabled(record) else ""
+        due = reference is not None and _enabled(record)
+        return "nothing was told" if due and not _refused_at_rest(record, right) else ""
     if named[0] in right:
         return ""
     words = next((text for _, text in record.trips), str(record.failure))
     return f"'{words}' for {', '.join(planned.kind for planned, _ in record.onsets)}"
+
+
+def _refused_at_rest(record: Record, right: set[str]) -> bool:
+    """Whether the condition came to rest winches and refused the next command in its words."""
+    for one in record.forbidden:
+        moving = any(
+            sample.enabled
+            for samples in record.truth.values()
+            for sample in _between(samples, one.time - 0.01, record.mended)
+        )
+        later = [words for moment, words in record.refused if moment >= one.time]
+        if one.kind in right and not moving and later:
+            return all(_NUMBER.sub("", words) == _NUMBER.sub("", one.words) for words in later)
+    return False
 
 
 def _enabled(record: Record) -> bool:

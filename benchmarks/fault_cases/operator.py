@@ -28,7 +28,8 @@ class Operator:
         """Whether the keys are held."""
         self.orders = True
         """Whether moves are sent."""
-        self.errors: list[BaseException] = []
+        self.errors: list[tuple[float, BaseException]] = []
+        """What refused a command, and when, s."""
         self.acknowledged: list[float] = []
         """When each command was accepted, s."""
         self._threads = []
@@ -74,7 +75,7 @@ class Operator:
         try:
             command()
         except Exception as error:  # noqa: BLE001 - a script that goes on whatever happens
-            self.errors.append(error)
+            self.errors.append((self._world.now, error))
         else:
             self.acknowledged.append(self._world.now)
 

@@ -19,13 +19,23 @@ from winchkit.bench.recording.recorder import Recorder
 from winchkit.runs import read_run
 from winchkit.runs.recording.rows import RowLog
 
-__all__ = ["Record", "play"]
+__all__ = ["Forbidden", "Record", "play"]
 
 _AFTER = 1.1
 """From the last fault until all is mended, s."""
 _HELD_ON = 0.5
 _RELEASED = 0.95
 """A held command counts as released after 0.8 s."""
+
+
+@dataclass(frozen=True)
+class Forbidden:
+    """A condition that forbids motion."""
+
+    kind: str
+    time: float
+    """When it first did, s."""
+    words: str
 
 
 @dataclass
@@ -53,6 +63,10 @@ class Record:
     """When the first trip was shown, s."""
     trips: list[tuple[str, str]] = field(default_factory=list)
     """Kind and words of the trips before the reset, in their order."""
+    forbidden: list[Forbidden] = field(default_factory=list)
+    """Each kind of condition that forbade motion, when it first did, in that order."""
+    refused: list[tuple[float, str]] = field(default_factory=list)
+    """When a command was refused before the mending, s, and the words."""
     failure: BaseException | None = None
     early_reset: str = ""
     late_reset: str = ""
@@ -110,6 +124,7 @@ def _play(world: World, record: Record) -> None:
         clock.sleep(0.3)
     record.trips = record.trips or _trips(world)
     record.mended = world.now
+    record.refused = [(moment, str(error)) for moment, error in operator.errors]
     for end in ends:
         end()
     clock.sleep(_HELD_ON)
@@ -176,6 +191,9 @@ def _schedule(
 def _note_trip(record: Record, snapshot: BenchSnapshot) -> None:
     if snapshot.tripped and not math.isfinite(record.tripped_at):
         record.tripped_at = snapshot.time
+    for one in snapshot.blocked:
+        if all(one.kind != before.kind for before in record.forbidden):
+            record.forbidden.append(Forbidden(one.kind, snapshot.time, str(one)))
 
 
 def _press(world: World, case: Case) -> None:

@@ -117,6 +117,34 @@ def test_a_cell_that_freezes_as_the_load_touches_down_is_detected_by_its_known_n
     assert "followed set-points" in judge(record).stopped, "no exemption where the noise is known"
 
 
+def test_a_motion_that_ended_before_the_condition_is_due_is_told_by_the_next_refusal() -> None:
+    """A programme's move ends 0.36 s after the cell refuses; its reading is stale after 0.40 s."""
+    refuses = Planned("cell refuses", "A", 1.0047, None)
+    moves = case("cell refuses", motion="programme", speed=0.45, paying_out=True, faults=(refuses,))
+    record = play(moves)
+    assert judge(record).good, judge(record)
+    assert not record.trips, "a condition latches where it forbids a motion under way"
+    assert record.moved_again
+    words = record.refused
+    for wrong in ([], [(moment, "no reason") for moment, _ in words]):
+        record.refused = wrong
+        assert judge(record).cause == "nothing was told"
+
+
+def test_a_drive_that_does_not_hear_a_stop_has_the_bound_of_what_deafens_it() -> None:
+    """The drive falls silent 7 ms before the trip of a wrong answer of its cell is due."""
+    wrong, silent = (
+        Planned("cell: wrong unit", "A", 0.449, None),
+        Planned("drive silent", "A", 0.811, None),
+    )
+    record = play(case("cell: wrong unit", motion="move", speed=0.05, faults=(wrong, silent)))
+    verdict = judge(record)
+    assert verdict.good, verdict
+    assert 0.43 < verdict.reaction < 0.362 + 0.15, "of the second fault's onset"
+    record.onsets = record.onsets[:1]
+    assert "followed set-points" in judge(record).stopped, "one fault has the first's bound"
+
+
 @pytest.mark.parametrize(
     "words", [("--case", "203"), ("--case", "a/b"), ("--case", "1/-1"), ("--cases", "0")]
 )

@@ -200,6 +200,21 @@ def test_a_stall_of_this_computer_is_named_and_no_device_is_blamed() -> None:
     assert kinds(rig) == ["computer"]
 
 
+@pytest.mark.parametrize(("since_the_beat", "named"), [(0.012, False), (0.040, True)])
+def test_a_stall_at_rest_is_named_where_the_drives_have_missed_the_heartbeat(
+    since_the_beat: float, named: bool
+) -> None:
+    """They count from the last heartbeat: 2.5 of 50 ms, not from the last cycle."""
+    rig = Rig(LIMITS)
+    sent = rig.bus.beats
+    while rig.bus.beats == sent:
+        rig.step()
+    rig.run(since_the_beat)
+    rig.now += 0.102
+    rig.loop.step(rig.now)
+    assert kinds(rig) == (["computer"] if named else [])
+
+
 def test_a_short_standstill_makes_no_drive_silent() -> None:
     """80 ms after a heartbeat of a 100 ms old: the drive sent the next, which waits to be read."""
     rig = moving_rig()

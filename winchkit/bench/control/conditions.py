@@ -447,7 +447,7 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
     BenchCondition(
         "computer",
         "time between two cycles by the bench's clock",
-        "2 heartbeat periods, at least 6 cycles (while nothing moves: 2.5 heartbeat periods)",
+        "2 heartbeat periods, at least 6 cycles (while nothing moves also 2.5 since the heartbeat)",
     ),
     BenchCondition(
         "loop",

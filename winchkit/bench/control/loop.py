@@ -31,7 +31,8 @@ _UNRESPONSIVE = (
     "withheld, so that the watchdogs of all drives stop them; look at the drive before the reset"
 )
 _DRIVES_NOTICE = 1.25
-"""Of the longest gap, which is 2 heartbeats: after 2.5 the drives count the host as lost."""
+"""Of the longest gap, which is 2 heartbeats: 2.5 after the last one the drives count the host as
+lost."""
 _LATE = 5
 """Cycles: after a longer gap the frames that wait are read within as many."""
 _ANEW = 0.1
@@ -185,7 +186,8 @@ class ControlLoop:
             return
         self._resumed = now
         moving = any(p.controller.phase not in _STOPPED for p in self.winches.values())
-        if moving or gap < 0 or gap > _DRIVES_NOTICE * self._longest_gap:
+        silence = max((now - each.last for _, _, each in self._buses), default=gap)
+        if moving or gap < 0 or silence > _DRIVES_NOTICE * self._longest_gap:
             self.supervisor.latch(
                 Trip(
                     "computer",

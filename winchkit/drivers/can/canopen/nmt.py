@@ -66,12 +66,15 @@ class HeartbeatProducer:
 
     period: float
     """s."""
+    last: float = float("nan")
+    """When it was due last, s; NaN before the first time."""
     _next: float = float("-inf")
 
     def due(self, now: float) -> bool:
         """Whether to send one now; then counts on to the next."""
         if now < self._next:
             return False
+        self.last = now
         self._next = (
             now + self.period if now - self._next > self.period else self._next + self.period
         )
