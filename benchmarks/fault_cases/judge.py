@@ -2,9 +2,9 @@
 
 Two bounds are those of two faults together:
 
-- A bound that ends while the computer stands still is that of the drives' own watchdogs: nobody
-  else can stop them in that time.
-- A drive that does not hear the stop of an earlier fault, because a communication fault began
+- A bound that ends while the computer stands still is that of the drives' own watchdogs:
+  nothing else can stop them in that time.
+- A drive that does not receive the stop of an earlier fault, because a communication fault began
   before that stop was due and lasts, is stopped by what this second fault leaves (SDO, or its own
   watchdog after withheld heartbeats). That takes the bound of a communication fault, counted from
   the onset of the second fault.
@@ -117,11 +117,11 @@ def _span(record: Record, planned: Planned, onset: float) -> float:
 
 
 def _bound_of(record: Record, name: str, start: float, bound: float) -> float:
-    """The bound of a winch whose drive does not hear the stop is that of what deafens it."""
+    """The bound of a winch whose drive receives no stop is that of the fault that blocks it."""
     for planned, onset in record.onsets:
         kind = KINDS[planned.kind]
-        deaf = kind.deafens == "bus" or (kind.deafens == "drive" and planned.winch == name)
-        if deaf and onset < start + bound < onset + _span(record, planned, onset):
+        blocked = kind.blocks == "bus" or (kind.blocks == "drive" and planned.winch == name)
+        if blocked and onset < start + bound < onset + _span(record, planned, onset):
             bound = max(bound, onset + KINDS["cut wire"].bound - start)
     return bound
 

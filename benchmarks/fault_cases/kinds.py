@@ -47,8 +47,8 @@ class Kind:
     """Whether it can be made in real time."""
     lasts: bool = False
     """Whether it goes on until it is mended, whatever span is drawn."""
-    deafens: Literal["", "drive", "bus"] = ""
-    """Which drives do not hear a stop by the usual way while it lasts."""
+    blocks: Literal["", "drive", "bus"] = ""
+    """Which drives do not receive a stop in the usual way while it lasts."""
     part: str = ""
     """What recovers where a fault of it ends, from its other faults too: servo, cell, line."""
 
@@ -234,24 +234,24 @@ _ROWS = (
     Kind("stranger: NMT reset node", _nmt(0x81), ("second master", *_WIRES), least=0.0),
     Kind("stranger: NMT reset communication", _nmt(0x82), ("second master", *_WIRES), least=0.0),
     Kind("reboot", _drive("reboot"), _WIRES, least=0.0, part="servo"),
-    Kind("RPDO 1 lost", _lost(0x200), _LOST, stops=False, deafens="drive"),
-    Kind("RPDOs lost", _lost(0x200, 0x300, 0x400, 0x500), _LOST, stops=False, deafens="drive"),
+    Kind("RPDO 1 lost", _lost(0x200), _LOST, stops=False, blocks="drive"),
+    Kind("RPDOs lost", _lost(0x200, 0x300, 0x400, 0x500), _LOST, stops=False, blocks="drive"),
     Kind("TPDOs lost", _lost(0x180, 0x280, 0x380, 0x480), _LOST, least=_COMMUNICATION),
-    Kind("SYNC lost", _lost(shared=(0x080,)), _LOST, least=_COMMUNICATION, deafens="bus"),
+    Kind("SYNC lost", _lost(shared=(0x080,)), _LOST, least=_COMMUNICATION, blocks="bus"),
     Kind(
         "drive's heartbeat lost", _drive("heartbeat stop"), ("heartbeat",), least=0.2, part="servo"
     ),
     Kind("host's heartbeat lost", _host_heartbeat, _LOST, least=0.2),
-    Kind("host frames lost", _host_frames, _LOST, least=0.2, deafens="bus"),
-    Kind("cut wire", _cut, _LOST, least=0.2, deafens="bus"),
-    Kind("drive silent", _drive("silence"), _LOST, least=0.2, deafens="drive", part="servo"),
+    Kind("host frames lost", _host_frames, _LOST, least=0.2, blocks="bus"),
+    Kind("cut wire", _cut, _LOST, least=0.2, blocks="bus"),
+    Kind("drive silent", _drive("silence"), _LOST, least=0.2, blocks="drive", part="servo"),
     Kind(
         "PDO mapping lost",
         _drive("map lost"),
         _LOST,
         least=0.0,
         lasts=True,
-        deafens="drive",
+        blocks="drive",
         part="servo",
     ),
     *(

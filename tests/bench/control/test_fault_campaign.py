@@ -131,7 +131,7 @@ def test_a_motion_that_ended_before_the_condition_is_due_is_told_by_the_next_ref
         assert judge(record).cause == "nothing was told"
 
 
-def test_a_drive_that_does_not_hear_a_stop_has_the_bound_of_what_deafens_it() -> None:
+def test_a_drive_that_receives_no_stop_has_the_bound_of_the_fault_that_blocks_it() -> None:
     """The drive falls silent 7 ms before the trip of a wrong answer of its cell is due."""
     wrong, silent = (
         Planned("cell: wrong unit", "A", 0.449, None),
