@@ -117,7 +117,7 @@ def test_a_cell_that_freezes_as_the_load_touches_down_is_detected_by_its_known_n
     assert "followed set-points" in judge(record).stopped, "no exemption where the noise is known"
 
 
-def test_a_motion_that_ended_before_the_condition_is_due_is_told_by_the_next_refusal() -> None:
+def test_after_a_motion_that_ended_before_the_condition_was_due_the_next_refusal_names_it() -> None:
     """A programme's move ends 0.36 s after the cell refuses; its reading is stale after 0.40 s."""
     refuses = Planned("cell refuses", "A", 1.0047, None)
     moves = case("cell refuses", motion="programme", speed=0.45, paying_out=True, faults=(refuses,))
