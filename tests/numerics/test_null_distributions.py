@@ -129,6 +129,15 @@ class TestSignedRanks:
         assert size.min() > 0.02 * size.max()
         assert signed_rank_p_value(before, before - change) == pytest.approx(wanted, rel=1e-6)
 
+    def test_many_blocks_and_equal_changes_have_scipys_approximation(self) -> None:
+        random = np.random.default_rng(7)
+        many = 0.2 + random.standard_normal(80)
+        equal = np.repeat([1.0, -0.5, 0.7, 0.9, -0.8, 0.6, 0.4, 0.3], 2)
+        for change in (many[np.abs(many) > 0.02 * np.abs(many).max()], equal):
+            before = np.full(len(change), 100.0)
+            wanted = stats.wilcoxon(change, alternative="greater", method="asymptotic").pvalue
+            assert signed_rank_p_value(before, before - change) == pytest.approx(wanted, rel=1e-9)
+
     def test_changes_about_zero_are_accepted_as_often_as_the_level(self) -> None:
         random, cases = np.random.default_rng(6), 1500
         before, p_values = np.full(48, 1000.0), []

@@ -18,7 +18,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.signal import firwin, upfirdn, welch
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.sampling import bridged, gaps
@@ -121,6 +120,8 @@ class Decimation:
 
     def _low_passed(self, values: Array, pieces: Sequence[slice]) -> Array:
         """Zero-phase low-pass and decimation, each piece between gaps by itself."""
+        from scipy.signal import firwin, upfirdn  # Slow to import, and needed by long runs only.
+
         reach = _TAPS // 2 * self.factor
         taps = firwin(2 * reach + 1, 1.0 / self.factor, window=("kaiser", _BETA))
         out = []
@@ -175,6 +176,8 @@ def decimation_for(runs: Sequence[Run]) -> Decimation | None:
 
 def _highest_frequency(values: Array, rate: float) -> float:
     """Frequency above which less than 1 % of a signal's power beyond its white noise lies, Hz."""
+    from scipy.signal import welch
+
     finite = np.isfinite(values)
     length = min(len(values) // _BLOCKS, round(_BLOCK * rate))
     if not finite.any() or length < 2:

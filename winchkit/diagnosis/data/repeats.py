@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate
+from scipy.fft import irfft, next_fast_len, rfft
 
 from winchkit.arrays import Array
 from winchkit.model.line import GRAVITY
@@ -100,12 +100,19 @@ def _best_lag(a: Array, b: Array) -> int:
     a, b = a - mean, b - mean
     within_a, within_b = (np.concatenate([[0.0], np.cumsum(x**2)]) for x in (a, b))
     squares = within_a[stop] - within_a[start] + within_b[stop + lags] - within_b[start + lags]
-    differences = (squares - 2 * correlate(b, a, mode="full")) / (stop - start)
+    differences = (squares - 2 * _correlation(a, b)) / (stop - start)
     overlapping = stop - start >= _LEAST_OVERLAP * min(len(a), len(b))
     differences = np.where(overlapping, differences, np.inf)
     # A periodic motion fits at several lags: take the one of largest overlap.
     best = differences <= differences.min() + _TIE * float(np.mean(a**2))
     return int(lags[best][np.argmax((stop - start)[best])])
+
+
+def _correlation(a: Array, b: Array) -> Array:
+    """Sums of products a[i] b[i + lag] for the lags from 1 − len(a) to len(b) − 1."""
+    count = len(a) + len(b) - 1
+    length = next_fast_len(count, real=True)
+    return np.asarray(irfft(rfft(b, length) * rfft(a[::-1], length), length)[:count])
 
 
 def _same_load(first: Signals, other: Signals) -> bool:

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import ncx2
+from scipy.special import chndtr
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, simulated
@@ -103,7 +103,7 @@ def power_of(strength: float, required: float = SEPARATED_AT) -> float:
     float
         P(χ²'(1, λ) > needed).
     """
-    return float(ncx2.sf(required, 1, max(strength, 0.0)))
+    return float(1 - chndtr(required, 1, max(strength, 0.0)))
 
 
 def separation(

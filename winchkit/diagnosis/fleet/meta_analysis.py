@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.results import Diagnosis, Step
@@ -250,7 +250,7 @@ def _cochran(x: Array, s: Array) -> tuple[float, float]:
         return 0.0, float("nan")
     weight = 1 / s**2
     q = float(np.sum(weight * (x - np.average(x, weights=weight)) ** 2))
-    return q, float(chi2.sf(q, len(x) - 1))
+    return q, float(chdtrc(len(x) - 1, q))
 
 
 def _homogeneous_subset(x: Array, s: Array) -> NDArray[np.bool_]:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset, Recording
@@ -117,6 +116,8 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     None where the derivatives are not differences of these samples: they were taken before a long
     run was decimated, or the drive's own velocity has less noise than the differences.
     """
+    from scipy.interpolate import make_interp_spline  # Slow to import.
+
     signals, smooth = recording.signals, recording.smooth
     if recording.decimated:
         return None

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
@@ -82,7 +82,7 @@ def lack_of_fit_test(
     taken = sums_per_band(np.sum(basis**2, axis=1), regression.band_of_row, count)
     dof = np.maximum(dof - taken, 1.0)
     ratio = total / dof / noise.power
-    p = np.asarray(f_distribution.sf(ratio, dof, noise.dof))
+    p = np.asarray(fdtrc(dof, noise.dof, ratio))
     tested = max(count, 1)
     worst = float(min(1.0, p.min() * tested)) if count else 1.0
     return LackOfFitTest(worst, total / noise.power - dof, p * tested < 0.05)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.diagnose import (
@@ -319,7 +319,7 @@ def _is_significant(preparation: Preparation, gain: float) -> bool:
     """
     count = len(preparation.prior)
     dof = preparation.noise.dof.get("cable_length", 1.0)
-    level = float(f_distribution.isf(_GEOMETRY_LEVEL, count, max(dof, 1.0)))
+    level = float(fdtri(count, max(dof, 1.0), 1 - _GEOMETRY_LEVEL))
     return gain / count > level
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
@@ -80,7 +80,7 @@ class PoseSelection(SelectionEngine):
         taken = np.bincount(bands[real], np.sum(left**2, axis=1)[real], count)
         total = np.bincount(bands[real], present.residual[real] ** 2, count)
         dof = np.maximum(np.bincount(bands[real], minlength=count) - taken, 1.0)
-        p = np.asarray(f_distribution.sf(total / dof, dof, noise.dof))
+        p = np.asarray(fdtrc(dof, noise.dof, total / dof))
         worst = float(min(1.0, p.min() * count))
         return LackOfFitTest(worst, total - dof, p * count < 0.05)
 

@@ -95,7 +95,7 @@ class _Canvas:
         self._here = regression.change(present, outputs)
 
     def draw(self, column: Array, term: Term, outputs: Collection[str]) -> bool:
-        """Write the change by a term into a column; False where it is zero or not finite."""
+        """Write the change by a term into its rows of some outputs; False where there is none."""
         if not outputs:
             return False
         there = self._regression.change(
@@ -129,16 +129,18 @@ def signatures(
     tried = list(points(regression, effects))
     candidates: list[Candidate] = []
     without_signature: list[tuple[Effect, dict[str, float]]] = []
-    # Columns are contiguous in memory, since each is written and read as a whole.
+    # Columns are contiguous in memory, since each is written and read as a whole. Pages of zeros,
+    # the rows of outputs that an effect does not act on, are not allocated by the system.
     columns, count = (
-        np.empty((sum(len(usual_steps) for *_, usual_steps in tried), regression.n_rows)),
+        np.zeros((sum(len(usual_steps) for *_, usual_steps in tried), regression.n_rows)),
         0,
     )
     for effect, shape, usual_steps in tried:
         own = []
+        reached = regression.outputs_of(effect.stage)
         for usual_step in usual_steps:
             values = {**effect.null, **shape, **usual_step}
-            if canvas.draw(columns[count], Term(effect, values), outputs):
+            if canvas.draw(columns[count], Term(effect, values), reached):
                 own.append(usual_step)
                 count += 1
             else:

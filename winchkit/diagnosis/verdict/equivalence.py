@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.cross_validation import held_out
@@ -243,7 +243,7 @@ def _weakly_preferred(simple: Fit, rich: Fit, more: int) -> bool:
     """Likelihood-ratio test significant at 5 %, for a law that BIC does not prefer."""
     states = [sum(len(start) for start in f.hypothesis.starts) for f in (simple, rich)]
     unknowns = max(1, more + states[1] - states[0])
-    return bool(chi2.sf(simple.chi_square - rich.chi_square, unknowns) < _LEVEL)
+    return bool(chdtrc(unknowns, max(0.0, simple.chi_square - rich.chi_square)) < _LEVEL)
 
 
 def _confusable_by_drift(rival: Effect, own: Effect) -> bool:
