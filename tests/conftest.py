@@ -50,6 +50,7 @@ SLOW = frozenset(
             "repository/test_examples.py",
             "repository/test_pages.py",
             "repository/test_wheel.py",
+            "testing/test_sessions.py",
         ),
     )
 )

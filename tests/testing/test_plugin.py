@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 import subprocess
 import sys
 import threading
@@ -18,8 +16,6 @@ from winchkit.testing.plugin import SimBench
 
 ROOT = Path(__file__).parents[2]
 WEIGHT = 10 * 9.80665
-STALLED = ("no complete feedback", "no load cell reading", "heartbeat is gone")
-"""What a bench says when this machine stood still for a moment."""
 
 
 @pytest.fixture
@@ -234,53 +230,3 @@ def test_the_plugin_is_registered_and_light() -> None:
         "assert one.value == 'winchkit.testing.plugin'\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
-
-
-def run_pytest(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    """A session of its own, as a user starts one."""
-    environment = {key: text for key, text in os.environ.items() if "PYTEST" not in key}
-    return subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "error", *options],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-
-
-def test_parallel_workers_do_not_clash(tmp_path: Path) -> None:
-    """Two workers, the same bench in each test, and each sees its own motion only."""
-    (tmp_path / "test_own.py").write_text(
-        "import pytest\n"
-        "@pytest.mark.parametrize('way, sign', [('wind_in', -1), ('pay_out', 1)])\n"
-        "def test_own(sim_bench, way, sign):\n"
-        "    sim = sim_bench('spiral-bench')\n"
-        "    sim.bench.winch['A'].move_by(**{way: 0.04}, speed=0.2)\n"
-        "    sim.assert_moved('A', sign * 0.04, 2e-3)\n",
-        encoding="utf-8",
-    )
-    done = run_pytest(tmp_path, "-n", "2")
-    assert done.returncode == 0, done.stdout
-    assert "2 passed" in done.stdout
-
-
-@pytest.mark.realtime
-def test_the_example_passes_its_own_tests() -> None:
-    """Its last test moves a bench in another process, in real time: a stall stops that, rightly."""
-    for _ in range(3):
-        done = run_pytest(ROOT / "examples" / "control_loop")
-        if not any(word in done.stdout for word in STALLED):
-            break
-    assert done.returncode == 0, done.stdout
-    assert "skipped" not in done.stdout or "multicast" in done.stdout
-
-
-def test_the_page_is_a_file_of_tests(tmp_path: Path) -> None:
-    page = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    (tmp_path / "test_page.py").write_text(block, encoding="utf-8")
-    done = run_pytest(tmp_path)
-    assert done.returncode == 0, done.stdout
-    assert f"{block.count('def test_')} passed" in done.stdout

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from winchkit import errors
 from winchkit.bench.ownership import connect_to_owner
 from winchkit.bench.remote.identity import client_name
+from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
@@ -106,6 +107,11 @@ class RemoteStation:
             Winch, "all", or None for the only one.
         """
         self._call("take_over", winch)
+
+    @property
+    def clock(self) -> Clock:
+        """Steady clock of this computer, which the bench process has too."""
+        return MonotonicClock()
 
     def names(self) -> list[str]:
         """Winches there are."""

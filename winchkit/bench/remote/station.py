@@ -14,6 +14,7 @@ from winchkit.bench.control.snapshot import to_dict
 from winchkit.bench.recording.recorder import Recorder, counters_of
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.winch import Winch
+from winchkit.drivers.clock import Clock
 from winchkit.errors import UsageError
 from winchkit.schema.programme import ALL
 
@@ -22,6 +23,10 @@ __all__ = ["LocalStation", "Station"]
 
 class Station(Protocol):
     """An operator's place at a bench. Closing it ends what it has started."""
+
+    @property
+    def clock(self) -> Clock:
+        """Clock of the bench, on which a client waits."""
 
     def names(self) -> list[str]:
         """Winches there are."""
@@ -102,6 +107,11 @@ class LocalStation:
         self._bench = bench
         self._recorder: Recorder | None = None
         self._homing: Generator[None] | None = None
+
+    @property
+    def clock(self) -> Clock:
+        """Clock of the bench, on which a client waits."""
+        return self._bench.clock
 
     def names(self) -> list[str]:
         """Winches there are."""

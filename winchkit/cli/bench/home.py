@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 import click
@@ -74,7 +73,7 @@ def command(
             station.take_over(winch)
         station.home(winch, method, length, optional(speed, "speed"))
         while station.homing():
-            time.sleep(_POLL)
+            station.clock.sleep(_POLL)
         status = station.status()
     if dry_run:
         return

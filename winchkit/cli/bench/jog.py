@@ -136,17 +136,18 @@ def _read(
 
 def _jog_for(station: Station, winch: str | None, winding_speed: float, duration: float) -> None:
     """Keep a dead-man alive from here for a time."""
-    end = time.monotonic() + duration
-    while (left := end - time.monotonic()) > 0:
+    clock = station.clock
+    end = clock.now() + duration
+    while (left := end - clock.now()) > 0:
         station.jog(winch, winding_speed, min(_HOLD, left + _REFRESH))
-        time.sleep(min(_REFRESH, left))
+        clock.sleep(min(_REFRESH, left))
     station.jog(winch, 0.0, _REFRESH)
     _wait(station, winch)
 
 
 def _wait(station: Station, winch: str | None) -> None:
     while station.moving(winch):
-        time.sleep(_REFRESH)
+        station.clock.sleep(_REFRESH)
 
 
 def _jog_by_keys(station: Station, winch: str | None, speed: float) -> None:

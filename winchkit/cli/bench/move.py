@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -88,4 +87,4 @@ def command(
 
 def _wait(station: Station, winch: str | None) -> None:
     while station.moving(winch):
-        time.sleep(_POLL)
+        station.clock.sleep(_POLL)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -133,7 +132,7 @@ def _rehearse(bench: str, programme: Programme, effects: Sequence[str], *, as_js
                 continue
             station.move(step.winch, step.to, step.by, step.speed, step.acceleration)
             while station.moving(step.winch):
-                time.sleep(_POLL)
+                station.clock.sleep(_POLL)
 
 
 def _ask(step: Step) -> None:

@@ -6,28 +6,25 @@ commands that only write name their frames without any drive.
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
-import can
 import click
 
 from winchkit.cli.core.output import echo_json
-from winchkit.drivers.clock import Clock
 from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
     from winchkit.bench.remote.station import Station
     from winchkit.drivers.can.tools.decode import Decoded, KnownNode
-    from winchkit.schema.bench import BenchSpec, BusSpec
+    from winchkit.schema.bench import BenchSpec
     from winchkit.schema.simbench import SimBench
+    from winchkit.sim.live.buses import Carried
 
 __all__ = [
     "Frame",
-    "FrameTap",
     "nodes_of",
     "show_frames",
     "station_for",
@@ -172,26 +169,34 @@ def _summed(items: Sequence[Decoded]) -> Iterator[str]:
 
 @contextmanager
 def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
-    """The bench with simulated drives; what the host sends is collected."""
+    """The bench with simulated drives, in simulated time; frames of the host are collected."""
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
-    from winchkit.cli.core.dry_run import FrameTap
+    from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live.bench import LiveBench
-    from winchkit.sim.live.paced_clock import PacedClock
 
-    clock = PacedClock()
     click.echo(
         "dry run on simulated drives, each cable at its reference length; nothing is sent", err=True
     )
-    with ExitStack() as stack:
-        live = stack.enter_context(LiveBench(_simulated(spec), clock=clock.simulation))
-        for name, bus in live.bench_spec.bus.items():
-            stack.enter_context(FrameTap(name, bus, clock, frames))
-        bench = stack.enter_context(open_bench(live.bench_spec, clock))
-        bench.on_cycle(clock.control)
-        station = LocalStation(bench)
-        yield station
-        station.close()
+    clock = SimulatedClock()
+    with LiveBench(_simulated(spec), simulated_time=clock) as live:
+        for name, wire in live.wire.items():
+            wire.taps.append(_tap(name, clock.now(), frames))
+        with open_bench(live.bench_spec, clock) as bench:
+            station = LocalStation(bench)
+            yield station
+            station.close()
+
+
+def _tap(bus: str, start: float, frames: list[Frame]) -> Callable[[Carried], None]:
+    """Collects the frames of the host on one bus, with times since ``start``."""
+
+    def take(carried: Carried) -> None:
+        if not carried.from_drive:
+            time = carried.time - start
+            frames.append(Frame(time, bus, carried.identifier, carried.data))
+
+    return take
 
 
 def _simulated(spec: BenchSpec) -> SimBench:
@@ -209,44 +214,3 @@ def _simulated(spec: BenchSpec) -> SimBench:
         for name, mass in hanging.items()
     }
     return SimBench(spec.name, replace(spec, winch=winches, bus=buses), truth, NoiseSpec(), ())
-
-
-_WAIT = 0.02
-_FROM_HOST = (0x000, 0x200, 0x300, 0x400, 0x500, 0x600)
-"""Identifiers, less the node number, that a host sends; and its SYNC, heartbeat and LSS."""
-_SYNC, _HEARTBEAT, _LSS = 0x080, 0x700, 0x7E5
-
-
-class FrameTap:
-    """Collects what the host sends for as long as its ``with`` block lasts."""
-
-    def __init__(self, name: str, bus: BusSpec, clock: Clock, frames: list[Frame]) -> None:
-        """Append to ``frames``; times count from now."""
-        self._name, self._clock, self._begun = name, clock, clock.now()
-        self._host = (_SYNC, _HEARTBEAT + bus.node, _LSS)
-        self._frames = frames
-        self._bus = can.Bus(interface="virtual", channel=bus.channel)
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._listen, name=f"tap-{name}", daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stopping.set()
-        self._thread.join()
-        self._bus.shutdown()
-
-    def _listen(self) -> None:
-        """Take every frame that there is, also those that wait when it is to end."""
-        while True:
-            message = self._bus.recv(0.0 if self._stopping.is_set() else _WAIT)
-            if message is None:
-                if self._stopping.is_set():
-                    return
-                continue
-            identifier = message.arbitration_id
-            if identifier in self._host or identifier & ~0x7F in _FROM_HOST:
-                time = self._clock.now() - self._begun
-                self._frames.append(Frame(time, self._name, identifier, bytes(message.data)))
