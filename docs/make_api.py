@@ -12,7 +12,8 @@ SECTIONS = {
     "A bench": ("open_bench", "attach", "Bench", "BenchSnapshot"),
     "A simulated bench": ("LiveBench", "SimulatedClock", "simulate"),
     "Files": (
-        *("find", "read_profile", "read_robot", "read_bench", "read_programme", "read_simbench"),
+        *("find", "read_profile", "read_axis", "read_robot"),
+        *("read_bench", "read_programme", "read_simbench"),
         *("read_run", "read_poses", "write_run", "open_writer", "Run"),
     ),
     "Diagnosis": (

@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from winchkit.runs.run import Run
     from winchkit.runs.writer import open_writer, write_run
     from winchkit.schema.read import (
+        read_axis,
         read_bench,
         read_profile,
         read_programme,
@@ -100,6 +101,7 @@ __all__ = [
     "open_bench",
     "open_writer",
     "plan",
+    "read_axis",
     "read_bench",
     "read_poses",
     "read_profile",
@@ -165,6 +167,7 @@ _NAMES = {
         "read_bench",
         "read_profile",
         "read_programme",
+        "read_axis",
         "read_robot",
         "read_simbench",
     ),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from campaign.case import Case
+from campaign.sizes import CATALOGUED
 from campaign.truth import Hidden
 
 __all__ = ["Score", "refused", "score", "summary", "table"]
@@ -71,7 +72,7 @@ class Score:
         """Whether the answer is as the truth is."""
         if self.kind == "none":
             return self.verdict == "adequate"
-        if self.kind == "outside":
+        if self.kind == "outside" and self.found < len(self.truth):
             return self.verdict in {"unknown", "partly"} and not self.wrong_single_names
         if self.snr < 1:
             return not self.wrong_single_names
@@ -81,7 +82,7 @@ class Score:
 def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) -> Score:
     """Compare an answer (as JSON) with what the case hides."""
     steps = tuple(tuple(s["effects"]) for s in answer["steps"])
-    truth = tuple(case.hidden)
+    truth = tuple(CATALOGUED.get(name, name) for name in case.hidden)
     inside = [t for t in truth if not t.startswith("outside-")]
     ratios = [
         o["heldout_rms_after"] / o["noise_rms"]

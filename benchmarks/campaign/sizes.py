@@ -10,7 +10,7 @@ import numpy as np
 
 from campaign.winch import Winch
 
-__all__ = ["CATALOGUE", "OUTSIDE", "Scene", "allowed", "draw"]
+__all__ = ["CATALOGUE", "CATALOGUED", "OUTSIDE", "Scene", "allowed", "draw"]
 
 Random = np.random.Generator
 Values = dict[str, float]
@@ -39,6 +39,9 @@ OUTSIDE = (
     "outside-mis-spooling", "outside-joint", "outside-wander", "outside-clipping",
     "outside-platform", "outside-square-drag",
 )  # fmt: skip
+
+CATALOGUED = {"outside-crosstalk": "spring-balancer", "outside-clipping": "cell-clipping"}
+"""Physics that was outside the catalogue when seeds were first drawn, and its name there now."""
 
 
 def allowed(effect: str, winch: Winch, load_known: bool, warms: bool, loads: int) -> bool:

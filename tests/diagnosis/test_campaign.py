@@ -21,7 +21,8 @@ ONE = {
     "motor-coulomb": 209,
     "cable-elongation-linear": 210,
 }
-STRANGE = {"outside-harmonic": 301, "outside-sticky-place": 302, "outside-crosstalk": 303}
+STRANGE = {"outside-harmonic": 301, "outside-sticky-place": 302, "outside-wander": 303}
+NAMED_SINCE = {"outside-crosstalk": 303, "outside-clipping": 304}
 
 
 @pytest.mark.parametrize("seed", NOTHING)
@@ -47,6 +48,14 @@ def test_what_no_effect_explains_gets_no_name(kind: str, seed: int, tmp_path: Pa
     assert score is not None
     assert score.verdict in {"unknown", "partly"}
     assert score.steps == ()
+
+
+@pytest.mark.parametrize(("kind", "seed"), NAMED_SINCE.items())
+def test_what_the_catalogue_has_got_since_is_named(kind: str, seed: int, tmp_path: Path) -> None:
+    score = run_case(seed, Plan("outside", 3.0, (kind,), small=True), tmp_path)
+    assert score is not None
+    assert score.verdict == "explained"
+    assert score.found == len(score.steps) == 1
 
 
 @pytest.mark.parametrize(

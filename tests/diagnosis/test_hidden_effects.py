@@ -30,6 +30,14 @@ HIDDEN = {
     "heavy rotor": "rotor-inertia",
     "weak motor": "torque-constant",
     "lossy gear": "gear-efficiency",
+    "clipping cell": "cell-clipping",
+    "unbalanced drum": "drum-unbalance",
+    "balancer": "spring-balancer",
+    "load lever": "load-lever",
+    "rippled motor": "torque-ripple",
+    "rough place": "friction-at-place",
+    "growing drag": "friction-growth",
+    "leaking current": "cell-crosstalk",
 }
 SIZES = {
     "elastic rope": ("axial_stiffness", 250e3, "N"),
@@ -42,7 +50,7 @@ TOLD = {
     "stretched cell": "stretched cell, gain_error=0.02",
     "motor drag": "motor drag, torque=30 mN m",
 }
-OUTSIDE = ("five-cornered drum", "clipping cell", "sticky place")
+OUTSIDE = ("five-cornered drum", "sticky place")
 
 
 @cache

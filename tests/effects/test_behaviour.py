@@ -50,6 +50,15 @@ LINEAR = {
     "motor-stribeck",
     "motor-cogging",
     "rotor-inertia",
+    "joint-gravity",
+    "drum-unbalance",
+    "load-lever",
+    "spring-balancer",
+    "torque-ripple",
+    "friction-growth",
+    "friction-at-place",
+    "cell-crosstalk",
+    "cell-clipping",
 }
 
 every_effect = pytest.mark.parametrize("effect", EFFECTS, ids=IDS)

@@ -78,6 +78,19 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "rotor-inertia": {"inertia": ("kg m^2", 0)},
     "torque-lag": {"time_constant": ("s", 0)},
     "torque-lead": {"lead": ("s", 0)},
+    "joint-gravity": {"amplitude": ("N m", 0), "phase": ("rad", SHAPE)},
+    "drum-unbalance": {"amplitude": ("N m", 0), "phase": ("rad", SHAPE)},
+    "load-lever": {"amplitude": ("1", 0), "phase": ("rad", SHAPE)},
+    "spring-balancer": {"stiffness": ("N m/rad", 0), "torque": ("N m", 0)},
+    "torque-ripple": {"amplitude": ("1", 0), "phase": ("rad", SHAPE), "order": ("1", SHAPE)},
+    "friction-growth": {"rate": ("N m/s", 0)},
+    "friction-at-place": {
+        "torque": ("N m", 0),
+        "place": ("rad", SHAPE),
+        "width": ("rad", SHAPE),
+    },
+    "cell-crosstalk": {"share": ("N/(N m)", 0), "mass": ("kg", 0)},
+    "cell-clipping": {"share": ("1", 0), "limit": ("N", SHAPE)},
 }
 every_effect = pytest.mark.parametrize("effect", EFFECTS, ids=IDS)
 

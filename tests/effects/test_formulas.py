@@ -300,6 +300,39 @@ CASES: dict[str, Case] = {
         {"time_constant": 0.1},
         lambda: {"motor_torque": _lag(X.T * X.arm, 0.1, (X.T * X.arm)[0])},
     ),
+    "joint-gravity": (
+        {"amplitude": 0.6, "phase": 0.4},
+        lambda: _torque(0.6 * (cos(0.4) * np.sin(X.phi) + sin(0.4) * np.cos(X.phi))),
+    ),
+    "drum-unbalance": (
+        {"amplitude": 0.02, "phase": -0.4},
+        lambda: _torque(0.02 * np.cos(X.phi - 0.4 - pi / 2)),
+    ),
+    "load-lever": (
+        {"amplitude": 0.05, "phase": 0.2},
+        lambda: _tension(X.T * (1 + 0.05 * np.cos(X.phi + 0.2 - pi / 2))),
+    ),
+    "spring-balancer": (
+        {"stiffness": 2e-3, "torque": -0.03},
+        lambda: _torque(2e-3 * X.theta / RATIO - 0.03),
+    ),
+    "torque-ripple": (
+        {"amplitude": 0.04, "phase": 0.3, "order": 5},
+        lambda: {"motor_torque": X.T * X.arm * (1 + 0.04 * np.sin(5 * X.theta + 0.3))},
+    ),
+    "friction-growth": ({"rate": 3e-4}, lambda: _torque(3e-4 * X.t * X.sm)),
+    "friction-at-place": (
+        {"torque": 0.05, "place": 3.0, "width": 2.0},
+        lambda: _torque(0.05 * X.sm * np.exp(-((X.phi - 3.0) ** 2) / 4.0)),
+    ),
+    "cell-crosstalk": (
+        {"share": 3.0, "mass": 0.4},
+        lambda: {"tension": X.T + 3.0 * X.T * X.arm + 0.4 * X.a},
+    ),
+    "cell-clipping": (
+        {"share": 1.0, "limit": 300.0},
+        lambda: {"tension": np.minimum(X.T, 300.0)},
+    ),
 }
 OWN_TESTS = {"pulley-dahl", "length-time-offset", "drum-winding-tension", "torque-lead"}
 

@@ -71,6 +71,15 @@ PAIRS = [
     Pair("heavy rotor", "rotor-inertia"),
     Pair("weak motor", "torque-constant"),
     Pair("slow torque", "torque-lag"),
+    Pair("unbalanced drum", "drum-unbalance"),
+    Pair("hanging joint", "joint-gravity"),
+    Pair("balancer", "spring-balancer"),
+    Pair("growing drag", "friction-growth"),
+    Pair("rough place", "friction-at-place"),
+    Pair("rippled motor", "torque-ripple"),
+    Pair("load lever", "load-lever"),
+    Pair("leaking current", "cell-crosstalk"),
+    Pair("clipping cell", "cell-clipping"),
     Pair("late length", "length-time-offset"),
 ]
 
@@ -98,6 +107,7 @@ def misses(pair: Pair) -> tuple[dict[str, float], dict[str, float]]:
                 run["motor_angle"],
                 load_mass=run.load_mass,
                 temperature=run["temperature"],
+                motor_torque=run["motor_torque"],
             )
             predicted = line.predict(line.motion(signals))
             for name in OUTPUTS:

@@ -34,6 +34,7 @@ from winchkit.diagnosis.verdict.decision import Judgement, reweighted_judgement
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.location import located
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.runs.run import Run
@@ -225,7 +226,8 @@ def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelect
     """Selection engine whose initial model is the profile's own effects."""
     regression = TimeSeriesRegression(dataset)
     initial_model = initial_hypothesis(dataset.profile, catalogue, regression)
-    return TimeSeriesSelection(regression, initial_model, catalogue)
+    candidates = [located(effect, dataset.motions) for effect in catalogue]
+    return TimeSeriesSelection(regression, initial_model, candidates)
 
 
 def steps_of(

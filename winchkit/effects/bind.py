@@ -119,6 +119,8 @@ def _short(profile: WinchProfile) -> list[tuple[str, dict[str, float]]]:
         short.append(("cable-weight", {"mass_per_length": cable.mass_per_length}))
     if efficiency is not None:
         short.append(("gear-efficiency", {"efficiency": efficiency}))
+    if profile.motor.inertia is not None:
+        short.append(("rotor-inertia", {"inertia": profile.motor.inertia}))
     return short
 
 

@@ -30,8 +30,9 @@ __all__ = [
 
 Values = Mapping[str, float]
 Need = Literal[
-    "cable", "layers", "guide", "pulley", "temperature", "load", "rope_force", "gearing", "robot"
-]
+    "cable", "layers", "guide", "pulley", "temperature", "load", "rope_force", "gearing", "robot",
+    "axis", "drum", "whole_turns", "torque",
+]  # fmt: skip
 Output = Literal["cable_length", "tension", "motor_torque"]
 Placement = Literal["one", "all", "platform"]
 
@@ -60,6 +61,10 @@ class Parameter:
     """Coarse grid of a shape for the scores."""
     whole: bool = False
     """A whole number (an order): scanned over the grid, not refined."""
+    over: str = ""
+    """Variable over whose range in the data the grid's shares (0 to 1) are placed."""
+    along: str = ""
+    """Variable whose range in the data multiplies the grid, for a shape that is an extent."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ signatures of cards are computed on it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from math import pi
 
@@ -56,14 +57,14 @@ def standard_motion() -> Motion:
     unique, place = np.unique(length, return_inverse=True)
     angle = np.array([line.motor_angle(x) for x in unique.tolist()])[place]
     acceleration = np.gradient(np.gradient(length, time), time)
-    return line.motion(
-        Signals(
-            time=time,
-            motor_angle=angle,
-            load=mass * (GRAVITY - acceleration),
-            temperature=np.linspace(_WARM_FROM, _WARM_TO, len(time)),
-        )
+    signals = Signals(
+        time=time,
+        motor_angle=angle,
+        load=mass * (GRAVITY - acceleration),
+        temperature=np.linspace(_WARM_FROM, _WARM_TO, len(time)),
     )
+    torque = line.predict(line.motion(signals))["motor_torque"]
+    return line.motion(replace(signals, motor_torque=torque))
 
 
 def _ride() -> tuple[Array, Array]:

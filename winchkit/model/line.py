@@ -120,7 +120,7 @@ class Line:
             load = mass * (GRAVITY - bent)
             discretization = clock.span**2 * clock.second_derivative(load)
         tension = load if load is not None else signals.tension
-        missing = np.full_like(time, np.nan)
+        missing, zero = np.full_like(time, np.nan), np.zeros_like(time)
         fastest = signals.fastest or float(np.max(np.abs(rate), initial=0.0))
         reeled = fastest * float(np.max(np.abs(pace), initial=0.0))
         at = At(
@@ -135,8 +135,9 @@ class Line:
             speed=speed,
             direction=smooth_sign(speed, _CREEP_SPEED, reeled),
             free_length=length,
-            tension=np.zeros_like(time) if tension is None else tension,
+            tension=zero if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
+            motor_torque=zero if signals.motor_torque is None else signals.motor_torque,
         )
         drum_tension = signals.tension if load is None else None
         return Motion(at, clock, load, drum_tension, mass, discretization)
@@ -272,6 +273,7 @@ class Line:
             free_length=length,
             tension=tension,
             temperature=temperature,
+            motor_torque=np.zeros_like(time),
         )
 
     def lengths(self, at: At) -> Array:

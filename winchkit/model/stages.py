@@ -111,6 +111,7 @@ class Signals:
     tension: Array | None = None
     temperature: Array | None = None
     motor_velocity: Array | None = None
+    motor_torque: Array | None = None
     fastest: float | None = None
     """Highest motor speed in all runs of this machine, rad/s; None: that of this run."""
 
@@ -139,6 +140,8 @@ class At:
     """Cable force: the load, else the cell's reading, else zero, N."""
     temperature: Array
     """degrees Celsius; NaN where not measured."""
+    motor_torque: Array
+    """The drive's reading, else zero, N m."""
     pulley: int = -1
     wrap: float = 0.0
 

@@ -17,6 +17,7 @@ from winchkit.errors import Fault, FileError
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.calibration import CellCalibration, TareBook
 from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.sizing import SizeSpec
 from winchkit.schema.profiles.winch import WinchProfile
@@ -32,6 +33,7 @@ __all__ = [
     "Declared",
     "load",
     "read_any",
+    "read_axis",
     "read_bench",
     "read_calibration",
     "read_device",
@@ -87,6 +89,27 @@ def read_profile(path: PathLike) -> WinchProfile:
         With every fault of the file, each with its line.
     """
     return _read(path, "winch", WinchProfile)
+
+
+def read_axis(path: PathLike) -> AxisProfile:
+    """Read the profile of an axis: a joint or a motor without drum and cable.
+
+    Parameters
+    ----------
+    path : str or Path
+        File in TOML of the kind ``axis``.
+
+    Returns
+    -------
+    AxisProfile
+        Motor, gearbox, reference and effects, in SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file, each with its line.
+    """
+    return _read(path, "axis", AxisProfile)
 
 
 def read_robot(path: PathLike) -> RobotProfile:
@@ -301,7 +324,9 @@ def load(path: PathLike, kind: str | None = None) -> Declaration:
     reading = Reading(open_source(path))
     found = reading.source.kind
     if kind is not None and found != kind:
-        raise FileError(reading.source.fault(("kind",), f"is '{found}'; a '{kind}' is needed here"))
+        without = ", which has no drum and no cable" if found == "axis" else ""
+        message = f"is '{found}'{without}; a '{kind}' is needed here"
+        raise FileError(reading.source.fault(("kind",), message))
     value = _READERS[found](reading, reading.source.tree)
     reading.refuse_faults()
     assert value is not None, "a reader that returns nothing has noted why"
@@ -316,6 +341,10 @@ def _read(path: PathLike, kind: str, expected: type[T]) -> T:
 
 def _winch(reading: Reading, tree: dict[str, Any]) -> WinchProfile | None:
     return reading.winch(tree, reading.stem)
+
+
+def _axis(reading: Reading, tree: dict[str, Any]) -> AxisProfile | None:
+    return reading.axis(tree)
 
 
 def _robot(reading: Reading, tree: dict[str, Any]) -> RobotProfile | None:
@@ -406,6 +435,7 @@ def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
 
 _READERS: dict[str, Callable[[Reading, dict[str, Any]], Declared | None]] = {
     "winch": _winch,
+    "axis": _axis,
     "robot": _robot,
     "bench": _bench,
     "programme": _programme,

@@ -49,7 +49,11 @@ def standard_on(drum: str, **changed: object) -> tuple[Line, Motion]:
     """The standard motion's signals on another drum, some of them changed."""
     at = standard_motion().at
     signals = Signals(
-        at.time, at.motor_angle, load=standard_motion().load, temperature=at.temperature
+        at.time,
+        at.motor_angle,
+        load=standard_motion().load,
+        temperature=at.temperature,
+        motor_torque=at.motor_torque,
     )
     line = Line(profile_with(drum))
     return line, line.motion(replace(signals, **changed))

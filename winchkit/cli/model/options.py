@@ -67,10 +67,12 @@ class Asked:
 
     @property
     def declared(self) -> WinchProfile:
-        """The profile. Raises FileError with its faults."""
-        from winchkit.schema.read import read_profile
+        """The profile of a winch or an axis. Raises FileError with its faults."""
+        from winchkit.schema.profiles.axis import AxisProfile
+        from winchkit.schema.read import read_any, read_profile
 
-        return read_profile(self.source)
+        value = read_any(self.source)
+        return value if isinstance(value, AxisProfile) else read_profile(self.source)
 
     @property
     def catalogue(self) -> Catalogue:

@@ -24,6 +24,7 @@ from winchkit.errors import UsageError
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUTS, At, Signals
 from winchkit.runs.run import Run
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Dataset", "Filtering", "Recording", "assemble", "prepare"]
@@ -153,12 +154,12 @@ def assemble(
     """Build the data set of runs that were validated before."""
     line, filtering = Line(profile), filtering or Filtering()
     fastest = max((_fastest(run) for run in runs), default=0.0)
-    raw = [line.motion(_signals(run, fastest)) for run in runs]
+    raw = [line.motion(_signals(run, profile, fastest)) for run in runs]
     decimation = filtering.decimation
     if decimation is not None:
         raw = [decimation.motion(motion) for motion in raw]
         runs = [decimation.run(run) for run in runs]
-    signals = [_signals(run, fastest) for run in runs]
+    signals = [_signals(run, profile, fastest) for run in runs]
     repeats = find_repeats(signals)
     smooth = denoised_motions(line, signals, raw, repeats)
     recordings = tuple(
@@ -174,18 +175,20 @@ def _fastest(run: Run) -> float:
     return float(np.max(np.abs(rate)))
 
 
-def _signals(run: Run, fastest: float) -> Signals:
+def _signals(run: Run, profile: WinchProfile, fastest: float) -> Signals:
     def channel(name: str) -> Array | None:
         return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
 
+    has_cable = not isinstance(profile, AxisProfile)
     return Signals(
         time=run.time,
         motor_angle=bridged(run["motor_angle"]),
-        load=channel("load"),
-        load_mass=run.load_mass,
-        tension=channel("tension"),
+        load=channel("load") if has_cable else None,
+        load_mass=run.load_mass if has_cable else None,
+        tension=channel("tension") if has_cable else None,
         temperature=channel("temperature"),
         motor_velocity=channel("motor_velocity"),
+        motor_torque=channel("motor_torque"),
         fastest=fastest,
     )
 
@@ -195,7 +198,8 @@ def _recording(
 ) -> Recording:
     raw, smooth = motions
     nominal = line.predict(raw)
-    outputs = [output for output in OUTPUTS if output in run and output in nominal]
+    predicted = ("motor_torque",) if isinstance(line.profile, AxisProfile) else OUTPUTS
+    outputs = [output for output in predicted if output in run and output in nominal]
     bands = {output: _band(run, output, filtering) for output in outputs}
     return Recording(
         name=run.name,

@@ -8,6 +8,8 @@ import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.effects.effect import Effect
+from winchkit.model.stages import Stage
+from winchkit.schema.profiles.axis import AxisProfile
 
 __all__ = ["excites", "missing_needs"]
 
@@ -22,15 +24,21 @@ _NEEDED = {
     "rope_force": "a load, load_mass or tension",
     "gearing": "a gearbox",
     "robot": "a robot's profile",
+    "axis": "a profile of kind 'axis'",
+    "whole_turns": "a run in which the drum turns once at least",
+    "torque": "a motor_torque channel",
 }
 
 
 def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
     """Parts and channels that an effect needs and that are absent, in words."""
+    profile, recordings = dataset.profile, dataset.recordings
+    is_axis = isinstance(profile, AxisProfile)
+    if is_axis and effect.stage < Stage.MOTOR:
+        return ["a drum with a cable; the profile is of kind 'axis'"]
     if not effect.needs:
         measured = set(effect.outputs) & set(dataset.outputs)
         return [] if measured else ["a measured " + " or ".join(effect.outputs)]
-    profile, recordings = dataset.profile, dataset.recordings
     cable = profile.cable
     roped = cable.diameter or cable.dead_length or profile.pulley
     have = {
@@ -43,11 +51,19 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "rope_force": any(bool(r.raw.at.tension.any()) for r in recordings),
         "gearing": True,
         "robot": False,
+        "axis": is_axis,
+        "whole_turns": not is_axis and _turns(dataset) >= 1,
+        "torque": "motor_torque" in dataset.outputs,
     }
     lacking = [_NEEDED[need] for need in effect.needs if not have[need]]
     if not set(effect.outputs) & set(dataset.outputs):
         lacking.append("a measured " + " or ".join(effect.outputs))
     return lacking
+
+
+def _turns(dataset: Dataset) -> float:
+    """Turns of the drum in the run with the longest stroke."""
+    return max(float(np.ptp(r.raw.at.drum_angle)) for r in dataset.recordings) / (2 * np.pi)
 
 
 def excites(shape: Mapping[str, float], dataset: Dataset) -> bool:

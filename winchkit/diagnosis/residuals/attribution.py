@@ -21,6 +21,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLES
+from winchkit.schema.profiles.axis import AxisProfile
 
 __all__ = [
     "BINS",
@@ -38,6 +39,8 @@ __all__ = [
 BINS = 16
 """Bins per variable."""
 _ORDERS = 40
+_OF_THE_CABLE = "cable_length", "directed_length"
+"""Variables of a cable, which an axis lacks."""
 _LEAST_SHARE = 0.02
 _LEAST_JOINT_GAIN = 0.05
 """Share that two variables together must explain beyond either of them."""
@@ -70,6 +73,8 @@ _S = TypeVar("_S", bound=_HasShare)
 def variables_of(recording: Recording) -> dict[str, Array]:
     """Variables that may explain a residual along one run, (n,) each."""
     known = [name for name in VARIABLES if name not in ("load", "tension", "temperature")]
+    if isinstance(recording.raw.at.profile, AxisProfile):
+        known = [name for name in known if name not in _OF_THE_CABLE]
     out = {name: VARIABLES[name](recording.raw.at) for name in known}
     if recording.raw.load is not None:
         out["load"] = VARIABLES["load"](recording.smooth.at)

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from winchkit.schema.quantity import (
     Angle,
     Count,
+    Inertia,
     Length,
     LinearDensity,
     PositiveForce,
@@ -29,6 +30,7 @@ __all__ = [
     "GearboxSpec",
     "GuideSpec",
     "LedgerEntry",
+    "MotorSpec",
     "PathSpec",
     "PulleySpec",
     "ReferenceSpec",
@@ -61,6 +63,7 @@ SHORTHANDS: dict[str, str] = {
     "cable.axial_stiffness": "cable-elongation-linear",
     "cable.mass_per_length": "cable-weight",
     "gearbox.efficiency": "gear-efficiency",
+    "motor.inertia": "rotor-inertia",
 }
 """Profile keys that are equivalent to an effect."""
 
@@ -137,6 +140,16 @@ class GearboxSpec(Table):
 
 
 @dataclass(frozen=True)
+class MotorSpec(Table):
+    """The motor."""
+
+    inertia: Inertia | None = None
+    """Shorthand for the effect rotor-inertia: rotor and gearbox, at the motor, kg m²."""
+    torque_constant: Annotated[float, Quantity("torque per current", 0.0, above=True)] | None = None
+    """Torque per current, N m/A, for runs that have the current in place of the torque."""
+
+
+@dataclass(frozen=True)
 class GuideSpec(Table):
     """The lead-screw guide that lays the cable on the drum."""
 
@@ -187,6 +200,7 @@ class WinchProfile(Table):
     reference: ReferenceSpec
     cable: CableSpec = field(default_factory=CableSpec)
     path: PathSpec = field(default_factory=PathSpec)
+    motor: MotorSpec = field(default_factory=MotorSpec)
     guide: GuideSpec | None = None
     pulley: tuple[PulleySpec, ...] = ()
     effect: tuple[EffectTable, ...] = ()

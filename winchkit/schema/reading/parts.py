@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from winchkit.catalog import Kind, find
 from winchkit.errors import Fault, FileError
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.source import Source
@@ -17,6 +18,7 @@ from winchkit.schema.reading.tables import read_table
 __all__ = ["Reading"]
 
 T = TypeVar("T")
+_PARTS_OF_A_WINCH = "drum", "cable", "path", "guide", "pulley"
 
 
 @dataclass
@@ -70,10 +72,21 @@ class Reading:
 
     def winch(self, raw: Mapping[str, Any], name: str, at: Key = ()) -> WinchProfile | None:
         """Read a winch's own tables."""
+        return self.table(WinchProfile, self._with_effects(raw, name, at), at)
+
+    def axis(self, raw: Mapping[str, Any]) -> AxisProfile | None:
+        """Read an axis; the parts of a winch are refused with the reason."""
+        parts = [key for key in _PARTS_OF_A_WINCH if key in raw]
+        for key in parts:
+            self.fault((key,), "belongs to a winch; an axis has no drum and no cable")
+        own = {key: value for key, value in raw.items() if key not in parts}
+        return self.table(AxisProfile, self._with_effects(own, self.stem))
+
+    def _with_effects(self, raw: Mapping[str, Any], name: str, at: Key = ()) -> dict[str, Any]:
         tree = {"name": name, **raw}
         if "effect" in tree:
             tree["effect"] = self.effects(tree["effect"], at)
-        return self.table(WinchProfile, tree, at)
+        return tree
 
     def shipped(self, kind: Kind, name: object, at: Key) -> Path | None:
         """The file of a declaration that this one names; notes a fault where there is none."""

@@ -17,6 +17,7 @@ __all__ = ["KINDS", "Source", "open_source", "spelled"]
 
 KINDS = (
     "winch",
+    "axis",
     "robot",
     "bench",
     "programme",

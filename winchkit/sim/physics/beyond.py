@@ -19,7 +19,6 @@ from winchkit.sim.physics.base import Physics, Stiffness, winding_direction
 from winchkit.sim.physics.state import State
 
 __all__ = [
-    "ClippingCell",
     "FiveCornerDrum",
     "GivingJoint",
     "StickyPlace",
@@ -119,14 +118,3 @@ class WanderingLength(Physics):
     def length_signal(self, state: State, reading: float, dt: float) -> float:
         """Add a slow sine of time."""
         return reading + self.amplitude * sin(2 * pi * state.time / self.period)
-
-
-@dataclass
-class ClippingCell(Physics):
-    """The cell's amplifier saturates."""
-
-    limit: PositiveForce = 195.0
-
-    def cell(self, state: State, reading: float, dt: float) -> float:
-        """Limit the reading."""
-        return min(reading, self.limit)

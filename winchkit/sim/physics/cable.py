@@ -7,7 +7,9 @@ from math import exp, sin
 from typing import ClassVar
 
 from winchkit.schema.quantity import (
+    Angle,
     LinearDensity,
+    Number,
     PositiveDuration,
     PositiveForce,
     PositiveNumber,
@@ -21,6 +23,7 @@ __all__ = [
     "ElasticCable",
     "HeavyCable",
     "LaggingCable",
+    "LoadLever",
     "SoftFrame",
     "WarmCable",
 ]
@@ -117,3 +120,16 @@ class HeavyCable(Physics):
     def weight(self, state: State) -> float:
         """Weight of the free cable along its slope."""
         return self.mass_per_length * GRAVITY * state.unstrained * sin(state.inclination)
+
+
+@dataclass
+class LoadLever(Physics):
+    """The load acts through a lever that turns with the drum."""
+
+    amplitude: Number = 0.03
+    phase: Angle = 0.3
+    size: ClassVar[str] = "amplitude"
+
+    def weight(self, state: State) -> float:
+        """Change of the load by the angle of the lever."""
+        return state.load * self.amplitude * sin(state.drum_angle + self.phase)

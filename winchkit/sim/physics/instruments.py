@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 from math import exp
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from winchkit.schema.quantity import Force, Number, PositiveDuration
+from winchkit.schema.quantity import Force, Number, PositiveDuration, PositiveForce, Quantity
 from winchkit.sim.physics.base import ForceDrift, Physics, ThermalForce
 from winchkit.sim.physics.state import State
 
 __all__ = [
     "BentCell",
+    "ClippingCell",
     "DriftingCell",
     "LateLength",
+    "LeakingCurrent",
     "ShiftedCell",
     "SlowCell",
     "StretchedCell",
@@ -96,6 +98,32 @@ class SlowCell(Physics):
             self._value = reading
         self._value += (reading - self._value) * (1.0 - exp(-dt / self.time_constant))
         return self._value
+
+
+@dataclass
+class ClippingCell(Physics):
+    """The cell's amplifier saturates; with ``share`` below 1 its gain only decreases."""
+
+    limit: PositiveForce = 195.0
+    share: Annotated[float, Quantity("ratio", 0.0, 1.0)] = 1.0
+    size: ClassVar[str] = "share"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Take a share away of the reading above the limit."""
+        return reading - self.share * max(0.0, reading - self.limit)
+
+
+@dataclass
+class LeakingCurrent(Physics):
+    """The motor current couples into the cell's cable."""
+
+    share: Annotated[float, Quantity("force per torque")] = 4.0
+    """N per N m of motor torque."""
+    size: ClassVar[str] = "share"
+
+    def cell(self, state: State, reading: float, dt: float) -> float:
+        """Add a share of the motor torque."""
+        return reading + self.share * state.motor_torque
 
 
 @dataclass

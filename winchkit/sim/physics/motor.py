@@ -24,14 +24,20 @@ from winchkit.sim.physics.base import (
 from winchkit.sim.physics.state import State
 
 __all__ = [
+    "Balancer",
     "Cogging",
+    "GrowingDrag",
+    "HangingJoint",
     "HeavyRotor",
     "LossyGear",
     "MotorDrag",
     "MotorGrease",
     "MotorStiction",
     "OneWayGrease",
+    "RippledMotor",
+    "RoughPlace",
     "SlowTorque",
+    "UnbalancedDrum",
     "WeakMotor",
 ]
 
@@ -112,6 +118,80 @@ class Cogging(Physics):
     def motor(self, state: State) -> float:
         """Sine of the motor angle."""
         return self.amplitude * sin(self.order * state.motor_angle + self.phase)
+
+
+@dataclass
+class RippledMotor(Physics):
+    """Ripple of the torque constant, a whole number of periods per motor turn."""
+
+    amplitude: Number = 0.02
+    order: PositiveNumber = 6.0
+    phase: Angle = 0.3
+    size: ClassVar[str] = "amplitude"
+
+    def torque_signal(self, state: State, reading: float, dt: float) -> float:
+        """Scale the torque by a sine of the motor angle."""
+        return reading * (1.0 + self.amplitude * sin(self.order * state.motor_angle + self.phase))
+
+
+@dataclass
+class UnbalancedDrum(Physics):
+    """An eccentric mass on the drum: a torque once per drum turn, at every load."""
+
+    amplitude: Torque = 0.02
+    phase: Angle = 0.3
+    size: ClassVar[str] = "amplitude"
+
+    def motor(self, state: State) -> float:
+        """Sine of the drum angle."""
+        return self.amplitude * sin(state.drum_angle + self.phase)
+
+
+@dataclass
+class HangingJoint(UnbalancedDrum):
+    """The weight of a part that the axis turns."""
+
+    amplitude: Torque = 0.5
+
+
+@dataclass
+class Balancer(Physics):
+    """A spring between the drum and the frame, preloaded at the reference."""
+
+    stiffness: Annotated[float, Quantity("rotational stiffness")] = 1e-3
+    torque: Torque = 0.02
+    size: ClassVar[str] = "stiffness"
+
+    def motor(self, state: State) -> float:
+        """Torque linear in the drum angle."""
+        return self.stiffness * state.drum_angle + self.torque
+
+
+@dataclass
+class GrowingDrag(Physics):
+    """Coulomb friction of the motor that grows with time."""
+
+    rate: Annotated[float, Quantity("torque per time")] = 1e-3
+    size: ClassVar[str] = "rate"
+
+    def motor(self, state: State) -> float:
+        """Coulomb friction in proportion to the time since the start."""
+        return motor_direction(state) * self.rate * state.time
+
+
+@dataclass
+class RoughPlace(Physics):
+    """Coulomb friction of the motor side around one position of the drum."""
+
+    torque: Torque = 0.05
+    place: Angle = 22.0
+    width: Annotated[float, Quantity("angle", 0.0, above=True)] = 2.0
+    size: ClassVar[str] = "torque"
+
+    def motor(self, state: State) -> float:
+        """Coulomb friction times a Gaussian window over the drum angle."""
+        distance = (state.drum_angle - self.place) / self.width
+        return motor_direction(state) * self.torque * exp(-distance * distance)
 
 
 @dataclass

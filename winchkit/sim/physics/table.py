@@ -32,6 +32,7 @@ PHYSICS: dict[str, type[Physics]] = {
     "warm rope": cable.WarmCable,
     "giving joint": beyond.GivingJoint,
     "heavy rope": cable.HeavyCable,
+    "load lever": cable.LoadLever,
     "sticky pulleys": pulley.StickyPulleys,
     "presliding pulleys": pulley.PreslidingPulleys,
     "viscous pulleys": pulley.ViscousPulleys,
@@ -43,17 +44,24 @@ PHYSICS: dict[str, type[Physics]] = {
     "bent cell": instruments.BentCell,
     "drifting cell": instruments.DriftingCell,
     "warm cell": instruments.WarmCell,
+    "leaking current": instruments.LeakingCurrent,
     "torque crosstalk": beyond.TorqueCrosstalk,
     "temperature crosstalk": beyond.TemperatureCrosstalk,
     "slow cell": instruments.SlowCell,
-    "clipping cell": beyond.ClippingCell,
+    "clipping cell": instruments.ClippingCell,
     "lossy gear": motor.LossyGear,
     "motor drag": motor.MotorDrag,
     "motor grease": motor.MotorGrease,
     "one-way grease": motor.OneWayGrease,
     "motor stiction": motor.MotorStiction,
     "cogging": motor.Cogging,
+    "unbalanced drum": motor.UnbalancedDrum,
+    "hanging joint": motor.HangingJoint,
+    "balancer": motor.Balancer,
+    "growing drag": motor.GrowingDrag,
+    "rough place": motor.RoughPlace,
     "heavy rotor": motor.HeavyRotor,
+    "rippled motor": motor.RippledMotor,
     "weak motor": motor.WeakMotor,
     "slow torque": motor.SlowTorque,
     "late length": instruments.LateLength,
@@ -104,6 +112,8 @@ def declared(profile: WinchProfile, pieces: Sequence[Physics]) -> list[Physics]:
         own.append(cable.HeavyCable(profile.cable.mass_per_length))
     if profile.gearbox.efficiency is not None:
         own.append(motor.LossyGear(profile.gearbox.efficiency))
+    if profile.motor.inertia is not None:
+        own.append(motor.HeavyRotor(profile.motor.inertia))
     for piece in own:
         if any(type(other) is type(piece) for other in pieces):
             name = next(name for name, kind in PHYSICS.items() if kind is type(piece))

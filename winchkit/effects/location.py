@@ -1,0 +1,49 @@
+"""Location of shape grids in the range of the data: places along a stroke, limits of a reading."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from winchkit.effects.effect import Effect, Parameter
+from winchkit.model.stages import At
+from winchkit.model.variables import VARIABLES
+
+__all__ = ["located"]
+
+
+def located(effect: Effect, motions: Sequence[At]) -> Effect:
+    """An effect with the grids of its places in the range of the data.
+
+    Parameters
+    ----------
+    effect : Effect
+        Any effect; one without such a grid is returned unchanged.
+    motions : sequence of At
+        Motion of every run.
+
+    Returns
+    -------
+    Effect
+        Grids in the units of their parameters: ``low + share (high − low)`` for a place
+        (``Parameter.over``), ``share (high − low)`` for an extent (``Parameter.along``).
+    """
+    if not any(p.over or p.along for p in effect.parameters):
+        return effect
+    parameters = tuple(_located(p, motions) for p in effect.parameters)
+    return replace(effect, parameters=parameters)
+
+
+def _located(parameter: Parameter, motions: Sequence[At]) -> Parameter:
+    name = parameter.over or parameter.along
+    if not name:
+        return parameter
+    ranges = [VARIABLES[name](at) for at in motions]
+    low = min(float(np.min(values)) for values in ranges)
+    extent = max(float(np.max(values)) for values in ranges) - low
+    origin = low if parameter.over else 0.0
+    grid = (origin + share * extent for share in parameter.grid)
+    within = tuple(x for x in grid if parameter.low < x < parameter.high)
+    return replace(parameter, grid=within or (parameter.null,))
