@@ -57,7 +57,7 @@ UNITS: dict[str, dict[str, float]] = {
     "temperature": {"degC": 1.0, "K": 1.0},
     "temperature difference": {"K": 1.0, "degC": 1.0},
     "temperature drift": {"K/h": 1.0, "K/min": 60.0, "K/s": 3600.0},
-    "ratio": {"1": 1.0, "%": 1e-2},
+    "ratio": {"1": 1.0, "%": 1e-2, "ppm": 1e-6},
 }
 _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf)\s*(.*)", re.ASCII)
 _ZERO_CELSIUS = 273.15

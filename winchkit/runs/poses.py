@@ -47,19 +47,26 @@ class Measured:
     """Text with the run and the row of each pose, (p,)."""
     length_zeroed: bool = False
     """Whether the length instruments have no offset."""
+    session_of_run: tuple[str, ...] = ()
+    """Session of each run, in which the instruments were set up once; by default each is one."""
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.motor_angle)
+
+    @property
+    def sessions(self) -> tuple[str, ...]:
+        """Name of the session of each run."""
+        count = int(self.run.max()) + 1 if len(self.run) else 0
+        return self.session_of_run or tuple(f"run {n + 1}" for n in range(count))
 
     def __getitem__(self, rows: NDArray[np.bool_]) -> Measured:
         """The poses of a mask."""
         return replace(self, **{name: getattr(self, name)[rows] for name in _ARRAYS})
 
 
-_ARRAYS = tuple(
-    field.name for field in fields(Measured) if field.name not in {"length_zeroed", "notes"}
-)
+_SCALARS = {"length_zeroed", "session_of_run", "notes"}
+_ARRAYS = tuple(field.name for field in fields(Measured) if field.name not in _SCALARS)
 
 
 def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
@@ -112,7 +119,12 @@ def joined(parts: Sequence[Measured]) -> Measured:
         name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
     }
     notes = tuple(note for part in parts for note in part.notes)
-    return Measured(**arrays, length_zeroed=all(part.length_zeroed for part in parts), notes=notes)
+    return Measured(
+        **arrays,
+        length_zeroed=all(part.length_zeroed for part in parts),
+        session_of_run=tuple(name for part in parts for name in part.session_of_run),
+        notes=notes,
+    )
 
 
 def _faults(run: Run, profile: RobotProfile) -> list[Fault]:
@@ -170,6 +182,7 @@ def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
         run=np.full(len(run), number, dtype=np.intp),
         place=np.array([f"row {n} of {run.path or run.name}" for n in range(1, len(run) + 1)]),
         length_zeroed=run.length_zeroed,
+        session_of_run=(run.metadata.get("session", "").strip() or run.path or run.name,),
     )
     moved = np.any(np.isfinite(found.motor_angle), axis=1)
     messages = [*_partly(run), *_gaps(found, moved)]

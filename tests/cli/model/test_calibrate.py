@@ -22,9 +22,9 @@ def invoke(*arguments: object) -> Result:
     return CliRunner().invoke(main, ["calibrate", *map(str, arguments)])
 
 
-def answer(*arguments: object) -> dict[str, Any]:
+def answer(*arguments: object, code: int = 0) -> dict[str, Any]:
     result = invoke(*arguments, "--json")
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == code, result.output
     found: dict[str, Any] = json.loads(result.stdout)
     return found
 
@@ -141,7 +141,9 @@ def test_one_coordinate_of_the_position_is_used_and_reported(run: Path, tmp_path
 def test_gross_errors_are_named_and_poses_of_another_robot_rejected(
     run: Path, tmp_path: Path
 ) -> None:
-    found = answer("ipanema3", run, "-o", tmp_path / "new.toml")
+    found = answer("ipanema3", run, "-o", tmp_path / "new.toml", code=1)
+    assert "not calibrated" in found["refused"]
+    assert not (tmp_path / "new.toml").exists()
     assert any("poses are of this robot" in text for text in found["warnings"])
     assert not any("gross" in text for text in found["warnings"])
     lines = run.read_text().splitlines()
@@ -194,7 +196,9 @@ def test_motors_that_turn_the_other_way_are_suspected(run: Path, tmp_path: Path)
     for cells in turned:
         cells[1:9] = [repr(-float(cell)) for cell in cells[1:9]]
     run.write_text("\n".join([head, *(",".join(cells) for cells in turned)]) + "\n")
-    found = answer("cabtive", run, "-o", tmp_path / "new.toml")
+    found = answer("cabtive", run, "-o", tmp_path / "new.toml", code=1)
+    assert "gearbox.direction" in found["refused"]
+    assert not (tmp_path / "new.toml").exists()
     assert any("gearbox.direction" in text for text in found["warnings"])
 
 

@@ -16,7 +16,7 @@ less than 3 %, at most eight times. A robust loss ρ is used after the first fit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -32,6 +32,8 @@ from winchkit.calibration.robot.identifiability import (
     outside_bounds,
     refuse_unfit,
 )
+from winchkit.calibration.robot.instruments import declared_instruments
+from winchkit.calibration.robot.options import Options, ProgressCallback
 from winchkit.calibration.robot.outliers import gross_errors
 from winchkit.calibration.robot.parameters import (
     EFFECTS,
@@ -40,39 +42,25 @@ from winchkit.calibration.robot.parameters import (
     own_effects,
     parameters_of,
 )
-from winchkit.calibration.robot.prediction import PoseErrors, errors_at, start_of
-from winchkit.calibration.robot.variance_components import NOISE, re_estimated_weights
+from winchkit.calibration.robot.prediction import PoseErrors, errors_at, rms
+from winchkit.calibration.robot.selection import Fitted, fitted_with_instruments
 from winchkit.errors import UsageError
 from winchkit.model.robot import Robot
-from winchkit.model.robot.bundle_adjustment import Loss, Solution, State, Weights, place, solve
+from winchkit.model.robot.bundle_adjustment import Solution, Weights
 from winchkit.runs.poses import Measured
 
 __all__ = ["Calibrated", "Estimated", "Options", "calibrate", "equations_of", "split"]
 
-ProgressCallback = Callable[[str], None]
-
 _HELD_OUT_EVERY = 10
 _NAMES = {"rope": "lengths by the drums", "position": "positions"}
-_NOISE_ROUNDS = 8
-_SETTLED_CHANGE = 0.03
-"""Relative change of a standard deviation at which variance components have settled."""
+_LARGEST_ERROR = 0.05
+"""Held-out position error as a share of the largest distance of two exit points, above which a
+robot is not called calibrated (rule of thumb: far above any camera, far below a wrong pose)."""
+_WORSE_ROTATION = 1.5
+"""Ratio of the held-out rotation errors after and before above which a warning is due."""
 _COARSE_RATIO = 5.0
 """Standard deviation of positions, in that of the exit points' prior, above which a warning is due
 (rule of thumb: a camera may be coarser than a drawing)."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """Options of a calibration."""
-
-    effects: tuple[str, ...] = ()
-    """Effects of the catalogue that are fitted beside the geometry."""
-    loss: Loss = "least-squares"
-    sigma: Mapping[str, float] | None = None
-    """Standard deviations by kind of equation, SI; those that are not given are estimated."""
-    middle_force: float | None = None
-    """Force, N, to which cable forces are nearest where an effect needs them and no tension was
-    measured."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +93,36 @@ class Calibrated:
     """Effects that would explain a large part of the remaining cost."""
     seconds: float
     warnings: tuple[str, ...]
+    found_instruments: frozenset[str] = frozenset()
+    """Numbers of the tracker that the poses require and that the file does not declare unknown."""
+
+    @property
+    def refusal(self) -> str:
+        """Reason why the robot is not calibrated, in words; empty where it is."""
+        before, after = rms(self.validation_before.distance), rms(self.validation_after.distance)
+        if after > before:
+            return (
+                f"not calibrated: the held-out position error is {after * 1e3:.4g} mm rms after "
+                f"the fit, larger than {before * 1e3:.4g} mm with the starting profile; nothing "
+                "was written. Check that the poses are of this robot, record more of them, or fit "
+                "a missing effect beside the geometry (--effect)"
+            )
+        exits = self.equations.robot.geometry.exit_point
+        size = float(np.max(np.linalg.norm(exits[:, None] - exits, axis=2)))
+        if after > _LARGEST_ERROR * size:
+            return (
+                f"not calibrated: the held-out position error is {after * 1e3:.4g} mm rms, in a "
+                f"robot of {size:.3g} m (limit: {_LARGEST_ERROR:.0%} of it); nothing was written. "
+                "Check units and signs of the positions, the lines' order and gearbox.direction"
+            )
+        count = len(self.validation_after.distance)
+        if self.validation_after.unfound > count / 2:
+            return (
+                f"not calibrated: {self.validation_after.unfound} of {count} held-out poses were "
+                "not found from their motor angles; nothing was written. Check the lines' order, "
+                "gearbox.direction, [home] and the motor angles there"
+            )
+        return ""
 
     @property
     def values(self) -> Array:
@@ -168,29 +186,37 @@ def calibrate(
     begin = perf_counter()
     equations = equations_of(robot, fit, options)
     refuse_unfit(equations)
-    equations, state = _start(equations, options)
-    solution, weights = _fit(equations, state, options, progress)
+    declared, chosen = fitted_with_instruments(equations, options, progress)
+    equations, solution, weights = chosen.equations, chosen.solution, chosen.weights
     observed = observability(equations, solution, weights)
     seconds = perf_counter() - begin
-    held_out_equations = replace(
-        equations, measured=validation, forces=_forces(validation, options)
-    )
-    nominal = equations.parameters.nominal
-    values = solution.state.values
-    after = errors_at(held_out_equations, values)
+
+    def held_out(own: Equations) -> Equations:
+        return replace(own, measured=validation, forces=_forces(validation, options))
+
+    start = declared
+    nominal, values = start.parameters.nominal, solution.state.values
+    before = errors_at(held_out(start), nominal)
+    after = errors_at(held_out(equations), values)
     return Calibrated(
         equations=equations,
         solution=solution,
         weights=weights,
         estimates=_estimates(equations.parameters, solution, observed),
-        fit_before=errors_at(equations, nominal),
+        fit_before=errors_at(start, nominal),
         fit_after=errors_at(equations, values),
-        validation_before=errors_at(held_out_equations, nominal),
+        validation_before=before,
         validation_after=after,
         observed=observed,
         candidates=candidates(equations, solution, weights, effects),
         seconds=seconds,
-        warnings=_warnings(equations, solution, weights, observed, after.unfound),
+        warnings=(
+            *_instrument_notes(declared, chosen),
+            *_warnings(equations, solution, weights, observed, after.unfound),
+            *_worse_rotation(before, after),
+        ),
+        found_instruments=chosen.free
+        - (declared.instruments.free if declared.instruments else frozenset()),
     )
 
 
@@ -199,12 +225,14 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
 
     Raises UsageError where a measurement is missing that an effect needs.
     """
+    instruments = declared_instruments(robot, measured)
     parameters = parameters_of(
         robot,
         options.effects,
         swivel=bool(np.any(np.isfinite(measured.swivel))),
         length_offset=bool(np.any(np.isfinite(measured.cable_length)))
         and not measured.length_zeroed,
+        instruments=instruments,
     )
     tension = bool(np.any(np.isfinite(measured.tension)))
     needing = [e for e in options.effects if e.startswith(("cable-elongation", "payload"))]
@@ -228,54 +256,18 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
             f"{payload[0]} shows in tensions, or in elongation by computed forces: record "
             "'LINE.tension [N]', or add an elongation effect"
         )
-    return Equations(robot, parameters, measured, _forces(measured, options))
+    return Equations(
+        robot,
+        parameters,
+        measured,
+        _forces(measured, options),
+        None if instruments.is_trivial else instruments,
+        tuple(options.effects),
+    )
 
 
 def _forces(measured: Measured, options: Options) -> CableForces:
     return CableForces(measured.tension, options.middle_force)
-
-
-def _start(equations: Equations, options: Options) -> tuple[Equations, State]:
-    """Nominal parameters within bounds, poses estimated with them, zeros of instruments."""
-    low, high = equations.parameters.bounds
-    values = np.clip(equations.parameters.nominal, low, high)
-    placing = Weights({**_sigma(equations, options), "swivel": np.inf, "cable_length": np.inf})
-    state = place(equations, State(values, start_of(equations)), placing)
-    parameters = equations.parameters
-    for kind, block in (("swivel", "swivel_zero"), ("cable_length", "length_offset")):
-        if block in parameters.block:
-            parameters = parameters.starting(block, equations.offsets(kind, state))
-    equations = replace(equations, parameters=parameters)
-    return equations, State(np.clip(parameters.nominal, low, high), state.pose)
-
-
-def _sigma(equations: Equations, options: Options) -> dict[str, float]:
-    given = options.sigma or {}
-    return {kind: given.get(kind, NOISE[kind].start) for kind in equations.kinds}
-
-
-def _fit(
-    equations: Equations, state: State, options: Options, progress: ProgressCallback
-) -> tuple[Solution, Weights]:
-    """Fit and variance components in turn until both have settled."""
-    given = options.sigma or {}
-    weights = Weights(_sigma(equations, options))
-    solution = solve(equations, state, weights, _reporter(progress, "fit"))
-    for _ in range(_NOISE_ROUNDS):
-        found = replace(re_estimated_weights(solution, weights, given), loss=options.loss)
-        if found.loss == weights.loss and _settled(found.sigma, weights.sigma):
-            break
-        weights = found
-        solution = solve(equations, solution.state, weights, _reporter(progress, "refit"))
-    return solution, weights
-
-
-def _reporter(progress: ProgressCallback, word: str) -> Callable[[int, float], None]:
-    return lambda step, cost: progress(f"{word}: step {step}, cost {cost:.6g}")
-
-
-def _settled(new: Mapping[str, float], old: Mapping[str, float]) -> bool:
-    return all(abs(new[kind] - old[kind]) <= _SETTLED_CHANGE * old[kind] for kind in new)
 
 
 def _estimates(
@@ -301,6 +293,48 @@ def _left_out(equations: Equations) -> list[str]:
     if equations.parameters.law is None and any(w.cable.axial_stiffness for w in robot.winches):
         names.add("cable-elongation-linear (cable.axial_stiffness)")
     return [f"effects of the profile left out here: {', '.join(sorted(names))}"] if names else []
+
+
+_OF_TRACKER = {
+    "frame": "the tracker's frame",
+    "reflector": "the reflector's offset on the platform",
+    "scale": "the tracker's scale",
+    "mounting": "the axes of the target on the platform",
+}
+
+
+def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
+    """Numbers of the tracker that were fitted, and the datum, in words."""
+    before = declared.instruments.free if declared.instruments else frozenset()
+    out = []
+    if found := [text for name, text in _OF_TRACKER.items() if name in chosen.free - before]:
+        out.append(
+            f"the poses require {' and '.join(found)} to be other than the robot's file has: "
+            "fitted beside the geometry. Declare it as unknown in [instrument.tracker]"
+        )
+    if "frame" in chosen.free:
+        own = chosen.equations.robot.profile.instrument.tracker.datum
+        kept = {
+            "robot": "the robot's base frame, by the home pose and the priors of the exit points",
+            "tracker": "the tracker's frame; exit points and home pose are written in it",
+        }
+        out.append(f"datum: {kept[own]}")
+    if "reflector" in chosen.free:
+        out.append(
+            "datum of the platform: its anchor points at the home pose; a common shift of all "
+            "anchor points and of the home pose is the same as another reflector offset"
+        )
+    return out
+
+
+def _worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:
+    first, last = rms(before.angle), rms(after.angle)
+    if not last > _WORSE_ROTATION * first:
+        return []
+    return [
+        f"the held-out rotation error grew from {np.degrees(first):.3g} to {np.degrees(last):.3g} "
+        "deg: the fit traded rotations for positions; check the tracker's frame"
+    ]
 
 
 def _disagreements(equations: Equations, weights: Weights) -> list[str]:

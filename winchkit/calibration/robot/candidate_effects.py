@@ -63,8 +63,9 @@ def candidates(
         if effect.startswith("payload") or effect in effects or not _possible(equations, effect):
             continue
         gain = _gain(equations, solution, weights, (*effects, effect))
-        share = gain / max(solution.linear.cost, gain)
-        if gain > _LEAST_GAIN and share > _LEAST_SHARE:
+        if not gain > _LEAST_GAIN:
+            continue
+        if (share := gain / max(solution.linear.cost, gain)) > _LEAST_SHARE:
             out.append(Candidate(effect, share))
     laws = [c for c in out if c.effect in LAWS]
     if laws:
@@ -92,6 +93,7 @@ def _gain(
         effects,
         swivel="swivel_zero" in equations.parameters.block,
         length_offset="length_offset" in equations.parameters.block,
+        instruments=equations.instruments,
     )
     values = wider.nominal
     _carry(equations.parameters.block, wider.block, solution.state.values, values)

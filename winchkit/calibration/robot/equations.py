@@ -12,11 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.calibration.robot.cable_forces import CableForces
+from winchkit.calibration.robot.instruments import Instruments
 from winchkit.calibration.robot.parameters import Parameters
 from winchkit.model.robot import Geometry, Pose, Robot, lengths
 from winchkit.model.robot.bundle_adjustment import Rows, State
@@ -34,6 +36,7 @@ from winchkit.model.robot.constraints import (
     winding_of,
 )
 from winchkit.model.robot.elongation import strain_of
+from winchkit.model.robot.tracker import Tracker, tracked_position, tracked_rotation
 from winchkit.runs.poses import Measured
 from winchkit.schema.profiles.robot import PlatformSpec
 
@@ -52,6 +55,10 @@ class Equations:
     parameters: Parameters
     measured: Measured
     forces: CableForces
+    instruments: Instruments | None = None
+    """Of the measured poses; None where they are in the base frame, of the platform's origin."""
+    effects: tuple[str, ...] = ()
+    """Effects beside those of the robot's profile."""
 
     @cached_property
     def winding(self) -> Winding:
@@ -122,6 +129,33 @@ class Equations:
             by["payload"] = ((more - strain) / step)[..., None] * by_payload
         return Strain(strain, by)
 
+    def instruments_at(self, values: Array) -> Instruments | None:
+        """Instruments with the parameters' values."""
+        own, block = self.instruments, self.parameters.block
+        if own is None:
+            return None
+        trackers = own.trackers
+        common: dict[str, Any] = {}
+        if "reflector" in block:
+            common["offset"] = values[block["reflector"]]
+        if "tracker_scale" in block:
+            common["scale"] = float(values[block["tracker_scale"][0]])
+        if "mounting" in block:
+            common["mounting"] = values[block["mounting"]]
+        out = []
+        for n, tracker in enumerate(trackers):
+            frame: dict[str, Any] = {}
+            if "tracker_frame" in block:
+                six = values[block["tracker_frame"][n]]
+                frame = {"shift": six[:3], "turn": six[3:]}
+            out.append(replace(tracker, **common, **frame))
+        return replace(own, trackers=tuple(out))
+
+    def tracker(self, values: Array) -> Tracker | None:
+        """The tracker at each measured pose; None where it shows the pose in the base frame."""
+        own = self.instruments_at(values)
+        return None if own is None else own.at(self.measured)
+
     def constraints(self, state: State) -> Iterator[tuple[str, Constraint]]:
         """All equations at a state, by kind, with derivatives by each line's own numbers."""
         for kind in self.kinds:
@@ -141,8 +175,8 @@ class Equations:
     def _constraint_of(self) -> dict[str, Callable[[State], Constraint]]:
         return {
             "rope": self._closure,
-            "position": lambda state: position(state.pose, self.measured.position),
-            "rotation": lambda state: rotation(state.pose, self.measured.angles),
+            "position": self._position,
+            "rotation": self._rotation,
             "swivel": self._swivel,
             "cable_length": self._cable_length,
             "balance": self._balance,
@@ -160,6 +194,31 @@ class Equations:
             strain=self.strain(values, state.pose),
             dead_length=self.robot.dead_length,
         )
+
+    def _position(self, state: State) -> Constraint:
+        tracker = self.tracker(state.values)
+        if tracker is None:
+            return position(state.pose, self.measured.position)
+        return self._by_session(tracked_position(tracker, state.pose, self.measured.position))
+
+    def _rotation(self, state: State) -> Constraint:
+        tracker = self.tracker(state.values)
+        if tracker is None:
+            return rotation(state.pose, self.measured.angles)
+        return self._by_session(tracked_rotation(tracker, state.pose, self.measured.angles))
+
+    def _by_session(self, found: Constraint) -> Constraint:
+        """The constraint with the derivatives by the frame in the columns of each session."""
+        assert self.instruments is not None
+        part = found.by_robot["tracker_frame"]
+        which = np.maximum(self.instruments.session_of(self.measured), 0)
+        count = len(self.instruments.sessions)
+        frame = np.zeros((*part.shape[:2], count, 6))
+        for number in range(count):
+            rows = which == number
+            frame[rows, :, number] = part[rows]
+        by = {**found.by_robot, "tracker_frame": frame.reshape(*part.shape[:2], 6 * count)}
+        return replace(found, by_robot=by)
 
     def _swivel(self, state: State) -> Constraint:
         zero = state.values[self.parameters.block["swivel_zero"]]
@@ -189,7 +248,8 @@ class Equations:
             if name in block:
                 out[:, line[:, None] if part.ndim == 3 else line, block[name]] = part
         for name, part in constraint.by_robot.items():
-            out[..., block[name]] = part
+            if name in block:
+                out[..., block[name].ravel()] = part
         return out
 
     @cached_property

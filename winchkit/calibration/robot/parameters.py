@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.calibration.robot.elongation import LAWS, LawParameter
+from winchkit.calibration.robot.instruments import LARGEST_SCALE, Instruments
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.drum import drum_of
 from winchkit.model.robot import Robot
@@ -95,6 +96,11 @@ EFFECTS = (*LAWS, "home-length", "payload-mass", "payload-centre")
 _HOME_LENGTH = 1e-3
 _MASS_SHARE, _MASS_LEAST = 0.2, 0.1
 _CENTRE = 20e-3
+_TRACKER_STD = {"m": 1.0, "rad": 1.0, "1": 0.01}
+"""Standard deviations of the priors of a tracker's numbers about their registration, by unit: far
+above what the registration leaves, so that the data decide."""
+_REFLECTOR_STD = 0.1
+"""Of a reflector's offset, m: the size of a platform."""
 
 
 @dataclass(frozen=True)
@@ -223,8 +229,9 @@ def parameters_of(
     *,
     swivel: bool = False,
     length_offset: bool = False,
+    instruments: Instruments | None = None,
 ) -> Parameters:
-    """Parameters of geometry, winches, named effects and zeros of instruments.
+    """Parameters of geometry, winches, named effects and instruments.
 
     Parameters
     ----------
@@ -235,6 +242,8 @@ def parameters_of(
         tension at home is unknown.
     swivel, length_offset : bool
         Whether the zeros of swivel angles and the offsets of length instruments are unknown.
+    instruments : Instruments, optional
+        Numbers of a tracker that are unknown, with their starting values.
 
     Raises
     ------
@@ -263,6 +272,8 @@ def parameters_of(
         build.zeros("swivel_zero", "rad", ZERO_STD["swivel"], zero=True)
     if length_offset:
         build.zeros("length_offset", "m", ZERO_STD["cable_length"], zero=True)
+    if instruments is not None:
+        _tracker(build, instruments)
     found = Parameters(tuple(build.all), build.block, law)
     if offsets := own.get("home-length"):
         found = found.starting("home_length", np.array([offsets[n] for n in robot.names]))
@@ -321,3 +332,41 @@ def _payload(build: _Builder, effects: Sequence[str]) -> None:
         for axis, value in zip("xyz", platform.center_of_mass, strict=True)
     ]
     build.add("payload_centre", found)
+
+
+def _tracker(build: _Builder, instruments: Instruments) -> None:
+    """Numbers of a tracker that are free; a frame per session."""
+
+    def add(block: str, names: Sequence[str], units: Sequence[str], values: Array) -> None:
+        found = [
+            Parameter(
+                name,
+                unit,
+                float(value),
+                _REFLECTOR_STD if block == "reflector" else _TRACKER_STD[unit],
+                low=-LARGEST_SCALE if unit == "1" else -np.inf,
+                high=LARGEST_SCALE if unit == "1" else np.inf,
+                zero=True,
+            )
+            for name, unit, value in zip(names, units, values.ravel(), strict=True)
+        ]
+        shape = (-1, 6) if block == "tracker_frame" else ()
+        build.add(block, found, *shape)
+
+    first = instruments.trackers[0]
+    if "frame" in instruments.free:
+        several = len(instruments.sessions) > 1
+        names = [
+            f"tracker_frame{f'[{session}]' if several else ''}.{axis}"
+            for session in instruments.sessions
+            for axis in ("x", "y", "z", "rx", "ry", "rz")
+        ]
+        values = np.array([[*t.shift, *t.turn] for t in instruments.trackers])
+        add("tracker_frame", names, ["m", "m", "m", "rad", "rad", "rad"] * len(values), values)
+    if "reflector" in instruments.free:
+        add("reflector", [f"reflector.{axis}" for axis in "xyz"], ["m"] * 3, first.offset)
+    if "scale" in instruments.free:
+        add("tracker_scale", ["tracker_scale"], ["1"], np.array([first.scale]))
+    if "mounting" in instruments.free:
+        mounting = np.zeros(3) if first.mounting is None else first.mounting
+        add("mounting", [f"mounting.r{axis}" for axis in "xyz"], ["rad"] * 3, mounting)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,9 @@ from winchkit.calibration.robot.equations import Equations
 from winchkit.model.robot import Pose, forward, rotation_of
 from winchkit.model.robot.pose_estimation import start_pose
 from winchkit.model.robot.rotation import rotation_vector
+from winchkit.model.robot.tracker import pose_behind, reading_of, registered
 
-__all__ = ["PoseErrors", "errors_at", "rms", "start_of"]
+__all__ = ["PoseErrors", "errors_at", "predicted_poses", "rms", "start_of"]
 
 _ROUNDS = 4
 
@@ -43,14 +44,73 @@ def errors_at(equations: Equations, values: Array) -> PoseErrors:
     values : (q,) array
         Parameters in fitted units.
     """
-    pose, unfound = _poses(equations, values)
+    found = predicted_poses(equations, values)
+    unfound = int(np.count_nonzero(_known(equations) & ~np.isfinite(found.position[:, 0])))
     measured = equations.measured
+    pose = _reading(equations, values, found)
     distance = np.linalg.norm(pose.position - measured.position, axis=1)
     angle = np.full(len(distance), np.nan)
     whole = np.all(np.isfinite(measured.angles), axis=1) & np.isfinite(pose.rotation[:, 0, 0])
     seen = np.swapaxes(rotation_of(*measured.angles[whole].T), 1, 2)
     angle[whole] = np.linalg.norm(rotation_vector(pose.rotation[whole] @ seen), axis=1)
     return PoseErrors(distance, angle, measured.place, unfound)
+
+
+def predicted_poses(equations: Equations, values: Array, start: Pose | None = None) -> Pose:
+    """Forward kinematics of the motor angles, with strains by fixed-point iteration.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the p poses to predict.
+    values : (q,) array
+        Parameters in fitted units.
+    start : Pose, optional
+        Where the iteration starts; by default at the measured poses.
+
+    Returns
+    -------
+    Pose
+        (p,); NaN where no pose was found. A search that fails starts again from home.
+    """
+    geometry, slack = equations.geometry(values), equations.by_drum(values)
+    dead = equations.robot.dead_length
+    start = start_of(equations, values) if start is None else start
+    given, platform = slack, equations.platform(values)
+    strained = equations.parameters.law is not None and equations.forces.middle is not None
+    for _ in range(_ROUNDS if strained else 1):
+        if (strain := equations.strain(values, start)) is not None:
+            given = (slack + strain.value * dead) / (1 - strain.value)
+        found = forward(geometry, given, start, platform)
+        # A search that did not converge starts again from home.
+        start = _where(found.converged.astype(bool), found.pose, equations)
+    return found.pose
+
+
+def _reading(equations: Equations, values: Array, pose: Pose) -> Pose:
+    """What the tracker shows of poses.
+
+    A session that was not fitted has an unknown frame, which is registered on its own poses.
+    """
+    own = equations.instruments_at(values)
+    if own is None:
+        return pose
+    measured, tracker = equations.measured, own.at(equations.measured)
+    which = own.session_of(measured)
+    if "frame" in own.free and np.any(which < 0):
+        shift, turn = np.array(tracker.shift), np.array(tracker.turn)
+        for run in np.unique(measured.run[which < 0]):
+            rows = (which < 0) & (measured.run == run)
+            part = Pose(pose.position[rows], pose.rotation[rows])
+            seen, angles = measured.position[rows], measured.angles[rows]
+            frame = registered(own.trackers[0], part, seen, angles, {"frame"})
+            shift[rows], turn[rows] = frame.shift, frame.turn
+        tracker = replace(tracker, shift=shift, turn=turn)
+    return reading_of(tracker, pose)
+
+
+def _known(equations: Equations) -> NDArray[np.bool_]:
+    return np.asarray(np.all(np.isfinite(equations.measured.motor_angle), axis=1))
 
 
 def rms(values: Sequence[float] | Array) -> float:
@@ -70,23 +130,6 @@ def rms(values: Sequence[float] | Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
 
-def _poses(equations: Equations, values: Array) -> tuple[Pose, int]:
-    """Forward kinematics from the measured pose or home, with strains by fixed-point iteration."""
-    geometry, slack = equations.geometry(values), equations.by_drum(values)
-    dead, measured = equations.robot.dead_length, equations.measured
-    start = start_of(equations)
-    given, platform = slack, equations.platform(values)
-    rounds = 1 if equations.parameters.law is None or equations.forces.middle is None else _ROUNDS
-    for _ in range(rounds):
-        if (strain := equations.strain(values, start)) is not None:
-            given = (slack + strain.value * dead) / (1 - strain.value)
-        found = forward(geometry, given, start, platform)
-        # A search that did not converge starts again from home.
-        start = _where(found.converged.astype(bool), found.pose, equations)
-    known = np.all(np.isfinite(measured.motor_angle), axis=1)
-    return found.pose, int(np.count_nonzero(known & ~found.converged.astype(bool)))
-
-
 def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
     home = equations.robot.home
     return Pose(
@@ -95,9 +138,26 @@ def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
     )
 
 
-def start_of(equations: Equations) -> Pose:
-    """Measured positions and rotations; those of the home pose where one was not measured whole."""
-    measured = equations.measured
+def start_of(equations: Equations, values: Array | None = None) -> Pose:
+    """Measured poses in the base frame; those of the home pose where one was not measured whole.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the measured poses.
+    values : (q,) array, optional
+        Parameters with those of the instruments; by default the nominal ones.
+    """
+    measured, home = equations.measured, equations.robot.home
     whole = np.all(np.isfinite(measured.angles), axis=1, keepdims=True)
     angles = np.where(whole, measured.angles, np.nan)
-    return start_pose(measured.position, angles, equations.robot.home)
+    tracker = equations.tracker(equations.parameters.nominal if values is None else values)
+    if tracker is None:
+        return start_pose(measured.position, angles, home)
+    # Without a measured rotation the platform is taken to stand as at home.
+    turned = reading_of(tracker, Pose(np.zeros_like(measured.position), home.rotation)).rotation
+    seen = np.where(whole[..., None], rotation_of(*np.nan_to_num(angles).T), turned)
+    behind = pose_behind(tracker, Pose(measured.position, seen))
+    return Pose(
+        np.where(np.isfinite(behind.position), behind.position, home.position), behind.rotation
+    )

@@ -9,15 +9,19 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 
+from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Calibrated, Estimated
 from winchkit.calibration.robot.elongation import LAWS
 from winchkit.calibration.robot.prediction import rms
 from winchkit.catalog import find
+from winchkit.model.robot import angles_of, rotation_of
+from winchkit.model.robot.rotation import rotation_by
 from winchkit.profile_edit.document import effect_tables, read_document, write_document
 from winchkit.schema.profiles.winch import LAYERED
-from winchkit.units import format_quantity
+from winchkit.units import format_quantity, parse
 
 __all__ = ["Provenance", "write_calibrated"]
 
@@ -56,10 +60,64 @@ def write_calibrated(source: Path, found: Calibrated, out: Path, where: Provenan
     document = read_document(source)
     for line in document["line"]:
         _line(line, source, found)
+    _instruments(document, found)
     _effects(document, found.estimates)
     _platform(document, found.estimates)
     document["fitted"] = _fitted(found, where)
     write_document(document, out)
+
+
+def _instruments(document: Any, found: Calibrated) -> None:
+    """Fitted numbers of the tracker; with the datum ``tracker`` the robot in the tracker's frame.
+
+    A frame of several sessions stays unknown: each session has its own.
+    """
+    own = found.equations.instruments_at(found.values)
+    if own is None or not own.free:
+        return
+    tables = document.setdefault("instrument", tomlkit.table(is_super_table=True))
+    table = tables.setdefault("tracker", tomlkit.table())
+    tracker = own.trackers[0]
+    if "frame" in own.free:
+        of_file = found.equations.robot.profile.instrument.tracker
+        if len(own.sessions) > 1:
+            table["frame"] = "unknown"
+        elif of_file.datum == "tracker":
+            _into_frame(document, *tracker.frame_in_base)
+            table.pop("frame", None)
+        else:
+            origin, turned = tracker.frame_in_base
+            frame = tomlkit.inline_table()
+            frame["position"] = _vector(origin, "mm")
+            frame["rotation"] = _vector(angles_of(turned), "deg")
+            table["frame"] = frame
+    if "reflector" in own.free:
+        table["reflector"] = _vector(tracker.offset, "mm")
+    if "scale" in own.free:
+        table["scale"] = format_quantity(tracker.scale, "ppm", _DIGITS)
+    if "mounting" in own.free and tracker.mounting is not None:
+        there = table
+        if found.equations.robot.profile.instrument.imu is not None:
+            there = tables.setdefault("imu", tomlkit.table())
+        there["mounting"] = _vector(angles_of(rotation_by(tracker.mounting)), "deg")
+
+
+def _into_frame(document: Any, origin: Array, turned: Array) -> None:
+    """Move exit points, swivel axes and home pose by a rigid transformation."""
+    for line in document["line"]:
+        exit_point = np.array([parse(text, "length") for text in line["exit_point"]])
+        line["exit_point"] = _vector(turned @ exit_point + origin, "mm")
+        axis = np.array([float(x) for x in line.get("swivel_axis", (0.0, 0.0, 1.0))])
+        line["swivel_axis"] = [float(f"{x:.{_DIGITS}g}") for x in turned @ axis]
+    home = document["home"]
+    position = np.array([parse(text, "length") for text in home["position"]])
+    home["position"] = _vector(turned @ position + origin, "mm")
+    angles = [parse(text, "angle") for text in home.get("rotation", ("0 rad",) * 3)]
+    home["rotation"] = _vector(angles_of(turned @ rotation_of(*angles)), "deg")
+
+
+def _vector(values: Array, unit: str) -> list[str]:
+    return [format_quantity(float(value), unit, _DIGITS) for value in values]
 
 
 def _line(line: Any, source: Path, found: Calibrated) -> None:

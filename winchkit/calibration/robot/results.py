@@ -12,6 +12,7 @@ from winchkit.calibration.robot.calibrate import Calibrated, Estimated
 from winchkit.calibration.robot.pose_design import NextPose
 from winchkit.calibration.robot.prediction import PoseErrors, rms
 from winchkit.calibration.robot.variance_components import NOISE
+from winchkit.model.robot import angles_of
 
 __all__ = [
     "calibration_json",
@@ -69,9 +70,44 @@ def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[s
         "next_poses": [
             {"position": p.position, "rotation": p.angles, "gain": p.gain} for p in following
         ],
+        "instruments": instruments_json(found),
+        "refused": found.refusal or None,
         "warnings": list(found.warnings),
         "converged": found.solution.converged,
         "seconds": found.seconds,
+    }
+
+
+def instruments_json(found: Calibrated) -> dict[str, Any]:
+    """Numbers of the tracker that were fitted, with the datum; empty where none were.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+
+    Returns
+    -------
+    dict
+        ``fitted``: names; ``undeclared``: those that the file does not declare unknown; ``frames``:
+        by session the pose of the base frame in the tracker's frame, SI; ``datum``.
+    """
+    own = found.equations.instruments_at(found.values)
+    if own is None or not own.free:
+        return {}
+    frames = {}
+    if "frame" in own.free:
+        for session, tracker in zip(own.sessions, own.trackers, strict=True):
+            origin, turned = tracker.frame_in_base
+            frames[session] = {
+                "position": origin.tolist(),
+                "rotation": angles_of(turned).tolist(),
+            }
+    return {
+        "fitted": sorted(own.free),
+        "undeclared": sorted(found.found_instruments),
+        "frames": frames,
+        "datum": found.equations.robot.profile.instrument.tracker.datum,
     }
 
 

@@ -55,6 +55,8 @@ def calibration_html(found: Calibrated, following: Sequence[NextPose], title: st
 
 def _verdict(found: Calibrated) -> tuple[str, str]:
     """The result in a word, and its colour."""
+    if found.refusal:
+        return "not calibrated", "unknown"
     if not found.solution.converged:
         return "not converged", "partly"
     if found.candidates:

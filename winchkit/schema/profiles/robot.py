@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from winchkit.schema.profiles.instruments import InstrumentSpec
 from winchkit.schema.profiles.winch import EffectTable, LedgerEntry, WinchProfile
 from winchkit.schema.quantity import (
     Angle,
@@ -107,6 +108,8 @@ class RobotProfile(Table):
     line: tuple[LineSpec, ...]
     platform: PlatformSpec = field(default_factory=PlatformSpec)
     prior: Mapping[PriorName, PriorSpec] = field(default_factory=dict)
+    instrument: InstrumentSpec = field(default_factory=InstrumentSpec)
+    """Instruments that measure the platform's pose."""
     effect: tuple[EffectTable, ...] = ()
     fitted: FittedSpec | None = None
     ledger: tuple[LedgerEntry, ...] = ()

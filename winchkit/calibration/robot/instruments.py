@@ -1,0 +1,226 @@
+"""Instruments of a robot's calibration: which of their numbers are unknown, and their parameters.
+
+A tracker that was set up anew has another frame, a reflector sits elsewhere on the platform, a
+scale is off by some ppm, a target or an IMU is mounted at an angle. These numbers are parameters
+beside those of the robot (:mod:`winchkit.model.robot.tracker`), one frame per session. Each starts
+from the closed-form registration of the measured poses on those that the starting values predict
+from the motor angles alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.model.robot import Pose, Robot, rotation_of
+from winchkit.model.robot.constraints import rotation_residual
+from winchkit.model.robot.rotation import rotation_vector
+from winchkit.model.robot.tracker import Tracker, reading_of, registered
+from winchkit.runs.poses import Measured
+from winchkit.schema.profiles.instruments import FrameSpec, InstrumentSpec
+
+__all__ = [
+    "LARGEST_SCALE",
+    "NUMBERS",
+    "Instruments",
+    "declared_instruments",
+    "registered_instruments",
+]
+
+LARGEST_SCALE = 0.01
+"""Largest relative error of a tracker's scale that is fitted: a hundred times that of a camera
+system in good order; beyond it units are wrong."""
+NUMBERS = ("frame", "reflector", "scale", "mounting")
+"""Numbers of a tracker that may be unknown."""
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """Numbers of a tracker: those that are estimated, and the values of all.
+
+    Attributes
+    ----------
+    free : frozenset of str
+        Of :data:`NUMBERS`.
+    sessions : tuple of str
+        Names of sessions, each with a frame of its own.
+    trackers : tuple of Tracker
+        One per session; they differ in the frame alone.
+    """
+
+    free: frozenset[str]
+    sessions: tuple[str, ...]
+    trackers: tuple[Tracker, ...]
+
+    @property
+    def is_trivial(self) -> bool:
+        """Whether the tracker shows the platform's pose in the base frame and nothing is free."""
+        if self.free:
+            return False
+        return all(
+            not np.any(t.shift)
+            and not np.any(t.turn)
+            and not np.any(t.offset)
+            and t.scale == 0
+            and t.mounting is None
+            for t in self.trackers
+        )
+
+    def session_of(self, measured: Measured) -> NDArray[np.intp]:
+        """Index of the session of each pose, (p,); −1 where it is another session."""
+        index = {name: n for n, name in enumerate(self.sessions)}
+        of_run = [index.get(name, -1) for name in measured.sessions]
+        if len(of_run) == 1:
+            return np.full(len(measured), of_run[0], dtype=np.intp)
+        return np.array(of_run, dtype=np.intp)[measured.run]
+
+    def at(self, measured: Measured) -> Tracker:
+        """The tracker with a frame per pose; that of the first session for other sessions."""
+        which = np.maximum(self.session_of(measured), 0)
+        shift = np.stack([t.shift for t in self.trackers])[which]
+        turn = np.stack([t.turn for t in self.trackers])[which]
+        return replace(self.trackers[0], shift=shift, turn=turn)
+
+
+def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
+    """Instruments as the robot's file declares them.
+
+    Parameters
+    ----------
+    robot : Robot
+        With its profile.
+    measured : Measured
+        Poses, whose sessions get a frame each.
+
+    Returns
+    -------
+    Instruments
+        Numbers of what was not measured are not free.
+    """
+    spec = robot.profile.instrument
+    tracker = _tracker(robot, spec)
+    free = {
+        name
+        for name, value in (
+            ("frame", spec.tracker.frame),
+            ("reflector", spec.tracker.reflector),
+            ("scale", spec.tracker.scale),
+            ("mounting", spec.imu.mounting if spec.imu else spec.tracker.mounting),
+        )
+        if isinstance(value, str)
+    }
+    if not np.any(np.isfinite(measured.position)):
+        free &= {"mounting"}
+    if not np.any(np.isfinite(measured.angles)):
+        free -= {"mounting"}
+    sessions = tuple(dict.fromkeys(measured.sessions))
+    return Instruments(frozenset(free), sessions, (tracker,) * len(sessions))
+
+
+def _tracker(robot: Robot, spec: InstrumentSpec) -> Tracker:
+    """Values of the file, with zero for what is unknown."""
+    tracker, home = Tracker.at(robot.home.position), robot.home.position[0]
+    of_tracker, own = spec.tracker, spec.imu.mounting if spec.imu else spec.tracker.mounting
+    scale = 0.0 if isinstance(of_tracker.scale, str) else of_tracker.scale
+    shift, turn = np.zeros(3), np.zeros(3)
+    if isinstance(of_tracker.frame, FrameSpec):
+        turned = rotation_of(*of_tracker.frame.rotation)
+        shift = np.array(of_tracker.frame.position) + (1 + scale) * (turned @ home) - home
+        turn = rotation_vector(turned)
+    offset = (
+        np.zeros(3) if isinstance(of_tracker.reflector, str) else np.array(of_tracker.reflector)
+    )
+    mounting = None
+    if not isinstance(own, str) and any(own):
+        mounting = rotation_vector(rotation_of(*own))
+    return replace(
+        tracker,
+        shift=shift,
+        turn=turn,
+        offset=offset,
+        scale=scale,
+        mounting=mounting,
+        turns_rotation=spec.imu is None,
+    )
+
+
+def registered_instruments(
+    instruments: Instruments,
+    free: Collection[str],
+    predicted: Pose,
+    measured: Measured,
+    *,
+    imu: bool,
+) -> Instruments:
+    """Instruments with these numbers free, at the values of the closed-form registration.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        Values of the numbers that are not free.
+    free : collection of str
+        Of :data:`NUMBERS`.
+    predicted : Pose
+        Poses by the motor angles alone, (p,); NaN where one was not found.
+    measured : Measured
+        Measurements at these poses.
+    imu : bool
+        Whether rotations are declared to be those of an IMU. Otherwise they are in the tracker's
+        frame if the registration fits them better so.
+
+    Returns
+    -------
+    Instruments
+        With ``free``.
+    """
+    variants = [False] if imu or "frame" not in free else [True, False]
+    found = [
+        _registered(instruments, frozenset(free), predicted, measured, turns) for turns in variants
+    ]
+    if not np.any(np.isfinite(measured.angles)):
+        return found[0]
+    return min(found, key=lambda own: _misfit_of_rotation(own, predicted, measured))
+
+
+def _registered(
+    instruments: Instruments,
+    free: frozenset[str],
+    predicted: Pose,
+    measured: Measured,
+    turns: bool,
+) -> Instruments:
+    """Common numbers from all sessions at once, then a frame per session."""
+    first = replace(
+        instruments.trackers[0],
+        turns_rotation=turns if "frame" in free else instruments.trackers[0].turns_rotation,
+    )
+    which = instruments.session_of(measured)
+    common = free - {"frame"} if len(instruments.sessions) > 1 else free
+    largest = int(np.argmax(np.bincount(which[which >= 0], minlength=len(instruments.sessions))))
+    rows = which == largest
+    whole = registered(
+        first,
+        Pose(predicted.position[rows], predicted.rotation[rows]),
+        measured.position[rows],
+        measured.angles[rows],
+        free,
+    )
+    if common == free:
+        return Instruments(free, instruments.sessions, (whole,) * len(instruments.sessions))
+    trackers = []
+    for number in range(len(instruments.sessions)):
+        rows = which == number
+        own = Pose(predicted.position[rows], predicted.rotation[rows])
+        trackers.append(
+            registered(whole, own, measured.position[rows], measured.angles[rows], free & {"frame"})
+        )
+    return Instruments(free, instruments.sessions, tuple(trackers))
+
+
+def _misfit_of_rotation(instruments: Instruments, predicted: Pose, measured: Measured) -> float:
+    shown = reading_of(instruments.at(measured), predicted)
+    difference = rotation_residual(shown.rotation, measured.angles)
+    return float(np.nanmean(difference**2))

@@ -1,0 +1,141 @@
+"""Instruments of a robot: numbers beside the machine's, known or ``"unknown"``.
+
+    [instrument.tracker]
+    frame = "unknown"
+    reflector = ["10 mm", "5 mm", "25 mm"]
+
+An unknown number is estimated from the poses beside the parameters of the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from winchkit.errors import UsageError, suggest
+from winchkit.schema.quantity import Marker, Quantity
+from winchkit.schema.table import Rule, Table
+
+__all__ = [
+    "UNKNOWN",
+    "FrameSpec",
+    "ImuSpec",
+    "InstrumentSpec",
+    "TrackerSpec",
+]
+
+UNKNOWN = "unknown"
+Vector = tuple[float, float, float]
+Unknown = Literal["unknown"]
+
+
+@dataclass(frozen=True)
+class FrameSpec:
+    """Pose of the robot's base frame in the tracker's frame."""
+
+    position: Vector
+    """m."""
+    rotation: Vector
+    """Roll, pitch and yaw, rad."""
+
+
+@dataclass(frozen=True)
+class _OrUnknown(Marker):
+    """Marks a field that is a quantity, or several of one dimension, or ``"unknown"``."""
+
+    dimension: str
+    count: int = 1
+
+    @property
+    def wanted(self) -> str:
+        """Description of the expected value."""
+        one = Quantity(self.dimension).wanted
+        return f'"{UNKNOWN}" or ' + (one if self.count == 1 else f"{self.count} values: {one} each")
+
+    def read(self, raw: object) -> float | Vector | Unknown:
+        """Convert a value of a file to SI; raises UsageError with the reason."""
+        if raw == UNKNOWN:
+            return "unknown"
+        marker = Quantity(self.dimension)
+        if self.count == 1:
+            if isinstance(raw, str) and not any(c.isdigit() for c in raw):
+                raise UsageError(f"expected {self.wanted}, not '{raw}'{suggest(raw, [UNKNOWN])}")
+            return marker.read(raw)
+        return _vector(raw, marker, self.wanted)
+
+
+@dataclass(frozen=True)
+class _Frame(Marker):
+    """Marks a field that is the pose of a frame, or ``"unknown"``."""
+
+    @property
+    def wanted(self) -> str:
+        """Description of the expected value."""
+        return (
+            f'"{UNKNOWN}" or {{ position = ["0 mm", "0 mm", "0 mm"], '
+            'rotation = ["0 deg", "0 deg", "0 deg"] }'
+        )
+
+    def read(self, raw: object) -> FrameSpec | Unknown:
+        """Convert a value of a file to SI; raises UsageError with the reason."""
+        if raw == UNKNOWN:
+            return "unknown"
+        if not isinstance(raw, dict) or set(raw) != {"position", "rotation"}:
+            raise UsageError(f"expected {self.wanted}, not {raw!r}")
+        return FrameSpec(
+            _vector(raw["position"], Quantity("length"), self.wanted),
+            _vector(raw["rotation"], Quantity("angle"), self.wanted),
+        )
+
+
+def _vector(raw: object, marker: Quantity, wanted: str) -> Vector:
+    if not isinstance(raw, list | tuple) or len(raw) != 3:
+        raise UsageError(f"expected {wanted}, not {raw!r}")
+    x, y, z = (marker.read(item) for item in raw)
+    return x, y, z
+
+
+Frame = Annotated[FrameSpec | Unknown, _Frame()]
+Place = Annotated[Vector | Unknown, _OrUnknown("length", 3)]
+Turn = Annotated[Vector | Unknown, _OrUnknown("angle", 3)]
+Ratio = Annotated[float | Unknown, _OrUnknown("ratio")]
+_NONE: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class TrackerSpec(Table):
+    """Instrument that measures positions, and rotations where no IMU is declared."""
+
+    frame: Frame = FrameSpec(_NONE, _NONE)
+    """Pose of the robot's base frame in the tracker's; one per session where it is unknown."""
+    reflector: Place = _NONE
+    """Observed point in the platform's frame, m."""
+    scale: Ratio = 0.0
+    """Relative error of measured distances."""
+    mounting: Turn = _NONE
+    """Roll, pitch and yaw of the target's axes in the platform's frame, rad."""
+    datum: Literal["robot", "tracker"] = "robot"
+    """Frame in which a calibration writes exit points and home pose where the tracker's frame is
+    unknown."""
+
+    def rules(self) -> Iterator[Rule]:
+        """A scale differs from one by a small amount."""
+        if not isinstance(self.scale, str) and not abs(self.scale) < 0.5:
+            yield "scale", f"{self.scale:g} is a relative error, such as 12 ppm, below 50 %"
+
+
+@dataclass(frozen=True)
+class ImuSpec(Table):
+    """Inertial measurement unit on the platform: roll and pitch against gravity."""
+
+    mounting: Turn = _NONE
+    """Roll, pitch and yaw of its axes in the platform's frame, rad."""
+
+
+@dataclass(frozen=True)
+class InstrumentSpec(Table):
+    """Instruments of a robot."""
+
+    tracker: TrackerSpec = field(default_factory=TrackerSpec)
+    imu: ImuSpec | None = None
