@@ -50,6 +50,7 @@ UNITS: dict[str, dict[str, float]] = {
     "torque per current": {"N m/A": 1.0, "mN m/A": 1e-3},
     "force per temperature": {"N/K": 1.0, "mN/K": 1e-3},
     "expansion": {"1/K": 1.0, "1/degC": 1.0},
+    "torque constant": {"N m/A": 1.0, "mN m/A": 1e-3},
     "current": {"A": 1.0, "mA": 1e-3},
     "voltage": {"V": 1.0, "mV": 1e-3},
     "power": {"W": 1.0, "kW": 1e3},

@@ -81,6 +81,10 @@ SECTIONS: dict[str, dict[str, At]] = {
     },
     "Files and simulation": {
         "check": At("winchkit.cli.files.check", "Check files of any kind and list every fault."),
+        "import": At(
+            "winchkit.cli.files.import_logs",
+            "Import recordings of other programs: channels and units.",
+        ),
         "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
         "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
         "completion": At(

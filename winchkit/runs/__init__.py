@@ -1,7 +1,7 @@
 """Runs: recordings of named channels with units and metadata.
 
 ``formats`` reads and writes files, ``recording`` writes logs of a bench while they grow, ``sanity``
-tests channels before any analysis. The public
+tests channels before any analysis, ``importing`` reads recordings of other programs. The public
 functions are in ``read`` (runs and logs), ``writer``, ``export``, ``recover`` and ``info``.
 """
 

@@ -11,19 +11,23 @@ from winchkit.runs.formats.csv_read import read_bytes, read_csv, read_events
 from winchkit.runs.log import Log, aligned, joined, log_of_run
 from winchkit.runs.recording.rotation import parts_beside
 from winchkit.runs.run import Run
+from winchkit.schema.mapping import ImportMapping
 
 __all__ = ["SUFFIXES", "read_log", "read_run"]
 
 SUFFIXES = (".csv", ".mcap")
 
 
-def read_run(path: str | Path) -> Run:
-    """Read a run from CSV or MCAP.
+def read_run(path: str | Path, mapping: str | Path | ImportMapping | None = None) -> Run:
+    """Read a run from CSV or MCAP, or by a mapping from a file of another program.
 
     Parameters
     ----------
     path : str or Path
         The file; ``lift.mcap`` also stands for the parts ``lift.001.mcap``, ``lift.002.mcap`` …
+    mapping : str, Path or ImportMapping, optional
+        Channels and units of another program's columns, as ``winchkit import`` writes them; the
+        file may then be text, XLSX, MAT, HDF5, Parquet, NPZ or MCAP.
 
     Returns
     -------
@@ -34,7 +38,13 @@ def read_run(path: str | Path) -> Run:
     ------
     RunError
         With every fault of the file.
+    FileError
+        With every fault of the mapping.
     """
+    if mapping is not None:
+        from winchkit.runs.importing.runs import read_mapped
+
+        return read_mapped(path, mapping)
     _format_of(path)
     files = _files(path)
     return _read_run(files[0]) if len(files) == 1 else aligned(read_log(files))

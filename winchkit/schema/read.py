@@ -17,6 +17,7 @@ from winchkit.errors import Fault, FileError
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.calibration import CellCalibration, TareBook
 from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.mapping import ImportMapping
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.sizing import SizeSpec
@@ -37,6 +38,7 @@ __all__ = [
     "read_bench",
     "read_calibration",
     "read_device",
+    "read_mapping",
     "read_profile",
     "read_programme",
     "read_robot",
@@ -55,6 +57,7 @@ Declared = (
     | SizeSpec
     | CellCalibration
     | TareBook
+    | ImportMapping
 )
 T = TypeVar("T")
 PathLike = str | Path
@@ -280,6 +283,27 @@ def read_tares(path: PathLike) -> TareBook:
     return _read(path, "tares", TareBook)
 
 
+def read_mapping(path: PathLike) -> ImportMapping:
+    """Read a mapping of another program's columns.
+
+    Parameters
+    ----------
+    path : PathLike
+        TOML file of the kind ``mapping``.
+
+    Returns
+    -------
+    ImportMapping
+        Channels, units and factors by column.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file.
+    """
+    return _read(path, "mapping", ImportMapping)
+
+
 def read_any(path: PathLike) -> Declared:
     """Read a declaration of the kind that it declares.
 
@@ -412,6 +436,10 @@ def _tares(reading: Reading, tree: dict[str, Any]) -> TareBook | None:
     return reading.table(TareBook, _named(reading, tree))
 
 
+def _mapping(reading: Reading, tree: dict[str, Any]) -> ImportMapping | None:
+    return reading.table(ImportMapping, _named(reading, tree))
+
+
 def _named(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
     """With the file's name, where it gives itself none, and its path."""
     if "path" in tree:
@@ -444,6 +472,7 @@ _READERS: dict[str, Callable[[Reading, dict[str, Any]], Declared | None]] = {
     "size": _size,
     "calibration": _calibration,
     "tares": _tares,
+    "mapping": _mapping,
 }
 
 

@@ -26,6 +26,7 @@ KINDS = (
     "size",
     "calibration",
     "tares",
+    "mapping",
 )
 SCHEMA = 1
 _LARGEST = 4_000_000

@@ -1,0 +1,471 @@
+"""``winchkit import``: recordings of other programs to runs, with a mapping for the next time."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from winchkit.cli.core.output import echo_json
+from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
+
+if TYPE_CHECKING:
+    from winchkit.runs.importing.answers import Answers
+    from winchkit.runs.importing.assignment import Guess
+    from winchkit.runs.importing.clocks import Joint
+    from winchkit.runs.importing.streams import Streams
+    from winchkit.runs.run import Run
+    from winchkit.schema.mapping import ImportMapping
+
+__all__ = ["command"]
+
+_MAPPING = "mapping.toml"
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@click.option("-o", "--output", metavar="DIR", help="Folder of the runs; without it, only look.")
+@click.option("-y", "--yes", is_flag=True, help="Accept the guess.")
+@click.option("--mapping", metavar="FILE", help="Channels and units of an earlier import.")
+@click.option(
+    "--save-mapping", metavar="FILE", help=f"Where to save them; by default DIR/{_MAPPING}."
+)
+@click.option(
+    "-c",
+    "--column",
+    "columns",
+    multiple=True,
+    metavar="CHANNEL=COLUMN",
+    help="Column of a channel, by name or number, e.g. 'motor_angle=Pos [deg]', "
+    "'motor_torque=u*35.1'; nothing after = for none. May be given several times.",
+)
+@click.option("--rated-torque", metavar="TORQUE", help="Torque of 100 %, e.g. '2.4 N m'.")
+@click.option("--torque-constant", metavar="CONSTANT", help="Of the motor, e.g. '0.12 N m/A'.")
+@click.option("--counts-per-turn", type=float, metavar="N", help="Counts in a turn of the motor.")
+@click.option("--sensitivity", metavar="RATIO", help="Of the load cell, e.g. '2 mV/V'.")
+@click.option("--capacity", metavar="FORCE", help="Of the load cell, e.g. '500 N'.")
+@click.option(
+    "--sample-rate", metavar="RATE", help="Rate of the rows, in place of times, e.g. '1 kHz'."
+)
+@click.option("--body", metavar="NAME", help="Body or marker of a tracker's export.")
+@click.option(
+    "--load-mass",
+    "load_masses",
+    multiple=True,
+    metavar="MASS",
+    help="Mass on the cable, e.g. '10 kg': one for all runs, or one for each FILE in order.",
+)
+@click.option("--join", is_flag=True, help="Join all FILEs to one run.")
+@click.option(
+    "--lag",
+    metavar="TIME",
+    help="Clock of the first FILE less that of the others; '0 s': one clock.",
+)
+@click.option("--replace", "overwrite", is_flag=True, help="Write over earlier runs.")
+@click.option("--json", "as_json", is_flag=True, help="Print columns, joints and runs as JSON.")
+def command(
+    *,
+    files: tuple[str, ...],
+    output: str | None,
+    yes: bool,
+    mapping: str | None,
+    save_mapping: str | None,
+    load_masses: tuple[str, ...],
+    join: bool,
+    lag: str | None,
+    overwrite: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Import recordings of other programs as runs in DIR, one for each FILE.
+
+    Reads text (any delimiter and decimal sign), XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP and
+    exports of trackers. Guesses columns and units, shows the guess, and asks what it cannot know;
+    without a terminal it ends with 2 and names the options that answer. The mapping that it saves
+    makes the next import silent. A FILE without a motor angle is joined to the one that has it, by
+    its time stamps or by cross-correlation (docs/importing.md).
+    """
+    from winchkit.cli.files.import_table import entry_of, tables_text
+    from winchkit.runs.importing.streams import streams_of
+
+    masses = _masses(load_masses, len(files))
+    guesses, declared = _guesses(files, mapping, _answers(options), asking=_may_ask(yes, as_json))
+    is_new = declared is None
+    report: dict[str, Any] = {
+        "schema": 1,
+        "files": [entry_of(guess) for guess in guesses],
+        "joints": [],
+        "mapping": mapping,
+        "mapping_id": None,
+        "runs": [],
+        "sanity": [],
+    }
+    shown = "\n\n".join(tables_text(guess) for guess in guesses)
+    if is_new and not as_json:
+        click.echo(shown, err=output is not None)
+    open_options = [option for guess in guesses for q in guess.questions for option in q.options]
+    if open_options or (is_new and output and not _is_accepted(guesses, yes, as_json)):
+        if as_json:
+            echo_json(report)
+        raise UsageError(_unanswered(guesses))
+    if output is None:
+        if as_json:
+            echo_json(report)
+        return
+    mapping_file = declared or _mapping_of(files, guesses)
+    targets = _targets(files, Path(output), overwrite=overwrite, is_joined=join)
+    results, joints = _runs(
+        files,
+        [streams_of(guess) for guess in guesses],
+        _Metadata(guesses, mapping_file, masses),
+        is_joined=join,
+        lag=_lag(lag),
+    )
+    report["joints"], report["mapping_id"] = joints, _identity(mapping_file)
+    report["sanity"] = _inspected([run for _, run in results])
+    for joint in joints:
+        click.echo(f"{joint.path}: {joint.text}", err=True)
+    for finding in report["sanity"]:
+        click.echo(f"{finding['run']}: {finding['channel']}: {finding['text']}", err=True)
+    report["runs"] = _written(results, targets, Path(output), as_json=as_json)
+    if is_new or save_mapping:
+        report["mapping"] = _saved(mapping_file, save_mapping or str(Path(output) / _MAPPING))
+    if as_json:
+        echo_json(report)
+
+
+def _may_ask(yes: bool, as_json: bool) -> bool:
+    """Whether somebody can answer: a terminal, and no request for silence."""
+    return not yes and not as_json and sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def _answers(options: Mapping[str, Any]) -> Answers:
+    """Answers of the command line in SI; raises UsageError."""
+    from winchkit.runs.importing.answers import Answers, read_column
+
+    constants = {
+        key: _quantity(key, str(options[key])) for key in _QUANTITIES if options[key] is not None
+    }
+    columns = tuple(read_column(text) for text in options["columns"])
+    return _with(Answers(columns=columns, body=options["body"]), **constants)
+
+
+def _with(answers: Answers, **constants: Any) -> Answers:
+    return replace(answers, **constants)
+
+
+_QUANTITIES = {
+    "rated_torque": "torque",
+    "torque_constant": "torque constant",
+    "counts_per_turn": "ratio",
+    "sensitivity": "bridge",
+    "capacity": "force",
+    "sample_rate": "frequency",
+}
+"""Dimension of each constant."""
+
+
+def _quantity(key: str, text: str) -> float:
+    """A positive constant in SI; a sensitivity in mV/V."""
+    from winchkit.cli.core.quantities import quantity
+
+    dimension = _QUANTITIES[key]
+    plain = re.sub(r"\s*(mV/V|counts?)\s*$", "", text) if dimension in {"bridge", "ratio"} else text
+    value = quantity(plain, "ratio" if dimension == "bridge" else dimension)
+    if value <= 0:
+        raise UsageError(f"--{key.replace('_', '-')} '{text}' must be above 0")
+    return value
+
+
+def _masses(texts: Sequence[str], count: int) -> list[str | None]:
+    from winchkit.cli.core.quantities import quantity
+
+    for text in texts:
+        if quantity(text, "mass") < 0:
+            raise UsageError(f"--load-mass '{text}' is below 0")
+    if len(texts) not in {0, 1, count}:
+        raise UsageError(f"{len(texts)} --load-mass for {count} files; give one, or one for each")
+    kept = [f"{quantity(text, 'mass'):.12g} kg" for text in texts]
+    return [kept[0]] * count if len(kept) == 1 else [*kept] or [None] * count
+
+
+def _lag(text: str | None) -> float | None:
+    from winchkit.cli.core.quantities import quantity
+
+    if text is None:
+        return None
+    negative = text.strip().startswith("-")
+    value = quantity(text.strip().lstrip("-+"), "time")
+    return -value if negative else value
+
+
+def _guesses(
+    files: Sequence[str], mapping: str | None, answers: Answers, *, asking: bool
+) -> tuple[list[Guess], ImportMapping | None]:
+    """Assignments of every file; all faults of all files at once."""
+    from winchkit.runs.importing.formats.source import read_table
+    from winchkit.runs.importing.guess import guess_columns
+    from winchkit.runs.importing.mapping import guess_by
+    from winchkit.schema.read import read_mapping
+
+    declared = None if mapping is None else read_mapping(mapping)
+    faults: list[Fault] = []
+    guesses = []
+    for file in files:
+        try:
+            table = read_table(file)
+            guess = guess_by(table, declared) if declared else guess_columns(table, answers)
+        except FileError as error:
+            faults += error.faults
+            continue
+        if asking and declared is None:
+            guess, answers = _asked(guess, answers)
+        guesses.append(guess)
+    if faults:
+        raise RunError(faults)
+    unknown = [
+        item.source
+        for item in answers.columns
+        if item.source
+        and declared is None
+        and not any(g.table.column(item.source) for g in guesses)
+    ]
+    if not unknown:
+        # A column of one file is no question about the others.
+        guesses = [_without_foreign(guess) for guess in guesses] if len(guesses) > 1 else guesses
+    return guesses, declared
+
+
+def _without_foreign(guess: Guess) -> Guess:
+    kept = tuple(q for q in guess.questions if not q.text.startswith("there is no column"))
+    return replace(guess, questions=kept)
+
+
+def _asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
+    """Ask the open questions on the terminal, and guess again with the answers."""
+    from winchkit.cli.files.import_table import tables_text
+    from winchkit.runs.importing.guess import guess_columns
+
+    while guess.questions:
+        click.echo(tables_text(replace(guess, questions=())), err=True)
+        answers = _answered(guess, answers)
+        guess = guess_columns(guess.table, answers)
+    return guess, answers
+
+
+def _answered(guess: Guess, answers: Answers) -> Answers:
+    question = guess.questions[0]
+    click.echo(f"? {question.text}", err=True)
+    if question.key:
+        example = re.sub(r'^--\S+ |"', "", question.options[0])
+        value = _until(f"  {question.key.replace('_', ' ')} (e.g. {example})", question.key)
+        return _with(answers, **{question.key: value})
+    if question.options[0].startswith("--body"):
+        return replace(answers, body=_picked([o[8:-1] for o in question.options]))
+    own = [option[len('--column "') : -1] for option in question.options]
+    if len(own) == 1 and "[UNIT]" in own[0]:
+        unit = _until("  unit", lambda text: _column(own[0].replace("[UNIT]", f"[{text}]")))
+        return replace(answers, columns=(*answers.columns, unit))
+    if any("COLUMN" in text for text in own):
+        text = _until(f"  CHANNEL=COLUMN [UNIT] (e.g. {own[0]})", _column)
+        return replace(answers, columns=(*answers.columns, text))
+    return replace(answers, columns=(*answers.columns, _column(_picked(own))))
+
+
+def _column(text: str) -> Any:
+    from winchkit.runs.importing.answers import read_column
+
+    return read_column(text)
+
+
+def _picked(texts: Sequence[str]) -> str:
+    for number, text in enumerate(texts, start=1):
+        click.echo(f"  {number}  {one_line(text)}", err=True)
+    choice = click.prompt("  number", type=click.IntRange(1, len(texts)), err=True)
+    return texts[int(choice) - 1]
+
+
+def _until(words: str, read: str | Callable[[str], Any]) -> Any:
+    """Prompt until the answer can be read."""
+    while True:
+        text = click.prompt(words, err=True)
+        try:
+            return _quantity(read, text) if isinstance(read, str) else read(text)
+        except UsageError as error:
+            click.echo(f"  {error}", err=True)
+
+
+def _is_accepted(guesses: Sequence[Guess], yes: bool, as_json: bool) -> bool:
+    if yes or all(guess.is_certain for guess in guesses):
+        return True
+    if not _may_ask(yes, as_json):
+        return False
+    return click.confirm("Import as shown?", default=True, abort=True, err=True)
+
+
+def _unanswered(guesses: Sequence[Guess]) -> str:
+    """Message on what is not known, with the options that answer."""
+    lines = []
+    for guess in guesses:
+        path = guess.table.path
+        for question in guess.questions:
+            options = " or ".join(question.options)
+            lines.append(f"  {one_line(path)}: {question.text}: {options}")
+        if not guess.questions:
+            lines += [
+                f"  {one_line(path)}: '{item.source}' as {item.channel} [{item.unit}] is "
+                f"{item.confidence} ({item.reason})"
+                for item in guess.used
+                if item.confidence in {"derived", "assumed"}
+            ]
+    if any(guess.questions for guess in guesses):
+        return "\n".join(["not known, and no terminal to ask; give", *lines])
+    accept = 'accept the guess by --yes, or correct it by --column "CHANNEL=COLUMN [UNIT]":'
+    return "\n".join([accept, *lines])
+
+
+def _mapping_of(files: Sequence[str], guesses: Sequence[Guess]) -> ImportMapping:
+    from winchkit.runs.importing.mapping import mapping_of
+
+    pairs = [(Path(file).stem, guess) for file, guess in zip(files, guesses, strict=True)]
+    return mapping_of("mapping", pairs)
+
+
+def _identity(mapping: ImportMapping) -> str:
+    from winchkit.runs.importing.mapping import mapping_id
+
+    return mapping_id(mapping)
+
+
+def _saved(mapping: ImportMapping, path: str) -> str:
+    from winchkit.runs.importing.mapping import write_mapping
+
+    write_mapping(mapping, Path(path))
+    click.echo(f"mapping: {path}", err=True)
+    return path
+
+
+def _targets(files: Sequence[str], folder: Path, *, overwrite: bool, is_joined: bool) -> list[Path]:
+    """File of each run; raises UsageError rather than write over a recording."""
+    stems: list[str] = []
+    for file in files:
+        stem, number = Path(file).stem, 1
+        while (name := stem if number == 1 else f"{stem}-{number}") in stems:
+            number += 1
+        stems.append(name)
+    targets = [folder / f"{stem}.csv" for stem in (stems[:1] if is_joined else stems)]
+    inputs = {Path(file).resolve() for file in files}
+    for target in targets:
+        if target.resolve() in inputs:
+            raise UsageError(
+                f"{target}: would replace the imported file; name another folder by -o"
+            )
+        if target.exists() and not overwrite:
+            raise UsageError(f"{target} exists; --replace writes over it")
+    return targets
+
+
+@dataclass(frozen=True)
+class _Metadata:
+    guesses: Sequence[Guess]
+    mapping: ImportMapping
+    masses: Sequence[str | None]
+
+    def of(self, indices: Sequence[int]) -> dict[str, str]:
+        """Metadata of the run of one file, or of several that were joined."""
+        from winchkit.runs.importing.runs import metadata_of
+
+        more = {"imported_mapping": _identity(self.mapping)}
+        merged: dict[str, str] = {}
+        for index in indices:
+            for key, value in metadata_of(self.guesses[index], more).items():
+                if key in {"imported_from", "imported_format"} and key in merged:
+                    merged[key] += f" + {value}"
+                else:
+                    merged.setdefault(key, value)
+        if (mass := self.masses[indices[0]]) is not None:
+            merged["load_mass"] = mass
+        return merged
+
+
+def _runs(
+    files: Sequence[str],
+    parts: Sequence[Streams],
+    metadata: _Metadata,
+    *,
+    is_joined: bool,
+    lag: float | None,
+) -> tuple[list[tuple[int, Run]], tuple[Joint, ...]]:
+    """Runs with the index of their file; files without a motor angle are joined to the one with."""
+    from winchkit.runs.importing.clocks import joined
+    from winchkit.runs.importing.runs import has_angle, run_of
+
+    angles = [index for index, part in enumerate(parts) if has_angle(part)]
+    others = [index for index in range(len(parts)) if index not in angles]
+    if others and angles and (len(angles) == 1 or is_joined):
+        is_joined = True
+    elif others and len(parts) > 1 and not is_joined:
+        names = ", ".join(files[index] for index in others)
+        raise UsageError(
+            f"{names}: no motor angle; import each with the one file that it belongs to, by --join"
+        )
+    if not is_joined or len(parts) == 1:
+        faults: list[Fault] = []
+        results = []
+        for index, part in enumerate(parts):
+            try:
+                results.append((index, run_of(part, metadata.of([index]))))
+            except RunError as error:
+                faults += error.faults
+        if faults:
+            raise RunError(faults)
+        return results, ()
+    order = [*angles[:1], *(index for index in range(len(parts)) if index not in angles[:1])]
+    whole, joints = joined([parts[index] for index in order], lag)
+    texts = metadata.of(order)
+    texts["joined"] = "; ".join(joint.text.replace(":", " ") for joint in joints)
+    return [(order[0], run_of(whole, texts))], joints
+
+
+def _inspected(runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """Findings on what came in."""
+    return []
+
+
+def _written(
+    results: Sequence[tuple[int, Run]], targets: Sequence[Path], folder: Path, *, as_json: bool
+) -> list[dict[str, Any]]:
+    """Write the runs; their paths to stdout, sizes and notes to stderr."""
+    from winchkit.runs.info import summary_of
+    from winchkit.runs.writer import write_run
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
+    entries = []
+    for index, run in results:
+        target = targets[index] if len(targets) > index else targets[0]
+        write_run(run, target)
+        summary = summary_of(run)
+        for note in run.notes:
+            click.echo(f"{run.path}: {note} (warning)", err=True)
+        click.echo(f"{target}: {summary.text}", err=True)
+        if not as_json:
+            click.echo(str(target))
+        entries.append(
+            {
+                "path": target,
+                "source": run.path,
+                "summary": summary,
+                "metadata": run.metadata,
+                "channels": list(run),
+                "notes": run.notes,
+            }
+        )
+    return entries

@@ -1,0 +1,119 @@
+"""Table of an import: column, channel, unit, factor, confidence, first values, a plot of text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from winchkit.errors import one_line
+
+if TYPE_CHECKING:
+    from winchkit.runs.importing.assignment import Assignment, Guess
+    from winchkit.runs.importing.table import Column
+
+__all__ = ["entry_of", "tables_text"]
+
+_WIDEST = 24
+_PLOT = 16
+_FIRST = 3
+_HEAD = ("column", "channel", "unit", "SI of 1", "confidence", "first values", "plot", "reason")
+
+
+def tables_text(guess: Guess) -> str:
+    """The guess of one file as text: a line per column, notes, and what is not known.
+
+    Parameters
+    ----------
+    guess : Guess
+        Assignments.
+
+    Returns
+    -------
+    str
+        Columns that are not used stand at the end.
+    """
+    table = guess.table
+    rows = max((len(column) for column in table.columns), default=0)
+    title = f"{one_line(table.path)}: {table.layout}; {len(table.columns)} columns, {rows} rows"
+    columns = {column.source: column for column in table.columns}
+    ordered = sorted(guess.assignments, key=lambda item: not item.channel)
+    lines = [_HEAD, *(_row(item, columns[item.source]) for item in ordered)]
+    widths = [max(len(line[n]) for line in lines) for n in range(len(_HEAD))]
+    body = [
+        "  "
+        + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    ]
+    notes = [f"  note: {note}" for note in (*table.notes, *guess.notes)]
+    asked = [
+        f"  ? {question.text}: {' or '.join(question.options)}" for question in guess.questions
+    ]
+    return "\n".join([title, *body, *notes, *asked])
+
+
+def _row(item: Assignment, column: Column) -> tuple[str, ...]:
+    from winchkit.effects.card import sparkline
+
+    name = one_line(item.source)
+    name = name if len(name) <= _WIDEST else f"{name[: _WIDEST - 1]}…"
+    first = column.texts[:_FIRST] if column.texts is not None else []
+    numbers = [f"{value:.6g}" for value in column.values[:_FIRST]]
+    shown = " ".join(one_line(str(text)) for text in first)[:_WIDEST] if len(first) else ""
+    plot = "" if column.texts is not None else sparkline(column.values, _PLOT)
+    if not item.channel:
+        return name, "—", one_line(item.unit), "", "", shown or " ".join(numbers), plot, item.reason
+    factor = "" if item.factor != item.factor else f"{item.factor:.6g}"
+    factor += f" {item.offset:+.6g}" if item.offset else ""
+    return (
+        name,
+        item.channel,
+        one_line(item.unit) or "?",
+        factor or "?",
+        item.confidence if factor else "not known",
+        shown or " ".join(numbers),
+        plot,
+        item.reason,
+    )
+
+
+def entry_of(guess: Guess) -> dict[str, Any]:
+    """The guess of one file for JSON.
+
+    Parameters
+    ----------
+    guess : Guess
+        Assignments.
+
+    Returns
+    -------
+    dict
+        Every column with its channel (null where it is not used), factor and origin.
+    """
+    table = guess.table
+    columns = {column.source: column for column in table.columns}
+    return {
+        "path": table.path,
+        "layout": table.layout,
+        "rows": max((len(column) for column in table.columns), default=0),
+        "interval": table.interval,
+        "sample_rate": guess.sample_rate,
+        "metadata": table.metadata,
+        "constants": table.constants,
+        "columns": [
+            {
+                "source": item.source,
+                "number": columns[item.source].number,
+                "channel": item.channel or None,
+                "unit": item.unit,
+                "factor": item.factor if item.channel else None,
+                "offset": item.offset if item.channel else None,
+                "confidence": item.confidence,
+                "reason": item.reason,
+                "first": list(columns[item.source].values[:_FIRST]),
+            }
+            for item in guess.assignments
+        ],
+        "questions": [
+            {"text": question.text, "options": question.options} for question in guess.questions
+        ],
+        "notes": [*table.notes, *guess.notes],
+    }

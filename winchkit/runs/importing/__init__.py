@@ -1,0 +1,6 @@
+"""Import of recordings that other programs made.
+
+``formats`` reads a file of any format to a :class:`~winchkit.runs.importing.table.Table` of named
+columns; ``guess`` assigns columns to channels with unit, factor and confidence; ``streams``
+converts them to SI; ``clocks`` aligns several files; ``mapping`` stores the assignment.
+"""

@@ -1,0 +1,85 @@
+"""What a file cannot say and its user knows: constants, and the column of a channel."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from winchkit.errors import UsageError
+from winchkit.runs.columns import column_dimension
+from winchkit.runs.importing.unit_spelling import read_unit
+from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
+from winchkit.units import UNITS, suggest
+
+__all__ = ["Answers", "ColumnAnswer", "read_column"]
+
+_COLUMN = re.compile(
+    r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<source>.*?)\s*"
+    r"(?:\*\s*(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?))?\s*(?:\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
+)
+
+
+@dataclass(frozen=True)
+class ColumnAnswer:
+    """Column of a channel; an empty ``source`` says that the file has none."""
+
+    channel: str
+    source: str
+    unit: str
+    """As given; empty for the unit that the column has in the file."""
+    factor: float | None
+    """Multiplier of the numbers before the unit; None where none was given."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Constants and columns that the user gives; SI."""
+
+    columns: tuple[ColumnAnswer, ...] = ()
+    rated_torque: float | None = None
+    """Torque of 100 %, N m."""
+    torque_constant: float | None = None
+    """N m/A."""
+    counts_per_turn: float | None = None
+    """Counts of the encoder in a turn of the motor."""
+    sensitivity: float | None = None
+    """Output of the load cell at its capacity, mV/V."""
+    capacity: float | None = None
+    """N."""
+    sample_rate: float | None = None
+    """Hz; replaces the time stamps."""
+    body: str | None = None
+    """Body or marker of a tracker's export."""
+
+
+def read_column(text: str) -> ColumnAnswer:
+    """Read ``motor_angle=Pos [deg]`` or ``motor_torque=vir*35.15``; raises UsageError.
+
+    Parameters
+    ----------
+    text : str
+        ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; nothing after ``=`` for a
+        channel that the file does not have.
+
+    Returns
+    -------
+    ColumnAnswer
+        The factor is a multiplier of the unit.
+    """
+    found = _COLUMN.fullmatch(text)
+    if found is None:
+        raise UsageError(f"'{text}' is not CHANNEL=COLUMN, e.g. 'motor_angle=Pos [deg]'")
+    channel, unit = found["channel"], (found["unit"] or "").strip()
+    known = channel in CHANNELS or column_dimension(channel) is not None
+    if not known:
+        raise UsageError(
+            f"'{channel}' is no channel of a run; use one of {', '.join(CHANNELS)}"
+            + suggest(channel, list(CHANNELS))
+        )
+    dimension = column_dimension(channel)
+    spelled = read_unit(unit)
+    if unit and unit not in {STAMP, EXCEL} and spelled is None:
+        units = ", ".join(UNITS[dimension]) if dimension else "1"
+        raise UsageError(f"'{unit}' in '{text}' is no known unit; use one of {units}")
+    factor = float(found["factor"]) if found["factor"] else None
+    return ColumnAnswer(channel, found["source"], unit, factor)

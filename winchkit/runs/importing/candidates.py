@@ -1,0 +1,364 @@
+"""Candidate columns of every channel, by name and dimension, and the choice among them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from winchkit.runs.columns import POSE_DIMENSIONS, column_dimension
+from winchkit.runs.importing.assignment import Question
+from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
+from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of, words_of
+from winchkit.runs.importing.pose_columns import (
+    body_of,
+    chosen_body,
+    complete_sets,
+    quaternion_names,
+)
+from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.unit_spelling import (
+    BRIDGE,
+    COUNT_RATE,
+    COUNTS,
+    SHARE,
+    SpelledUnit,
+    read_unit,
+)
+from winchkit.schema.mapping import DATE, MATRIX
+
+__all__ = ["Candidate", "Choice", "choose"]
+
+_PERMITTED: dict[str, tuple[str, ...]] = {
+    "time": ("time",),
+    "motor_angle": ("angle", COUNTS),
+    "motor_velocity": ("angular speed", COUNT_RATE),
+    "motor_torque": ("torque", "current", SHARE),
+    "tension": ("force", "mass", BRIDGE),
+    "load": ("force", "mass", BRIDGE),
+    "cable_length": ("length",),
+    "temperature": ("temperature",),
+    "swivel": ("angle",),
+}
+"""Dimensions that a column of a channel may have."""
+_BY_DIMENSION = {
+    "time": "time",
+    "angle": "motor_angle",
+    COUNTS: "motor_angle",
+    "angular speed": "motor_velocity",
+    "torque": "motor_torque",
+    "force": "tension",
+    "mass": "tension",
+    BRIDGE: "tension",
+    "length": "cable_length",
+    "temperature": "temperature",
+    "current": "motor_torque",
+}
+_PREFERRED = {
+    "actual",
+    "act",
+    "ist",
+    "measured",
+    "meas",
+    "motor",
+    "mot",
+    "feedback",
+    "fb",
+    "estimate",
+}
+_AVOIDED = {"output", "abtrieb", "raw", "filtered", "filt", "error", "gear", "phase", "bus", "dc"}
+_BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
+_SINGLE = ("motor_angle", "motor_torque", "tension", "cable_length", "load")
+"""Channels whose column is asked for where several fit equally well; others are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A column and the channel that it may be."""
+
+    column: Column
+    channel: str
+    """Empty where it is not used."""
+    rank: int = 0
+    unit: SpelledUnit | None = None
+    reason: str = ""
+
+    @property
+    def order(self) -> tuple[int, bool, int]:
+        """Sort key: the best candidate first."""
+        words = set(words_of(" ".join((*self.column.labels, self.column.name))).split())
+        is_current = self.unit is not None and self.unit.dimension == "current"
+        preference = len(words & _AVOIDED) - len(words & _PREFERRED)
+        return self.rank, is_current, preference
+
+
+@dataclass
+class Choice:
+    """Chosen columns by channel, and why others were not."""
+
+    chosen: list[Candidate] = field(default_factory=list)
+    """Candidates with their final channel."""
+    unused: list[Candidate] = field(default_factory=list)
+    questions: list[Question] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def choose(table: Table, given: Mapping[str, str], body: str | None) -> Choice:
+    """Choose the columns of all channels.
+
+    Parameters
+    ----------
+    table : Table
+        Columns.
+    given : mapping of str to str
+        Channel by the unique name of a column, as the user gave it; empty for an unused one.
+    body : str, optional
+        Body of a tracker's export.
+
+    Returns
+    -------
+    Choice
+        Every column is in ``chosen`` or in ``unused``.
+    """
+    choice = Choice()
+    numbered = quaternion_names([item.name for item in table.columns])
+    free: list[Candidate] = []
+    for column in table.columns:
+        if column.source in given:
+            channel, unit = given[column.source], read_unit(column.unit)
+            (choice.chosen if channel else choice.unused).append(
+                Candidate(column, channel, 0, unit, "given")
+            )
+        else:
+            found = _candidate(column, numbered)
+            (free if found.channel else choice.unused).append(found)
+    taken = {item.channel for item in choice.chosen}
+    free = _left_after(taken, free, choice)
+    times = [item for item in free if item.channel in {"time", DATE}]
+    poses = [item for item in free if item.channel in (*POSE_DIMENSIONS, *MATRIX)]
+    exact = [item for item in free if item.rank == 0 and item not in times]
+    others = [i for i in free if i not in times and i not in poses and i not in exact]
+    _choose_times(table, times, choice)
+    _choose_pose([*poses], body, choice)
+    choice.chosen += [item for item in exact if item not in poses]
+    others = _left_after({item.channel for item in choice.chosen}, others, choice)
+    _choose_channels(others, choice)
+    return choice
+
+
+def _left_after(taken: set[str], free: list[Candidate], choice: Choice) -> list[Candidate]:
+    for item in free:
+        if item.channel in taken:
+            choice.unused.append(
+                replace(item, channel="", reason=f"another column is {item.channel}")
+            )
+    return [item for item in free if item.channel not in taken]
+
+
+def _candidate(column: Column, numbered: Mapping[str, str]) -> Candidate:
+    """Channel of one column by its name, its unit, or its values."""
+    unit = read_unit(column.unit)
+    meaning = meaning_of(column.name, column.labels)
+    if column.texts is not None:
+        return _of_text(column)
+    if not np.any(np.isfinite(column.values)):
+        return Candidate(column, "", reason="no values")
+    if column.name in numbered:
+        return Candidate(column, numbered[column.name], 1, unit, f"'{column.name}'")
+    return _by_unit(column, unit) if meaning is None else _by_name(column, meaning, unit)
+
+
+def _by_name(column: Column, meaning: Meaning, unit: SpelledUnit | None) -> Candidate:
+    """Channel that the name stands for, or that of the unit where the two contradict each other."""
+    base = meaning.channel.rpartition(".")[2]
+    if base == IGNORED:
+        return Candidate(column, "", reason=f"'{meaning.text}': set point, error, state or counter")
+    if base == CURRENT:
+        base, unit = "motor_torque", unit or read_unit("A")
+    channel = base if meaning.channel == CURRENT else meaning.channel
+    dimension = column_dimension(base)
+    permitted = _PERMITTED.get(base, () if dimension is None else (dimension,))
+    fits = unit is None or unit.dimension in permitted or dimension == "ratio"
+    if base == "time" and not _is_clock(column):
+        return Candidate(column, "", reason=f"'{meaning.text}', and no clock")
+    if fits:
+        return Candidate(column, channel, meaning.rank, unit, f"'{meaning.text}'")
+    found = _by_unit(column, unit)
+    return replace(found, rank=_BY_RANK) if found.channel else found
+
+
+def _by_unit(column: Column, unit: SpelledUnit | None) -> Candidate:
+    """Channel of a dimension; the time of a first column without a name that increases."""
+    channel = "" if unit is None else _BY_DIMENSION.get(unit.dimension, "")
+    if channel and (channel != "time" or _is_clock(column)):
+        return Candidate(column, channel, _BY_UNIT, unit, f"unit {column.unit}")
+    if column.number == 1 and column.name.isdecimal() and _is_clock(column):
+        return Candidate(column, "time", _BY_ORDER, None, "first column, increasing")
+    known = "unknown name" if unit is None else f"unknown name, {unit.dimension}"
+    return Candidate(column, "", reason=known)
+
+
+def _of_text(column: Column) -> Candidate:
+    stamps = read_stamps(column.texts or ())
+    count = len(column.texts or ())
+    if not count or len(stamps.wrong) > 0.1 * count or not np.any(np.isfinite(stamps.values)):
+        return Candidate(column, "", reason="text")
+    channel = "time" if stamps.has_clock else DATE
+    return Candidate(column, channel, 1, None, "dates and times of day as text")
+
+
+def _is_clock(column: Column) -> bool:
+    """Whether values increase, apart from a few returns and repeated values."""
+    steps = np.diff(column.values[np.isfinite(column.values)])
+    return len(steps) > 0 and float(np.mean(steps < 0)) < 0.05 and bool(np.any(steps > 0))
+
+
+def _choose_times(table: Table, times: Sequence[Candidate], choice: Choice) -> None:
+    """One time column per group, or one before each block of channels of its own rate."""
+    dates = [item for item in times if item.channel == DATE]
+    clocks = [item for item in times if item.channel == "time"]
+    for group in dict.fromkeys(item.column.group for item in clocks):
+        own = [item for item in clocks if item.column.group == group]
+        best = min(item.rank for item in own)
+        for item in own:
+            if item.rank > best:
+                choice.unused.append(replace(item, channel="", reason="another column is time"))
+        own = [item for item in own if item.rank == best]
+        for block in _blocks(table, own):
+            kept = max(block, key=_quality)
+            choice.chosen.append(kept)
+            choice.unused += [
+                replace(item, channel="", reason="another column is time")
+                for item in block
+                if item is not kept
+            ]
+            day = next((d for d in dates if d.column.group == group), None)
+            if day is not None and _needs_date(kept):
+                choice.chosen.append(day)
+                dates.remove(day)
+    choice.unused += [replace(item, channel="", reason="date without use") for item in dates]
+
+
+def _blocks(table: Table, clocks: Sequence[Candidate]) -> list[list[Candidate]]:
+    """Time columns without another column between them are alternatives."""
+    blocks: list[list[Candidate]] = []
+    used = {item.column.number for item in clocks}
+    for item in sorted(clocks, key=lambda c: c.column.number):
+        before = blocks[-1][-1].column.number if blocks else 0
+        between = [
+            column
+            for column in table.columns
+            if before < column.number < item.column.number and column.number not in used
+        ]
+        if blocks and not any(np.any(np.isfinite(column.values)) for column in between):
+            blocks[-1].append(item)
+        else:
+            blocks.append([item])
+    return blocks
+
+
+def _quality(item: Candidate) -> tuple[bool, bool, int]:
+    """An absolute clock with distinct stamps first, then one with a unit, then the finest."""
+    if item.column.texts is not None:
+        stamps = read_stamps(item.column.texts)
+        distinct, absolute = len(np.unique(stamps.values)), stamps.has_date
+    else:
+        distinct = len(np.unique(item.column.values))
+        absolute = epoch_unit(item.column.values) is not None
+    complete = distinct >= 0.99 * len(item.column)
+    return complete and absolute, complete and item.unit is not None, distinct
+
+
+def _needs_date(item: Candidate) -> bool:
+    return item.column.texts is not None and not read_stamps(item.column.texts[:50]).has_date
+
+
+def _choose_pose(poses: list[Candidate], body: str | None, choice: Choice) -> None:
+    """Pose channels of one body, where they are complete."""
+    if not poses:
+        return
+    chosen, bodies = chosen_body([item.column for item in poses], body)
+    if chosen is None:
+        wanted = f"no body '{body}'" if body is not None else "which body is the platform?"
+        options = tuple(f'--body "{name}"' for name in bodies)
+        choice.questions.append(Question(f"{wanted} The file has {', '.join(bodies)}", options))
+        choice.unused += [replace(i, channel="", reason="one of several bodies") for i in poses]
+        return
+    own: dict[str, Candidate] = {}
+    for item in poses:
+        if body_of(item.column) == chosen:
+            own.setdefault(item.channel, item)
+    complete = complete_sets(own)
+    for item in poses:
+        if own.get(item.channel) is item and item.channel in complete:
+            choice.chosen.append(item)
+        else:
+            is_own = body_of(item.column) == chosen
+            reason = "not a complete pose" if is_own else f"of another body than '{chosen}'"
+            choice.unused.append(replace(item, channel="", reason=reason))
+
+
+def _choose_channels(others: Sequence[Candidate], choice: Choice) -> None:
+    labels = _winch_labels(others)
+    by_channel: dict[str, list[Candidate]] = {}
+    for item in others:
+        label = _label_of(item, labels)
+        name = f"{label}.{item.channel}" if label else item.channel
+        by_channel.setdefault(name, []).append(item)
+    for channel, items in by_channel.items():
+        items.sort(key=lambda item: item.order)
+        best = [item for item in items if item.order == items[0].order]
+        base = channel.rpartition(".")[2]
+        if len(best) > 1:
+            names = [item.column.source for item in best]
+            if base in _SINGLE:
+                choice.questions.append(
+                    Question(
+                        f"which column is {channel}? {' and '.join(map(repr, names))} fit equally",
+                        tuple(f'--column "{channel}={name}"' for name in names),
+                    )
+                )
+            reason = f"one of several: --column {channel}=…"
+            choice.unused += [replace(item, channel="", reason=reason) for item in items]
+            continue
+        choice.chosen.append(replace(items[0], channel=channel))
+        choice.unused += [
+            replace(item, channel="", reason=f"'{items[0].column.source}' is {channel}")
+            for item in items[1:]
+        ]
+
+
+def _winch_labels(others: Sequence[Candidate]) -> tuple[str, ...]:
+    """Words that distinguish equal columns of several winches: ``1 2 3``, ``a b``; else none."""
+    for channel in _SINGLE:
+        items = sorted((i for i in others if i.channel == channel), key=lambda i: i.order)
+        best = [item for item in items if item.order == items[0].order]
+        if len(best) < 2:
+            continue
+        words = [_words(item) for item in best]
+        if len({len(item) for item in words}) != 1:
+            continue
+        differing = [n for n, column in enumerate(zip(*words, strict=True)) if len(set(column)) > 1]
+        if len(differing) != 1:
+            continue
+        labels = tuple(item[differing[0]] for item in words)
+        if len(set(labels)) == len(labels) and _is_series(labels):
+            return labels
+    return ()
+
+
+def _is_series(labels: Sequence[str]) -> bool:
+    """Whether labels are numbered or lettered, and not ``motor`` and ``load``."""
+    stems = {label.rstrip("0123456789") for label in labels}
+    numbered = len(stems) == 1 and all(label[-1:].isdecimal() for label in labels)
+    return numbered or all(len(label) == 1 for label in labels)
+
+
+def _words(item: Candidate) -> list[str]:
+    return words_of(" ".join((*item.column.labels, item.column.name))).split()
+
+
+def _label_of(item: Candidate, labels: Sequence[str]) -> str:
+    found = [label for label in labels if label in _words(item)]
+    return found[0] if len(found) == 1 else ""

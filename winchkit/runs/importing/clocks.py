@@ -1,0 +1,163 @@
+"""Files joined to one run: by time stamps where their clocks agree, else by cross-correlation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.join import Agreement, agreement_of, shifted, span_of
+from winchkit.runs.importing.streams import Stream, Streams
+
+__all__ = ["Joint", "joined"]
+
+_SIGNIFICANT = 3.0
+"""Standard deviations of a drift that is applied, and of a lag that contradicts the stamps."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """How a file was joined to the first one."""
+
+    path: str
+    method: str
+    """``time stamps``, ``cross-correlation``, ``given lag`` or ``rows``."""
+    lag: float
+    """s, added to the clock of the file for that of the first one."""
+    drift: float
+    """Relative correction of the rate of its clock; 0 where none was applied."""
+    text: str
+    agreement: Agreement | None = None
+
+
+def joined(parts: Sequence[Streams], lag: float | None = None) -> tuple[Streams, tuple[Joint, ...]]:
+    """All channels of several files on the clock of the first one.
+
+    Parameters
+    ----------
+    parts : sequence of Streams
+        Files; the first one has the reference clock.
+    lag : float, optional
+        Known difference of the clocks, s: time of the first = time of the others + lag.
+
+    Returns
+    -------
+    Streams
+        Streams of all files; of a channel that several files have, that of the earlier one.
+    joints : tuple of Joint
+        One for each further file.
+
+    Raises
+    ------
+    RunError
+        Where the difference of the clocks cannot be determined.
+    """
+    first = parts[0]
+    streams = list(first.streams)
+    notes, joints = list(first.notes), []
+    faults = [fault for part in parts for fault in part.faults]
+    for other in parts[1:]:
+        moved, joint = _aligned(first, other, lag)
+        joints.append(joint)
+        notes += [*other.notes, f"{Path(other.path).name}: {joint.text}"]
+        known = {name for item in streams for name in item.channels}
+        for item in moved.streams:
+            doubled = sorted(known & set(item.channels))
+            if doubled:
+                notes.append(
+                    f"{Path(other.path).name}: {', '.join(doubled)} left out: given before"
+                )
+            own = {name: values for name, values in item.channels.items() if name not in known}
+            if own:
+                streams.append(Stream(item.time, own, item.rows))
+    if all(joint.method == "rows" for joint in joints):
+        channels = {name: values for item in streams for name, values in item.channels.items()}
+        streams = [Stream(first.streams[0].time, channels, first.streams[0].rows)]
+    return (
+        replace(first, streams=tuple(streams), faults=tuple(faults), notes=tuple(notes)),
+        tuple(joints),
+    )
+
+
+def _aligned(first: Streams, other: Streams, lag: float | None) -> tuple[Streams, Joint]:
+    """Another file on the clock of the first one."""
+    if not other.has_time or not first.has_time:
+        return other, _by_rows(first, other)
+    stamped = other.origin - first.origin
+    if lag is not None:
+        moved = shifted(other, stamped + lag)
+        _require_overlap(first, moved)
+        return moved, Joint(other.path, "given lag", lag, 0.0, f"joined with a lag of {lag:g} s")
+    found = agreement_of(first, other)
+    known = found is not None and found.is_known
+    overlapping = _overlap(first, shifted(other, stamped)) > 0
+    if first.is_absolute and other.is_absolute and overlapping:
+        apart = found.lag - stamped if found is not None and known else 0.0
+        if found is None or not known:
+            text = (
+                "joined by time stamps; no channels follow each other clearly enough to test them"
+            )
+            return shifted(other, stamped), Joint(other.path, "time stamps", 0.0, 0.0, text, found)
+        if abs(apart) <= _resolution(first, other) + _SIGNIFICANT * found.lag_std:
+            text = f"joined by time stamps, which agree to {apart * 1e3:.3g} ms ({found.text})"
+            return shifted(other, stamped), Joint(other.path, "time stamps", 0.0, 0.0, text, found)
+    if found is None or not known:
+        raise RunError(Fault(_unknown(first, other, found), other.path))
+    drift = found.drift if abs(found.drift) > _SIGNIFICANT * found.drift_std else 0.0
+    moved = shifted(other, found.lag, drift, found.reference)
+    text = f"joined by cross-correlation of {found.text}"
+    if first.is_absolute and other.is_absolute:
+        text += f"; the time stamps differ from it by {(found.lag - stamped):.4g} s"
+    return moved, Joint(other.path, "cross-correlation", found.lag - stamped, drift, text, found)
+
+
+def _by_rows(first: Streams, other: Streams) -> Joint:
+    counts = [len(item.time) for item in (*first.streams, *other.streams)]
+    if len(set(counts)) == 1 and len(first.streams) == len(other.streams) == 1:
+        text = f"joined row by row ({counts[0]} rows each)"
+        return Joint(other.path, "rows", 0.0, 0.0, text)
+    message = (
+        f"has no times, and not as many rows as {first.path} ({' and '.join(map(str, counts))}); "
+        "give both files times, e.g. by --sample-rate"
+    )
+    raise RunError(Fault(message, other.path))
+
+
+def _overlap(first: Streams, other: Streams) -> float:
+    (start, end), (begin, stop) = span_of(first), span_of(other)
+    return min(end, stop) - max(start, begin)
+
+
+def _require_overlap(first: Streams, other: Streams) -> None:
+    if _overlap(first, other) <= 0:
+        (start, end), (begin, stop) = span_of(first), span_of(other)
+        message = (
+            f"does not overlap {first.path}: {begin:.6g} to {stop:.6g} s against {start:.6g} to "
+            f"{end:.6g} s on its clock; is the lag right?"
+        )
+        raise RunError(Fault(message, other.path))
+
+
+def _resolution(first: Streams, other: Streams) -> float:
+    """Longest sampling interval of the two files, s."""
+    steps = [item.interval for item in (*first.streams, *other.streams)]
+    return max((step for step in steps if np.isfinite(step)), default=0.0)
+
+
+def _unknown(first: Streams, other: Streams, found: Agreement | None) -> str:
+    if found is None:
+        why = (
+            f"its channels ({', '.join(other.channels) or 'none'}) and those of {first.path} "
+            f"({', '.join(first.channels)}) do not follow each other"
+        )
+    elif abs(found.correlation) < abs(found.rival) + 0.05:
+        why = f"several lags fit equally, as in a periodic motion ({found.text})"
+    else:
+        why = f"the correlation is too small ({found.text})"
+    return (
+        f"the difference of its clock from that of {first.path} is not known: {why}; give it as "
+        '--lag, "0 s" for one clock'
+    )

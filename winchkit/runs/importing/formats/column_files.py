@@ -1,0 +1,109 @@
+"""Readers of NPY and NPZ files (without pickled objects) and of Parquet files."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from typing import Any
+
+import numpy as np
+
+from winchkit.errors import Fault, RunError, UsageError
+from winchkit.runs.importing.formats.variables import table_of_arrays
+from winchkit.runs.importing.table import Table, refuse_size
+from winchkit.runs.importing.unit_spelling import split_unit
+
+__all__ = ["read_numpy", "read_parquet"]
+
+
+def read_numpy(path: str, data: bytes) -> Table:
+    """Read NPY or NPZ; raises RunError, also for arrays of Python objects, which may hold code.
+
+    Parameters
+    ----------
+    path : str
+        File, for messages.
+    data : bytes
+        Its content.
+
+    Returns
+    -------
+    Table
+        An array of an NPY file is called ``array``; the fields of a structured one have names.
+    """
+    try:
+        if data.startswith(b"PK"):
+            with zipfile.ZipFile(io.BytesIO(data)) as packed:
+                refuse_size(path, sum(item.file_size for item in packed.infolist()), "arrays")
+        loaded = np.load(io.BytesIO(data), allow_pickle=False)
+        arrays = dict(loaded) if hasattr(loaded, "files") else None
+    except RunError:
+        raise
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError, MemoryError) as error:
+        reason = "has Python objects, which may hold code" if "pickle" in str(error) else error
+        raise RunError(Fault(f"is not a readable NumPy file: {reason}", path)) from None
+    if arrays is None:
+        names = loaded.dtype.names
+        arrays = {name: loaded[name] for name in names} if names else {"array": loaded}
+    named = {name: split_unit(name) for name in arrays}
+    return table_of_arrays(
+        path,
+        "NPZ" if data.startswith(b"PK") else "NPY",
+        {named[name][0]: value for name, value in arrays.items()},
+        units=dict(named.values()),
+    )
+
+
+def read_parquet(path: str, data: bytes) -> Table:
+    """Read Parquet; units are in the columns' names or metadata (``unit``).
+
+    Parameters
+    ----------
+    path : str
+        File, for messages.
+    data : bytes
+        Its content.
+
+    Returns
+    -------
+    Table
+        A column per column of numbers or dates.
+
+    Raises
+    ------
+    UsageError
+        Without pyarrow.
+    RunError
+        For an invalid file.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        raise UsageError(
+            f"{path}: Parquet needs pyarrow; install it with pip install 'winchkit[parquet]'"
+        ) from None
+    try:
+        source = parquet.ParquetFile(io.BytesIO(data))
+        shape = source.metadata.num_rows * source.metadata.num_columns
+        refuse_size(path, 8 * shape, "columns")
+        table = source.read()
+    except (OSError, ValueError, pa.ArrowException) as error:
+        raise RunError(Fault(f"is not a readable Parquet file: {error}", path)) from None
+    arrays: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    for field, column in zip(table.schema, table.columns, strict=True):
+        plain, unit = split_unit(field.name)
+        own = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
+        is_number = pa.types.is_integer(field.type) or pa.types.is_floating(field.type)
+        is_truth = pa.types.is_boolean(field.type)
+        is_text = pa.types.is_temporal(field.type) or pa.types.is_string(field.type)
+        if is_number or is_truth or is_text:
+            arrays[plain] = (column.cast(pa.int8()) if is_truth else column).to_numpy()
+            units[plain] = own or unit
+    plain_metadata = {
+        key.decode("utf-8", "replace"): value.decode("utf-8", "replace")
+        for key, value in (table.schema.metadata or {}).items()
+        if key not in (b"pandas", b"ARROW:schema")
+    }
+    return table_of_arrays(path, "Parquet", arrays, units=units, metadata=plain_metadata)

@@ -1,0 +1,154 @@
+"""Encoding, delimiter and decimal sign of a text file, from its content."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.formats.cells import number
+from winchkit.runs.importing.formats.stamps import is_stamp
+
+__all__ = ["Dialect", "decode", "find_dialect", "split_line"]
+
+BLANKS = " "
+_DELIMITERS = ("\t", ";", "|", ",", BLANKS)
+_CALLED = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", BLANKS: "blanks"}
+_SAMPLED = 240
+_TEXT_LINES = re.compile(r"\r\n|\n|\r")
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a line becomes cells, and a cell a number."""
+
+    delimiter: str
+    decimal: str
+    width: int
+    """Most frequent number of cells in a row of numbers."""
+
+    @property
+    def text(self) -> str:
+        """Description."""
+        sign = ", decimal comma" if self.decimal == "," else ""
+        return f"{_CALLED[self.delimiter]}{sign}"
+
+
+def decode(data: bytes, path: str) -> tuple[list[str], str]:
+    """Lines of a text file and its encoding; raises RunError for a binary file.
+
+    Parameters
+    ----------
+    data : bytes
+        Content.
+    path : str
+        File, for the message.
+
+    Returns
+    -------
+    lines : list of str
+        Without line ends.
+    encoding : str
+        Name of the encoding; empty for UTF-8.
+    """
+    for encoding, called in _encodings(data):
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            lines = _TEXT_LINES.split(text)
+            return (lines[:-1] if lines and not lines[-1] else lines), called
+    message = "is a binary file of an unknown format; export it as text, XLSX, MAT, HDF5 or Parquet"
+    raise RunError(Fault(message, path))
+
+
+def _encodings(data: bytes) -> list[tuple[str, str]]:
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return [("utf-16", "UTF-16")]
+    sample = data[:4000]
+    # ASCII in UTF-16 without its mark has a zero in every other byte.
+    if len(sample) > 8 and sample[1::2].count(0) > 0.8 * len(sample[1::2]):
+        return [("utf-16-le", "UTF-16")]
+    if len(sample) > 8 and sample[::2].count(0) > 0.8 * len(sample[::2]):
+        return [("utf-16-be", "UTF-16")]
+    return [("utf-8-sig", ""), ("cp1252", "Windows-1252"), ("latin-1", "Latin-1")]
+
+
+def split_line(line: str, delimiter: str) -> list[str]:
+    """Cells of a line; quoted cells may have delimiters.
+
+    Parameters
+    ----------
+    line : str
+        Line without its end.
+    delimiter : str
+        One character; a blank stands for any number of blanks.
+
+    Returns
+    -------
+    list of str
+        Cells without blanks at their ends.
+    """
+    if delimiter == BLANKS:
+        if '"' not in line:
+            return line.split()
+        line = " ".join(line.split())
+    try:
+        cells = next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:
+        cells = line.split(delimiter)
+    return [cell.strip() for cell in cells]
+
+
+def find_dialect(lines: Sequence[str]) -> Dialect | None:
+    """Delimiter and decimal sign that read the most rows of numbers; None without such rows.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Lines of the file.
+
+    Returns
+    -------
+    Dialect, optional
+        Of equal candidates the one with more cells in a row.
+    """
+    filled = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "%"))]
+    step = max(1, len(filled) // _SAMPLED)
+    # The last line may be cut off; the first ones are a header.
+    sample = filled[-1 - step * (_SAMPLED - 1) : -1 : step] if len(filled) > _SAMPLED else filled
+    best: tuple[float, Dialect] | None = None
+    for delimiter in _DELIMITERS:
+        split = [split_line(line, delimiter) for line in sample]
+        for decimal in ".,":
+            if decimal == delimiter:
+                continue
+            candidate = _rated(split, delimiter, decimal)
+            if candidate is not None and (best is None or candidate[0] > best[0]):
+                best = candidate
+    return None if best is None else best[1]
+
+
+def _rated(
+    split: Sequence[list[str]], delimiter: str, decimal: str
+) -> tuple[float, Dialect] | None:
+    """Cells with a value less cells with a text, in rows of the most frequent width."""
+    widths: dict[int, int] = {}
+    for cells in split:
+        values, given = _values(cells, decimal)
+        if 2 * values > given:
+            widths[len(cells)] = widths.get(len(cells), 0) + 2 * values - given
+    if not widths:
+        return None
+    width = max(widths, key=lambda item: (widths[item], item))
+    return widths[width], Dialect(delimiter, decimal, width)
+
+
+def _values(cells: Sequence[str], decimal: str) -> tuple[int, int]:
+    """Number of cells with a number or a stamp, and with any text."""
+    given = [cell for cell in cells if cell]
+    return sum(number(c, decimal) is not None or is_stamp(c) for c in given), len(given)

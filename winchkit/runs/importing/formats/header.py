@@ -1,0 +1,235 @@
+"""Names and units of columns from the rows above the numbers, and the metadata above these rows.
+
+Known shapes: one row ``name [unit]``; a row of names and one of units; several rows of labels above
+the names (trackers: body, quantity, axis); pairs of key and value per column (TwinCAT Scope).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from winchkit.runs.importing.formats.cells import number
+from winchkit.runs.importing.unit_spelling import is_unit_row, read_unit, split_unit
+
+__all__ = ["Header", "read_header"]
+
+Row = tuple[int, list[str]]
+"""Line number and cells."""
+_COMMENT = re.compile(r"^\s*[#%!;*/]+\s*")
+_ROW_LABELS = {"type", "name", "id", "parent", "unit", "units", "description", "channel"}
+_IDENTIFIER = re.compile(r"[0-9A-Fa-f]{8,}(-[0-9A-Fa-f]{4,})*|\d+")
+_RATE_KEYS = re.compile(
+    r"(export frame rate|capture frame rate|frame rate|sample ?rate|sampling ?rate|"
+    r"sample frequency|sampling frequency|abtastrate|messrate|frequenz|frequency|rate|fs)\W*"
+    r"(?P<unit>k?hz)?\W*",
+    re.IGNORECASE,
+)
+_STEP_KEYS = re.compile(
+    r"(delta_x|sample ?time|sampling ?time|sample ?interval|sampling ?interval|sample ?period|"
+    r"sampling ?period|abtastzeit|abtastintervall|zykluszeit|cycle ?time|dt)"
+    r"\W*(?P<unit>[mun]?s)?\W*",
+    re.IGNORECASE,
+)
+
+
+@dataclass
+class Header:
+    """Header of a text file."""
+
+    names: list[str]
+    units: list[str]
+    labels: list[tuple[str, ...]]
+    metadata: dict[str, str] = field(default_factory=dict)
+    interval: float | None = None
+    """Declared sampling interval, s."""
+    rows: tuple[tuple[str, ...], ...] = ()
+    """Cells of the rows of the header, which some programs repeat."""
+
+
+def read_header(rows: Sequence[Row], width: int, decimal: str) -> Header:
+    """Read what is above the numbers.
+
+    Parameters
+    ----------
+    rows : sequence of (int, list of str)
+        All rows above the first one of numbers; blank ones have no cells.
+    width : int
+        Cells of a row of numbers.
+    decimal : str
+        Decimal sign.
+
+    Returns
+    -------
+    Header
+        Names are empty where the file has none.
+    """
+    cut = _start_of_block(rows, width, decimal)
+    above = [cells for _, cells in rows[:cut]]
+    block = [_uncommented(cells, width) for _, cells in rows[cut:] if any(cells)]
+    header = _pairs(block, width) or _stacked(block, width)
+    header.metadata.update(_metadata(above))
+    header.rows = tuple(tuple(cells) for _, cells in rows[cut:] if any(cells))
+    header.interval = header.interval or _interval(header.metadata, decimal)
+    lengths = header.metadata.get("Length Units")
+    if lengths and read_unit(lengths):
+        header.units = [
+            lengths if not unit and "position" in " ".join(labels).lower() else unit
+            for unit, labels in zip(header.units, header.labels, strict=True)
+        ]
+    return header
+
+
+def _start_of_block(rows: Sequence[Row], width: int, decimal: str) -> int:
+    """Index of the first row that belongs to the columns."""
+    cut = len(rows)
+    while cut and not any(rows[cut - 1][1]):
+        cut -= 1
+    end = cut
+    while cut:
+        cells = _uncommented(rows[cut - 1][1], width)
+        given = [cell for cell in cells if cell]
+        texts = [cell for cell in given if number(cell, decimal) is None]
+        spread = cells and not cells[0] and len(given) >= 1 and end > cut
+        fits = len(cells) <= width + 1 and (spread or 2 * len(given) >= width)
+        if not given or not fits or (not texts and not spread):
+            break
+        if len(given) == 1 and width > 1:
+            break
+        if end > cut and len(given) == 2 and width > 3 and not spread:
+            break
+        cut -= 1
+    return cut
+
+
+def _uncommented(cells: list[str], width: int) -> list[str]:
+    """A header behind a comment sign: ``# time pos``, ``%time,pos``."""
+    if not cells or not _COMMENT.match(cells[0]):
+        return cells
+    first = _COMMENT.sub("", cells[0])
+    # A sign that stands alone before the names is a cell too many.
+    return cells[1:] if not first and len(cells) > width else [first, *cells[1:]]
+
+
+def _padded(cells: Sequence[str], width: int) -> list[str]:
+    return [*cells, *[""] * (width - len(cells))][:width]
+
+
+def _pairs(block: list[list[str]], width: int) -> Header | None:
+    """Pairs of key and value for each column: ``Name, x, Name, y`` and ``Unit, mm, Unit, N``."""
+    keyed: dict[str, list[str]] = {}
+    for cells in block:
+        padded = _padded(cells, width)
+        keys = {cell for cell in padded[0::2] if cell}
+        if len(keys) != 1 or width % 2 or width < 2:
+            return None
+        keyed[keys.pop()] = padded[1::2]
+    if "Name" not in keyed:
+        return None
+    units = keyed.get("Unit", [""] * (width // 2))
+    steps = next((v for key, v in keyed.items() if key.lower().startswith("sampletime")), None)
+    names, spelled, labels = [], [], []
+    for name, unit in zip(keyed["Name"], units, strict=True):
+        plain, own = split_unit(name)
+        known = unit if read_unit(unit) else own
+        names += ["time", plain]
+        spelled += ["ms" if steps else "", known]
+        labels += [(name,), ()]
+    return Header(names, spelled, labels)
+
+
+def _stacked(block: list[list[str]], width: int) -> Header:
+    """Rows of labels, the lowest of which has the names, and perhaps a row of units."""
+    rows = [_padded(cells, width) for cells in block]
+    unit_row = next((row for row in reversed(rows) if is_unit_row(row)), None)
+    if unit_row is not None and len(rows) > 1:
+        rows.remove(unit_row)
+    else:
+        unit_row = None
+    names, units, labels = [], [], []
+    split = [split_unit(cell) for cell in rows[-1]] if rows else [("", "")] * width
+    uppers = [_filled(row) for row in rows[:-1]]
+    for index, (own_name, own_unit) in enumerate(split):
+        name, unit = own_name, own_unit
+        texts = tuple(row[index] for row in uppers if row[index])
+        above = tuple(dict.fromkeys(t for t in texts if not _IDENTIFIER.fullmatch(t)))
+        if unit_row is not None and not unit:
+            unit = unit_row[index].strip()
+        found = next((text for text in reversed(above) if text), "")
+        if not name and found:
+            name, above = found, above[:-1]
+        names.append(name)
+        units.append(unit if unit.lower().strip("[](){}") not in {"", "-", "none"} else "")
+        labels.append(above)
+    return Header(names, units, labels)
+
+
+def _filled(row: list[str]) -> list[str]:
+    """Labels that stand once for several columns are repeated; titles of rows are left out."""
+    cells = ["" if cell.lower() in _ROW_LABELS else cell for cell in row]
+    if not any(cells):
+        return cells
+    start = next(index for index, cell in enumerate(cells) if cell)
+    is_sparse = start > 0 and sum(bool(cell) for cell in cells[start:]) < len(cells) - start
+    if not is_sparse:
+        return cells
+    last = ""
+    for index in range(start, len(cells)):
+        last = cells[index] or last
+        cells[index] = last
+    return cells
+
+
+def _metadata(rows: Sequence[Sequence[str]]) -> dict[str, str]:
+    """Keys and values: ``Key: value``, ``Key = value``, and rows with a key in every other cell."""
+    found: dict[str, str] = {}
+    for cells in rows:
+        given = [cell for cell in cells if cell]
+        if not given:
+            continue
+        given[0] = _COMMENT.sub("", given[0])
+        joined = " ".join(given)
+        match = re.match(r"([^:=]{1,60}?)\s*[:=]\s*(.+)", joined)
+        if len(cells) > 1 and len(given) > 1:
+            for key, value in zip(cells[0::2], cells[1::2], strict=False):
+                if key:
+                    found.setdefault(_COMMENT.sub("", key).rstrip(":= "), value)
+        elif match:
+            found.setdefault(match[1].strip(), match[2].strip())
+        elif len(given) == 1:
+            found.setdefault(f"line {len(found) + 1}", given[0])
+    return found
+
+
+def _interval(metadata: dict[str, str], decimal: str) -> float | None:
+    """Sampling interval that the metadata declare, s."""
+    for key, value in metadata.items():
+        text = key.strip()
+        for pattern, is_rate in ((_RATE_KEYS, True), (_STEP_KEYS, False)):
+            match = pattern.fullmatch(text)
+            if match is None:
+                continue
+            figure = re.match(r"\s*([-+0-9.,eE]+)\s*([a-zA-Zµ]*)", value)
+            if not figure:
+                continue
+            size = number(figure[1], decimal) or number(figure[1], ".")
+            if not size or size <= 0:
+                continue
+            unit = (figure[2] or match["unit"] or "").lower().replace("µ", "u")
+            scale = {"khz": 1e3, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}.get(unit, 1.0)
+            return 1 / (size * scale) if is_rate else size * scale
+    rate = _rate_alone(metadata)
+    return 1 / rate if rate else None
+
+
+def _rate_alone(metadata: dict[str, str]) -> float | None:
+    """Rate in a line of its own under the title of a section, as Vicon writes it, Hz."""
+    texts = list(metadata.values())
+    for title, value in pairwise(texts):
+        if title in {"Trajectories", "Model Outputs", "Devices"}:
+            rate = number(value, ".")
+            if rate and rate > 0:
+                return rate
+    return None

@@ -1,0 +1,119 @@
+"""Reader of a file of another program in the format of its content, not of its suffix."""
+
+from __future__ import annotations
+
+import zipfile
+from io import BytesIO
+from pathlib import Path
+
+from winchkit.errors import Fault, RunError
+from winchkit.regular_file import regular
+from winchkit.runs.importing.table import LARGEST, Table
+
+__all__ = ["read_table"]
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def read_table(path: str | Path) -> Table:
+    """Read a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        Text, XLSX, MAT, HDF5, Parquet, NPY, NPZ or MCAP.
+
+    Returns
+    -------
+    Table
+        Columns in the units of the file.
+
+    Raises
+    ------
+    RunError
+        For a file that cannot be read, an unknown format, and one without numbers.
+    UsageError
+        Without the library of the format, with the name of the extra that installs it.
+    """
+    name, data = str(path), _content(Path(path))
+    if data.startswith(b"PK\x03\x04"):
+        return _packed(name, data)
+    if data.startswith((b"MATLAB", _HDF5)) or _HDF5 in data[:1024] or _is_mat4(path, data):
+        return _of_arrays(name, data)
+    if data.startswith((b"PAR1", b"\x93NUMPY")):
+        from winchkit.runs.importing.formats.column_files import read_numpy, read_parquet
+
+        return (read_parquet if data.startswith(b"PAR1") else read_numpy)(name, data)
+    if data.startswith(b"\x89MCAP0\r\n"):
+        from winchkit.runs.importing.formats.messages import read_messages
+
+        return read_messages(name, data)
+    _refuse_known(name, data)
+    from winchkit.runs.importing.formats.text import read_text_table
+
+    return read_text_table(name, data)
+
+
+def _of_arrays(name: str, data: bytes) -> Table:
+    """MAT of version 5 or 7.3, or HDF5, whose signature stands behind a user block."""
+    from winchkit.runs.importing.formats.matlab import read_hdf5, read_mat
+
+    return (read_hdf5 if _HDF5 in data[:1024] else read_mat)(name, data)
+
+
+def _content(path: Path) -> bytes:
+    """Content of a regular file; raises RunError where it cannot be read."""
+    try:
+        with open(path, "rb", opener=regular) as file:
+            data = file.read(LARGEST + 1)
+    except FileNotFoundError:
+        raise RunError(Fault("there is no such file", str(path))) from None
+    except OSError as error:
+        raise RunError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
+    except ValueError as error:
+        raise RunError(Fault(f"is not a usable file name: {error}", repr(str(path)))) from None
+    if not data:
+        raise RunError(Fault("the file is empty", str(path)))
+    if len(data) > LARGEST:
+        message = f"is larger than {LARGEST / 1e9:.3g} GB; split the recording"
+        raise RunError(Fault(message, str(path)))
+    return data
+
+
+def _packed(name: str, data: bytes) -> Table:
+    try:
+        with zipfile.ZipFile(BytesIO(data)) as packed:
+            names = packed.namelist()
+    except zipfile.BadZipFile as error:
+        raise RunError(Fault(f"is a damaged ZIP archive: {error}", name)) from None
+    if any(item.startswith("xl/") for item in names):
+        from winchkit.runs.importing.formats.spreadsheet import read_workbook
+
+        return read_workbook(name, data)
+    if names and all(item.endswith(".npy") for item in names):
+        from winchkit.runs.importing.formats.column_files import read_numpy
+
+        return read_numpy(name, data)
+    message = f"is an archive of {', '.join(names[:3])} …; unpack it and import the files in it"
+    raise RunError(Fault(message, name))
+
+
+def _is_mat4(path: str | Path, data: bytes) -> bool:
+    """Whether a file called .mat is of version 4, which has no signature."""
+    return Path(path).suffix.lower() == ".mat" and b"\0" in data[:16]
+
+
+_KNOWN = {
+    b"\x1f\x8b": "is compressed by gzip; unpack it first",
+    b"\xd0\xcf\x11\xe0": "is an old Excel file (XLS); save it as XLSX or CSV",
+    b"TDSm": "is a TDMS file; export it as text, or as HDF5",
+    b"MDF ": "is an MDF file; export it as CSV, Parquet or HDF5",
+    b"%PDF": "is a PDF document",
+    b"SQLite format 3": "is an SQLite database (perhaps a ROS 2 bag); convert it to MCAP or CSV",
+}
+
+
+def _refuse_known(name: str, data: bytes) -> None:
+    for mark, message in _KNOWN.items():
+        if data.startswith(mark):
+            raise RunError(Fault(message, name))

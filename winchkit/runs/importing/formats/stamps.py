@@ -1,0 +1,181 @@
+"""Dates and times of day as texts, and numbers that count from an epoch, as seconds.
+
+Absolute times are seconds since 1970-01-01 UTC; a stamp without a zone is taken as UTC.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, timedelta, timezone
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.schema.mapping import EXCEL
+
+__all__ = ["Stamps", "epoch_unit", "is_stamp", "read_stamps"]
+
+_CLOCK = (
+    r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,12}))?)?"
+    r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
+)
+_DAY = (
+    r"(?:(?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
+    r"|(?P<first>\d{1,2})(?P<mark>[./-])(?P<second_part>\d{1,2})[./-](?P<last>\d{4}|\d{2}))"
+)
+_ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?"
+_PATTERNS = (
+    re.compile(rf"{_DAY}[T\s,;_]+{_CLOCK}{_ZONE}"),
+    re.compile(rf"{_CLOCK}{_ZONE}"),
+    re.compile(_DAY),
+)
+_NAMED = re.compile(r"[A-Za-z]{3,9}\.?,?\s+")
+_EPOCHS = {"s": (3e8, 4e9), "ms": (3e11, 4e12), "us": (3e14, 4e15), "ns": (3e17, 4e18)}
+"""Numbers of 1979 to 2096 in each unit since 1970; other counters and clocks are smaller."""
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """Times of a column of text."""
+
+    values: Array
+    """Seconds: since 1970 where there is a date, since midnight for times of day; NaN."""
+    wrong: tuple[int, ...]
+    """Rows that are no stamp."""
+    has_date: bool
+    has_clock: bool
+
+
+def is_stamp(cell: str) -> bool:
+    """Whether a cell is a date, a time of day or both."""
+    text = _plain(cell)
+    return any(pattern.fullmatch(text) for pattern in _PATTERNS)
+
+
+def read_stamps(cells: Sequence[str]) -> Stamps:
+    """Read a column of stamps.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Dates, times of day, or both.
+
+    Returns
+    -------
+    Stamps
+        Days of the form 3/4/2026 are day/month where any first number exceeds 12, else month/day;
+        3.4.2026 is day.month. Times of day that go back by more than 12 h start the next day.
+    """
+    found = [_match(cell) for cell in cells]
+    day_first = any(int(m["first"]) > 12 for m in found if m and _group(m, "first"))
+    values = np.full(len(cells), np.nan)
+    wrong = []
+    has_date = has_clock = False
+    for row, (cell, match) in enumerate(zip(cells, found, strict=True)):
+        if match is None:
+            if cell.strip():
+                wrong.append(row)
+            continue
+        try:
+            values[row] = _seconds(match, day_first=day_first)
+        except (ValueError, OverflowError):
+            wrong.append(row)
+            continue
+        has_date |= bool(_group(match, "year") or _group(match, "first"))
+        has_clock |= bool(_group(match, "hour"))
+    if has_clock and not has_date:
+        values = _over_midnight(values)
+    return Stamps(values, tuple(wrong), has_date, has_clock)
+
+
+def epoch_unit(values: Array) -> str | None:
+    """Unit in which a column counts from 1970 (``s``, ``ms``, ``us``, ``ns``, ``excel``), or None.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Numbers of a time column.
+
+    Returns
+    -------
+    str, optional
+        None for a clock that starts at another moment. Days of a spreadsheet (30000 to 60000, years
+        1982 to 2064) are recognised where the numbers have fractions finer than 0.1 s.
+    """
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    for unit, (least, most) in _EPOCHS.items():
+        if least <= low and high <= most:
+            return unit
+    steps = np.diff(finite)
+    in_days = low >= 30_000 and high <= 60_000 and high - low < 1.0
+    if in_days and len(steps) and 0 < float(np.median(np.abs(steps))) < 0.01:
+        return EXCEL
+    return None
+
+
+def _plain(cell: str) -> str:
+    text = cell.strip().strip('"').strip()
+    return _NAMED.sub("", text, count=1) if text[:1].isalpha() else text
+
+
+def _match(cell: str) -> re.Match[str] | None:
+    text = _plain(cell)
+    return next((m for pattern in _PATTERNS if (m := pattern.fullmatch(text))), None)
+
+
+def _group(match: re.Match[str], name: str) -> str:
+    return match.groupdict().get(name) or ""
+
+
+def _seconds(match: re.Match[str], *, day_first: bool) -> float:
+    clock = 0.0
+    if hour := _group(match, "hour"):
+        hours = int(hour)
+        if half := _group(match, "half").lower():
+            hours = hours % 12 + (12 if half.startswith("p") else 0)
+        if hours > 24 or int(match["minute"]) > 59 or int(_group(match, "second") or 0) > 60:
+            raise ValueError
+        fraction = _group(match, "fraction")
+        clock = hours * 3600 + int(match["minute"]) * 60 + int(_group(match, "second") or 0)
+        clock += int(fraction) / 10 ** len(fraction) if fraction else 0.0
+    day = _day(match, day_first=day_first)
+    if day is None:
+        return clock
+    start = datetime(day.year, day.month, day.day, tzinfo=_zone(_group(match, "zone")))
+    return start.timestamp() + clock
+
+
+def _day(match: re.Match[str], *, day_first: bool) -> date | None:
+    if year := _group(match, "year"):
+        return date(int(year), int(match["month"]), int(match["day"]))
+    if first := _group(match, "first"):
+        last = int(match["last"])
+        last += 2000 if last < 100 else 0
+        one, two = int(first), int(match["second_part"])
+        is_day_first = day_first or match["mark"] == "."
+        return date(last, two, one) if is_day_first else date(last, one, two)
+    return None
+
+
+def _zone(text: str) -> timezone:
+    if not text or text[0] not in "+-":
+        return UTC
+    hours, minutes = int(text[1:3]), int(text[-2:])
+    offset = timedelta(hours=hours, minutes=minutes)
+    return timezone(-offset if text[0] == "-" else offset)
+
+
+def _over_midnight(values: Array) -> Array:
+    """Times of day with 24 h added after each return to the start of a day."""
+    finite = np.flatnonzero(np.isfinite(values))
+    if len(finite) < 2:
+        return values
+    days = np.concatenate(([0], np.cumsum(np.diff(values[finite]) < -43_200)))
+    shifted = values.copy()
+    shifted[finite] += 86_400.0 * days
+    return shifted

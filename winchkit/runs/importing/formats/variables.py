@@ -1,0 +1,102 @@
+"""Table of named arrays, as MAT, HDF5, NPZ and Parquet files have them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.table import Column, Table, named_apart
+
+__all__ = ["table_of_arrays"]
+
+_WIDEST = 200
+"""Most columns of one matrix; a larger one is an image or a table of another kind."""
+
+
+def table_of_arrays(
+    path: str,
+    layout: str,
+    arrays: Mapping[str, Any],
+    *,
+    units: Mapping[str, str] | None = None,
+    metadata: Mapping[str, str] | None = None,
+    notes: Sequence[str] = (),
+) -> Table:
+    """Table of arrays: vectors and columns of matrices, scalars as constants, texts as metadata.
+
+    Parameters
+    ----------
+    path : str
+        File, for messages.
+    layout : str
+        Description of the format.
+    arrays : mapping of str to array
+        Variables; matrices have a row or a column per sample, the longer side is time.
+    units : mapping, optional
+        Units by name.
+    metadata : mapping, optional
+        Keys and texts.
+    notes : sequence of str
+        Notes of the reader.
+
+    Returns
+    -------
+    Table
+        Arrays of different lengths are groups.
+
+    Raises
+    ------
+    RunError
+        Without any array of numbers.
+    """
+    columns: list[Column] = []
+    constants: dict[str, float] = {}
+    texts = dict(metadata or {})
+    left = list(notes)
+    for name, value in arrays.items():
+        unit = (units or {}).get(name, "")
+        array = np.squeeze(np.asarray(value))
+        if array.dtype.names:
+            columns += [_column(f"{name}.{k}", array[k], unit) for k in array.dtype.names]
+        elif array.dtype.kind in "USO":
+            if array.ndim == 0:
+                texts[name] = str(array)
+            elif array.ndim == 1 and array.dtype.kind in "US" and len(array) > 1:
+                cells = [str(item) for item in array]
+                columns.append(Column(name, np.full(len(cells), np.nan), unit, texts=cells))
+        elif array.dtype.kind not in "fiubmM":
+            left.append(f"variable '{name}' is of type {array.dtype} and left out")
+        elif array.ndim == 0:
+            constants[name] = float(array)
+        elif array.ndim == 1 and len(array):
+            columns.append(_column(name, array, unit))
+        elif array.ndim == 2 and min(array.shape) <= _WIDEST:
+            long = array if array.shape[0] >= array.shape[1] else array.T
+            columns += [_column(f"{name}[{k}]", long[:, k], unit) for k in range(long.shape[1])]
+        elif array.size:
+            left.append(f"variable '{name}' of shape {array.shape} is left out")
+    lengths = sorted({len(item) for item in columns})
+    if not lengths or lengths[-1] < 2:
+        raise RunError(Fault("has no variables with more than one number", path))
+    several = len(lengths) > 1
+    grouped = [
+        Column(
+            c.name, c.values, c.unit, texts=c.texts, group=f"{len(c)} samples" if several else ""
+        )
+        for c in columns
+    ]
+    return Table(
+        path, layout, named_apart(grouped), metadata=texts, constants=constants, notes=tuple(left)
+    )
+
+
+def _column(name: str, array: Any, unit: str) -> Column:
+    """Numbers; dates as nanoseconds since 1970."""
+    if array.dtype.kind in "mM":
+        missing = np.isnat(array)
+        whole = array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64).astype(np.float64)
+        return Column(name, np.where(missing, np.nan, whole), "ns")
+    return Column(name, array.astype(np.float64), unit)

@@ -1,0 +1,403 @@
+"""Alignment of the clocks of two files, by their stamps or by cross-correlation.
+
+The lag maximises the correlation of two signals that follow each other: a quantity that both files
+have, or a tension and a torque, a cable length and an angle. Each signal is band-limited by its own
+sampling; both are interpolated on the finer time base. The lag is known when the residual variance
+at every other maximum exceeds that at the best one by more than chance (F test), so that a periodic
+motion, which repeats its maxima, is refused.
+
+References
+----------
+C. H. Knapp and G. C. Carter, "The generalized correlation method for estimation of time delay",
+IEEE Trans. ASSP 24, 1976.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.runs.importing.streams import Streams
+
+__all__ = ["Agreement", "agreement_of", "shifted", "span_of"]
+
+_PAIRS = (
+    ("motor_angle", "motor_angle"),
+    ("tension", "tension"),
+    ("cable_length", "cable_length"),
+    ("motor_torque", "motor_torque"),
+    ("motor_velocity", "motor_velocity"),
+    ("cable_length", "motor_angle"),
+    ("tension", "motor_torque"),
+    ("load", "motor_torque"),
+    ("load", "tension"),
+    ("platform_x", "motor_angle"),
+    ("platform_y", "motor_angle"),
+    ("platform_z", "motor_angle"),
+)
+"""Channels that follow each other up to a scale, an offset and a small error."""
+_MOST = 200_000
+"""Most samples of the common time base."""
+_LEAST_OVERLAP = 0.4
+"""Least share of the shorter recording that overlaps at a lag."""
+_LEAST_CORRELATION = 0.8
+_CHANCE = 1e-4
+_WINDOWS = 6
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well two clocks agree."""
+
+    pair: tuple[str, str]
+    """Channel of the first and of the second file."""
+    lag: float
+    """s to be added to the times of the second file for those of the first."""
+    lag_std: float
+    correlation: float
+    """Signed, at the lag."""
+    rival: float
+    """Largest magnitude of the correlation at another lag."""
+    drift: float
+    """Rate of the second clock against the first one, less 1; NaN where it is not determined."""
+    drift_std: float
+    overlap: float
+    """s."""
+    is_known: bool
+    """Whether the lag is significantly better than every other."""
+    reference: float
+    """Time on the second clock at which the lag is valid, s."""
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        first, second = self.pair
+        digits = max(0, 1 - math.floor(math.log10(max(self.lag_std * 1e3, 1e-9))))
+        drift = (
+            f", clocks drift by {self.drift * 1e6:.3g} ± {self.drift_std * 1e6:.2g} ppm"
+            if math.isfinite(self.drift)
+            else ""
+        )
+        return (
+            f"{first} against {second}: lag {self.lag * 1e3:.{digits}f} ± "
+            f"{self.lag_std * 1e3:.2g} ms, correlation {self.correlation:.4f} "
+            f"(next lag {self.rival:.4f}){drift}, overlap {self.overlap:.4g} s"
+        )
+
+
+def agreement_of(first: Streams, second: Streams) -> Agreement | None:
+    """Lag of two files by the channel pair with the largest correlation.
+
+    Parameters
+    ----------
+    first, second : Streams
+        Files with times.
+
+    Returns
+    -------
+    Agreement, optional
+        None without channels that follow each other.
+    """
+    best: Agreement | None = None
+    for one, two in _signals(first, second):
+        found = _correlated(one, two)
+        if found is None:
+            continue
+        better = best is None or (found.is_known, abs(found.correlation)) > (
+            best.is_known,
+            abs(best.correlation),
+        )
+        if better:
+            best = found
+    return best
+
+
+def span_of(streams: Streams) -> tuple[float, float]:
+    """First and last time of a file, s."""
+    times = [item.time for item in streams.streams if len(item.time)]
+    return min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
+
+
+def shifted(streams: Streams, lag: float, drift: float = 0.0, reference: float = 0.0) -> Streams:
+    """Streams on another clock: t + lag + drift (t − reference).
+
+    Parameters
+    ----------
+    streams : Streams
+        A file.
+    lag : float
+        s.
+    drift : float
+        Relative difference of the rates.
+    reference : float
+        Time at which the lag is valid, s.
+
+    Returns
+    -------
+    Streams
+        The same samples.
+    """
+    moved = tuple(
+        replace(item, time=item.time + lag + drift * (item.time - reference))
+        for item in streams.streams
+    )
+    return replace(streams, streams=moved)
+
+
+@dataclass(frozen=True)
+class _Signal:
+    channel: str
+    time: Array
+    values: Array
+
+
+def _signals(first: Streams, second: Streams) -> Iterator[tuple[_Signal, _Signal]]:
+    """Pairs of signals of the two files."""
+    ours, theirs = _by_base(first), _by_base(second)
+    for one, two in _PAIRS:
+        for a, b in {(one, two), (two, one)}:
+            for left in ours.get(a, ()):
+                for right in theirs.get(b, ()):
+                    yield left, right
+
+
+def _by_base(streams: Streams) -> dict[str, list[_Signal]]:
+    found: dict[str, list[_Signal]] = {}
+    for item in streams.streams:
+        for name, values in item.channels.items():
+            known = np.isfinite(values) & np.isfinite(item.time)
+            if np.count_nonzero(known) >= 16 and np.ptp(values[known]) > 0:
+                signal = _Signal(name, item.time[known], values[known])
+                found.setdefault(name.rpartition(".")[2], []).append(signal)
+    return found
+
+
+def _correlated(one: _Signal, two: _Signal) -> Agreement | None:
+    """Lag with the largest magnitude of the correlation."""
+    # The slower sampling limits both: the faster signal is averaged over the slower interval.
+    interval = max(_interval(one), _interval(two))
+    step = max(
+        min(_interval(one), _interval(two)),
+        interval / 4,
+        (np.ptp(one.time) + np.ptp(two.time)) / _MOST,
+    )
+    a, b = _even(one, step, interval), _even(two, step, interval)
+    shorter = min(len(a), len(b))
+    if shorter < 16:
+        return None
+    lags, r, counts = _normalised(a, b, max(16, int(_LEAST_OVERLAP * shorter)))
+    if not len(lags):
+        return None
+    size = np.abs(r)
+    top = int(np.argmax(size))
+    if not math.isfinite(size[top]) or size[top] == 0:
+        return None
+    offset = _vertex(size, top)
+    start = float(one.time[0] - two.time[0])
+    lag = start + (float(lags[top]) + offset) * step
+    rival = _rival(size, top)
+    independent = _independent(a, b, int(lags[top]))
+    known = size[top] >= _LEAST_CORRELATION and _is_better(float(size[top]), rival, independent)
+    overlap = float(counts[top]) * step
+    middle = float(two.time[0]) + 0.5 * float(np.ptp(two.time))
+    std = _lag_std(b, step, float(size[top]), independent)
+    drift, drift_std = math.nan, math.nan
+    if known:
+        drift, drift_std, lag, middle = _drift(one, two, lag, interval, middle)
+    return Agreement(
+        (one.channel, two.channel),
+        lag,
+        std,
+        float(r[top]),
+        rival,
+        drift,
+        drift_std,
+        overlap,
+        known,
+        middle,
+    )
+
+
+def _interval(signal: _Signal) -> float:
+    return float(np.ptp(signal.time)) / (len(signal.time) - 1)
+
+
+def _even(signal: _Signal, step: float, window: float) -> Array:
+    """Samples at even times, averaged over a window where the signal has a finer sampling."""
+    time = signal.time[0] + step * np.arange(int(np.ptp(signal.time) / step) + 1)
+    own = _interval(signal)
+    values = signal.values
+    width = round(window / own)
+    if width > 1:
+        kernel = np.ones(width + 1 - width % 2) / (width + 1 - width % 2)
+        padded = np.pad(values, len(kernel) // 2, mode="edge")
+        values = np.convolve(padded, kernel, mode="valid")
+    return np.asarray(np.interp(time, signal.time, values), dtype=np.float64)
+
+
+def _normalised(a: Array, b: Array, least: int) -> tuple[Array, Array, Array]:
+    """Pearson's correlation at every lag with enough overlap: means and variances of the overlap.
+
+    At a lag of k samples b[n] is compared with a[n + k].
+    """
+    size = 1 << (len(a) + len(b) - 1).bit_length()
+
+    def product(x: Array, y: Array) -> Array:
+        spectrum = np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size))
+        whole = np.fft.irfft(spectrum, size)
+        return np.concatenate(
+            (whole[-(len(b) - 1) :] if len(b) > 1 else whole[:0], whole[: len(a)])
+        )
+
+    a, b = a - a.mean(), b - b.mean()
+    one, two = np.ones_like(a), np.ones_like(b)
+    lags = np.arange(-(len(b) - 1), len(a))
+    n = np.round(product(one, two))
+    sums = product(a, two), product(one, b)
+    squares = product(a**2, two), product(one, b**2)
+    kept = n >= least
+    n = np.where(kept, n, 1.0)
+    top = product(a, b) - sums[0] * sums[1] / n
+    below = (squares[0] - sums[0] ** 2 / n) * (squares[1] - sums[1] ** 2 / n)
+    tiny = 1e-12 * float(np.sum(a**2)) * float(np.sum(b**2))
+    r = np.where(below > tiny, top / np.sqrt(np.maximum(below, tiny)), 0.0)
+    return lags[kept].astype(np.float64), r[kept], n[kept]
+
+
+def _vertex(size: Array, top: int) -> float:
+    """Offset of a maximum between samples, by a parabola."""
+    if not 0 < top < len(size) - 1:
+        return 0.0
+    left, middle, right = size[top - 1 : top + 2]
+    bend = left - 2 * middle + right
+    return float(0.5 * (left - right) / bend) if bend < 0 else 0.0
+
+
+def _rival(size: Array, top: int) -> float:
+    """Largest correlation outside the maximum's own lobe."""
+    left, right = top, top
+    while left > 0 and size[left - 1] < size[left]:
+        left -= 1
+    while right < len(size) - 1 and size[right + 1] < size[right]:
+        right += 1
+    outside = np.concatenate((size[:left], size[right + 1 :]))
+    return float(outside.max()) if len(outside) else 0.0
+
+
+def _residual(a: Array, b: Array, lag: int) -> Array:
+    """Residual of the regression of the overlapping parts."""
+    start, end = max(0, lag), min(len(a), len(b) + lag)
+    x, y = b[start - lag : end - lag], a[start:end]
+    x, y = x - x.mean(), y - y.mean()
+    scale = float(np.sum(x * y)) / max(float(np.sum(x**2)), 1e-300)
+    return np.asarray(y - scale * x)
+
+
+def _independent(a: Array, b: Array, lag: int) -> float:
+    """Number of independent samples of the residual, from its autocorrelation (first order)."""
+    rest = _residual(a, b, lag)
+    power = float(np.sum(rest**2))
+    if power == 0 or len(rest) < 8:
+        return float(len(rest))
+    rho = min(max(float(np.sum(rest[1:] * rest[:-1])) / power, 0.0), 0.9999)
+    return max(4.0, len(rest) * (1 - rho) / (1 + rho))
+
+
+def _is_better(best: float, rival: float, independent: float) -> bool:
+    """F test of the residual variances at the best lag and at the next maximum."""
+    from scipy.stats import f
+
+    ratio = (1 - rival**2) / max(1 - best**2, 1e-12)
+    return bool(ratio > f.isf(_CHANCE, independent, independent))
+
+
+def _lag_std(b: Array, step: float, r: float, independent: float) -> float:
+    """Standard deviation of the lag: residual noise over the slope of the signal.
+
+    With a = s b(t − τ) + e, var τ = var e / (n s² mean(b'²)); var e / (s² var b) = (1 − r²)/r².
+    """
+    slope = np.gradient(b, step)
+    sharp = float(np.mean(slope**2)) / max(float(np.var(b)), 1e-300)
+    noise = max(1 - r**2, 1e-12) / r**2
+    return math.sqrt(noise / (independent * max(sharp, 1e-300)))
+
+
+def _drift(
+    one: _Signal, two: _Signal, lag: float, window: float, middle: float
+) -> tuple[float, float, float, float]:
+    """Drift of the clocks from the lags of parts of the recording, by a weighted line.
+
+    Returns the drift, its standard deviation, the lag at the mean time of the parts and that time.
+    """
+    edges = np.linspace(two.time[0], two.time[-1], _WINDOWS + 1)
+    reach = max(8 * window, 0.02 * float(np.ptp(two.time)))
+    times, lags, weights = [], [], []
+    for start, end in pairwise(edges):
+        inside = (two.time >= start) & (two.time <= end)
+        if np.count_nonzero(inside) < 16 or np.ptp(two.values[inside]) == 0:
+            continue
+        part = _Signal(two.channel, two.time[inside], two.values[inside])
+        found = _local_lag(one, part, lag=lag, reach=reach, window=window)
+        if found is not None:
+            times.append(0.5 * (start + end))
+            lags.append(found[0])
+            weights.append(1 / found[1] ** 2)
+    if len(times) < 3:
+        return math.nan, math.nan, lag, middle
+    t, y, w = np.array(times), np.array(lags), np.array(weights)
+    centre = float(np.average(t, weights=w))
+    mean = float(np.average(y, weights=w))
+    spread = float(np.sum(w * (t - centre) ** 2))
+    slope = float(np.sum(w * (t - centre) * (y - mean))) / spread
+    rest = y - mean - slope * (t - centre)
+    chi2 = float(np.sum(w * rest**2)) / (len(t) - 2)
+    std = math.sqrt(max(1.0, chi2) / spread)
+    return slope, std, mean, centre
+
+
+def _local_lag(
+    one: _Signal, two: _Signal, *, lag: float, reach: float, window: float
+) -> tuple[float, float] | None:
+    """Lag near an approximate one by least squares, with its standard deviation."""
+    step = window / 4
+    even = np.arange(two.time[0], two.time[-1], step)
+    if len(even) < 16 or len(even) > _MOST:
+        return None
+    b = np.interp(even, two.time, two.values)
+    reference = _even(one, step, window)
+    origin = one.time[0]
+    axis = origin + step * np.arange(len(reference))
+    found = lag
+    std = math.nan
+    for _ in range(8):
+        at = even + found
+        inside = (at >= axis[0]) & (at <= axis[-1])
+        if np.count_nonzero(inside) < 0.8 * len(even):
+            return None
+        a = np.interp(at, axis, reference)[inside]
+        slope = np.interp(at, axis, np.gradient(reference, step))[inside]
+        matrix = np.stack([np.ones(len(a)), b[inside], slope], axis=1)
+        scale = np.where(np.ptp(matrix, axis=0) > 0, np.std(matrix, axis=0), 1.0)
+        scale[0] = 1.0
+        solved, *_ = np.linalg.lstsq(matrix / scale, a, rcond=None)
+        # a(t + τ) = c + s b(t), τ = found + δ: a(t + found) + δ a' = c + s b.
+        change = -float(solved[2] / scale[2])
+        rest = a - (matrix / scale) @ solved
+        power = float(np.mean(rest**2))
+        rho = float(np.sum(rest[1:] * rest[:-1])) / max(float(np.sum(rest**2)), 1e-300)
+        independent = max(4.0, len(rest) * (1 - max(rho, 0)) / (1 + max(rho, 0)))
+        sharp = float(np.mean((slope - slope.mean()) ** 2))
+        if sharp == 0:
+            return None
+        std = math.sqrt(max(power, 1e-300) / (sharp * independent))
+        found += float(np.clip(change, -reach / 4, reach / 4))
+        if abs(found - lag) > reach:
+            return None
+        if abs(change) < 0.01 * std:
+            break
+    return found, max(std, 1e-9)

@@ -1,0 +1,159 @@
+"""Mappings: assignments of columns as a file, and a table read with one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from winchkit.errors import Fault, RunError
+from winchkit.runs.files import write_whole
+from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.table import Table
+from winchkit.schema.mapping import ImportMapping, MappedColumn, MappedLog
+
+__all__ = ["guess_by", "mapping_id", "mapping_of", "write_mapping"]
+
+
+def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping:
+    """Mapping of the logs that were imported.
+
+    Parameters
+    ----------
+    name : str
+        Name of the mapping.
+    guesses : sequence of (str, Guess)
+        Name and assignments of each file.
+
+    Returns
+    -------
+    ImportMapping
+        Files with the same columns are one log.
+    """
+    logs: list[MappedLog] = []
+    for title, guess in guesses:
+        columns = tuple(
+            MappedColumn(item.source, item.channel, item.unit, item.factor, item.offset)
+            for item in guess.used
+        )
+        known = [
+            log for log in logs if (log.column, log.sample_rate) == (columns, guess.sample_rate)
+        ]
+        if not known:
+            logs.append(MappedLog(title, columns, guess.sample_rate))
+    return ImportMapping(name, tuple(logs))
+
+
+def mapping_id(mapping: ImportMapping) -> str:
+    """Identifier of a mapping's content, 12 hexadecimal digits.
+
+    Parameters
+    ----------
+    mapping : ImportMapping
+        The mapping.
+
+    Returns
+    -------
+    str
+        Equal for equal columns, units and factors.
+    """
+    content = json.dumps([asdict(log) for log in mapping.log], sort_keys=True)
+    return hashlib.sha256(content.encode()).hexdigest()[:12]
+
+
+def write_mapping(mapping: ImportMapping, path: Path) -> None:
+    """Write a mapping file; raises FileError.
+
+    Parameters
+    ----------
+    mapping : ImportMapping
+        The mapping.
+    path : Path
+        The file.
+    """
+    import tomlkit
+
+    document = tomlkit.document()
+    document["schema"] = 1
+    document["kind"] = "mapping"
+    document["name"] = mapping.name
+    logs = tomlkit.aot()
+    for log in mapping.log:
+        table = tomlkit.table()
+        table["name"] = log.name
+        if log.sample_rate is not None:
+            table["sample_rate"] = f"{log.sample_rate!r} Hz"
+        columns = tomlkit.aot()
+        for item in log.column:
+            column = tomlkit.table()
+            column["source"], column["channel"] = item.source, item.channel
+            if item.unit:
+                column["unit"] = item.unit
+            if item.factor is not None:
+                column["factor"] = float(item.factor)
+            if item.offset:
+                column["offset"] = float(item.offset)
+            columns.append(column)
+        table["column"] = columns
+        logs.append(table)
+    document["log"] = logs
+    write_whole(path, tomlkit.dumps(document).encode())
+
+
+def guess_by(table: Table, mapping: ImportMapping) -> Guess:
+    """Assignments of a table by a mapping.
+
+    Parameters
+    ----------
+    table : Table
+        The file.
+    mapping : ImportMapping
+        Its first log whose columns the file has is used.
+
+    Returns
+    -------
+    Guess
+        Without questions.
+
+    Raises
+    ------
+    RunError
+        With the columns that the file lacks, where no log fits.
+    """
+    for log in mapping.log:
+        found = [(item, table.column(item.source)) for item in log.column]
+        if any(column is None for _, column in found):
+            continue
+        by_source = {
+            column.source: Assignment(
+                column.source,
+                item.channel,
+                item.unit,
+                item.si if item.si is not None else 1.0,
+                item.offset,
+                "given",
+                f"mapping '{mapping.name}'",
+            )
+            for item, column in found
+            if column is not None
+        }
+        assignments = [
+            by_source.get(c.source, Assignment(c.source, "", c.unit, reason="not in the mapping"))
+            for c in table.columns
+        ]
+        return Guess(table, tuple(assignments), sample_rate=log.sample_rate)
+    raise RunError(
+        [Fault(_lacking(table, log, mapping), table.path) for log in mapping.log]
+        or [Fault("the mapping has no log", table.path)]
+    )
+
+
+def _lacking(table: Table, log: MappedLog, mapping: ImportMapping) -> str:
+    lacking = [repr(item.source) for item in log.column if table.column(item.source) is None]
+    has = ", ".join(repr(column.source) for column in table.columns[:20])
+    return (
+        f"is no log '{log.name}' of the mapping '{mapping.path or mapping.name}': it lacks the "
+        f"columns {', '.join(lacking)}; it has {has}"
+    )

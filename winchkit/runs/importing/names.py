@@ -1,0 +1,232 @@
+"""Quantity that the name of a column stands for, in English, German, French, Spanish and Italian.
+
+The rules are ordered: the first one that matches decides. Abbreviations follow CiA 402, robotics
+(q, dq, tau) and the recorders of common drives.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from functools import cache
+
+from winchkit.runs.columns import column_dimension
+
+__all__ = ["CURRENT", "IGNORED", "Meaning", "meaning_of", "words_of"]
+
+IGNORED = ""
+"""Channel of a set point, an error, a status word: known and not used."""
+CURRENT = "current"
+"""Channel of a motor current, which gives the torque."""
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """Channel that a name stands for."""
+
+    channel: str
+    """Empty where the column is not used."""
+    rank: int
+    """1 for the name of the channel itself, larger for weaker hints."""
+    text: str
+    """Part of the name that decided."""
+
+
+_RULES: tuple[tuple[str, int, str], ...] = (
+    # Set points, errors, states and counters.
+    (
+        r"\b(soll\w*|\w+soll|target|set ?points?|sp|cmd|commande?d?|demand(ed)?|desired|des|"
+        r"reference|ref|consigne|consigna|goal|planned|vorgabe|fuhrungs\w*|profile|offset|"
+        r"limit\w*)\b",
+        1,
+        IGNORED,
+    ),
+    (
+        r"\b(error|err|fehler|regelabweichung|schlepp\w*|following|erreur|deviation|abweichung|"
+        r"residual|mean error|std|stddev|variance|covariance)\b",
+        1,
+        IGNORED,
+    ),
+    (r"^pulses?$", 1, IGNORED),
+    (
+        r"^(frame|sub ?frame|index|idx|nr|no|number|sample|samples|counter|count|row|"
+        r"zeile|status|state|"
+        r"status ?word|control ?word|mode|modes|flags?|seq|sequence|comment|comments|kommentar|id|"
+        r"event|trigger|marker|quality|valid|time ?code)( \d+)?$",
+        1,
+        IGNORED,
+    ),
+    (r"^(date|datum|fecha|data|jour|day|tag|local date|recording date)$", 1, "date"),
+    # Time.
+    (
+        r"^(time|t|zeit|temps|tiempo|tempo|timestamps?|time stamps?|zeitstempel|x value|"
+        r"uhrzeit|clock|"
+        r"stamp|sec|secs|seconds|sekunden|date ?time|datum uhrzeit|date heure|heure|hora|log time|"
+        r"elapsed( time)?|elapsed seconds|sim time|rel ?time|relative time|abs ?time|"
+        r"local time|messzeit|"
+        r"zeit \d.*|time \d.*|t \d|tid|ora|date time|datum zeit|millis|micros|header stamp)$",
+        1,
+        "time",
+    ),
+    (r"^(time|zeit|temps|tiempo)\b|\b(time ?stamps?|zeitstempel)\b", 2, "time"),
+    # Temperature before force: "cell temperature".
+    (r"\b(temperaturs?|temperatures?|temp|temperatura|\w*temperatur|tmp)\b", 1, "temperature"),
+    # Poses of a platform.
+    *(
+        (
+            rf"\b(q ?{axis}|(quat\w*|rotation|orientation) {axis}|{axis} quat\w*)\b",
+            1,
+            f"platform_q{axis}",
+        )
+        for axis in "wxyz"
+    ),
+    (r"^(roll|rx|rot ?x|a rx|euler x)$|\broll\b", 1, "platform_roll"),
+    (r"^(pitch|ry|rot ?y|a ry|euler y)$|\bpitch\b", 1, "platform_pitch"),
+    (r"^(yaw|rz|rot ?z|a rz|euler z)$|\byaw\b", 1, "platform_yaw"),
+    (
+        r"^(x|px|pos(ition)? x|x pos(ition)?|tx|x coord\w*|.* position x|translation x)$",
+        1,
+        "platform_x",
+    ),
+    (
+        r"^(y|py|pos(ition)? y|y pos(ition)?|ty|y coord\w*|.* position y|translation y)$",
+        1,
+        "platform_y",
+    ),
+    (
+        r"^(z|pz|pos(ition)? z|z pos(ition)?|tz|z coord\w*|.* position z|translation z)$",
+        1,
+        "platform_z",
+    ),
+    # Forces and lengths of the cable.
+    (
+        r"\b(cable|r[o]pe|wire|line|tendon|seil\w*|string) ?(length|lange|lenght)\b|\bseillange\b|"
+        r"\b(longueur|longitud|lunghezza) (du |de |del )?(cable|cuerda|fune)\b",
+        1,
+        "cable_length",
+    ),
+    (
+        r"\b(load|platform|hook|last|haken|end) ?(force|kraft|side force)\b|\blastkraft\b|"
+        r"\bhakenlast\b|\bfuerza de carga\b",
+        1,
+        "load",
+    ),
+    (
+        r"\b(tensions?|cable forces?|r[o]pe forces?|line pull|seilkraft\w*|seilzugkraft|zugkraft|"
+        r"seilspannung|tracci?on|tension|load ?cells?|kraftmessdose|kmd|kraftaufnehmer|dynamometer|"
+        r"loadcell|lc\d*)\b",
+        1,
+        "tension",
+    ),
+    # Motor: velocity and torque before position, whose words are the most general.
+    (
+        r"\b(velocity|velocities|velocite|vel|speeds?|drehzahl\w*|\w+drehzahl|geschwindigkeit\w*|"
+        r"\w+geschwindigkeit|winkelgeschwindigkeit|omega|vitesse|velocidad|velocita|dq|qd|qdot|"
+        r"dtheta|thetadot|rpm|n ist|nist|v ist|vist|vx|angular rate|rotational speed|w)\b",
+        1,
+        "motor_velocity",
+    ),
+    (
+        r"\b(torques?|drehmoment\w*|\w+drehmoment|moment\w*|\w+moment|couple|par|coppia|tau|trq|"
+        r"effort|m ist|mist|motormoment)\b",
+        1,
+        "motor_torque",
+    ),
+    (
+        r"\b(currents?|strom\w*|\w+strom|istrom|courant|corriente|corrente|iq|i q|"
+        r"amperage|curr|i ist|"
+        r"motor i|phase current)\b",
+        2,
+        CURRENT,
+    ),
+    (
+        r"\b(motor ?angles?|motor ?pos(ition)?|motorwinkel|motorposition|rotor\w*|theta|phi|"
+        r"encoder\w*|geber\w*|drehgeber|resolver|angles?|\w*winkel\w*|angulo|angolo|q|qm|px)\b",
+        1,
+        "motor_angle",
+    ),
+    (
+        r"\b(positions?|pos|\w*position|lage\w*|\w*lage|istposition|posicion|posizione|"
+        r"pos estimate)\b",
+        2,
+        "motor_angle",
+    ),
+    (
+        r"\b(forces?|kraft\w*|\w+kraft|fuerza|forza|effort de traction|f|fz|cell|zelle|cellule)\b",
+        2,
+        "tension",
+    ),
+    (r"\b(load|last|charge|carga|carico|gewicht|weight)\b", 3, "tension"),
+    (
+        r"\b(length|lange|longueur|longitud|lunghezza|draw ?wire|seilzug\w*|distance|"
+        r"abstand|weg|wegstrecke|"
+        r"displacement|stroke|hub|laser|extension)\b",
+        2,
+        "cable_length",
+    ),
+    (r"\bswivel\b|\bschwenkwinkel\b", 1, "swivel"),
+)
+_COMPILED = tuple((re.compile(pattern), rank, channel) for pattern, rank, channel in _RULES)
+_CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)")
+_MATRIX = re.compile(r"^(?:.* )?(?:r|rot|m|matrix|t) ?([123]) ?([1234])$")
+
+
+@cache
+def words_of(name: str) -> str:
+    """A name in lower case: words, camel case and numbers separated, accents removed.
+
+    Parameters
+    ----------
+    name : str
+        Name of a column.
+
+    Returns
+    -------
+    str
+        ``MotorPos_ist2`` becomes ``motor pos ist 2``.
+    """
+    text = _CAMEL.sub(" ", name.replace("ß", "ss"))
+    text = unicodedata.normalize("NFKD", text)
+    text = "".join(char for char in text if not unicodedata.combining(char)).lower()
+    return " ".join(re.split(r"[^a-z0-9]+", text)).strip()
+
+
+def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
+    """Channel that a name stands for; None for an unknown name.
+
+    Parameters
+    ----------
+    name : str
+        Name without unit; the name of a channel of winchkit stands for it.
+    labels : tuple of str
+        Texts of higher rows of the header.
+
+    Returns
+    -------
+    Meaning, optional
+        A column that is not used has the channel :data:`IGNORED`.
+    """
+    if column_dimension(name) is not None or name == "time":
+        return Meaning(name, 0, name)
+    words = words_of(name)
+    if matrix := _MATRIX.match(words):
+        row, column = int(matrix[1]), int(matrix[2])
+        channel = f"platform_{'xyz'[row - 1]}" if column == 4 else f"platform_r{row}{column}"
+        return Meaning(channel, 1, name)
+    whole = words_of(" ".join((*labels, name)))
+    for text in dict.fromkeys((_axis_of(labels, words), words, whole)):
+        for pattern, rank, channel in _COMPILED:
+            if text and (found := pattern.search(text)):
+                return Meaning(channel, rank, found[0])
+    return None
+
+
+def _axis_of(labels: tuple[str, ...], words: str) -> str:
+    """``rotation x`` of a tracker's column ``X`` below ``Rotation``."""
+    if words not in {"x", "y", "z", "w"}:
+        return ""
+    above = words_of(" ".join(labels))
+    if "rotation" in above or "quaternion" in above or "orientation" in above:
+        return f"rotation {words}"
+    return f"position {words}" if words != "w" else "rotation w"

@@ -1,0 +1,149 @@
+"""Runs from files of other programs: one by one, by a mapping, or joined."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from winchkit.errors import Fault
+from winchkit.runs.assemble import Recording, assemble, refuse
+from winchkit.runs.columns import column_dimension
+from winchkit.runs.importing.assignment import Guess
+from winchkit.runs.importing.formats.source import read_table
+from winchkit.runs.importing.mapping import guess_by, mapping_id
+from winchkit.runs.importing.streams import Stream, Streams, merged, streams_of
+from winchkit.runs.run import Run
+from winchkit.schema.mapping import ImportMapping
+from winchkit.schema.read import read_mapping
+from winchkit.units import UNITS
+
+__all__ = ["has_angle", "metadata_of", "read_mapped", "run_of"]
+
+_OWN = ("load_mass", "length_zeroed", "programme")
+"""Metadata that winchkit uses, in a file that has its names."""
+
+
+def read_mapped(path: str | Path, mapping: str | Path | ImportMapping) -> Run:
+    """Read a file of another program by a mapping.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, in any format that ``winchkit import`` reads.
+    mapping : str, Path or ImportMapping
+        The mapping, or its file.
+
+    Returns
+    -------
+    Run
+        Channels in SI on one time base.
+
+    Raises
+    ------
+    RunError
+        With every fault of the file.
+    FileError
+        With every fault of the mapping.
+    """
+    read = mapping if isinstance(mapping, ImportMapping) else read_mapping(mapping)
+    guess = guess_by(read_table(path), read)
+    return run_of(streams_of(guess), metadata_of(guess, {"imported_mapping": mapping_id(read)}))
+
+
+def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
+    """Metadata of an imported run: file, format, and what the file says above its header.
+
+    Parameters
+    ----------
+    guess : Guess
+        The file.
+    more : mapping
+        Further keys, which come first.
+
+    Returns
+    -------
+    dict
+        Keys of the file have the prefix ``source``.
+    """
+    table = guess.table
+    own = {
+        key if key in _OWN else f"source {_one_line(key)}": _one_line(value)
+        for key, value in table.metadata.items()
+        if value
+    }
+    return {
+        "imported_from": Path(table.path).name,
+        "imported_format": table.layout,
+        **more,
+        **own,
+    }
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.replace(":", " ").split())
+
+
+def has_angle(streams: Streams) -> bool:
+    """Whether a file has a motor angle, without which there is no run."""
+    return any(name.rpartition(".")[2] == "motor_angle" for name in streams.channels)
+
+
+def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
+    """Run of one file.
+
+    Parameters
+    ----------
+    streams : Streams
+        Channels in SI.
+    metadata : mapping
+        Keys and texts.
+
+    Returns
+    -------
+    Run
+        Time from the first row; ``start_time`` in the metadata where the clock has a date.
+
+    Raises
+    ------
+    RunError
+        With every fault of the file.
+    """
+    faults = list(streams.faults)
+    if len(streams.streams) > 1:
+        faults += [fault for item in streams.streams for fault in _time_faults(streams, item)]
+    if not streams.streams:
+        faults.append(Fault("has no channel of a run", streams.path))
+    refuse(sorted(faults, key=lambda fault: fault.line or 0))
+    time, channels, rows = merged(streams.streams)
+    known = time[np.isfinite(time)]
+    first = float(known[0]) if len(known) else 0.0
+    texts = dict(metadata)
+    if streams.is_absolute:
+        moment = datetime.fromtimestamp(streams.origin + first, UTC)
+        texts["start_time"] = moment.isoformat(timespec="microseconds")
+    header = [(name, next(iter(UNITS[column_dimension(name) or "ratio"]))) for name in channels]
+    columns = list(channels.values())
+    if streams.has_time:
+        header, columns = [("time", "s"), *header], [time - first, *columns]
+
+    def line_of(row: int) -> int | None:
+        return streams.line_of(int(rows[row])) if rows is not None else None
+
+    return assemble(Recording(streams.path, header, columns, line_of, texts, notes=streams.notes))
+
+
+def _time_faults(streams: Streams, stream: Stream) -> Sequence[Fault]:
+    """Stamps that are missing or do not increase."""
+    faults = []
+    for row in np.flatnonzero(~np.isfinite(stream.time)):
+        line = streams.line_of(int(stream.rows[row]))
+        faults.append(Fault("time is missing here", streams.path, line))
+    for row in np.flatnonzero(stream.time[1:] <= stream.time[:-1]) + 1:
+        earlier, later = stream.time[row - 1], stream.time[row]
+        word = "stands still at" if later == earlier else f"goes back from {earlier:.9g} s to"
+        line = streams.line_of(int(stream.rows[row]))
+        faults.append(Fault(f"time {word} {later:.9g} s", streams.path, line))
+    return faults

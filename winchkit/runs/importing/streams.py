@@ -1,0 +1,287 @@
+"""Channels in SI with their own time stamps, from a table and its assignments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.errors import Fault
+from winchkit.model.robot.rotation import quaternion_of
+from winchkit.runs.align import values_at
+from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
+from winchkit.runs.importing.table import Column, Table
+from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
+
+__all__ = ["Stream", "Streams", "merged", "streams_of"]
+
+_PADDED = 0.9
+"""Share of the fullest column's values below which a column has a rate of its own."""
+_BRIDGED = 2.5
+"""Median intervals of a channel over which it is interpolated."""
+_SLOW = ("temperature", "swivel")
+"""Channels that do not determine the rows of a run."""
+_EXCEL_EPOCH = 25_569.0
+"""1970-01-01 in days since 1899-12-30."""
+_QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Channels that are sampled together."""
+
+    time: Array
+    """s, on the clock of the file, from its first stamp; shape (n,)."""
+    channels: dict[str, Array]
+    """Values in SI by channel, shape (n,)."""
+    rows: NDArray[np.intp]
+    """Row of the table, shape (n,)."""
+
+    @property
+    def interval(self) -> float:
+        """Median interval, s; NaN with one sample."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else math.nan
+
+
+@dataclass(frozen=True)
+class Streams:
+    """All streams of one file."""
+
+    path: str
+    streams: tuple[Stream, ...]
+    origin: float
+    """Time 0 on the clock of the file, s."""
+    is_absolute: bool
+    """Whether the clock of the file counts from 1970 UTC."""
+    has_time: bool
+    """Whether the rows have times; rows of poses may have none."""
+    line_of: Callable[[int], int | None]
+    faults: tuple[Fault, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of all channels."""
+        return tuple(name for stream in self.streams for name in stream.channels)
+
+
+def streams_of(guess: Guess) -> Streams:
+    """Convert the used columns of a table to SI.
+
+    Parameters
+    ----------
+    guess : Guess
+        Assignments without open questions.
+
+    Returns
+    -------
+    Streams
+        With the faults of the table's rows and of the used columns' cells, each with its line.
+    """
+    table = guess.table
+    used = {item.source: item for item in guess.used}
+    columns = {c.source: c for c in table.columns if c.source in used}
+    faults = [*table.faults, *_cell_faults(table, columns, used)]
+    notes = list(table.notes)
+    clocks = [columns[s] for s, item in used.items() if item.channel == "time"]
+    if guess.sample_rate:
+        clocks = []
+    dates = {columns[s].group: columns[s] for s, item in used.items() if item.channel == DATE}
+    read = {c.source: _clock(c, used[c.source], dates.get(c.group)) for c in clocks}
+    absolute = [first for first, _, is_absolute in read.values() if is_absolute]
+    origin = min((first for first, _, _ in read.values()), default=0.0)
+    blocks: dict[str, dict[str, Array]] = {}
+    for source, column in columns.items():
+        item = used[source]
+        if item.channel in {"time", DATE}:
+            continue
+        clock = _clock_of(clocks, column)
+        key = clock.source if clock is not None else f"\0{len(column)}"
+        with np.errstate(over="ignore"):
+            values = column.values * item.factor + item.offset
+        blocks.setdefault(key, {})[item.channel] = values
+    streams = []
+    for key, channels in blocks.items():
+        first, time, _ = read.get(key, (0.0, None, False))
+        count = len(next(iter(channels.values())))
+        if time is None:
+            time = np.arange(count, dtype=np.float64) / (guess.sample_rate or 1.0)
+        elif len(time) != count:
+            faults.append(
+                Fault(f"column '{key}' has {len(time)} times for {count} values", table.path)
+            )
+            continue
+        else:
+            time = time + (first - origin)
+        stream = Stream(time, _with_quaternion(channels), np.arange(count))
+        stream, note = _without_copies(stream)
+        notes += note
+        streams += _by_rate(stream)
+    is_absolute = bool(absolute) and len(absolute) == len(read)
+    return Streams(
+        table.path,
+        tuple(streams),
+        origin,
+        is_absolute,
+        bool(clocks) or bool(guess.sample_rate),
+        table.line_of,
+        tuple(faults),
+        tuple(notes),
+    )
+
+
+def _cell_faults(
+    table: Table, columns: dict[str, Column], used: dict[str, Assignment]
+) -> list[Fault]:
+    found = []
+    for source, column in columns.items():
+        wrong = [(row, text) for row, text in column.wrong]
+        if column.texts is not None and used[source].channel in {"time", DATE}:
+            wrong += [(row, column.texts[row]) for row in read_stamps(column.texts).wrong]
+        elif column.texts is not None:
+            message = f"column '{source}' has text, e.g. {column.texts[0]!r}, and no numbers"
+            found.append(Fault(message, table.path, table.line_of(0)))
+        kind = "stamp" if column.texts is not None else "number"
+        found += [
+            Fault(f"column '{source}' has {text!r}, not a {kind}", table.path, table.line_of(row))
+            for row, text in wrong
+        ]
+    return found
+
+
+def _clock(column: Column, item: Assignment, day: Column | None) -> tuple[float, Array, bool]:
+    """First stamp, s; times from it, s; and whether the first one counts from 1970."""
+    if item.unit == STAMP:
+        stamps = read_stamps(column.texts or ())
+        values, absolute = stamps.values, stamps.has_date
+        if day is not None and day.texts is not None and not absolute:
+            dates = read_stamps(day.texts).values
+            # A date beside each time of day replaces the count of midnights.
+            values, absolute = dates + np.mod(values, 86_400.0), True
+    elif item.unit == EXCEL:
+        values, absolute = (column.values - _EXCEL_EPOCH) * 86_400.0, True
+    else:
+        absolute = epoch_unit(column.values) == item.unit
+        known = column.values[np.isfinite(column.values)]
+        raw = float(known[0]) if len(known) else 0.0
+        # The difference first: nanoseconds since 1970 have no digits left for its fraction.
+        return raw * item.factor + item.offset, (column.values - raw) * item.factor, absolute
+    known = values[np.isfinite(values)]
+    first = float(known[0]) if len(known) else 0.0
+    return first, values - first, absolute
+
+
+def _clock_of(clocks: Sequence[Column], column: Column) -> Column | None:
+    own = [item for item in clocks if item.group == column.group]
+    before = [item for item in own if item.number < column.number]
+    return before[-1] if before else own[0] if own else None
+
+
+def _with_quaternion(channels: dict[str, Array]) -> dict[str, Array]:
+    """A quaternion in place of the elements of a rotation matrix."""
+    if not all(name in channels for name in MATRIX):
+        return {name: values for name, values in channels.items() if name not in MATRIX}
+    matrix = np.stack([channels[name] for name in MATRIX], axis=-1).reshape(-1, 3, 3)
+    others = {name: values for name, values in channels.items() if name not in MATRIX}
+    known = np.isfinite(matrix).all(axis=(1, 2))
+    quaternion = np.full((len(matrix), 4), np.nan)
+    quaternion[known] = quaternion_of(matrix[known])
+    return {**others, **dict(zip(_QUATERNION, quaternion.T, strict=True))}
+
+
+def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
+    """Without rows that repeat the row before them with its stamp, and rows without values."""
+    table = np.stack([stream.time, *stream.channels.values()], axis=1)
+    same = np.zeros(len(table), dtype=bool)
+    same[1:] = np.all((table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1])), 1)
+    empty = np.all(np.isnan(table[:, 1:]), axis=1)
+    notes = []
+    if count := int(np.count_nonzero(same & ~empty)):
+        notes.append(f"{count} rows that repeat the row before them are left out")
+    return _rows_of(stream, ~(same | empty)), notes
+
+
+def _rows_of(stream: Stream, kept: NDArray[np.bool_]) -> Stream:
+    if kept.all():
+        return stream
+    channels = {name: values[kept] for name, values in stream.channels.items()}
+    return Stream(stream.time[kept], channels, stream.rows[kept])
+
+
+def _by_rate(stream: Stream) -> list[Stream]:
+    """Streams of one rate each, where empty cells stand between the samples of slower channels."""
+    known = {name: np.isfinite(values) for name, values in stream.channels.items()}
+    counts = {name: int(np.count_nonzero(mask)) for name, mask in known.items()}
+    fullest = max(counts.values(), default=0)
+    padded = [name for name, count in counts.items() if count < _PADDED * fullest]
+    if not padded or not all(_is_spread(known[name]) for name in padded if counts[name] > 1):
+        return [stream]
+    found: dict[bytes, list[str]] = {}
+    for name in stream.channels:
+        mask = known[name] if name in padded else known[name] | np.True_
+        found.setdefault(mask.tobytes(), []).append(name)
+    streams = []
+    for names in found.values():
+        only = replace(stream, channels={name: stream.channels[name] for name in names})
+        first = names[0]
+        mask = known[first] if first in padded else np.ones(len(stream.time), dtype=bool)
+        if first not in padded:
+            mask = np.any([known[name] for name in names], axis=0)
+        streams.append(_rows_of(only, mask))
+    return streams
+
+
+def _is_spread(known: NDArray[np.bool_]) -> bool:
+    """Whether values stand at even distances over the rows, and not in a few blocks."""
+    steps = np.diff(np.flatnonzero(known))
+    return float(np.percentile(steps, 90)) <= 2.0 * max(1.0, float(np.median(steps)))
+
+
+def merged(parts: Sequence[Stream]) -> tuple[Array, dict[str, Array], NDArray[np.intp] | None]:
+    """One time base for several streams of one clock.
+
+    Parameters
+    ----------
+    parts : sequence of Stream
+        Streams with increasing times.
+
+    Returns
+    -------
+    time : (n,) array
+        s: the samples of the slowest stream, of those with channels besides temperatures.
+    channels : dict
+        Other streams are interpolated there, and NaN without neighbours.
+    rows : (n,) array or None
+        Rows of the table; None where channels of several streams are in a row.
+    """
+    if len(parts) == 1:
+        return parts[0].time, parts[0].channels, parts[0].rows
+    bases = [
+        item
+        for item in parts
+        if any(name.rpartition(".")[2] not in _SLOW for name in item.channels)
+    ]
+    base = max(bases or parts, key=lambda item: item.interval)
+    channels: dict[str, Array] = dict(base.channels)
+    for item in parts:
+        if item is base or not item.channels:
+            continue
+        gap = _BRIDGED * item.interval if len(item.time) > 1 else 0.0
+        for name, values in item.channels.items():
+            known = np.isfinite(values)
+            found = values_at(item.time[known], values[known][:, None], base.time, gap)
+            channels[name] = found[:, 0]
+    kept = _covered(base, channels)
+    return base.time[kept], {name: values[kept] for name, values in channels.items()}, None
+
+
+def _covered(base: Stream, channels: dict[str, Array]) -> slice:
+    """Rows between the first and the last with a value of every channel but the slow ones."""
+    needed = [v for name, v in channels.items() if name.rpartition(".")[2] not in _SLOW]
+    complete = np.flatnonzero(np.all([np.isfinite(values) for values in needed], axis=0))
+    return slice(complete[0], complete[-1] + 1) if len(complete) else slice(0, len(base.time))

@@ -1,0 +1,118 @@
+"""Columns of a recording of another program, before channels and units are assigned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from winchkit.arrays import Array
+from winchkit.errors import Fault, RunError
+
+__all__ = ["LARGEST", "Column", "Table", "named_apart", "refuse_size"]
+
+LARGEST = 2 << 30
+"""Largest size of a file, of its unpacked content and of its numbers, bytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One column of a file, in the unit of the file."""
+
+    name: str
+    """Name without its unit, from the lowest row of the header."""
+    values: Array
+    """Shape (n,); NaN for a missing value and for text."""
+    unit: str = ""
+    """Unit as spelled in the file; empty where it gives none."""
+    labels: tuple[str, ...] = ()
+    """Texts of higher rows of the header, e.g. the marker of a tracker."""
+    texts: Sequence[str] | None = None
+    """Cells of a column of text, of dates or of times of day; None for numbers."""
+    wrong: tuple[tuple[int, str], ...] = ()
+    """Rows of a column of numbers that have a text, with the text."""
+    group: str = ""
+    """Sheet, topic or length: columns of one group are sampled together."""
+    number: int = 0
+    """Position in the file, from 1."""
+    source: str = ""
+    """Name that is unique within the file."""
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Content of a file."""
+
+    path: str
+    layout: str
+    """Description of the format, e.g. ``text in UTF-16, semicolons, decimal comma``."""
+    columns: tuple[Column, ...]
+    line_of: Callable[[int], int | None] = lambda _row: None
+    """Line of the file of a row; None where the format has no lines."""
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    """Keys and values above the header."""
+    constants: Mapping[str, float] = field(default_factory=dict)
+    """Variables with a single number, e.g. a gain."""
+    faults: tuple[Fault, ...] = ()
+    notes: tuple[str, ...] = ()
+    interval: float | None = None
+    """Sampling interval that the file declares, s."""
+
+    def column(self, source: str) -> Column | None:
+        """The column of a unique name, or of a number where no column has that name."""
+        found = next((item for item in self.columns if item.source == source), None)
+        if found is None and source.isdecimal():
+            found = next((item for item in self.columns if str(item.number) == source), None)
+        return found
+
+
+def named_apart(columns: Sequence[Column]) -> tuple[Column, ...]:
+    """Columns with numbers and unique names in ``source``.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        In the order of the file.
+
+    Returns
+    -------
+    tuple of Column
+        The name itself where it is unique; else with its labels before it, and with ``#2`` where
+        these are equal as well.
+    """
+    names = [item.name for item in columns]
+    full = [
+        item.name if names.count(item.name) == 1 else " ".join((*item.labels, item.name))
+        for item in columns
+    ]
+    seen: dict[str, int] = {}
+    found = []
+    for number, (item, name) in enumerate(zip(columns, full, strict=True), start=1):
+        seen[name] = seen.get(name, 0) + 1
+        source = name if seen[name] == 1 else f"{name} #{seen[name]}"
+        found.append(
+            Column(
+                item.name,
+                item.values,
+                item.unit,
+                item.labels,
+                item.texts,
+                item.wrong,
+                item.group,
+                number,
+                source,
+            )
+        )
+    return tuple(found)
+
+
+def refuse_size(path: str, size: int, what: str) -> None:
+    """Raise RunError for a content beyond :data:`LARGEST`."""
+    if size > LARGEST:
+        message = (
+            f"{what} of {size / 1e9:.3g} GB; at most {LARGEST / 1e9:.3g} GB are imported: split "
+            "the recording"
+        )
+        raise RunError(Fault(message, path))

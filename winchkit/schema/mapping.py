@@ -1,0 +1,103 @@
+"""Contents of a mapping (kind ``mapping``): the channels and units of another program's columns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from winchkit.errors import suggest
+from winchkit.schema.quantity import Frequency, Number
+from winchkit.schema.table import Rule, Table
+from winchkit.units import UNITS, dimension_of
+
+__all__ = ["DATE", "EXCEL", "MATRIX", "STAMP", "ImportMapping", "MappedColumn", "MappedLog"]
+
+STAMP, EXCEL = "stamp", "excel"
+"""Units of a time: text with a date or a time of day; days since 1899-12-30."""
+DATE = "date"
+"""Channel of a column with the date, beside one with the time of day."""
+MATRIX = tuple(f"platform_r{row}{column}" for row in "123" for column in "123")
+"""Elements of a platform's rotation matrix, which become its quaternion."""
+
+_OF_A_WINCH = (
+    *("motor_angle", "motor_velocity", "motor_torque", "tension", "tension_gross", "load"),
+    *("load_gross", "cable_length", "cable_length_gross", "temperature", "swivel"),
+)
+_OF_A_PLATFORM = (
+    *("platform_x", "platform_y", "platform_z"),
+    *("platform_qw", "platform_qx", "platform_qy", "platform_qz"),
+    *("platform_roll", "platform_pitch", "platform_yaw"),
+    *MATRIX,
+)
+CHANNELS = ("time", DATE, *_OF_A_WINCH, *_OF_A_PLATFORM)
+
+
+@dataclass(frozen=True)
+class MappedColumn(Table):
+    """One column: SI value = factor × number + offset."""
+
+    source: str
+    """Name of the column in the file, or its number from 1."""
+    channel: str
+    """Channel of a run, with a winch's name before it where there are several: ``A.tension``."""
+    unit: str = ""
+    """Unit in the file; with ``factor`` it is a description."""
+    factor: Number | None = None
+    """SI value of 1; by default that of ``unit``."""
+    offset: Number = 0.0
+    """SI value of 0."""
+
+    def rules(self) -> Iterator[Rule]:
+        """The channel exists, and the factor is known."""
+        name = self.channel if self.channel in CHANNELS else self.channel.rpartition(".")[2]
+        if name not in CHANNELS or (name != self.channel and name not in _OF_A_WINCH):
+            message = f"'{self.channel}' is no channel of a run; use one of {', '.join(CHANNELS)}"
+            yield "channel", message + suggest(name, list(CHANNELS))
+        if self.factor is None and self.si is None:
+            yield "unit", f"'{self.unit}' has no known SI value; give `factor`, the SI value of 1"
+        if self.factor is not None and (self.factor == 0 or not math.isfinite(self.factor)):
+            yield "factor", f"{self.factor:g} is not a scale"
+
+    @property
+    def si(self) -> float | None:
+        """The factor, or that of the unit; None for an unknown unit."""
+        if self.factor is not None:
+            return self.factor
+        if self.unit in {STAMP, EXCEL}:
+            return 1.0 if self.unit == STAMP else 86_400.0
+        dimension = dimension_of(self.unit)
+        return None if dimension is None else UNITS[dimension][self.unit]
+
+
+@dataclass(frozen=True)
+class MappedLog(Table):
+    """Columns of one kind of log; a file that has all of them is such a log."""
+
+    name: str
+    column: tuple[MappedColumn, ...]
+    sample_rate: Frequency | None = None
+    """Rate of the rows where the file has no times, or none to be used."""
+
+    def rules(self) -> Iterator[Rule]:
+        """Every channel has one column."""
+        channels = [item.channel for item in self.column]
+        for channel in dict.fromkeys(channels):
+            if channels.count(channel) > 1 and channel != "time":
+                yield "column", f"{channels.count(channel)} columns are '{channel}'"
+        if not channels:
+            yield "column", "a log needs at least one [[log.column]]"
+
+
+@dataclass(frozen=True)
+class ImportMapping(Table):
+    """Logs of one or several programs."""
+
+    name: str
+    log: tuple[MappedLog, ...]
+    path: str = field(default="", compare=False)
+
+    def rules(self) -> Iterator[Rule]:
+        """There is at least one log."""
+        if not self.log:
+            yield "log", "a mapping needs at least one [[log]]"
