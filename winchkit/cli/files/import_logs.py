@@ -108,15 +108,15 @@ def command(
     shown = "\n\n".join(tables_text(guess) for guess in guesses)
     if is_new and not as_json:
         click.echo(shown, err=output is not None)
-    open_options = [option for guess in guesses for q in guess.questions for option in q.options]
-    if open_options or (is_new and output and not _is_accepted(guesses, yes, as_json)):
-        if as_json:
-            echo_json(report)
-        raise UsageError(_unanswered(guesses))
     if output is None:
         if as_json:
             echo_json(report)
         return
+    is_open = any(guess.questions for guess in guesses)
+    if is_open or (is_new and not _is_accepted(guesses, yes, as_json)):
+        if as_json:
+            echo_json(report)
+        raise UsageError(_unanswered(guesses))
     mapping_file = declared or _mapping_of(files, guesses)
     targets = _targets(files, Path(output), overwrite=overwrite, is_joined=join)
     results, joints = _runs(

@@ -43,7 +43,9 @@ def tables_text(guess: Guess) -> str:
         + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
         for line in lines
     ]
-    notes = [f"  note: {note}" for note in (*table.notes, *guess.notes)]
+    constants = ", ".join(f"{one_line(k)} = {v:g}" for k, v in table.constants.items())
+    notes = [f"  constants: {constants}"] if constants else []
+    notes += [f"  note: {note}" for note in (*table.notes, *guess.notes)]
     asked = [
         f"  ? {question.text}: {' or '.join(question.options)}" for question in guess.questions
     ]

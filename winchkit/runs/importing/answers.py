@@ -15,7 +15,8 @@ __all__ = ["Answers", "ColumnAnswer", "read_column"]
 
 _COLUMN = re.compile(
     r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<source>.*?)\s*"
-    r"(?:\*\s*(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?))?\s*(?:\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
+    r"(?:\*\s*(?:(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
+    r"(?:\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
 )
 
 
@@ -29,6 +30,8 @@ class ColumnAnswer:
     """As given; empty for the unit that the column has in the file."""
     factor: float | None
     """Multiplier of the numbers before the unit; None where none was given."""
+    constant: str = ""
+    """Name of a variable of the file that is the multiplier."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +56,13 @@ class Answers:
 
 
 def read_column(text: str) -> ColumnAnswer:
-    """Read ``motor_angle=Pos [deg]`` or ``motor_torque=vir*35.15``; raises UsageError.
+    """Read ``motor_angle=Pos [deg]`` or ``motor_torque=u*35.15``; raises UsageError.
 
     Parameters
     ----------
     text : str
-        ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; nothing after ``=`` for a
-        channel that the file does not have.
+        ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; the factor is a number or a
+        variable of the file; nothing after ``=`` for a channel that the file does not have.
 
     Returns
     -------
@@ -82,4 +85,4 @@ def read_column(text: str) -> ColumnAnswer:
         units = ", ".join(UNITS[dimension]) if dimension else "1"
         raise UsageError(f"'{unit}' in '{text}' is no known unit; use one of {units}")
     factor = float(found["factor"]) if found["factor"] else None
-    return ColumnAnswer(channel, found["source"], unit, factor)
+    return ColumnAnswer(channel, found["source"], unit, factor, found["constant"] or "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -104,7 +104,9 @@ class Choice:
     notes: list[str] = field(default_factory=list)
 
 
-def choose(table: Table, given: Mapping[str, str], body: str | None) -> Choice:
+def choose(
+    table: Table, given: Mapping[str, str], body: str | None, without: Collection[str] = ()
+) -> Choice:
     """Choose the columns of all channels.
 
     Parameters
@@ -115,6 +117,8 @@ def choose(table: Table, given: Mapping[str, str], body: str | None) -> Choice:
         Channel by the unique name of a column, as the user gave it; empty for an unused one.
     body : str, optional
         Body of a tracker's export.
+    without : collection of str
+        Channels that the file does not have, as the user says.
 
     Returns
     -------
@@ -134,7 +138,7 @@ def choose(table: Table, given: Mapping[str, str], body: str | None) -> Choice:
             found = _candidate(column, numbered)
             (free if found.channel else choice.unused).append(found)
     taken = {item.channel for item in choice.chosen}
-    free = _left_after(taken, free, choice)
+    free = _left_after({*taken, *without}, free, choice)
     times = [item for item in free if item.channel in {"time", DATE}]
     poses = [item for item in free if item.channel in (*POSE_DIMENSIONS, *MATRIX)]
     exact = [item for item in free if item.rank == 0 and item not in times]
@@ -151,7 +155,7 @@ def _left_after(taken: set[str], free: list[Candidate], choice: Choice) -> list[
     for item in free:
         if item.channel in taken:
             choice.unused.append(
-                replace(item, channel="", reason=f"another column is {item.channel}")
+                replace(item, channel="", reason=f"{item.channel} is given otherwise")
             )
     return [item for item in free if item.channel not in taken]
 

@@ -62,7 +62,7 @@ def joined(parts: Sequence[Streams], lag: float | None = None) -> tuple[Streams,
     for other in parts[1:]:
         moved, joint = _aligned(first, other, lag)
         joints.append(joint)
-        notes += [*other.notes, f"{Path(other.path).name}: {joint.text}"]
+        notes += other.notes
         known = {name for item in streams for name in item.channels}
         for item in moved.streams:
             doubled = sorted(known & set(item.channels))

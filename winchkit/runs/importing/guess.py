@@ -97,7 +97,9 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     """
     answers = answers or Answers()
     given, unknown = _given(table, answers)
-    choice = choose(table, {source: item.channel for source, item in given.items()}, answers.body)
+    channels = {source: item.channel for source, item in given.items()}
+    without = {item.channel for item in answers.columns if not item.source}
+    choice = choose(table, channels, answers.body, without)
     work = _Work(table, answers, questions=[*unknown, *choice.questions], notes=[*choice.notes])
     for candidate in choice.chosen:
         work.columns.append(_started(work, candidate, given.get(candidate.column.source)))
@@ -126,7 +128,11 @@ def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], lis
     missing = []
     for item in answers.columns:
         column = table.column(item.source) if item.source else None
-        if column is not None:
+        if column is not None and item.constant and item.constant not in table.constants:
+            known = ", ".join(f"{k} = {v:g}" for k, v in table.constants.items()) or "none"
+            text = f"there is no constant '{item.constant}'; the file has {known}"
+            missing.append(Question(text, (f"--column {item.channel}={item.source}*FACTOR",)))
+        elif column is not None:
             found[column.source] = item
         elif item.source:
             names = ", ".join(repr(c.source) for c in table.columns)
@@ -144,9 +150,11 @@ def _started(work: _Work, candidate: Candidate, answer: ColumnAnswer | None) -> 
     if answer is not None:
         confidence = "given"
         scale = answer.factor if answer.factor is not None else 1.0
+        if answer.constant:
+            scale = work.table.constants.get(answer.constant, math.nan)
         if answer.unit:
             unit, text = read_unit(answer.unit), answer.unit
-        elif answer.factor is not None:
+        elif answer.factor is not None or answer.constant:
             si = column_dimension(item.base) or "ratio"
             item.settle(scale, next(iter(UNITS[si])), "given", "--column")
             return item
@@ -314,7 +322,10 @@ def _by_convention(work: _Work) -> None:
         if item.factor is not None or item.candidate.unit is not None or item.column.unit:
             continue
         words = words_of(item.column.name)
-        if item.base == "time":
+        declared = _declared(work.table, column_dimension(item.base))
+        if declared is not None:
+            item.settle(declared.factor, declared.text, "named", "unit of the whole file")
+        elif item.base == "time":
             if _is_in_seconds(item.column.values):
                 item.settle(1.0, "s", "assumed", "steps below 1, not whole numbers")
         elif item.base == "temperature":
@@ -327,6 +338,20 @@ def _by_convention(work: _Work) -> None:
             if dimension is not None:
                 unit = next(iter(UNITS[dimension]))
                 item.settle(1.0, unit, "assumed", "no unit in the file: SI by convention")
+
+
+def _declared(table: Table, dimension: str | None) -> SpelledUnit | None:
+    """Unit of a dimension that is declared above the header: ``Length Units, Millimeters``."""
+    if dimension not in {"length", "angle", "force", "torque"}:
+        return None
+    for key, value in table.metadata.items():
+        if not {"unit", "units", "einheit", "einheiten"} & set(words_of(key).split()):
+            continue
+        for word in value.replace(",", " ").replace(";", " ").split():
+            unit = read_unit(word)
+            if unit is not None and unit.dimension == dimension:
+                return unit
+    return None
 
 
 def _is_si(table: Table, words: str) -> bool:
@@ -407,7 +432,9 @@ def _ask_columns(work: _Work, choice: Choice) -> None:
     bases = {item.base for item in work.columns}
     asked = " ".join(option for q in work.questions for option in q.options)
     has_rate = work.answers.sample_rate or work.table.interval
-    is_pose = any(name.startswith("platform_") for name in bases)
+    is_pose = any(
+        name.startswith("platform_") or name.endswith(".motor_angle") for name in channels
+    )
     if not channels & {"time"} and not has_rate and not is_pose and "time=" not in asked:
         work.questions.append(
             Question(

@@ -208,7 +208,8 @@ def _correlated(one: _Signal, two: _Signal) -> Agreement | None:
     std = _lag_std(b, step, float(size[top]), independent)
     drift, drift_std = math.nan, math.nan
     if known:
-        drift, drift_std, lag, middle = _drift(one, two, lag, interval, middle)
+        drift, drift_std, lag, spread, middle = _drift(one, two, lag, interval, middle)
+        std = max(std, spread)
     return Agreement(
         (one.channel, two.channel),
         lag,
@@ -329,10 +330,11 @@ def _lag_std(b: Array, step: float, r: float, independent: float) -> float:
 
 def _drift(
     one: _Signal, two: _Signal, lag: float, window: float, middle: float
-) -> tuple[float, float, float, float]:
+) -> tuple[float, float, float, float, float]:
     """Drift of the clocks from the lags of parts of the recording, by a weighted line.
 
-    Returns the drift, its standard deviation, the lag at the mean time of the parts and that time.
+    Returns the drift, its standard deviation, the lag at the mean time of the parts, its standard
+    deviation from their scatter, and that time.
     """
     edges = np.linspace(two.time[0], two.time[-1], _WINDOWS + 1)
     reach = max(8 * window, 0.02 * float(np.ptp(two.time)))
@@ -348,7 +350,7 @@ def _drift(
             lags.append(found[0])
             weights.append(1 / found[1] ** 2)
     if len(times) < 3:
-        return math.nan, math.nan, lag, middle
+        return math.nan, math.nan, lag, 0.0, middle
     t, y, w = np.array(times), np.array(lags), np.array(weights)
     centre = float(np.average(t, weights=w))
     mean = float(np.average(y, weights=w))
@@ -356,8 +358,9 @@ def _drift(
     slope = float(np.sum(w * (t - centre) * (y - mean))) / spread
     rest = y - mean - slope * (t - centre)
     chi2 = float(np.sum(w * rest**2)) / (len(t) - 2)
-    std = math.sqrt(max(1.0, chi2) / spread)
-    return slope, std, mean, centre
+    excess = max(1.0, chi2)
+    std, lag_std = math.sqrt(excess / spread), math.sqrt(excess / float(np.sum(w)))
+    return slope, std, mean, lag_std, centre
 
 
 def _local_lag(

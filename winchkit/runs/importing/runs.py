@@ -24,6 +24,8 @@ __all__ = ["has_angle", "metadata_of", "read_mapped", "run_of"]
 
 _OWN = ("load_mass", "length_zeroed", "programme")
 """Metadata that winchkit uses, in a file that has its names."""
+_DIGITS = 12
+"""Decimals of a time in seconds: differences of stamps have no more."""
 
 
 def read_mapped(path: str | Path, mapping: str | Path | ImportMapping) -> Run:
@@ -127,7 +129,7 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     header = [(name, next(iter(UNITS[column_dimension(name) or "ratio"]))) for name in channels]
     columns = list(channels.values())
     if streams.has_time:
-        header, columns = [("time", "s"), *header], [time - first, *columns]
+        header, columns = [("time", "s"), *header], [np.round(time - first, _DIGITS), *columns]
 
     def line_of(row: int) -> int | None:
         return streams.line_of(int(rows[row])) if rows is not None else None

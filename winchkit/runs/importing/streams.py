@@ -20,8 +20,8 @@ from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
 
 __all__ = ["Stream", "Streams", "merged", "streams_of"]
 
-_PADDED = 0.9
-"""Share of the fullest column's values below which a column has a rate of its own."""
+_PADDED = 0.67
+"""Share of rows with a value below which a column has a rate of its own: half the rate or less."""
 _BRIDGED = 2.5
 """Median intervals of a channel over which it is interpolated."""
 _SLOW = ("temperature", "swivel")
@@ -217,8 +217,7 @@ def _by_rate(stream: Stream) -> list[Stream]:
     """Streams of one rate each, where empty cells stand between the samples of slower channels."""
     known = {name: np.isfinite(values) for name, values in stream.channels.items()}
     counts = {name: int(np.count_nonzero(mask)) for name, mask in known.items()}
-    fullest = max(counts.values(), default=0)
-    padded = [name for name, count in counts.items() if count < _PADDED * fullest]
+    padded = [name for name, count in counts.items() if count < _PADDED * len(stream.time)]
     if not padded or not all(_is_spread(known[name]) for name in padded if counts[name] > 1):
         return [stream]
     found: dict[bytes, list[str]] = {}

@@ -12,7 +12,7 @@ from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.formats.stamps import is_stamp
 
-__all__ = ["Dialect", "decode", "find_dialect", "split_line"]
+__all__ = ["BLANKS", "Dialect", "decode", "find_dialect", "split_line"]
 
 BLANKS = " "
 _DELIMITERS = ("\t", ";", "|", ",", BLANKS)

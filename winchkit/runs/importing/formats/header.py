@@ -49,7 +49,7 @@ class Header:
     """Cells of the rows of the header, which some programs repeat."""
 
 
-def read_header(rows: Sequence[Row], width: int, decimal: str) -> Header:
+def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool) -> Header:
     """Read what is above the numbers.
 
     Parameters
@@ -60,6 +60,8 @@ def read_header(rows: Sequence[Row], width: int, decimal: str) -> Header:
         Cells of a row of numbers.
     decimal : str
         Decimal sign.
+    is_blank : bool
+        Whether blanks separate the cells: a sentence above the names has cells as well.
 
     Returns
     -------
@@ -67,18 +69,14 @@ def read_header(rows: Sequence[Row], width: int, decimal: str) -> Header:
         Names are empty where the file has none.
     """
     cut = _start_of_block(rows, width, decimal)
+    if is_blank:
+        cut = _start_of_names(rows, cut)
     above = [cells for _, cells in rows[:cut]]
     block = [_uncommented(cells, width) for _, cells in rows[cut:] if any(cells)]
     header = _pairs(block, width) or _stacked(block, width)
-    header.metadata.update(_metadata(above))
+    header.metadata.update(_metadata([[" ".join(c)] if is_blank else c for c in above]))
     header.rows = tuple(tuple(cells) for _, cells in rows[cut:] if any(cells))
     header.interval = header.interval or _interval(header.metadata, decimal)
-    lengths = header.metadata.get("Length Units")
-    if lengths and read_unit(lengths):
-        header.units = [
-            lengths if not unit and "position" in " ".join(labels).lower() else unit
-            for unit, labels in zip(header.units, header.labels, strict=True)
-        ]
     return header
 
 
@@ -93,7 +91,9 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str) -> int:
         given = [cell for cell in cells if cell]
         texts = [cell for cell in given if number(cell, decimal) is None]
         spread = cells and not cells[0] and len(given) >= 1 and end > cut
-        fits = len(cells) <= width + 1 and (spread or 2 * len(given) >= width)
+        is_comment = bool(_COMMENT.match(rows[cut - 1][1][0])) if rows[cut - 1][1] else False
+        fits = (len(cells) <= width + 1 and not is_comment) or len(cells) == width
+        fits = fits and (spread or 2 * len(given) >= width)
         if not given or not fits or (not texts and not spread):
             break
         if len(given) == 1 and width > 1:
@@ -102,6 +102,17 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str) -> int:
             break
         cut -= 1
     return cut
+
+
+def _start_of_names(rows: Sequence[Row], cut: int) -> int:
+    """Index of the row of names, where nothing but a row of units is below it."""
+    start = len(rows)
+    while start > cut:
+        start -= 1
+        cells = rows[start][1]
+        if any(cells) and not is_unit_row(cells):
+            return start
+    return start
 
 
 def _uncommented(cells: list[str], width: int) -> list[str]:

@@ -9,7 +9,13 @@ import numpy as np
 
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.formats.cells import is_missing, number, numbers
-from winchkit.runs.importing.formats.dialect import Dialect, decode, find_dialect, split_line
+from winchkit.runs.importing.formats.dialect import (
+    BLANKS,
+    Dialect,
+    decode,
+    find_dialect,
+    split_line,
+)
 from winchkit.runs.importing.formats.header import Header, Row, read_header
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.table import Column, Table, named_apart
@@ -95,7 +101,9 @@ def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended:
     first = _first_of_numbers(rows, dialect)
     if first is None:
         raise RunError(Fault("has no rows of numbers", path))
-    header = read_header(rows[:first], dialect.width, dialect.decimal)
+    header = read_header(
+        rows[:first], dialect.width, dialect.decimal, is_blank=dialect.delimiter == BLANKS
+    )
     found = _kept(path, rows[first:], header, dialect, is_ended=is_ended)
     columns = _columns(header, found, dialect)
     lines = np.array(found.lines, dtype=np.intp)

@@ -1,0 +1,208 @@
+"""Every fault of a file at once, with its line; and what a file may not do."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import pickle
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from winchkit.errors import RunError, UsageError
+from winchkit.runs.importing.assignment import Guess
+from winchkit.runs.importing.formats import source
+from winchkit.runs.importing.formats.source import read_table
+from winchkit.runs.importing.guess import guess_columns
+from winchkit.runs.importing.runs import run_of
+from winchkit.runs.importing.streams import streams_of
+from winchkit.runs.run import Run
+
+HEAD = "time [s];angle [deg];torque [Nm]"
+
+
+def rows(count: int = 30) -> list[str]:
+    return [f"{0.01 * k:.2f};{k};{1 + 0.1 * k:.1f}" for k in range(count)]
+
+
+def guessed(path: Path, lines: list[str], end: str = "\n") -> Guess:
+    path.write_text("\n".join(lines) + end, encoding="utf-8")
+    return guess_columns(read_table(path))
+
+
+def run(path: Path, lines: list[str], end: str = "\n") -> Run:
+    return run_of(streams_of(guessed(path, lines, end)), {})
+
+
+def test_all_faults_are_reported_at_once_with_their_lines(tmp_path: Path) -> None:
+    lines = [HEAD, *rows()]
+    lines[4] = "0.03;three;1.3"
+    lines[9] = "0.08;8;OVERRANGE"
+    lines[14] = "0.13;13"
+    lines[20] = "0.19;19;2.9;7"
+    with pytest.raises(RunError) as caught:
+        run(tmp_path / "log.csv", lines)
+    found = {fault.line: fault.message for fault in caught.value.faults}
+    assert sorted(found) == [5, 10, 15, 21]  # type: ignore[type-var]
+    assert "'three', not a number" in found[5]
+    assert "'OVERRANGE'" in found[10]
+    assert "2 cells in this row, 3 in the others" in found[15]
+
+
+def test_times_that_stand_still_have_their_lines(tmp_path: Path) -> None:
+    lines = ["title", "", HEAD, *rows()]
+    lines[10] = lines[10].replace("0.07;", "0.06;")
+    lines[20] = lines[20].replace("0.17;", "0.10;")
+    with pytest.raises(RunError) as caught:
+        run(tmp_path / "log.csv", lines)
+    assert [fault.line for fault in caught.value.faults] == [11, 21]
+    assert "stands still at 0.06 s" in caught.value.faults[0].message
+
+
+def test_faults_of_unused_columns_do_not_matter(tmp_path: Path) -> None:
+    lines = [f"{HEAD};Status", *(f"{row};{'ok' if k % 7 else 3}" for k, row in enumerate(rows()))]
+    assert len(run(tmp_path / "log.csv", lines)) == 30
+
+
+def test_repeated_rows_are_left_out_with_a_note(tmp_path: Path) -> None:
+    lines = [HEAD, *rows()]
+    lines.insert(5, lines[4])
+    found = run(tmp_path / "log.csv", lines)
+    assert len(found) == 30
+    assert any("repeat the row before them" in note for note in found.notes)
+
+
+def test_missing_values_stay_missing(tmp_path: Path) -> None:
+    lines = [HEAD, *rows()]
+    for line, text in ((3, ""), (6, "NaN"), (9, "#NV"), (12, "---"), (15, "n/a")):
+        lines[line] = f"{0.01 * (line - 1):.2f};{line};{text}"
+    found = run(tmp_path / "log.csv", lines)
+    assert np.flatnonzero(np.isnan(found["motor_torque"])).tolist() == [2, 5, 8, 11, 14]
+
+
+def test_a_cut_off_last_row_is_left_out_with_a_note(tmp_path: Path) -> None:
+    found = run(tmp_path / "log.csv", [HEAD, *rows(), "0.30;3"], end="")
+    assert len(found) == 30
+    assert any("no line end" in note for note in found.notes)
+
+
+def test_one_clock_with_rows_in_between_of_a_rate_of_its_own(tmp_path: Path) -> None:
+    """A temperature once a second is interpolated and does not thin the rows."""
+    lines = [f"{HEAD};temperature [°C]"]
+    for k, row in enumerate(rows(300)):
+        lines.append(f"{row};{20 + 0.01 * k:.4f}" if k % 100 == 0 else f"{row};")
+    found = run(tmp_path / "log.csv", lines)
+    assert len(found) == 300
+    assert found["temperature"][150] == pytest.approx(21.5)
+    assert np.isnan(found["temperature"][250])
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        (b"", "the file is empty"),
+        (b"just some words\nand more\n", "no rows of numbers"),
+        (bytes(range(256)) * 20, "binary file of an unknown format"),
+        (b"\x1f\x8b\x08\x00", "compressed by gzip"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1", "old Excel file"),
+        (b"TDSm....", "TDMS file"),
+        (b"PK\x03\x04broken", "damaged ZIP"),
+        (b"MATLAB 5.0 MAT-file" + b" " * 109, "not a readable MAT file"),
+        (b"PAR1broken", "not a readable Parquet file"),
+        (b"\x93NUMPYbroken", "not a readable NumPy file"),
+        (b"\x89MCAP0\r\nbroken", "not a readable MCAP file"),
+        (b"\x89HDF\r\n\x1a\nbroken", "not a readable HDF5 file"),
+    ],
+)
+def test_files_that_cannot_be_read_are_refused_in_words(
+    content: bytes, text: str, tmp_path: Path
+) -> None:
+    for needed, mark in (("pyarrow", b"PAR1"), ("h5py", b"\x89HDF")):
+        if content.startswith(mark) and importlib.util.find_spec(needed) is None:
+            pytest.skip(f"needs {needed}")
+    path = tmp_path / "log.bin"
+    path.write_bytes(content)
+    with pytest.raises(RunError, match=text):
+        read_table(path)
+
+
+def test_a_missing_file_a_folder_and_a_fifo_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="no such file"):
+        read_table(tmp_path / "none.csv")
+    with pytest.raises(RunError, match="directory"):
+        read_table(tmp_path)
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe")
+        with pytest.raises(RunError, match="FIFO"):
+            read_table(tmp_path / "pipe")
+
+
+class _Marker:
+    """An object whose unpickling writes a file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, tuple[str, str]]:
+        return (os.rename, (str(self.path), f"{self.path}.executed"))
+
+
+def test_pickled_objects_are_refused_and_not_executed(tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    mark.write_text("here")
+    array = np.array([_Marker(mark)], dtype=object)
+    path = tmp_path / "log.npz"
+    np.savez(path, t=np.arange(5.0), x=array)
+    assert b"rename" in pickle.dumps(_Marker(mark))
+    with pytest.raises(RunError, match="Python objects, which may hold code"):
+        read_table(path)
+    assert mark.exists()
+
+
+def test_an_archive_larger_than_the_limit_is_not_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from winchkit.runs.importing import table
+
+    monkeypatch.setattr(table, "LARGEST", 1_000_000)
+    path = tmp_path / "log.npz"
+    np.savez_compressed(path, t=np.zeros(1_000_000))
+    assert path.stat().st_size < 20_000
+    with pytest.raises(RunError, match=r"arrays of 0\.008 GB"):
+        read_table(path)
+
+
+def test_an_archive_of_other_files_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.zip"
+    with zipfile.ZipFile(path, "w") as packed:
+        packed.writestr("a.csv", "1,2\n")
+    with pytest.raises(RunError, match=r"archive of a\.csv"):
+        read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("module", "content", "extra"),
+    [
+        ("openpyxl", None, "xlsx"),
+        ("h5py", source._HDF5, "hdf5"),
+        ("pyarrow", b"PAR1", "parquet"),
+    ],
+)
+def test_a_missing_library_is_named_with_its_extra(
+    module: str,
+    content: bytes | None,
+    extra: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "log"
+    if content is None:
+        with zipfile.ZipFile(path, "w") as packed:
+            packed.writestr("xl/workbook.xml", "")
+    else:
+        path.write_bytes(content)
+    monkeypatch.setitem(__import__("sys").modules, module, None)
+    with pytest.raises(UsageError, match=rf"pip install 'winchkit\[{extra}\]'"):
+        read_table(path)

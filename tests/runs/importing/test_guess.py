@@ -1,0 +1,299 @@
+"""Channels by name, unit and the ratio of angle and velocity; and what is asked."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logger_layouts import motion
+from winchkit.runs.columns import POSE_DIMENSIONS
+from winchkit.runs.importing.answers import Answers, read_column
+from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.consistency import likely_counts, ratio_of
+from winchkit.runs.importing.formats.source import read_table
+from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
+from winchkit.runs.importing.guess import guess_columns
+from winchkit.runs.importing.names import meaning_of, words_of
+from winchkit.runs.importing.unit_spelling import read_unit, split_unit
+from winchkit.runs.run import CHANNEL_DIMENSIONS
+from winchkit.schema.mapping import CHANNELS, DATE, MATRIX
+from winchkit.units import UNITS
+
+TURN = 2 * math.pi
+
+
+def guess(path: Path, columns: dict[str, np.ndarray], answers: Answers | None = None) -> Guess:
+    table = np.stack(list(columns.values()), axis=1)
+    lines = [",".join(columns), *(",".join(f"{v:.12g}" for v in row) for row in table)]
+    path.write_text("\n".join(lines) + "\n")
+    return guess_columns(read_table(path), answers)
+
+
+def of(found: Guess, channel: str) -> Assignment:
+    return next(item for item in found.assignments if item.channel == channel)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "factor"),
+    [
+        ("1/min", "angular speed", TURN / 60),
+        ("min^-1", "angular speed", TURN / 60),
+        ("U/min", "angular speed", TURN / 60),
+        ("RPM", "angular speed", TURN / 60),
+        ("°/s", "angular speed", math.pi / 180),
+        ("deg/sec", "angular speed", math.pi / 180),
+        ("N·m", "torque", 1.0),
+        ("N.m", "torque", 1.0),
+        ("Nm", "torque", 1.0),
+        ("mNm", "torque", 1e-3),
+        ("Ncm", "torque", 1e-2),
+        ("in-lb", "torque", 0.112984829),
+        ("mN", "force", 1e-3),
+        ("MN", "force", 1e6),
+        ("lbf", "force", 4.4482216),
+        ("daN", "force", 10.0),
+        ("µm", "length", 1e-6),
+        ("Millimeters", "length", 1e-3),
+        ("[°]", "angle", math.pi / 180),
+        ("(Grad)", "angle", math.pi / 180),
+        ("Umdr.", "angle", TURN),
+        ("µs", "time", 1e-6),
+        ("Seconds", "time", 1.0),
+        ("‰", "share", 1e-3),
+        ("mV/V", "bridge", 1.0),
+        ("V (Voltage)", "voltage", 1.0),
+        ("Inkr", "counts", 1.0),
+    ],
+)
+def test_units_as_others_spell_them(text: str, dimension: str, factor: float) -> None:
+    found = read_unit(text)
+    assert found is not None
+    assert found.dimension == dimension
+    assert found.factor == pytest.approx(factor, rel=1e-6)
+
+
+@pytest.mark.parametrize("dimension", ["angle", "angular speed", "torque", "force", "length"])
+def test_every_unit_of_ours_is_read(dimension: str) -> None:
+    for unit, value in UNITS[dimension].items():
+        found = read_unit(unit)
+        assert found is not None
+        assert (found.dimension, found.factor) == (dimension, value)
+
+
+def test_temperatures_have_offsets() -> None:
+    fahrenheit, kelvin = read_unit("°F"), read_unit("K")
+    assert fahrenheit is not None
+    assert kelvin is not None
+    assert 212 * fahrenheit.factor + fahrenheit.offset == pytest.approx(100.0)
+    assert 273.15 * kelvin.factor + kelvin.offset == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "unit"),
+    [
+        ("Torque (Nm)", "Torque", "Nm"),
+        ("speed/rpm", "speed", "rpm"),
+        ("pos_deg", "pos", "deg"),
+        ("vel_rad/s", "vel", "rad/s"),
+        ("Kraft in N", "Kraft", "N"),
+        ("Position actual value [inc]", "Position actual value", "inc"),
+        ("time, s", "time", "s"),
+        ("Motor (left)", "Motor (left)", ""),
+        ("motor_a", "motor_a", ""),
+        ("joint_position_in", "joint_position_in", ""),
+        ("Drehzahl [1/min]", "Drehzahl", "1/min"),
+    ],
+)
+def test_unit_of_a_header_cell(text: str, name: str, unit: str) -> None:
+    assert split_unit(text) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [
+        ("Winkel_ist", "motor_angle"),
+        ("Drehzahl", "motor_velocity"),
+        ("Istdrehmoment", "motor_torque"),
+        ("Seilkraft", "tension"),
+        ("Seillänge", "cable_length"),
+        ("Zeit", "time"),
+        ("couple", "motor_torque"),
+        ("vitesse", "motor_velocity"),
+        ("fuerza", "tension"),
+        ("velocidad", "motor_velocity"),
+        ("tiempo", "time"),
+        ("LoadCell", "tension"),
+        ("Cell temperature", "temperature"),
+        ("Position demand value", ""),
+        ("Sollwinkel", "motor_angle"),
+        ("Winkel Soll", ""),
+        ("Following error actual value", ""),
+        ("A.motor_angle", "A.motor_angle"),
+    ],
+)
+def test_names_in_several_languages(name: str, channel: str) -> None:
+    meaning = meaning_of(name)
+    if name == "Sollwinkel":  # a set point in one word
+        assert meaning is None or meaning.channel == ""
+        return
+    assert meaning is not None
+    assert meaning.channel == channel
+
+
+def test_words_are_separated() -> None:
+    assert words_of("MotorPos_ist2") == "motor pos ist 2"
+    assert words_of("fActTorque") == "f act torque"
+
+
+@pytest.mark.parametrize("angle", ["rad", "deg", "turn"])
+@pytest.mark.parametrize("speed", ["rad/s", "deg/s", "rpm", "turn/s"])
+def test_the_unit_of_a_velocity_follows_from_the_angle(
+    angle: str, speed: str, tmp_path: Path
+) -> None:
+    m = motion()
+    factor = UNITS["angular speed"].get(speed, TURN)
+    columns = {
+        "t [s]": m.time,
+        f"angle [{angle}]": m.angle / UNITS["angle"][angle],
+        "speed": m.velocity / factor,
+    }
+    item = of(guess(tmp_path / "log.csv", columns), "motor_velocity")
+    assert item.factor == pytest.approx(factor)
+    assert item.confidence == "derived"
+
+
+def test_the_unit_of_an_angle_and_of_the_time_follow_from_the_others(tmp_path: Path) -> None:
+    m = motion()
+    columns = {
+        "t [s]": m.time,
+        "angle": m.angle * 180 / math.pi,
+        "speed [rpm]": m.velocity * 9.5493,
+    }
+    assert of(guess(tmp_path / "a.csv", columns), "motor_angle").factor == pytest.approx(
+        math.pi / 180
+    )
+    columns = {"t": m.time * 1e3, "angle [rad]": m.angle, "speed [rad/s]": m.velocity}
+    assert of(guess(tmp_path / "b.csv", columns), "time").factor == pytest.approx(1e-3)
+
+
+def test_equal_units_of_angle_and_velocity_are_ambiguous_and_asked(tmp_path: Path) -> None:
+    m = motion()
+    found = guess(tmp_path / "log.csv", {"t [s]": m.time, "angle": m.angle, "speed": m.velocity})
+    assert [q.options[0] for q in found.questions] == [
+        '--column "motor_angle=angle [UNIT]"',
+        '--column "motor_velocity=speed [UNIT]"',
+    ]
+
+
+def test_counts_per_turn_follow_from_a_velocity_with_unit(tmp_path: Path) -> None:
+    m = motion()
+    counts = np.round(m.angle / TURN * 10_000)
+    columns = {"t [s]": m.time, "position [inc]": counts, "speed [rpm]": m.velocity * 60 / TURN}
+    found = guess(tmp_path / "log.csv", columns)
+    assert of(found, "motor_angle").factor == pytest.approx(TURN / 10_000)
+    alone = guess(tmp_path / "b.csv", {"t [s]": m.time, "position [inc]": counts})
+    assert alone.questions[0].options[0] == "--counts-per-turn 4096"
+
+
+def test_an_opposite_sense_and_a_wrong_unit_are_reported(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"t [s]": m.time, "angle [rad]": m.angle, "speed [rad/s]": -m.velocity}
+    found = guess(tmp_path / "a.csv", columns)
+    assert of(found, "motor_velocity").factor == -1.0
+    assert any("opposite sense" in note for note in found.notes)
+    columns["speed [rad/s]"] = m.velocity * 60 / TURN
+    wrong = guess(tmp_path / "b.csv", columns)
+    assert any("is a unit, a gear ratio or a resolution wrong?" in note for note in wrong.notes)
+
+
+def test_a_ratio_needs_proportional_signals() -> None:
+    m = motion()
+    assert ratio_of(m.time, m.angle, m.velocity) is not None
+    assert ratio_of(m.time, m.angle, np.random.default_rng(0).standard_normal(len(m.time))) is None
+    assert ratio_of(m.time, np.ones(len(m.time)), m.velocity) is None
+
+
+@pytest.mark.parametrize(
+    ("estimate", "counts"), [(4093.0, 4096), (10_020.0, 10_000), (777.7, None)]
+)
+def test_usual_resolutions(estimate: float, counts: int | None) -> None:
+    assert likely_counts(estimate) == counts
+
+
+def test_constants_are_asked_and_used(tmp_path: Path) -> None:
+    m = motion()
+    columns = {
+        "t [s]": m.time,
+        "angle [rad]": m.angle,
+        "torque [%]": 50 * m.torque,
+        "cell [mV/V]": m.tension / 250,
+    }
+    keys = [q.key for q in guess(tmp_path / "log.csv", columns).questions]
+    assert keys == ["rated_torque", "sensitivity", "capacity"]
+    answers = Answers(rated_torque=2.0, sensitivity=2.0, capacity=500.0)
+    found = guess(tmp_path / "log.csv", columns, answers)
+    assert of(found, "motor_torque").factor == pytest.approx(0.02)
+    assert of(found, "tension").factor == pytest.approx(250.0)
+
+
+def test_two_columns_that_fit_equally_are_asked(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"t [s]": m.time, "angle [rad]": m.angle, "left force [N]": m.tension,
+               "right force [N]": m.tension}  # fmt: skip
+    (question,) = guess(tmp_path / "log.csv", columns).questions
+    assert question.options == (
+        '--column "tension=left force"',
+        '--column "tension=right force"',
+    )
+
+
+def test_the_motor_is_preferred_to_the_output_and_set_points_are_left_out(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"t [s]": m.time, "output position [deg]": m.angle, "motor position [deg]": m.angle,
+               "target position [deg]": m.angle, "torque [Nm]": m.torque, "current [A]": m.torque}  # fmt: skip
+    found = guess(tmp_path / "log.csv", columns)
+    assert not found.questions
+    assert of(found, "motor_angle").source == "motor position"
+    assert of(found, "motor_torque").source == "torque"
+
+
+def test_columns_of_the_user_have_precedence() -> None:
+    given = read_column("motor_torque=vir*35.15 [N m]")
+    assert (given.channel, given.source, given.factor, given.unit) == (
+        "motor_torque",
+        "vir",
+        35.15,
+        "N m",
+    )
+    assert read_column("tension=").source == ""
+    assert read_column("motor_torque=u*gtau").constant == "gtau"
+    for text in ("tenson=x", "tension=x [furlong]", "x"):
+        with pytest.raises(ValueError, match="is no channel|no known unit|is not CHANNEL"):
+            read_column(text)
+
+
+def test_a_channel_can_be_left_out(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"t [s]": m.time, "angle [rad]": m.angle, "torque [Nm]": m.torque}
+    answers = Answers(columns=(read_column("motor_torque="),))
+    found = guess(tmp_path / "log.csv", columns, answers)
+    assert {item.channel for item in found.used} == {"time", "motor_angle"}
+
+
+def test_channels_of_a_mapping_are_those_of_a_run() -> None:
+    """The schema cannot import the run's tables: they are equal."""
+    assert set(CHANNELS) == {"time", DATE, *CHANNEL_DIMENSIONS, *POSE_DIMENSIONS, *MATRIX}
+
+
+def test_stamps() -> None:
+    two = read_stamps(["2026-03-04T09:30:15.25+01:00", "2026-03-04 08:30:15,5Z"])
+    assert two.values[1] - two.values[0] == pytest.approx(0.25)
+    days = read_stamps(["13/2/2026 01:00:00 PM", "1/3/2026 13:00:00"])
+    assert days.values[1] - days.values[0] == pytest.approx(16 * 86_400)
+    assert read_stamps(["25:00:00", "12:00:00"]).wrong == (0,)
+    assert epoch_unit(np.array([1.7e12, 1.7e12 + 10])) == "ms"
+    assert epoch_unit(np.array([0.0, 0.01, 0.02])) is None
+    assert epoch_unit(np.array([46000.0, 46000.0000001, 46000.0000002])) == "excel"

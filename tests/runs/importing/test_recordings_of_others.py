@@ -1,0 +1,110 @@
+"""Recordings that others made: EMPS by the variables of its authors, and three joints.
+
+The data carry no licence of ours and are no part of the project; the tests are skipped without
+them. WINCHKIT_EMPS and WINCHKIT_REAL name the folders, else ``shared/data`` beside the checkout.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from winchkit.runs import read_run
+from winchkit.runs.importing.answers import Answers, read_column
+from winchkit.runs.importing.formats.source import read_table
+from winchkit.runs.importing.guess import guess_columns
+from winchkit.runs.importing.mapping import mapping_of, write_mapping
+from winchkit.runs.importing.runs import run_of
+from winchkit.runs.importing.streams import streams_of
+from winchkit.runs.run import Run
+
+GAIN = 35.15065
+"""Force over the drive's signal, N/V, published with the data."""
+
+
+def folder(variable: str, name: str) -> Path | None:
+    """Where the data are, if they are anywhere."""
+    beside = [parent / "shared" / "data" / name for parent in Path(__file__).resolve().parents]
+    named = os.environ.get(variable)
+    places = [Path(named)] if named else beside
+    return next((place for place in places if place.is_dir()), None)
+
+
+EMPS, REAL = folder("WINCHKIT_EMPS", "emps"), folder("WINCHKIT_REAL", "real")
+
+
+@pytest.mark.skipif(EMPS is None, reason="the EMPS data are not here; WINCHKIT_EMPS names them")
+@pytest.mark.parametrize("name", ["train", "test"])
+def test_emps_by_the_variables_of_its_authors(name: str, tmp_path: Path) -> None:
+    assert EMPS is not None
+    known = read_run(EMPS / f"{name}.csv")
+    force = known["motor_torque"]
+    path = tmp_path / "DATA_EMPS.mat"
+    variables = {
+        "t": known.time,
+        "qm": known["motor_angle"],
+        "qg": known["motor_angle"] + 1e-5,
+        "vir": force / GAIN,
+    }
+    savemat(path, {**{k: v.reshape(-1, 1) for k, v in variables.items()}, "gtau": GAIN})
+    plain = guess_columns(read_table(path))
+    assert {item.channel for item in plain.used} == {"time", "motor_angle"}
+    answers = Answers(columns=(read_column("motor_torque=vir*gtau"),))
+    guess = guess_columns(read_table(path), answers)
+    assert not guess.questions
+    mapping = tmp_path / "emps.toml"
+    write_mapping(mapping_of("emps", [("emps", guess)]), mapping)
+    run = read_run(path, mapping=mapping)
+    # Times start at the first sample.
+    assert run.time == pytest.approx(known.time - known.time[0], abs=1e-12)
+    assert np.array_equal(run["motor_angle"], known["motor_angle"])
+    assert run["motor_torque"] == pytest.approx(force, rel=1e-12)
+
+
+def _paths() -> list[Path]:
+    return sorted(REAL.glob("*/*.csv")) if REAL is not None else []
+
+
+@pytest.mark.skipif(REAL is None, reason="the recordings are not here; WINCHKIT_REAL names them")
+@pytest.mark.parametrize("form", ["semicolons", "degrees"])
+@pytest.mark.parametrize("path", _paths(), ids=lambda path: path.stem)
+def test_recordings_in_another_layout_are_the_same_run(
+    path: Path, form: str, tmp_path: Path
+) -> None:
+    """Real stamps (jitter, gaps) and quantised signals, written as two other programs do."""
+    known = read_run(path)
+    units = {
+        "motor_angle": "°",
+        "motor_velocity": "1/min",
+        "motor_torque": "Nm",
+        "temperature": "°C",
+    }
+    scale = {"motor_angle": 180 / np.pi, "motor_velocity": 30 / np.pi}
+    names = {"motor_angle": "Winkel", "motor_velocity": "Drehzahl", "motor_torque": "Drehmoment",
+             "temperature": "Temperatur"}  # fmt: skip
+    columns = [known.time * 1e3, *(known[name] * scale.get(name, 1.0) for name in known)]
+    head = ["Zeit [ms]", *(f"{names[name]} [{units[name]}]" for name in known)]
+    mark, comma = (";", ",") if form == "semicolons" else ("\t", ".")
+    rows = zip(*columns, strict=True)
+    lines = [mark.join(f"{v:.15g}".replace(".", comma) for v in row) for row in rows]
+    other = tmp_path / "log.txt"
+    other.write_text(
+        "\r\n".join(["Messung", "", mark.join(head), *lines]) + "\r\n", encoding="cp1252"
+    )
+    guess = guess_columns(read_table(other))
+    assert not guess.questions
+    assert all(item.confidence == "named" for item in guess.used)
+    run = run_of(streams_of(guess), {})
+    _equal(run, known)
+
+
+def _equal(run: Run, known: Run) -> None:
+    assert len(run) == len(known)
+    assert run.time == pytest.approx(known.time - known.time[0], abs=1e-9)
+    assert set(run) == set(known)
+    for name in known:
+        assert run[name] == pytest.approx(known[name], rel=1e-9, abs=1e-12, nan_ok=True)
