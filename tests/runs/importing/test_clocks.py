@@ -87,7 +87,7 @@ def test_a_periodic_motion_is_refused() -> None:
     noise = np.random.default_rng(2).standard_normal(len(theirs))
     one = file("drive.csv", ours, {"motor_angle": np.sin(2 * ours)})
     two = file("laser.csv", theirs, {"cable_length": np.sin(2 * theirs + 0.6) + 0.01 * noise})
-    with pytest.raises(RunError, match="several lags fit equally.*--lag"):
+    with pytest.raises(RunError, match=r"several lags fit equally.*--lag"):
         joined([one, two])
 
 

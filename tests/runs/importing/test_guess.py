@@ -253,7 +253,8 @@ def test_two_columns_that_fit_equally_are_asked(tmp_path: Path) -> None:
 def test_the_motor_is_preferred_to_the_output_and_set_points_are_left_out(tmp_path: Path) -> None:
     m = motion()
     columns = {"t [s]": m.time, "output position [deg]": m.angle, "motor position [deg]": m.angle,
-               "target position [deg]": m.angle, "torque [Nm]": m.torque, "current [A]": m.torque}  # fmt: skip
+               "target position [deg]": m.angle, "torque [Nm]": m.torque,
+               "current [A]": m.torque}  # fmt: skip
     found = guess(tmp_path / "log.csv", columns)
     assert not found.questions
     assert of(found, "motor_angle").source == "motor position"
@@ -271,7 +272,7 @@ def test_columns_of_the_user_have_precedence() -> None:
     assert read_column("tension=").source == ""
     assert read_column("motor_torque=u*gtau").constant == "gtau"
     for text in ("tenson=x", "tension=x [furlong]", "x"):
-        with pytest.raises(ValueError, match="is no channel|no known unit|is not CHANNEL"):
+        with pytest.raises(ValueError, match=r"is no channel|no known unit|is not CHANNEL"):
             read_column(text)
 
 

@@ -251,8 +251,9 @@ def _asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
     from winchkit.cli.files.import_table import tables_text
     from winchkit.runs.importing.guess import guess_columns
 
-    while guess.questions:
+    if guess.questions:
         click.echo(tables_text(replace(guess, questions=())), err=True)
+    while guess.questions:
         answers = _answered(guess, answers)
         guess = guess_columns(guess.table, answers)
     return guess, answers

@@ -1,0 +1,294 @@
+"""``winchkit import`` as a user gives it: by pipes, on a terminal, with a mapping."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from logger_layouts import COUNTS, LAYOUTS, RATED, motion
+from winchkit.cli import main
+from winchkit.runs import read_run
+
+HEAD = "time [s],position [deg],speed [rpm],torque [%],force [N]"
+
+
+def command(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["import", *map(str, arguments)])
+
+
+def log(path: Path, head: str = HEAD) -> Path:
+    m = motion()
+    columns = (
+        m.time,
+        np.degrees(m.angle),
+        m.velocity * 9.549297,
+        100 * m.torque / RATED,
+        m.tension,
+    )
+    rows = (",".join(f"{v:.10g}" for v in row) for row in zip(*columns, strict=True))
+    path.write_text("\n".join([head, *rows]) + "\n")
+    return path
+
+
+def test_without_an_output_it_only_looks(tmp_path: Path) -> None:
+    result = command(log(tmp_path / "log.csv"))
+    assert result.exit_code == 0
+    assert "motor_velocity  rpm   0.10472    named" in result.stdout
+    assert "? 'torque' is in %: of which torque?: --rated-torque \"2.4 N m\"" in result.stdout
+    assert os.listdir(tmp_path) == ["log.csv"]
+
+
+def test_without_a_terminal_every_answer_is_named(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv", HEAD.replace("force [N]", "cell [mV/V]"))
+    result = command(path, "-o", tmp_path / "runs")
+    assert result.exit_code == 2
+    for option in ("--rated-torque", "--sensitivity", "--capacity"):
+        assert option in result.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_certain_guess_needs_no_consent_and_the_mapping_makes_the_next_import_silent(
+    tmp_path: Path,
+) -> None:
+    path, runs = log(tmp_path / "log.csv"), tmp_path / "runs"
+    first = command(path, "-o", runs, "--rated-torque", "2.4 N m", "--load-mass", "15 kg")
+    assert first.exit_code == 0, first.output
+    assert first.stdout == f"{runs / 'log.csv'}\n"
+    run = read_run(runs / "log.csv")
+    assert run.load_mass == 15.0
+    assert run.metadata["imported_from"] == "log.csv"
+    assert run["motor_torque"] == pytest.approx(motion().torque, rel=1e-9)
+    again = command(path, "-o", tmp_path / "again", "--mapping", runs / "mapping.toml")
+    assert again.exit_code == 0
+    assert "confidence" not in again.stderr
+    same = read_run(tmp_path / "again" / "log.csv")
+    assert np.array_equal(same["motor_torque"], run["motor_torque"])
+    assert same.metadata["imported_mapping"] == run.metadata["imported_mapping"]
+    by_python = read_run(path, mapping=runs / "mapping.toml")
+    assert np.array_equal(by_python["motor_angle"], run["motor_angle"])
+
+
+def test_an_assumed_unit_needs_consent(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv", "t,q,dq [rpm],tau,force [N]")
+    refused = command(path, "-o", tmp_path / "runs")
+    assert refused.exit_code == 2
+    assert "accept the guess by --yes" in refused.stderr
+    assert "'tau' as motor_torque [N m] is assumed" in refused.stderr
+    assert command(path, "-o", tmp_path / "runs", "--yes").exit_code == 0
+
+
+def test_json_is_complete(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv")
+    result = command(path, "--json", "-o", tmp_path / "runs", "--rated-torque", "2.4 N m")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found["schema"] == 1
+    (file,) = found["files"]
+    columns = {item["source"]: item for item in file["columns"]}
+    assert columns["torque"]["channel"] == "motor_torque"
+    assert columns["torque"]["factor"] == pytest.approx(0.024)
+    assert columns["torque"]["confidence"] == "given"
+    (run,) = found["runs"]
+    assert run["summary"]["rows"] == len(motion().time)
+    assert found["mapping"] == str(tmp_path / "runs" / "mapping.toml")
+    opened = command(path, "--json", "-o", tmp_path / "other")
+    assert opened.exit_code == 2
+    (question,) = json.loads(opened.stdout)["files"][0]["questions"]
+    assert question["options"][0] == '--rated-torque "2.4 N m"'
+
+
+def test_a_drive_and_a_cell_with_clocks_of_their_own_become_one_run(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    t, u = np.arange(0, 30, 0.004), np.arange(0, 25, 0.02)
+
+    def angle(x: np.ndarray) -> np.ndarray:
+        return 20 * np.sin(0.31 * x) + 4 * np.sin(1.7 * x + 0.4) + 0.8 * x
+
+    length = 0.06 * angle(u + 2.5) + 0.0003 * rng.standard_normal(len(u))
+    drive, laser = tmp_path / "drive.csv", tmp_path / "laser.txt"
+    drive.write_text(
+        "t [s],angle [rad]\n"
+        + "".join(f"{a:.4f},{b:.6f}\n" for a, b in zip(t, angle(t), strict=True))
+    )
+    laser.write_text(
+        "Zeit [ms]\tSeillänge [mm]\n"
+        + "".join(f"{1e3 * a:.1f}\t{1e3 * b:.4f}\n" for a, b in zip(u, length, strict=True))
+    )
+    result = command(drive, laser, "-o", tmp_path / "runs", "--json")
+    assert result.exit_code == 0, result.output
+    (joint,) = json.loads(result.stdout)["joints"]
+    assert joint["method"] == "cross-correlation"
+    assert joint["agreement"]["lag"] == pytest.approx(2.5, abs=2e-3)
+    run = read_run(tmp_path / "runs" / "drive.csv")
+    slope = np.polyfit(run["motor_angle"], run["cable_length"], 1)[0]
+    assert slope == pytest.approx(0.06, rel=1e-3)
+    assert "cross-correlation" in run.metadata["joined"]
+    mapped = command(
+        drive, laser, "-o", tmp_path / "more", "--mapping", tmp_path / "runs" / "mapping.toml"
+    )
+    assert mapped.exit_code == 0, mapped.output
+
+
+def test_recordings_are_never_written_over(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv")
+    before = path.read_bytes()
+    rated = ("--rated-torque", "2.4 N m")
+    result = command(path, "-o", tmp_path, *rated, "--replace")
+    assert result.exit_code == 2
+    assert "would replace the imported file" in result.stderr
+    assert path.read_bytes() == before
+    assert command(path, "-o", tmp_path / "runs", *rated).exit_code == 0
+    twice = command(path, "-o", tmp_path / "runs", *rated)
+    assert twice.exit_code == 2
+    assert "--replace" in twice.stderr
+    assert command(path, "-o", tmp_path / "runs", *rated, "--replace").exit_code == 0
+
+
+def test_files_of_one_name_become_different_runs(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        log(tmp_path / folder / "log.csv", HEAD.replace("[%]", "[Nm]"))
+    result = command(tmp_path / "a/log.csv", tmp_path / "b/log.csv", "-o", tmp_path / "runs")
+    assert result.exit_code == 0, result.output
+    assert sorted(os.listdir(tmp_path / "runs")) == ["log-2.csv", "log.csv", "mapping.toml"]
+
+
+def test_faults_of_all_files_are_reported_at_once(tmp_path: Path) -> None:
+    good = log(tmp_path / "log.csv")
+    result = command(good, tmp_path / "none.csv", tmp_path, "-o", tmp_path / "runs")
+    assert result.exit_code == 3
+    assert "none.csv: there is no such file" in result.stderr
+    assert "directory" in result.stderr
+
+
+def test_a_file_that_a_mapping_does_not_fit_is_refused(tmp_path: Path) -> None:
+    path, runs = log(tmp_path / "log.csv", HEAD.replace("[%]", "[Nm]")), tmp_path / "runs"
+    assert command(path, "-o", runs).exit_code == 0
+    other = log(tmp_path / "other.csv", "t [s],pos [deg],speed [rpm],torque [Nm],force [N]")
+    result = command(other, "-o", tmp_path / "more", "--mapping", runs / "mapping.toml")
+    assert result.exit_code == 3
+    assert "it lacks the columns 'time', 'position'" in result.stderr
+
+
+def test_check_reads_a_mapping_with_every_fault(tmp_path: Path) -> None:
+    mapping = tmp_path / "mapping.toml"
+    text = (
+        'schema = 1\nkind = "mapping"\n[[log]]\nname = "a"\n[[log.column]]\nsource = "x"\n'
+        'channel = "tenson"\nunit = "N"\n[[log.column]]\nsource = "y"\nchannel = "motor_angle"\n'
+        'unit = "furlong"\n'
+    )
+    mapping.write_text(text)
+    result = CliRunner().invoke(main, ["check", str(mapping)])
+    assert result.exit_code == 3
+    assert "mapping.toml:7: log[1].column[1].channel: 'tenson' is no channel" in result.stderr
+    assert (
+        "mapping.toml:12: log[1].column[2].unit: 'furlong' has no known SI value" in result.stderr
+    )
+
+
+def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv", HEAD.replace("force", "\x1b[2Jforce"))
+    done = subprocess.run(
+        [sys.executable, "-m", "winchkit", "import", str(path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "\x1b" not in done.stdout + done.stderr
+    assert "\\x1b[2Jforce" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--rated-torque", "2 kg"), "unknown torque unit 'kg'"),
+        (("--counts-per-turn", "-3"), "must be above 0"),
+        (("--column", "tenson=x"), "did you mean 'tension'?"),
+        (("--load-mass", "1 kg", "--load-mass", "2 kg"), "2 --load-mass for 1 files"),
+        (("--column", "tension=nowhere"), "there is no column 'nowhere'"),
+    ],
+)
+def test_invalid_options_are_refused_in_words(
+    arguments: Sequence[str], text: str, tmp_path: Path
+) -> None:
+    path = log(tmp_path / "log.csv", HEAD.replace("[%]", "[Nm]"))
+    result = command(path, "-o", tmp_path / "runs", *arguments)
+    assert result.exit_code == 2, result.output
+    assert text in result.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are of POSIX")
+def test_on_a_terminal_it_asks_and_writes(tmp_path: Path) -> None:
+    layout = next(item for item in LAYOUTS if item.name == "epos-studio")
+    path = tmp_path / "epos.txt"
+    layout.write(path)
+    lines = path.read_text(encoding="utf-8").replace("Velocity actual value [rpm]", "Aux input")
+    path.write_text(lines, encoding="utf-8")
+    shown = _on_terminal(
+        ["import", str(path), "-o", str(tmp_path / "runs")],
+        [("how many in a motor turn?", f"{COUNTS}\n"), ("of which torque?", "2.4 kg\n"),
+         ("unknown torque unit", "2.4 N m\n")],
+    )  # fmt: skip
+    assert "Aux input" in shown
+    run = read_run(tmp_path / "runs" / "epos.csv")
+    assert run["motor_angle"] == pytest.approx(motion().angle, abs=1e-4)
+    assert run["motor_torque"] == pytest.approx(motion().torque, rel=1e-6)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are of POSIX")
+def test_on_a_terminal_an_assumed_unit_is_confirmed(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv", "t,q,dq [rpm],tau,force [N]")
+    arguments = ["import", str(path), "-o", str(tmp_path / "runs")]
+    shown = _on_terminal(arguments, [("Import as shown?", "y\n")])
+    assert "assumed" in shown
+    assert (tmp_path / "runs" / "log.csv").exists()
+
+
+def _on_terminal(arguments: Sequence[str], talk: Sequence[tuple[str, str]]) -> str:
+    """Output of a command on a pseudo-terminal, with the answer to each prompt."""
+    import pty
+
+    host, guest = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "winchkit", *arguments],
+        stdin=guest,
+        stdout=guest,
+        stderr=guest,
+        close_fds=True,
+    )
+    os.close(guest)
+    shown, answers, end = "", list(talk), time.monotonic() + 60
+    answered_at = 0
+    while time.monotonic() < end:
+        ready, _, _ = select.select([host], [], [], 0.5)
+        if ready:
+            try:
+                piece = os.read(host, 4096)
+            except OSError:
+                break
+            if not piece:
+                break
+            shown += piece.decode(errors="replace")
+        if (
+            answers
+            and answers[0][0] in shown[answered_at:]
+            and shown.rstrip().endswith((":", "]:"))
+        ):
+            answered_at = len(shown)
+            os.write(host, answers.pop(0)[1].encode())
+        elif not ready and process.poll() is not None:
+            break
+    os.close(host)
+    assert process.wait(10) == 0, shown
+    assert not answers, shown
+    return shown
