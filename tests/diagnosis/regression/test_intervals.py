@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.stats import t
 
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.intervals import estimates, profile_ends, spread_of
+from winchkit.diagnosis.regression.intervals import (
+    between_parts,
+    effective_dof,
+    estimates,
+    profile_ends,
+    spread_of,
+)
 from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 
@@ -184,3 +192,92 @@ def test_an_unidentifiable_parameter_is_undetermined_without_warning() -> None:
     low, high = values["gap"].interval or (np.nan, np.nan)
     assert low < 0.02 < high
     assert values["gap"].std < 0.01
+
+
+def covered(parts: int, between: float, unequal: float = 0.0) -> tuple[float, float]:
+    """Share of 20 000 intervals that hold the truth, and their mean length over the plain one.
+
+    Every case has ``parts`` parts of weights e^N(0, ``unequal``) and values that differ by
+    ``between`` standard deviations of a mean part.
+    """
+    random = np.random.default_rng(parts)
+    weights = np.exp(unequal * random.standard_normal((parts, 20_000)))
+    weights /= weights.sum(axis=0)
+    whole = np.full(20_000, 1 / parts)
+    own = random.standard_normal(weights.shape) * np.sqrt(whole / weights)
+    values = own + between * random.standard_normal(weights.shape)
+    common = np.sum(weights * values, axis=0)
+    parted = between_parts(weights * (values - common), weights, whole)
+    variance = whole + parted.variance
+    half = t.ppf(0.975, effective_dof(variance, [parted])) * np.sqrt(variance)
+    return float(np.mean(np.abs(common) < half)), float(np.mean(half / np.sqrt(whole)) / 1.96)
+
+
+@pytest.mark.parametrize("parts", [2, 6, 20, 60])
+def test_equal_parts_keep_the_level_without_a_long_interval(parts: int) -> None:
+    share, length = covered(parts, 0.0)
+    assert 0.945 < share < 0.975
+    assert length < {2: 1.7, 6: 1.3, 20: 1.12, 60: 1.07}[parts]
+
+
+@pytest.mark.parametrize("parts", [6, 20, 60])
+@pytest.mark.parametrize("between", [1.0, 3.0, 20.0])
+def test_parts_that_differ_keep_the_level(parts: int, between: float) -> None:
+    assert covered(parts, between)[0] == pytest.approx(0.95, abs=0.01)
+
+
+def test_two_parts_that_differ_are_told_with_one_degree_of_freedom() -> None:
+    """No interval of two values has both the level and a useful length; methods.md states it."""
+    assert 0.80 < covered(2, 3.0)[0] < 0.95
+    assert covered(2, 100.0)[0] == pytest.approx(0.95, abs=0.02)
+
+
+def test_a_part_that_says_little_of_a_value_does_not_widen_it_more_than_it_contradicts() -> None:
+    """Sixty parts, one with a thousandth of the information and two deviations off."""
+    weights = np.full((60, 1), (1 - 1e-3) / 59)
+    weights[-1] = 1e-3
+    values = np.zeros((60, 1))
+    values[-1] = 2 / np.sqrt(1e-3)
+    shifts = weights * (values - np.sum(weights * values, axis=0))
+    assert between_parts(shifts, weights, np.ones(1)).variance == pytest.approx(0.0)
+    both = np.array([[0.999], [0.001]])
+    shifts = np.array([[0.999], [0.001]]) * np.array([[-0.001], [0.999]]) * 3 / np.sqrt(1e-3)
+    # Birge: Q is 9, and the variance with it.
+    assert between_parts(shifts, both, np.ones(1)).variance == pytest.approx(8.0, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("runs", [2, 6, 20, 60])
+@pytest.mark.parametrize("between", [0.0, 3.0])
+def test_intervals_of_many_programmes_cover_the_truth(runs: int, between: float) -> None:
+    """The gain of a cell, each run another programme, the gain the same or another in each."""
+    ride = Ride(samples=100, rate=10.0)
+    recorded = [
+        made(
+            i, GROOVED, (), {"tension": 0.0}, ride=replace(ride, stroke=100.0 * 1.1 ** (i % 30)),
+            load_mass=10.0 + i // 30, encoder=0.0,
+        )
+        for i in range(runs)
+    ]  # fmt: skip
+    regression = TimeSeriesRegression(prepare(recorded, GROOVED))
+    assert len(set(regression.group_of_run)) == runs
+    start = Hypothesis().with_term(term("cell-gain"), runs)
+    column = regression.change(Hypothesis().with_term(GAIN, runs)) / 0.01
+    power = np.full(len(regression.bands), 0.8**2)
+    noise = Noise(power, np.full(len(power), 1e6), {"tension": 0.8}, from_repeats=True)
+    one = 0.8 / np.sqrt(float(column @ column) / runs)
+    inside, cases = 0, 200
+    for seed in range(cases):
+        random = np.random.default_rng(seed)
+        residual = 0.8 * random.standard_normal(regression.n_rows)
+        for segment in regression.segments:
+            residual[segment.rows] += column[segment.rows] * between * one * random.normal()
+        regression.nominal_residual = residual
+        found = fit(regression, start, noise.inverse_sigma(regression))
+        spread = spread_of(regression, found, noise, regression.blocks)
+        ((_, values),) = estimates(regression, found, spread)
+        low, high = values["gain_error"].interval or (np.nan, np.nan)
+        inside += low < 0.0 < high
+    # Two of which differ have one degree of freedom between them.
+    least = 0.78 if runs == 2 and between else 0.95 - 3 * np.sqrt(0.95 * 0.05 / cases)
+    assert inside / cases > least

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import ks_2samp
 
 from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.data.dataset import prepare
@@ -16,16 +18,19 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.verdict.specification_test import (
+from winchkit.diagnosis.verdict.curve_fits import (
+    BasisProducts,
     PartialRegression,
+    ranked_curves,
+)
+from winchkit.diagnosis.verdict.specification_null import Named, null_excess
+from winchkit.diagnosis.verdict.specification_test import (
     SpecificationTest,
-    _BasisProducts,
-    best_curve,
     judge_with_specification_test,
 )
 from winchkit.diagnosis.verdict.spline_alternatives import (
-    PLACES,
-    columns_of,
+    CurveFamily,
+    curves,
     laws_over,
     linear_splines,
 )
@@ -62,9 +67,8 @@ def test_a_gain_is_what_least_squares_takes(seed: int, free: int, width: int) ->
     partial = PartialRegression(residual, jacobian, inverse_sigma)
     whitened = basis * inverse_sigma
     left = whitened - (whitened @ partial.explained) @ partial.explained.T
-    gain = _BasisProducts(
-        whitened @ whitened.T, left @ left.T, left @ partial.residual
-    ).explained_ss(law)
+    products = BasisProducts(whitened @ whitened.T, left @ left.T)
+    gain = products.explained_ss(law, left @ partial.residual)
 
     def squares(columns: Array) -> float:
         columns = columns * inverse_sigma[:, None]
@@ -84,10 +88,8 @@ def test_what_the_model_explains_whole_leaves_curves_nothing() -> None:
     partial = PartialRegression(residual, basis[:1].T, inverse_sigma)
     left = basis - (basis @ partial.explained) @ partial.explained.T
     only = np.eye(20)[:, :1]
-    assert (
-        _BasisProducts(basis @ basis.T, left @ left.T, left @ partial.residual).explained_ss(only)
-        == 0.0
-    )
+    products = BasisProducts(basis @ basis.T, left @ left.T)
+    assert products.explained_ss(only, left @ partial.residual) == 0.0
 
 
 def test_linear_splines_add_up_to_one_and_reproduce_straight_lines() -> None:
@@ -113,7 +115,8 @@ def test_a_curve_of_the_winding_pulls_the_torque_by_virtual_work() -> None:
     knots = np.linspace(min(map(np.min, lengths)), max(map(np.max, lengths)), 20)
     basis = [linear_splines(length, knots) for length in lengths]
     curve = np.zeros(regression.n_rows)
-    for own, columns in columns_of(regression, PLACES["winding"], basis, knots):
+    family = CurveFamily("winding", "cable_length", (), knots, basis)
+    for own, columns in family.columns(regression):
         curve[own] = (share * (knots - 4.0)) @ columns
     for output, close in (("cable_length", 0.02), ("motor_torque", 0.02)):
         rows = np.concatenate([np.r_[s.rows] for s in regression.segments if s.output == output])
@@ -196,7 +199,51 @@ def test_what_is_left_beside_all_terms_is_what_the_fit_left() -> None:
 def test_curves_are_searched_only_where_the_named_effects_act() -> None:
     engine, result = rubbed()
     partial = SpecificationTest(engine, result).partial([0])
-    curve = best_curve(engine.regression, partial, ["motor_torque"], engine.penalty_per_parameter)
-    assert curve is not None
-    assert curve.place in {"motor_torque", "cable_force"}
-    assert best_curve(engine.regression, partial, [], engine.penalty_per_parameter) is None
+    penalty = engine.penalty_per_parameter
+    ranked = ranked_curves(engine.regression, partial, ["motor_torque"], penalty)
+    assert {curve.place for curve in ranked} == {"motor_torque", "cable_force", "winding"}
+    assert ranked[0].place in {"motor_torque", "cable_force"}
+    assert ranked[0].net_gain == max(curve.net_gain for curve in ranked)
+    assert ranked_curves(engine.regression, partial, [], penalty) == []
+
+
+def with_residual(partial: PartialRegression, residual: Array) -> PartialRegression:
+    other = copy(partial)
+    other.residual = residual
+    return other
+
+
+def test_the_null_distribution_is_that_of_fits_to_drawn_data() -> None:
+    """Every draw once more, by least squares on whole data instead of by inner products."""
+    engine, result = rubbed()
+    regression, noise, penalty = engine.regression, result.noise, engine.penalty_per_parameter
+    test = SpecificationTest(engine, result)
+    partial = test.partial([0], discretization=False)
+    own = result.final.jacobian[:, regression.unknowns_of(0, result.final.hypothesis)]
+    columns = own * partial.inverse_sigma[:, None]
+    columns = columns / np.sqrt(np.sum(columns**2, axis=0))
+    columns -= partial.explained @ (partial.explained.T @ columns)
+    change = partial.projected(regression.change(result.final.hypothesis))
+    places = [("motor_torque", "speed"), ("cable_force", "cable_length")]
+    families = list(curves(regression, ["motor_torque"], places))
+    drawn = null_excess(regression, noise, partial, Named(change, columns, 1), families)
+    random, redrawn = np.random.default_rng(3), []
+    basis = np.linalg.qr(columns)[0]
+    for _ in range(200):
+        factor = np.sqrt(noise.dof / random.chisquare(noise.dof))[regression.band_of_row]
+        white = random.standard_normal(regression.n_rows) * factor
+        white -= partial.explained @ (partial.explained.T @ white)
+        seen = change + white
+        left = white - basis @ (basis.T @ white)
+        gain = max(
+            fitted.net_gain
+            for fitted in ranked_curves(
+                regression,
+                with_residual(partial, seen),
+                ["motor_torque"],
+                penalty,
+            )
+            if (fitted.place, fitted.variable) in places
+        )
+        redrawn.append(gain - (float(seen @ seen) - float(left @ left) - penalty))
+    assert ks_2samp(drawn, redrawn).pvalue > 1e-3

@@ -3,7 +3,7 @@
 The profile-likelihood interval assumes that model and noise variance are right. It is widened
 
 - to the interval of the block jackknife, where blocks of time vary by more than the noise;
-- by half of the contradiction between parts of the data (outputs, groups of runs);
+- by a variance between parts of the data (outputs, groups of runs), as in a meta-analysis;
 - by the discretisation error.
 
 The covariance of independent residuals is not used: residuals are correlated. The intervals are not
@@ -15,15 +15,18 @@ Venzon, D. J., Moolgavkar, S. H. (1988). A method for computing profile-likeliho
 intervals. Appl. Stat. 37, 87-94.
 Künsch, H. R. (1989). The jackknife and the bootstrap for general stationary observations. Ann.
 Stat. 17, 1217-1241.
+DerSimonian, R., Laird, N. (1986). Meta-analysis in clinical trials. Control. Clin. Trials 7,
+177-188.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds, Regression
@@ -36,7 +39,10 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
+    "BetweenParts",
     "Spread",
+    "between_parts",
+    "effective_dof",
     "estimates",
     "profile_ends",
     "spread_of",
@@ -139,8 +145,10 @@ class _Profile:
 
 
 _95 = 1.959964
-_CONTRADICTION = 3.5
-_LEAST_WEIGHT = 1e-3
+_MANY_PARTS = 3.0
+"""Effective number of parts from which a variance between parts is estimated."""
+_NO_INFORMATION = 1e-9
+"""Share of the information on an unknown below which a part says nothing of it."""
 _UNDETERMINED = 1e6
 """In units of the usual size: an unknown with a larger standard deviation is undetermined."""
 
@@ -188,8 +196,14 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
     shift_by_discretization = covariance @ (
         whitened.T @ (regression.discretization_error(fit.hypothesis) * inverse_sigma)
     )
-    contradiction = _contradiction(regression, whitened, fit.residual * inverse_sigma, covariance)
-    systematic = np.hypot(shift_by_discretization, contradiction)
+    own = statistical**2
+    kinds = [
+        between_parts(*_by_part(whitened, fit.residual * inverse_sigma, covariance, parts), own)
+        for parts in _kinds_of_parts(regression)
+    ]
+    between = sum((kind.variance for kind in kinds), np.zeros_like(own))
+    variance = own + shift_by_discretization**2 + between
+    stretch = stdtrit(effective_dof(variance, kinds), 0.975) / _95
     wider = np.divide(
         statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
     )
@@ -197,10 +211,11 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
     below, above = (
         np.where(unknown, _UNDETERMINED, way) for way in (fit.vector - low, high - fit.vector)
     )
+    systematic = _95 * np.sqrt(variance - own)
     return Spread(
-        np.hypot(statistical, systematic),
-        fit.vector - np.hypot(below, _95 * systematic),
-        fit.vector + np.hypot(above, _95 * systematic),
+        np.sqrt(variance),
+        fit.vector - stretch * np.hypot(below, systematic),
+        fit.vector + stretch * np.hypot(above, systematic),
     )
 
 
@@ -211,48 +226,100 @@ def _jackknife(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) ->
     return np.asarray(np.sqrt((n - 1) / n * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
 
 
-def _contradiction(
-    regression: Regression, whitened: Array, residual: Array, covariance: Array
-) -> Array:
-    """Half of the largest difference between the estimates from a part of the data and the rest.
+@dataclass(frozen=True)
+class BetweenParts:
+    """Variance of the common values by differences between parts of the data.
 
-    Zero where the difference is below 3.5 standard deviations. A part with the normal matrix N
-    changes an unknown by u = C Jᵀr, where C is the covariance of the fit; with the weight w = (C N
-    C)/C the estimates of part and rest differ by u/(w(1 − w)).
+    Attributes
+    ----------
+    variance : ndarray of shape (n_unknowns,)
+        Added variance; zero where parts agree within their uncertainties.
+    uncertain : ndarray of shape (n_unknowns,)
+        Part of the whole variance that was estimated from the parts.
+    dof : ndarray of shape (n_unknowns,)
+        Its degrees of freedom, parts less one.
     """
-    out = np.zeros(len(covariance))
+
+    variance: Array
+    uncertain: Array
+    dof: Array
+
+
+def between_parts(shifts: Array, weights: Array, within: Array) -> BetweenParts:
+    """Variance of common values by a random effect of every part.
+
+    Parameters
+    ----------
+    shifts : ndarray of shape (n_parts, n_unknowns)
+        Shift w (θ̂ − θ̂ of the part) of each common value by each part.
+    weights : ndarray of shape (n_parts, n_unknowns)
+        Share w of each part in the information on each unknown.
+    within : ndarray of shape (n_unknowns,)
+        Variance of the common values where all parts agree.
+
+    Notes
+    -----
+    The estimate of a part has the variance v/w + τ², v being ``within``. Cochran's Q = Σ u²/(w v)
+    of the shifts u gives τ² = v (Q − (G − 1))/(1 − Σw²), at least zero (DerSimonian and Laird). The
+    common value is the fit's, with the weights w, so that τ² Σw² is added to its variance; that of
+    the mean with the weights 1/(v/w + τ²) would not be larger. Where Q exceeds G − 1, intervals
+    have quantiles of t(G − 1) (Hartung and Knapp). One part with most of the weight makes the
+    divisor small: with fewer than three effective parts, 1/Σw², the variance is multiplied by
+    Q/(G − 1) instead (Birge), which is the same for equal weights.
+
+    References
+    ----------
+    DerSimonian, R., Laird, N. (1986). Controlled Clinical Trials 7, 177-188.
+    Hartung, J., Knapp, G. (2001). Statistics in Medicine 20, 1771-1782.
+    Birge, R. T. (1932). Phys. Rev. 40, 207-227.
+    """
+    informative = weights > _NO_INFORMATION
+    dof = np.maximum(np.sum(informative, axis=0) - 1.0, 1.0)
+    scaled = np.where(informative, weights, 1.0) * np.maximum(within, 1e-300)
+    q = np.sum(np.where(informative, shifts**2 / scaled, 0.0), axis=0)
+    concentration = np.sum(weights**2, axis=0)
+    differ = (q > dof) & (np.sum(informative, axis=0) > 1)
+    many = concentration * _MANY_PARTS < 1.0 + 1e-9
+    share = np.where(many, concentration / np.maximum(1.0 - concentration, 1e-9), 1.0 / dof)
+    variance = np.where(differ, within * share * (q - dof), 0.0)
+    uncertain = np.where(many & differ, within * share * q, variance)
+    return BetweenParts(variance, uncertain, dof)
+
+
+def effective_dof(variance: Array, kinds: Sequence[BetweenParts]) -> Array:
+    """Degrees of freedom of variances (n_unknowns,) that are partly estimated (Satterthwaite)."""
+    spread = sum((kind.uncertain**2 / kind.dof for kind in kinds), np.zeros_like(variance))
+    share = np.divide(spread, variance**2, out=np.zeros_like(spread), where=variance > 0.0)
+    return np.asarray(np.clip(1 / np.maximum(share, 1e-9), 1.0, 1e9))
+
+
+def _by_part(
+    whitened: Array, residual: Array, covariance: Array, parts: Sequence[NDArray[np.intp]]
+) -> tuple[Array, Array]:
+    """Shift of every unknown by each part, and the part's share in the information on it.
+
+    A part with the normal matrix N and the gradient g shifts the unknowns by C g, where C is the
+    covariance of the fit; its weight is (C N C)/C, on the diagonal.
+    """
     variance = np.maximum(np.diag(covariance), 1e-300)
-    for part in _parts(regression):
-        own = whitened[part]
-        normal = own.T @ own
-        shift_by_part = covariance @ (own.T @ residual[part])
-        through = covariance @ normal @ covariance
-        weight = np.clip(np.diag(through) / variance, 0.0, 1.0)
-        variance_of_part = np.diag(through - through @ normal @ covariance)
-        comparable = (
-            (weight > _LEAST_WEIGHT) & (weight < 1 - _LEAST_WEIGHT) & (variance_of_part > 0)
-        )
-        significant = comparable & (
-            shift_by_part**2 > _CONTRADICTION**2 * np.where(comparable, variance_of_part, 1.0)
-        )
-        differences = np.abs(shift_by_part) / np.where(significant, weight * (1 - weight), 1.0) / 2
-        out = np.maximum(out, np.where(significant, differences, 0.0))
-    return out
+    shifts, weights = np.zeros((2, len(parts), len(covariance)))
+    for index, rows in enumerate(parts):
+        own = whitened[rows]
+        shifts[index] = covariance @ (own.T @ residual[rows])
+        weights[index] = np.sum((own @ covariance) ** 2, axis=0) / variance
+    return shifts, weights
 
 
-def _parts(regression: Regression) -> Iterator[NDArray[np.intp]]:
-    """Rows of each output, and of each group of programme and load, where there are several."""
+def _kinds_of_parts(regression: Regression) -> Iterator[list[NDArray[np.intp]]]:
+    """Rows of every output, and of every group of programme and load, where there are several."""
     by_output = [s.output for s in regression.segments]
     by_group = [str(regression.group_of_run[s.run]) for s in regression.segments]
     for keys in (by_output, by_group):
-        kinds = dict.fromkeys(keys)
-        for kind in kinds if len(kinds) > 1 else ():
-            rows = [
-                np.arange(s.rows.start, s.rows.stop)
-                for s, key in zip(regression.segments, keys, strict=True)
-                if key == kind
-            ]
-            yield np.concatenate(rows)
+        rows: dict[str, list[NDArray[np.intp]]] = {}
+        for segment, key in zip(regression.segments, keys, strict=True):
+            rows.setdefault(key, []).append(np.arange(segment.rows.start, segment.rows.stop))
+        if len(rows) > 1:
+            yield [np.concatenate(own) for own in rows.values()]
 
 
 def estimates(

@@ -2,141 +2,41 @@
 
 Every named effect is compared with curves over one variable (polynomials, linear splines, kinks,
 powers), each penalised by ln n per parameter. Where the best curve explains more than the named
-effects by a margin, the names are withdrawn.
+effects, by more than noise gives in 0.5 % of cases in which the names are right and by more than a
+formula may deviate from the physics, the names are withdrawn.
 
 References
 ----------
 Hart, J. D. (1997). Nonparametric Smoothing and Lack-of-Fit Tests. Springer.
+Cox, D. R. (1962). Further results on tests of separate families of hypotheses. J. R. Statist. Soc.
+B 24, 406-424.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.projection import explained_ss, orthonormal
-from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, with_pair, without_term
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.verdict.curve_fits import Curve, PartialRegression, ranked_curves
 from winchkit.diagnosis.verdict.decision import Judgement, judge, withheld
-from winchkit.diagnosis.verdict.spline_alternatives import Columns, curves
+from winchkit.diagnosis.verdict.specification_null import Named, null_excess
+from winchkit.diagnosis.verdict.spline_alternatives import curves
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = [
-    "Curve",
-    "PartialRegression",
-    "SpecificationTest",
-    "best_curve",
-    "judge_with_specification_test",
-]
+__all__ = ["SpecificationTest", "judge_with_specification_test"]
 
-_UNIDENTIFIABLE = 1e-7
-_LEAST_SQUARED_LENGTH = 1e-300
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A curve over one variable and the net decrease of χ² by it."""
-
-    place: str
-    """Output that it is added to, or ``cable_force`` or ``winding``, which act on several."""
-    variable: str
-    net_gain: float
-    """Decrease of χ² less the penalty of its parameters."""
-
-
-class PartialRegression:
-    """Whitened residual with the fitted unknowns projected out, to which curves are fitted."""
-
-    def __init__(self, residual: Array, jacobian: Array, inverse_sigma: Array) -> None:
-        """Whiten ``residual`` (rows,) and project out the columns of ``jacobian`` (rows, k)."""
-        self.inverse_sigma = inverse_sigma
-        self.explained = orthonormal(jacobian * inverse_sigma[:, None])
-        whitened = residual * inverse_sigma
-        self.residual = whitened - self.explained @ (self.explained.T @ whitened)
-
-    @property
-    def chi_square(self) -> float:
-        """χ² that is left."""
-        return float(self.residual @ self.residual)
-
-
-def best_curve(
-    regression: TimeSeriesRegression,
-    partial: PartialRegression,
-    outputs: Sequence[str],
-    penalty_per_parameter: float,
-) -> Curve | None:
-    """Curve of the largest net decrease of χ², among those that act on one of ``outputs``.
-
-    Parameters
-    ----------
-    regression
-        Regression problem.
-    partial
-        Residual to which curves are fitted.
-    outputs
-        Outputs of which a curve must change one.
-    penalty_per_parameter
-        Penalty per parameter, ln n.
-
-    Returns
-    -------
-    Curve or None
-        None where no variable changes.
-    """
-    best: Curve | None = None
-    for place, variable, laws, columns in curves(regression, outputs):
-        basis = _inner_products(partial, columns, len(laws[0][0]))
-        net_gain = max(
-            basis.explained_ss(coefficients) - penalty_per_parameter * n_parameters
-            for coefficients, n_parameters in laws
-        )
-        if best is None or net_gain > best.net_gain:
-            best = Curve(place, variable, net_gain)
-    return best
-
-
-@dataclass(frozen=True)
-class _BasisProducts:
-    """Gram matrices of whitened basis functions, before and after projection."""
-
-    before: Array
-    """Before projection, (knots, knots)."""
-    after: Array
-    """After projection, (knots, knots)."""
-    inner_products: Array
-    """Inner products with the residual, (knots,)."""
-
-    def explained_ss(self, coefficients: Array) -> float:
-        """Decrease of χ² by the curves of ``coefficients`` (knots, k)."""
-        size = np.sqrt(
-            np.maximum(np.diag(coefficients.T @ self.before @ coefficients), _LEAST_SQUARED_LENGTH)
-        )
-        after = coefficients.T @ self.after @ coefficients / np.outer(size, size)
-        # Relative to the lengths before projection: a curve that the fit explains leaves rounding.
-        return explained_ss(after, (coefficients.T @ self.inner_products) / size, _UNIDENTIFIABLE)
-
-
-def _inner_products(partial: PartialRegression, columns: Columns, count: int) -> _BasisProducts:
-    """Gram matrices of ``count`` basis functions, summed over segments."""
-    before, inner_products = np.zeros((count, count)), np.zeros(count)
-    explained_products = np.zeros((count, partial.explained.shape[1]))
-    for rows, signal in columns:
-        whitened = signal * partial.inverse_sigma[rows]
-        before += whitened @ whitened.T
-        explained_products += whitened @ partial.explained[rows]
-        inner_products += whitened @ partial.residual[rows]
-    return _BasisProducts(
-        before, before - explained_products @ explained_products.T, inner_products
-    )
-
-
+_LEVEL = 0.005
+"""Probability that noise takes away the name of a right effect, over all tests of one result."""
+_COMPARED = 12
+"""Places and variables whose curves are in the null distribution, those of largest gain."""
 _MARGIN = 1e-3
 """Margin, share of the named effects' decrease of χ²: physics may differ from a formula."""
 _MARGIN_WITH_LACK_OF_FIT = 2e-4
@@ -209,18 +109,27 @@ class SpecificationTest:
         The others are not refitted: a lag that replaces a removed friction lies far from where both
         are right. With ``discretization`` the discretisation error is a free column as well.
         """
-        regression, final = self.engine.regression, self.result.final
-        hypothesis = final.hypothesis
-        others, own = hypothesis, np.zeros(len(final.vector), dtype=bool)
-        for index in sorted(indices, reverse=True):
-            own |= regression.unknowns_of(index, hypothesis)
-            others = others.without(index)
-        removed = regression.change(hypothesis) - regression.change(others) if indices else 0.0
-        free = final.jacobian[:, ~own]
+        final = self.result.final
+        free = final.jacobian[:, ~self._own(indices)]
         free = np.hstack([free, self._discretization_column]) if discretization else free
-        return PartialRegression(
-            final.residual + removed, free, self.result.noise.inverse_sigma(regression)
-        )
+        inverse_sigma = self.result.noise.inverse_sigma(self.engine.regression)
+        return PartialRegression(final.residual + self._change(indices), free, inverse_sigma)
+
+    def _own(self, indices: Sequence[int]) -> NDArray[np.bool_]:
+        """Mask of the unknowns of some terms."""
+        hypothesis = self.result.final.hypothesis
+        own = np.zeros(len(self.result.final.vector), dtype=bool)
+        for index in indices:
+            own |= self.engine.regression.unknowns_of(index, hypothesis)
+        return own
+
+    def _change(self, indices: Sequence[int]) -> Array | float:
+        """Change of the prediction by some terms beside the others, (rows,)."""
+        regression, hypothesis = self.engine.regression, self.result.final.hypothesis
+        others = hypothesis
+        for index in sorted(indices, reverse=True):
+            others = others.without(index)
+        return regression.change(hypothesis) - regression.change(others) if indices else 0.0
 
     def explained_ss(self, indices: Sequence[int]) -> float:
         """Decrease of χ² by terms, given the others."""
@@ -228,28 +137,67 @@ class SpecificationTest:
 
     def outperforming_curve(self, indices: Sequence[int]) -> Curve | None:
         """A curve that outperforms terms by the margin; None where there is none."""
-        if not self._outperforming_curve(indices, discretization=False):
+        if self._excess(indices, discretization=False) is None:
             return None
         # The discretisation error is slow to compute, so that it is projected out here only.
-        return self._outperforming_curve(indices, discretization=True)
+        excess = self._excess(indices, discretization=True)
+        if excess is None:
+            return None
+        curve, beyond = excess
+        return curve if beyond > self._critical_excess(indices) else None
 
-    def _outperforming_curve(self, indices: Sequence[int], *, discretization: bool) -> Curve | None:
-        engine, hypothesis = self.engine, self.result.final.hypothesis
-        effects = [hypothesis.terms[index].effect for index in indices]
+    def _excess(
+        self, indices: Sequence[int], *, discretization: bool
+    ) -> tuple[Curve, float] | None:
+        """Best curve and its net gain beyond that of the terms and the allowance.
+
+        None where that is not positive.
+        """
+        engine = self.engine
         partial = self.partial(indices, discretization=discretization)
         explained_ss = (
             partial.chi_square - self.partial((), discretization=discretization).chi_square
         )
-        # Initial states of runs are not parameters of the law; they carry no penalty here.
-        net_gain = explained_ss - engine.penalty_per_parameter * sum(
-            Coordinates(effect).n_parameters for effect in effects
+        ranked = ranked_curves(
+            engine.regression, partial, self._outputs(indices), engine.penalty_per_parameter
         )
-        outputs = sorted({output for effect in effects for output in effect.outputs})
-        curve = best_curve(engine.regression, partial, outputs, engine.penalty_per_parameter)
+        # Initial states of runs are no parameters of the law; they carry no penalty here.
+        net_gain = explained_ss - engine.penalty_per_parameter * self._n_parameters(indices)
         # A certain lack of fit is no chance deviation from the right formula.
-        relative_margin = _MARGIN_WITH_LACK_OF_FIT if self.result.lack_of_fit else _MARGIN
-        margin = engine.penalty_per_parameter + relative_margin * explained_ss
-        return curve if curve and curve.net_gain > net_gain + margin else None
+        share = _MARGIN_WITH_LACK_OF_FIT if self.result.lack_of_fit else _MARGIN
+        beyond = ranked[0].net_gain - net_gain - share * explained_ss if ranked else 0.0
+        return (ranked[0], beyond) if beyond > 0.0 else None
+
+    def _critical_excess(self, indices: Sequence[int]) -> float:
+        """Quantile of the excess where the terms are right, for one of all tests of a result."""
+        regression, noise = self.engine.regression, self.result.noise
+        penalty = self.engine.penalty_per_parameter
+        partial, own = self.partial(indices), self._own(indices)
+        columns = self.result.final.jacobian[:, own] * partial.inverse_sigma[:, None]
+        columns = columns[:, np.any(columns, axis=0)]
+        columns = columns / np.sqrt(np.sum(columns**2, axis=0))
+        columns -= partial.explained @ (partial.explained.T @ columns)
+        change = partial.projected(np.asarray(self._change(indices)))
+        outputs = self._outputs(indices)
+        ranked = ranked_curves(regression, partial, outputs, penalty)[:_COMPARED]
+        places = {(curve.place, curve.variable) for curve in ranked}
+        drawn = null_excess(
+            regression,
+            noise,
+            partial,
+            Named(change, columns, self._n_parameters(indices)),
+            list(curves(regression, outputs, places)),
+        )
+        tests = 1 + (len(self.added) if len(self.added) > 1 else 0)
+        return max(0.0, float(np.quantile(drawn, 1 - _LEVEL / tests)))
+
+    def _outputs(self, indices: Sequence[int]) -> list[str]:
+        terms = self.result.final.hypothesis.terms
+        return sorted({output for index in indices for output in terms[index].effect.outputs})
+
+    def _n_parameters(self, indices: Sequence[int]) -> int:
+        terms = self.result.final.hypothesis.terms
+        return sum(Coordinates(terms[index].effect).n_parameters for index in indices)
 
 
 def _withheld_note(terms: Sequence[Term], outperformed: Sequence[Term], curve: Curve) -> str:

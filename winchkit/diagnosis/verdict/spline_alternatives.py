@@ -10,18 +10,28 @@ de Boor, C. (1978). A Practical Guide to Splines. Springer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.regression.base import Segment
 from winchkit.diagnosis.regression.prediction_cache import masked
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.model.variables import ANGLES, COMPOUND
 
-__all__ = ["PLACES", "Columns", "Law", "columns_of", "curves", "laws_over", "linear_splines"]
+__all__ = [
+    "PLACES",
+    "Columns",
+    "CurveFamily",
+    "Law",
+    "curves",
+    "laws_over",
+    "linear_splines",
+]
 
 _KNOTS = 20
 _TAILS = 0.001
@@ -34,14 +44,46 @@ _LEAST_TEMPERATURE_RANGE = 1.0
 """A smaller range is noise of the thermometer, K."""
 Law = tuple[Array, int]
 """Values of a curve at the knots, (knots, k) for k parameters, and the number that is penalised."""
+_ChangeByCurve = Callable[[Recording, Array, Array], Array]
 Columns = Iterable[tuple[slice, Array]]
 """Some rows, and the change of them by the basis functions, (knots, rows)."""
 
 
+@dataclass(frozen=True)
+class CurveFamily:
+    """Curves over one variable at one place."""
+
+    place: str
+    """Output that they are added to, or ``cable_force`` or ``winding``."""
+    variable: str
+    laws: Sequence[Law]
+    knots: Array
+    basis: Sequence[Array]
+    """Basis functions of every run, (knots, samples)."""
+
+    def columns(self, regression: TimeSeriesRegression) -> Columns:
+        """Change of every output of every run by the basis functions."""
+        for segment in regression.segments:
+            own = self.columns_in(regression, segment)
+            if own is not None:
+                yield segment.rows, own
+
+    def columns_in(self, regression: TimeSeriesRegression, segment: Segment) -> Array | None:
+        """Change of one output of one run, (knots, rows); None where they do not act."""
+        change = PLACES[self.place].get(segment.output)
+        if change is None:
+            return None
+        recording = regression.dataset.recordings[segment.run]
+        signal = change(recording, self.basis[segment.run], self.knots)
+        return masked(recording, segment.output, signal)
+
+
 def curves(
-    regression: TimeSeriesRegression, outputs: Sequence[str]
-) -> Iterator[tuple[str, str, list[Law], Columns]]:
-    """Place, variable, curves and basis columns, where ``outputs`` are changed."""
+    regression: TimeSeriesRegression,
+    outputs: Sequence[str],
+    only: Container[tuple[str, str]] | None = None,
+) -> Iterator[CurveFamily]:
+    """Families of curves that change one of ``outputs``; ``only`` those of a place and variable."""
     recordings = regression.dataset.recordings
     known = [
         variables_of(recording) | {"direction": recording.smooth.at.direction}
@@ -51,6 +93,9 @@ def curves(
         n for n in known[0] if n not in _EXCLUDED_VARIABLES and all(n in other for other in known)
     ]
     for factor, name in (*((None, n) for n in names), *_products(names)):
+        variable = name if factor is None else f"{factor} times {name}"
+        if only is not None and not any((place, variable) in only for place in PLACES):
+            continue
         ends = _ends(name, [own_variables[name] for own_variables in known])
         if ends is None:
             continue
@@ -64,9 +109,10 @@ def curves(
         laws = laws_over(knots, name, level=factor is not None)
         for place, changes in PLACES.items():
             changed_outputs = set(changes) & set(outputs) & set(regression.dataset.outputs)
-            if changed_outputs and (place != "winding" or (name, factor) == ("cable_length", None)):
-                variable = name if factor is None else f"{factor} times {name}"
-                yield place, variable, laws, columns_of(regression, changes, basis, knots)
+            wanted = only is None or (place, variable) in only
+            winding = place != "winding" or (name, factor) == ("cable_length", None)
+            if wanted and changed_outputs and winding:
+                yield CurveFamily(place, variable, laws, knots, basis)
 
 
 def _products(names: Sequence[str]) -> list[tuple[str, str]]:
@@ -130,23 +176,6 @@ def laws_over(knots: Array, name: str, *, level: bool) -> list[Law]:
     if name == "speed":
         out += [((np.sign(knots) * np.abs(knots) ** n)[:, None], 2) for n in _POWERS]
     return out
-
-
-_ChangeByCurve = Callable[[Recording, Array, Array], Array]
-
-
-def columns_of(
-    regression: TimeSeriesRegression,
-    changes: Mapping[str, _ChangeByCurve],
-    basis: Sequence[Array],
-    knots: Array,
-) -> Columns:
-    """Change of every output of every run by the basis functions."""
-    for segment in regression.segments:
-        if segment.output in changes:
-            recording = regression.dataset.recordings[segment.run]
-            signal = changes[segment.output](recording, basis[segment.run], knots)
-            yield segment.rows, masked(recording, segment.output, signal)
 
 
 def _direct_change(recording: Recording, basis: Array, knots: Array) -> Array:

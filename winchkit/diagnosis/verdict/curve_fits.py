@@ -1,0 +1,132 @@
+"""Linear fits of free curves to a residual with the fitted unknowns projected out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.projection import orthonormal
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.verdict.spline_alternatives import Columns, CurveFamily, curves
+
+__all__ = ["BasisProducts", "Curve", "PartialRegression", "basis_products", "ranked_curves"]
+
+UNIDENTIFIABLE = 1e-7
+_LEAST_SQUARED_LENGTH = 1e-300
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve over one variable and the net decrease of χ² by it."""
+
+    place: str
+    """Output that it is added to, or ``cable_force`` or ``winding``, which act on several."""
+    variable: str
+    net_gain: float
+    """Decrease of χ² less the penalty of its parameters."""
+
+
+class PartialRegression:
+    """Whitened residual with the fitted unknowns projected out, to which curves are fitted."""
+
+    def __init__(self, residual: Array, jacobian: Array, inverse_sigma: Array) -> None:
+        """Whiten ``residual`` (rows,) and project out the columns of ``jacobian`` (rows, k)."""
+        self.inverse_sigma = inverse_sigma
+        self.explained = orthonormal(jacobian * inverse_sigma[:, None])
+        self.residual = self.projected(residual)
+
+    def projected(self, vector: Array) -> Array:
+        """A vector (rows,), whitened, with the fitted unknowns projected out."""
+        whitened = vector * self.inverse_sigma
+        return np.asarray(whitened - self.explained @ (self.explained.T @ whitened))
+
+    @property
+    def chi_square(self) -> float:
+        """χ² that is left."""
+        return float(self.residual @ self.residual)
+
+
+@dataclass(frozen=True)
+class BasisProducts:
+    """Gram matrices of whitened basis functions, before and after projection."""
+
+    before: Array
+    """Before projection, (knots, knots)."""
+    after: Array
+    """After projection, (knots, knots)."""
+
+    def root(self, coefficients: Array) -> Array:
+        """R (knots, rank): curves of ``coefficients`` (knots, k) decrease χ² by |Rᵀp|².
+
+        p are the inner products of the projected basis functions with the residual. Directions
+        that the fit explains leave rounding only, relative to the lengths before projection; they
+        are left out.
+        """
+        length = np.diag(coefficients.T @ self.before @ coefficients)
+        # A curve that changes nothing has no direction.
+        size = np.sqrt(np.where(length > _LEAST_SQUARED_LENGTH, length, np.inf))
+        after = coefficients.T @ self.after @ coefficients / np.outer(size, size)
+        values, vectors = np.linalg.eigh(after)
+        kept = values > UNIDENTIFIABLE
+        return np.asarray((coefficients / size) @ (vectors[:, kept] / np.sqrt(values[kept])))
+
+    def explained_ss(self, coefficients: Array, products: Array) -> float:
+        """Decrease of χ² by the curves of ``coefficients`` (knots, k), given p (knots,)."""
+        return float(np.sum((self.root(coefficients).T @ products) ** 2))
+
+
+def basis_products(
+    partial: PartialRegression, columns: Columns, count: int
+) -> tuple[BasisProducts, Array]:
+    """Gram matrices of ``count`` basis functions, and their products with the residual."""
+    before, products = np.zeros((count, count)), np.zeros(count)
+    explained_products = np.zeros((count, partial.explained.shape[1]))
+    for rows, signal in columns:
+        whitened = signal * partial.inverse_sigma[rows]
+        before += whitened @ whitened.T
+        explained_products += whitened @ partial.explained[rows]
+        products += whitened @ partial.residual[rows]
+    after = before - explained_products @ explained_products.T
+    return BasisProducts(before, after), products
+
+
+def ranked_curves(
+    regression: TimeSeriesRegression,
+    partial: PartialRegression,
+    outputs: Sequence[str],
+    penalty_per_parameter: float,
+) -> list[Curve]:
+    """Best curve of every place and variable, that of the largest net decrease of χ² first.
+
+    Parameters
+    ----------
+    regression
+        Regression problem.
+    partial
+        Residual to which curves are fitted.
+    outputs
+        Outputs of which a curve must change one.
+    penalty_per_parameter
+        Penalty per parameter, ln n.
+    """
+    found = _fitted(regression, partial, curves(regression, outputs), penalty_per_parameter)
+    return sorted(found, key=lambda curve: -curve.net_gain)
+
+
+def _fitted(
+    regression: TimeSeriesRegression,
+    partial: PartialRegression,
+    families: Iterator[CurveFamily],
+    penalty_per_parameter: float,
+) -> Iterator[Curve]:
+    for family in families:
+        count = len(family.knots)
+        grams, products = basis_products(partial, family.columns(regression), count)
+        net_gain = max(
+            grams.explained_ss(coefficients, products) - penalty_per_parameter * n_parameters
+            for coefficients, n_parameters in family.laws
+        )
+        yield Curve(family.place, family.variable, net_gain)
