@@ -226,13 +226,13 @@ def test_parts_that_differ_keep_the_level(parts: int, between: float) -> None:
     assert covered(parts, between)[0] == pytest.approx(0.95, abs=0.01)
 
 
-def test_two_parts_that_differ_are_told_with_one_degree_of_freedom() -> None:
+def test_two_parts_that_differ_have_one_degree_of_freedom() -> None:
     """No interval of two values has both the level and a useful length; methods.md states it."""
     assert 0.80 < covered(2, 3.0)[0] < 0.95
     assert covered(2, 100.0)[0] == pytest.approx(0.95, abs=0.02)
 
 
-def test_a_part_that_says_little_of_a_value_does_not_widen_it_more_than_it_contradicts() -> None:
+def test_a_part_with_little_information_widens_an_interval_by_its_contradiction_only() -> None:
     """Sixty parts, one with a thousandth of the information and two deviations off."""
     weights = np.full((60, 1), (1 - 1e-3) / 59)
     weights[-1] = 1e-3

@@ -1,7 +1,7 @@
 """Null distribution of the specification test: what the best curve gains where the names are right.
 
 Parametric bootstrap in the linearised model: data are the named effects at their fitted values plus
-noise, whose variance is drawn anew per band from its own uncertainty (ν/χ²(ν)). In every draw all
+noise, whose variance is drawn per band from its own uncertainty (ν/χ²(ν)). In every draw all
 curves and the named effects are fitted to the same noise, and the largest net gain of a curve over
 the names is kept. Few degrees of freedom of the lowest bands, in which slow curves have their
 power, make its upper tail heavy.
