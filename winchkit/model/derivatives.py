@@ -1,4 +1,4 @@
-"""Derivatives of sampled signals, robust against encoder noise and jitter of the time stamps."""
+"""Derivatives of sampled signals: differences of even samples, a spline of uneven ones."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.model.smoothing_spline import SmoothingSpline
 
 __all__ = [
     "Clock",
@@ -24,6 +25,9 @@ _CREEP_LEAST = 1e-3
 _LOAD_SPAN = 0.02
 _AGREES = 0.1
 _CALMER = 0.5
+_EVEN = 1e-3
+"""Deviation of a step from the median step up to which samples count as even."""
+_LEAST_SAMPLES = 8
 
 
 def smooth_sign(rate: Array, creep: float, fastest: float) -> Array:
@@ -76,18 +80,70 @@ def is_smoother(measured: Array, differences: Array) -> bool:
 
 @dataclass(frozen=True)
 class Clock:
-    """Sampling times, and derivatives of signals sampled at them."""
+    """Sampling times, and derivatives of signals sampled at them.
+
+    Derivatives are differences where the samples are even. Where they are not, a smoothing spline
+    takes their place, whose weight is estimated from the measured angle or rate.
+    """
 
     time: Array
     """(n,), s."""
+    angle: Array | None = None
+    """Measured angle at these times, (n,); None where derivatives are always differences."""
+    velocity: Array | None = None
+    """Rate that the drive reports, (n,), in the unit of the angle per second."""
 
     @cached_property
     def _step(self) -> float:
         return float(np.median(np.diff(self.time)))
 
     @cached_property
+    def even(self) -> bool:
+        """Whether all steps are equal to 0.1 %."""
+        return bool(np.max(np.abs(np.diff(self.time) - self._step)) <= _EVEN * self._step)
+
+    @cached_property
+    def measured_rate(self) -> Array | None:
+        """The reported rate where it has less noise than differences of the angle; else None."""
+        if self.angle is None or self.velocity is None:
+            return None
+        smoother = is_smoother(self.velocity, np.gradient(self.angle, self.time))
+        return self.velocity if smoother else None
+
+    @cached_property
+    def spline(self) -> SmoothingSpline | None:
+        """Smoothing spline of uneven samples; None where differences are taken."""
+        moved = self.angle if self.measured_rate is None else self.measured_rate
+        if moved is None or len(self.time) < _LEAST_SAMPLES or self.even or not np.ptp(moved):
+            return None
+        return SmoothingSpline.fit(self.time, moved)
+
+    @cached_property
+    def acceleration_std(self) -> Array | None:
+        """Standard deviation of the angle's second derivative, (n,); None for even samples."""
+        if self.spline is None:
+            return None
+        return self.spline.std(2 if self.measured_rate is None else 1)
+
+    @cached_property
+    def rate(self) -> Array:
+        """First derivative of the angle, (n,): as reported where that has less noise."""
+        assert self.angle is not None
+        return self.gradient(self.angle) if self.measured_rate is None else self.measured_rate
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """Second derivative of the angle, (n,)."""
+        if self.spline is not None and self.measured_rate is None:
+            assert self.angle is not None
+            return self.spline.smoothed(self.angle, 2)
+        return self.gradient(self.rate)
+
+    @cached_property
     def reach(self) -> int:
-        """Samples to either side of a difference for accelerations: at least 20 ms and one."""
+        """Samples to either side that an acceleration depends on: at least 20 ms and one."""
+        if self.spline is not None:
+            return int(np.ceil(self.spline.reach))
         return max(1, round(_LOAD_SPAN / self._step))
 
     @property
@@ -99,9 +155,17 @@ class Clock:
     def _by_sample(self) -> Array:
         return _by_number(self.time)
 
+    def gradient(self, x: Array) -> Array:
+        """First derivative between neighbours, (n,)."""
+        if self.spline is not None:
+            return self.spline.smoothed(x, 1)
+        return np.asarray(np.gradient(x, self.time))
+
     def wide_gradient(self, x: Array) -> Array:
         """First derivative over at least ±20 ms, (n,)."""
         step, time = self.reach, self.time
+        if self.spline is not None:
+            return self.spline.smoothed(x, 1)
         if len(x) <= 2 * step:
             return np.zeros_like(x)
         inner = (x[2 * step :] - x[: -2 * step]) / (time[2 * step :] - time[: -2 * step])
@@ -113,17 +177,31 @@ class Clock:
         The derivative by sample number is divided by that of time, so that straight lines stay
         exact on uneven samples; it is of second order at the ends.
         """
+        if self.spline is not None:
+            return self.spline.smoothed(x, 1)
         return np.asarray(_by_number(x) / self._by_sample)
 
     def second_derivative(self, x: Array) -> Array:
         """Central second difference over at least ±20 ms, so that encoder noise stays small."""
         step, time = self.reach, self.time
+        if self.spline is not None:
+            return self.spline.smoothed(x, 2)
         if len(x) <= 2 * step:
             return np.zeros_like(x)
         before, after = time[step:-step] - time[: -2 * step], time[2 * step :] - time[step:-step]
         slope = (x[2 * step :] - x[step:-step]) / after - (x[step:-step] - x[: -2 * step]) / before
         inner = 2 * slope / (before + after)
         return np.pad(inner, step, mode="edge")
+
+    def curvature(self, x: Array) -> Array:
+        """Minus twelve times the smoothing error of a derivative ``x`` computed by this clock.
+
+        A second difference over a span h adds h²/12 of the second derivative. What a spline adds is
+        estimated by smoothing once more (twicing; Tukey, J. W., 1977, Exploratory Data Analysis).
+        """
+        if self.spline is not None:
+            return 12 * (self.spline.smoothed(x) - x)
+        return self.span**2 * self.second_derivative(x)
 
 
 def _by_number(x: Array) -> Array:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.derivatives import Clock, is_smoother, smooth_sign
+from winchkit.model.derivatives import Clock, smooth_sign
 from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage, Way
 from winchkit.schema.profiles.winch import WinchProfile
@@ -45,6 +45,8 @@ class Motion:
     """Curvature of that load over the span of its differences, N: bound of its smoothing error."""
     rounded: float = 0.0
     """Share of the line's part of that load's acceleration that is smoothed, 0 to 1."""
+    load_std: Array | None = None
+    """Standard deviation of that load from the acceleration's, N; None for even samples."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ class Line:
         return Path(turned, np.full_like(turned, slope))
 
     def motion(self, signals: Signals) -> Motion:
-        """Derivatives, directions and cable force along a run, by central differences.
+        """Derivatives, directions and cable force along a run.
 
         Parameters
         ----------
@@ -107,18 +109,19 @@ class Line:
         """
         time, angle = signals.time, signals.motor_angle
         drum_angle, length = self._nominal_length(angle)
-        rate, speed = np.gradient(angle, time), -np.gradient(length, time)
-        clock, pace = Clock(time - time[0]), self._pace(angle)
-        jitter = signals.motor_velocity is not None and is_smoother(signals.motor_velocity, rate)
-        if jitter and signals.motor_velocity is not None:
-            speed = speed + pace * (signals.motor_velocity - rate)
-            rate = signals.motor_velocity
-        load, mass, discretization = signals.load, None, None
+        clock = signals.clock or Clock(time - time[0], angle, signals.motor_velocity)
+        pace, speed, rate = self._pace(angle), -clock.gradient(length), clock.rate
+        if clock.measured_rate is not None:
+            speed = speed + pace * (rate - clock.gradient(angle))
+        load, mass, discretization, load_std = signals.load, None, None, None
         if load is None and signals.load_mass is not None:
             mass = signals.load_mass
-            bent = -clock.wide_gradient(speed) if jitter else clock.second_derivative(length)
+            directly = clock.measured_rate is None
+            bent = clock.second_derivative(length) if directly else -clock.wide_gradient(speed)
             load = mass * (GRAVITY - bent)
-            discretization = clock.span**2 * clock.second_derivative(load)
+            discretization = clock.curvature(load)
+            if clock.acceleration_std is not None:
+                load_std = mass * np.abs(pace) * clock.acceleration_std
         tension = load if load is not None else signals.tension
         missing, zero = np.full_like(time, np.nan), np.zeros_like(time)
         fastest = signals.fastest or float(np.max(np.abs(rate), initial=0.0))
@@ -128,7 +131,7 @@ class Line:
             time=clock.time,
             motor_angle=angle,
             motor_rate=rate,
-            motor_acceleration=np.gradient(rate, time),
+            motor_acceleration=clock.acceleration,
             motor_direction=smooth_sign(rate, _CREEP_RATE, fastest),
             drum_angle=drum_angle,
             wound_angle=self._reference_wound + drum_angle,
@@ -140,7 +143,7 @@ class Line:
             motor_torque=zero if signals.motor_torque is None else signals.motor_torque,
         )
         drum_tension = signals.tension if load is None else None
-        return Motion(at, clock, load, drum_tension, mass, discretization)
+        return Motion(at, clock, load, drum_tension, mass, discretization, load_std=load_std)
 
     def predict(self, motion: Motion) -> dict[str, Array]:
         """Predict the outputs of a run.

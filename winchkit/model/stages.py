@@ -8,6 +8,7 @@ from enum import IntEnum
 from typing import Any
 
 from winchkit.arrays import Array
+from winchkit.model.derivatives import Clock
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = [
@@ -114,6 +115,8 @@ class Signals:
     motor_torque: Array | None = None
     fastest: float | None = None
     """Highest motor speed in all runs of this machine, rad/s; None: that of this run."""
+    clock: Clock | None = None
+    """Derivatives of the motor angle, where they were computed before; None to compute them."""
 
 
 @dataclass(frozen=True)

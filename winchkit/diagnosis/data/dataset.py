@@ -16,11 +16,12 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
 from winchkit.diagnosis.data.input_denoising import denoised_motions
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
-from winchkit.diagnosis.data.sampling import bridged, gaps
-from winchkit.diagnosis.data.spectrum import Band, torque_band
-from winchkit.diagnosis.data.transients import transient_mask
+from winchkit.diagnosis.data.sampling import away_from, bridged, even_instants
+from winchkit.diagnosis.data.spectrum import Band, torque_cut_off
+from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs
 from winchkit.errors import UsageError
+from winchkit.model.derivatives import Clock
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUTS, At, Signals
 from winchkit.runs.run import Run
@@ -42,9 +43,6 @@ class Filtering:
     """Coefficients are kept up to this many cut-offs."""
     decimation: Decimation | None = None
     """Decimation of long runs; None for none."""
-
-
-_GAP_MARGIN = 0.25
 
 
 @dataclass(frozen=True)
@@ -124,7 +122,7 @@ def prepare(
     profile
         Winch profile.
     band
-        Cut-off of the torque's low-pass, Hz; None for 20 Hz or a tenth of the sampling rate.
+        Cut-off of the torque's low-pass, Hz; None to choose it from sampling and residuals.
     kept_cut_offs
         Coefficients are kept up to this many cut-offs: 1 for fits, more for the rms of a filtered
         signal, to which the transition band contributes.
@@ -141,6 +139,8 @@ def prepare(
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
     notes = validate_runs(runs, profile)
+    runs, mended = evenly_stamped(runs)
+    notes += mended
     decimation = decimation_for(runs) if decimate else None
     if decimation is not None:
         notes.append(decimation.words)
@@ -153,109 +153,130 @@ def assemble(
 ) -> Dataset:
     """Build the data set of runs that were validated before."""
     line, filtering = Line(profile), filtering or Filtering()
-    fastest = max((_fastest(run) for run in runs), default=0.0)
-    raw = [line.motion(_signals(run, profile, fastest)) for run in runs]
+    clocks = [_clock(run) for run in runs]
+    fastest = max((_fastest(clock) for clock in clocks), default=0.0)
+    signals = [
+        _signals(run, profile, fastest, clock) for run, clock in zip(runs, clocks, strict=True)
+    ]
+    raw = [line.motion(own) for own in signals]
     decimation = filtering.decimation
     if decimation is not None:
         raw = [decimation.motion(motion) for motion in raw]
         runs = [decimation.run(run) for run in runs]
-    signals = [_signals(run, profile, fastest) for run in runs]
+        signals = [_signals(run, profile, fastest) for run in runs]
     repeats = find_repeats(signals)
     smooth = denoised_motions(line, signals, raw, repeats)
+    nominal = [line.predict(motion) for motion in raw]
+    cut_off = _torque_cut_off(runs, nominal, filtering)
+    outputs = ("motor_torque",) if isinstance(profile, AxisProfile) else OUTPUTS
     recordings = tuple(
-        _recording(run, own, (motion, denoised), line, filtering)
-        for run, own, motion, denoised in zip(runs, signals, raw, smooth, strict=True)
+        Recording(
+            name=run.name,
+            signals=own,
+            measured={output: bridged(run[output]) for output in shown},
+            valid={output: _valid(run, output, motion, predicted) for output in shown},
+            bands={output: _band(run, output, filtering, cut_off) for output in shown},
+            zeroed=run.length_zeroed,
+            raw=motion,
+            smooth=denoised,
+            nominal=predicted,
+            nominal_smooth=line.predict(denoised),
+            programme=run.metadata.get("programme", ""),
+            path=run.path,
+            decimated=decimation is not None,
+        )
+        for run, own, motion, denoised, predicted in zip(
+            runs, signals, raw, smooth, nominal, strict=True
+        )
+        for shown in ([output for output in outputs if output in run and output in predicted],)
     )
     return Dataset(profile, recordings, tuple(repeats))
 
 
-def _fastest(run: Run) -> float:
-    """Fastest motor rate of a run, rad/s."""
-    rate = np.gradient(bridged(run["motor_angle"]), run.time)
-    return float(np.max(np.abs(rate)))
+def evenly_stamped(runs: Sequence[Run]) -> tuple[list[Run], list[str]]:
+    """Runs at even sampling instants where their stamps jitter about them, and notes on these."""
+    out, notes = [], []
+    for run in runs:
+        instants = even_instants(run.time, bridged(run["motor_angle"]))
+        if instants is not None:
+            jitter = float(np.std(run.time - instants))
+            notes.append(
+                f"{run.name}: the stamps jitter by {jitter:.2g} s about even sampling instants, at "
+                "which the motor angle is a smoother motion; these are used"
+            )
+        out.append(run if instants is None else replace(run, time=instants))
+    return out, notes
 
 
-def _signals(run: Run, profile: WinchProfile, fastest: float) -> Signals:
-    def channel(name: str) -> Array | None:
-        return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
+def _clock(run: Run) -> Clock:
+    return Clock(
+        run.time - run.time[0], bridged(run["motor_angle"]), _channel(run, "motor_velocity")
+    )
 
+
+def _fastest(clock: Clock) -> float:
+    """Fastest motor rate of a run by its angle, rad/s."""
+    assert clock.angle is not None
+    return float(np.max(np.abs(clock.gradient(clock.angle))))
+
+
+def _channel(run: Run, name: str) -> Array | None:
+    return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
+
+
+def _signals(
+    run: Run, profile: WinchProfile, fastest: float, clock: Clock | None = None
+) -> Signals:
     has_cable = not isinstance(profile, AxisProfile)
     return Signals(
         time=run.time,
         motor_angle=bridged(run["motor_angle"]),
-        load=channel("load") if has_cable else None,
+        load=_channel(run, "load") if has_cable else None,
         load_mass=run.load_mass if has_cable else None,
-        tension=channel("tension") if has_cable else None,
-        temperature=channel("temperature"),
-        motor_velocity=channel("motor_velocity"),
-        motor_torque=channel("motor_torque"),
+        tension=_channel(run, "tension") if has_cable else None,
+        temperature=_channel(run, "temperature"),
+        motor_velocity=_channel(run, "motor_velocity"),
+        motor_torque=_channel(run, "motor_torque"),
         fastest=fastest,
+        clock=clock,
     )
 
 
-def _recording(
-    run: Run, signals: Signals, motions: tuple[Motion, Motion], line: Line, filtering: Filtering
-) -> Recording:
-    raw, smooth = motions
-    nominal = line.predict(raw)
-    predicted = ("motor_torque",) if isinstance(line.profile, AxisProfile) else OUTPUTS
-    outputs = [output for output in predicted if output in run and output in nominal]
-    bands = {output: _band(run, output, filtering) for output in outputs}
-    return Recording(
-        name=run.name,
-        signals=signals,
-        measured={output: bridged(run[output]) for output in outputs},
-        valid={output: _valid(run, output, raw, bands[output]) for output in outputs},
-        bands=bands,
-        zeroed=run.length_zeroed,
-        raw=raw,
-        smooth=smooth,
-        nominal=nominal,
-        nominal_smooth=line.predict(smooth),
-        programme=run.metadata.get("programme", ""),
-        path=run.path,
-        decimated=filtering.decimation is not None,
-    )
+def _torque_cut_off(
+    runs: Sequence[Run], nominal: Sequence[Mapping[str, Array]], filtering: Filtering
+) -> float:
+    """Cut-off of the torque's low-pass, Hz, the same for all runs."""
+    if filtering.band is not None:
+        return filtering.band
+    rate = 1 / max(run.interval for run in runs)
+    if filtering.decimation is not None:
+        return torque_cut_off([], rate * filtering.decimation.factor)
+    pairs = [(run, own) for run, own in zip(runs, nominal, strict=True) if "motor_torque" in run]
+    return torque_cut_off([run["motor_torque"] - own["motor_torque"] for run, own in pairs], rate)
 
 
-def _band(run: Run, output: str, filtering: Filtering) -> Band:
-    rate, decimation, cut_off = 1 / run.interval, filtering.decimation, None
-    if output == "motor_torque":
-        full = rate if decimation is None else rate * decimation.factor
-        cut_off = filtering.band or torque_band(full)
-    if decimation is not None:
-        cut_off = min(cut_off or np.inf, decimation.cut_off)
-    return Band(len(run), rate, cut_off, filtering.kept_cut_offs)
+def _band(run: Run, output: str, filtering: Filtering, torque_cut_off: float) -> Band:
+    cut_off = torque_cut_off if output == "motor_torque" else None
+    if filtering.decimation is not None:
+        cut_off = min(cut_off or np.inf, filtering.decimation.cut_off)
+    return Band(len(run), 1 / run.interval, cut_off, filtering.kept_cut_offs)
 
 
-def _valid(run: Run, output: str, motion: Motion, band: Band) -> Mask:
-    """Samples of an output that are compared: measured, with known inputs, away from transients."""
+def _valid(run: Run, output: str, motion: Motion, nominal: Mapping[str, Array]) -> Mask:
+    """Samples of an output that are compared: measured, with known inputs, away from transients.
+
+    Measured and predicted signals pass the same low-pass after samples that are not compared were
+    set to zero in both. Such samples therefore change no other one, and no further ones are left
+    out beside them but those whose derivatives need them.
+    """
     compared = np.isfinite(run[output]) & np.isfinite(run["motor_angle"])
-    compared &= _away_from_time_gaps(run.time)
     if motion.load is not None and "load" in run:
         compared &= np.isfinite(run["load"])
-    if output != "cable_length":
-        # No acceleration at the ends of a run: finite differences reach beyond them.
-        edge = 1 + motion.clock.reach
-        compared[:edge] = compared[-edge:] = False
-    compared = _away_from_gaps(compared, band.rate, band.cut_off)
-    if output != "cable_length":
-        compared &= ~transient_mask(run.time, bridged(run[output]), output, motion)
-    return compared
-
-
-def _away_from_time_gaps(time: Array) -> Mask:
-    """Samples away from gaps in time, within which the motion is not known."""
-    out = np.ones(len(time), dtype=bool)
-    for index in gaps(time):
-        out &= (time < time[index] - _GAP_MARGIN) | (time > time[index + 1] + _GAP_MARGIN)
-    return out
-
-
-def _away_from_gaps(compared: Mask, rate: float, cut_off: float | None) -> Mask:
-    """Samples away from interpolated ones, by the length of the low-pass's response."""
-    reach = 1 if cut_off is None else max(1, round(rate / cut_off))
-    if compared.all():
+    if output == "cable_length":
         return compared
-    affected = np.convolve(~compared, np.ones(2 * reach + 1), mode="same") > 0
-    return ~affected
+    if motion.clock.spline is None:
+        # No acceleration at the ends of a run and beside gaps: differences reach beyond them.
+        compared &= away_from(~np.isfinite(run["motor_angle"]), 1 + motion.clock.reach)
+    measured = bridged(run[output])
+    uncertain = uncertain_force_mask(measured, nominal[output], motion)
+    return compared & ~uncertain & ~transient_mask(run.time, measured, output, motion)

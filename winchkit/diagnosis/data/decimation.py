@@ -4,10 +4,6 @@ An hour at 1 kHz holds millions of samples of motions that take seconds. The sig
 (speed, direction, acceleration) are computed at the full rate and decimated like the measured
 ones, so that a friction force that changes its sign within a millisecond is low-passed alike in
 the measurement and in the prediction. The factor follows from Welch spectra of the channels.
-
-References
-----------
-Welch, P. D. (1967). IEEE Trans. Audio Electroacoust. 15, 70-73.
 """
 
 from __future__ import annotations
@@ -21,6 +17,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.sampling import bridged, gaps
+from winchkit.diagnosis.data.spectrum import LOST_POWER, highest_frequency
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Motion
 from winchkit.model.stages import At
@@ -36,14 +33,6 @@ _RELATIVE_CUT_OFF = 0.25
 """Cut-off over the new sampling rate: below it aliases come from three times the cut-off."""
 _LEAST_RATE = 20.0
 """Least sampling rate that is left, Hz: reversals and lags last about a tenth of a second."""
-_LOST_POWER = 0.01
-"""Share of a channel's power beyond its noise that may lie above the cut-off."""
-_BLOCK = 16.0
-"""Longest block of a Welch spectrum, s."""
-_BLOCKS = 8
-"""Least number of blocks of a Welch spectrum, overlapping by half."""
-_SIGNAL_TO_NOISE = 2.0
-"""Ratio to the noise power from which a frequency holds signal."""
 _TAPS = 10
 _BETA = 7.857
 """Shape of the Kaiser window for 80 dB stop-band attenuation."""
@@ -63,7 +52,7 @@ class Decimation:
         """Sentence for the notes of a diagnosis."""
         return (
             f"every {_ordinal(self.factor)} sample of the runs, whole up to {self.cut_off:.3g} Hz "
-            f"and low-passed above, is compared; less than {_LOST_POWER:.0%} of the power of any "
+            f"and low-passed above, is compared; less than {LOST_POWER:.0%} of the power of any "
             "channel is above"
         )
 
@@ -166,42 +155,12 @@ def decimation_for(runs: Sequence[Run]) -> Decimation | None:
         return None
     target_factor = -(-total // _TARGET_SAMPLES)
     highest = max(
-        (_highest_frequency(run[name], rate) for run in runs for name in _CHANNELS if name in run),
+        (highest_frequency(run[name], rate) for run in runs for name in _CHANNELS if name in run),
         default=0.0,
     )
     allowed = rate * _RELATIVE_CUT_OFF / highest if highest else np.inf
     factor = int(min(target_factor, allowed, rate / _LEAST_RATE))
     return Decimation(factor, _RELATIVE_CUT_OFF * rate / factor) if factor > 1 else None
-
-
-def _highest_frequency(values: Array, rate: float) -> float:
-    """Frequency above which less than 1 % of a signal's power beyond its white noise lies, Hz."""
-    from scipy.signal import welch
-
-    finite = np.isfinite(values)
-    length = min(len(values) // _BLOCKS, round(_BLOCK * rate))
-    if not finite.any() or length < 2:
-        return 0.0
-    # A ramp over many turns leaks over all frequencies through a Hann window.
-    window = ("general_cosine", (3 / 8, 1 / 2, 1 / 8))
-    frequency, power = welch(
-        bridged(values), fs=rate, window=window, nperseg=length, detrend=_without_jumps
-    )
-    noise = float(np.median(power[frequency > rate / 4]))
-    has_signal = np.where(power > _SIGNAL_TO_NOISE * noise, power - noise, 0.0)
-    power_above = np.cumsum(has_signal[::-1])[::-1]
-    return (
-        float(frequency[np.flatnonzero(power_above >= _LOST_POWER * power_above[0])[-1]])
-        if power_above[0]
-        else 0.0
-    )
-
-
-def _without_jumps(values: Array) -> Array:
-    """Remove mean and slope along the last axis."""
-    x = np.arange(values.shape[-1]) - (values.shape[-1] - 1) / 2
-    slope = (values @ x / (x @ x))[..., None]
-    return np.asarray(values - values.mean(axis=-1, keepdims=True) - slope * x)
 
 
 def _pieces(time: Array) -> list[slice]:

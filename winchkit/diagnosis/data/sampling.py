@@ -1,4 +1,4 @@
-"""Missing samples and gaps in the time of a run."""
+"""Sampling of a run: missing samples, gaps in time, and stamps that jitter."""
 
 from __future__ import annotations
 
@@ -6,11 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.model.derivatives import Clock
+from winchkit.model.smoothing_spline import SmoothingSpline
 
-__all__ = ["bridged", "gaps"]
+__all__ = ["away_from", "bridged", "even_instants", "gaps"]
+
+Mask = NDArray[np.bool_]
 
 _GAP = 2.5
 """Shortest gap in median sampling intervals (rule of thumb: one missing sample and jitter)."""
+
+_LEAST_STAMPS = 16
+"""Stamps from which a period is estimated."""
+_BINS = 8
+"""Bins per median step of the stamps' spectrum."""
+_FINER = 32
+"""Steps of a frequency within that spectrum's resolution."""
+_MOST_BINS = 8_000_000
 
 
 def bridged(values: Array) -> Array:
@@ -43,3 +55,71 @@ def gaps(time: Array) -> NDArray[np.intp]:
     """
     steps = np.diff(time)
     return np.flatnonzero(steps > _GAP * np.median(steps))
+
+
+def even_instants(time: Array, angle: Array) -> Array | None:
+    """Even sampling instants of a run whose stamps jitter, some of them missing.
+
+    A logger may sample evenly and stamp late, or sample whenever it has time. The angle decides:
+    it is a smooth motion over the times at which it was sampled.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Stamps, s, increasing.
+    angle : (n,) array
+        Motor angle, rad.
+
+    Returns
+    -------
+    (n,) array or None
+        Instants, s; None where the stamps are even, or where the restricted likelihood of the
+        smoothing spline is larger over the stamps.
+    """
+    if Clock(time).even or len(time) < _LEAST_STAMPS or not np.ptp(angle):
+        return None
+    instants = _nearest_even(time - time[0])
+    if instants is None:
+        return None
+    stamped = SmoothingSpline.fit(time - time[0], angle)
+    even = SmoothingSpline.fit(instants - instants[0], angle)
+    return time[0] + instants if even.deviance < stamped.deviance else None
+
+
+def _nearest_even(time: Array) -> Array | None:
+    """Multiples of the most regular period nearest to the stamps; None where two coincide.
+
+    The period is that of the largest peak of the stamps' own spectrum (Bartlett, M. S., 1963, J. R.
+    Statist. Soc. B 25, 264-296) within a third of the median rate.
+    """
+    bin_width = float(np.median(np.diff(time))) / _BINS
+    count = int(time[-1] / bin_width) + 1
+    if count > _MOST_BINS:
+        return None
+    counts = np.bincount((time / bin_width).astype(np.intp), minlength=count).astype(float)
+    power = np.abs(np.fft.rfft(counts - counts.mean()))
+    low, high = 2 * count // (3 * _BINS), min(4 * count // (3 * _BINS), len(power) - 1)
+    peak = low + int(np.argmax(power[low : high + 1]))
+    near = (peak + np.linspace(-1.0, 1.0, 2 * _FINER + 1)) / (count * bin_width)
+    sums = np.array([np.sum(np.exp(2j * np.pi * frequency * time)) for frequency in near])
+    best = int(np.argmax(np.abs(sums)))
+    frequency, phase = near[best], np.angle(sums[best]) / (2 * np.pi)
+    number = np.round(time * frequency - phase)
+    if np.any(np.diff(number) < 1):
+        return None
+    step, start = np.polyfit(number, time, 1)
+    return np.asarray(start + step * number)
+
+
+def away_from(unknown: Mask, reach: int) -> Mask:
+    """Samples whose differences over ``reach`` samples use no unknown one, (n,).
+
+    Parameters
+    ----------
+    unknown : (n,) array of bool
+        Samples without a value. All samples beyond both ends of a run are unknown too.
+    reach
+        Samples to either side that a difference needs.
+    """
+    padded = np.pad(unknown, reach, constant_values=True).astype(float)
+    return np.convolve(padded, np.ones(2 * reach + 1), mode="valid") < 0.5

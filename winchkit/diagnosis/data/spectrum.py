@@ -7,24 +7,29 @@ their variance.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.fft import dct, idct
+from scipy.special import chdtri, fdtri
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.sampling import bridged
 
 __all__ = [
+    "LOST_POWER",
     "WHOLE_TRANSITION",
     "Band",
     "band_edges",
+    "highest_frequency",
     "low_pass",
     "narrow_edges",
     "smoothed",
     "to_frequency",
     "to_time",
-    "torque_band",
+    "torque_cut_off",
 ]
 
 _BUTTERWORTH_ORDER = 4
@@ -38,9 +43,101 @@ WHOLE_TRANSITION = 3.0
 """In units of the cut-off: beyond it the low-pass passes about 10⁻⁴ of the amplitude."""
 
 
-def torque_band(rate: float) -> float:
-    """Default cut-off of the torque's low-pass, Hz: 20 Hz or a tenth of the sampling rate."""
-    return min(_TORQUE_BAND, rate / 10)
+LOST_POWER = 0.01
+"""Share of a signal's power beyond its noise that may lie above a cut-off."""
+_BLOCK = 16_384
+"""Longest block of a Welch spectrum, samples."""
+_BLOCKS = 8
+"""Least number of blocks of a Welch spectrum, overlapping by half."""
+_LEVEL = 0.01
+"""Level of the test of a spectrum against its noise, all frequencies together."""
+_HIGHEST_CUT_OFF = 0.4
+"""In units of the sampling rate."""
+
+
+def torque_cut_off(residuals: Sequence[Array], rate: float) -> float:
+    """Cut-off of the torque's low-pass, Hz, the same for all runs.
+
+    Parameters
+    ----------
+    residuals
+        Measured minus predicted torque of every run, (n,) each.
+    rate
+        Lowest sampling rate of the runs, Hz.
+
+    Returns
+    -------
+    float
+        20 Hz, or less where the sampling rate is below 200 Hz: a tenth of the rate, or the highest
+        frequency at which a residual exceeds its noise.
+    """
+    needed = rate / 10
+    if needed < _TORQUE_BAND:
+        highest = [highest_frequency(r, rate, len(residuals)) for r in residuals]
+        needed = max(needed, min(max(highest, default=0.0), _HIGHEST_CUT_OFF * rate))
+    return min(_TORQUE_BAND, needed)
+
+
+def highest_frequency(values: Array, rate: float, signals: int = 1) -> float:
+    """Frequency above which less than 1 % of a signal's power beyond its white noise lies, Hz.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Signal; NaN where it is missing.
+    rate
+        Samples per second.
+    signals
+        Number of signals that are tested together.
+
+    Returns
+    -------
+    float
+        Zero where no frequency exceeds the noise.
+
+    Notes
+    -----
+    The noise is that of the upper half of the frequencies, from the median of Welch's spectrum. A
+    frequency counts where its power exceeds the noise by an F test at 1 % for all frequencies and
+    signals together (Bonferroni). A block has two degrees of freedom: under this window, blocks
+    that overlap by half are nearly independent (ρ² = 0.002). Neighbouring frequencies are not, and
+    a median has 2/π of the efficiency of a mean: of the noise 1/π of the degrees of freedom count.
+
+    References
+    ----------
+    Welch, P. D. (1967). IEEE Trans. Audio Electroacoust. 15, 70-73.
+    """
+    length = min(len(values) // _BLOCKS, _BLOCK)
+    if length < _BLOCKS or not np.isfinite(values).any():
+        return 0.0
+    frequency, power = np.arange(length // 2 + 1) * rate / length, _welch(bridged(values), length)
+    upper = power[frequency > rate / 4]
+    freedom = 2 * (2 * len(values) / length - 1)
+    noise = float(np.median(upper) * freedom / chdtri(freedom, 0.5))
+    level = _LEVEL / (signals * len(frequency))
+    limit = noise * float(fdtri(freedom, freedom * len(upper) / np.pi, 1 - level))
+    power_above = np.cumsum(np.where(power > limit, power - noise, 0.0)[::-1])[::-1]
+    if not power_above[0]:
+        return 0.0
+    last = int(np.flatnonzero(power_above >= LOST_POWER * power_above[0])[-1])
+    return float(frequency[min(last + 1, len(frequency) - 1)])
+
+
+def _welch(values: Array, length: int) -> Array:
+    """Mean power of windowed blocks that overlap by half, (length // 2 + 1,), any unit."""
+    blocks = np.lib.stride_tricks.sliding_window_view(values, length)[:: max(1, length // 2)]
+    # A ramp over many turns leaks over all frequencies through a Hann window.
+    turn = 2 * np.pi * np.arange(length) / length
+    window = 3 / 8 - np.cos(turn) / 2 + np.cos(2 * turn) / 8
+    spectra = np.fft.rfft(_without_ramp(blocks) * window, axis=-1)
+    return np.asarray(np.mean(np.abs(spectra) ** 2, axis=0))
+
+
+def _without_ramp(values: Array) -> Array:
+    """Remove mean and slope along the last axis."""
+    x = np.arange(values.shape[-1]) - (values.shape[-1] - 1) / 2
+    slope = (values @ x / (x @ x))[..., None]
+    return np.asarray(values - values.mean(axis=-1, keepdims=True) - slope * x)
 
 
 @dataclass(frozen=True)

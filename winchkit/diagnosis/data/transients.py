@@ -1,8 +1,9 @@
-"""Masks of transients where a hanging weight meets the next layer of a spiral drum.
+"""Masks of samples at which the force of a hanging weight is not known.
 
-The winding radius jumps there, and with it the speed of the cable. How large the force of that
-transient is depends on compliances that the nominal model does not have, and its accelerations
-are finite differences across the jump.
+Where the weight meets the next layer of a spiral drum, the winding radius jumps, and with it the
+speed of the cable. How large the force of that transient is depends on compliances that the
+nominal model does not have, and its accelerations are finite differences across the jump. Of
+unevenly sampled runs the acceleration is uncertain beside gaps.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from winchkit.model.derivatives import Clock
 from winchkit.model.drum import Spiral, drum_of
 from winchkit.model.line import Motion
 
-__all__ = ["transient_mask", "with_neighbours"]
+__all__ = ["transient_mask", "uncertain_force_mask", "with_neighbours"]
 
 Mask = NDArray[np.bool_]
 _NEIGHBOURS = 2
@@ -61,6 +62,29 @@ def transient_mask(time: Array, measured: Array, output: str, motion: Motion) ->
     if not transients.any():
         return none
     return with_neighbours(transients, time)
+
+
+def uncertain_force_mask(measured: Array, nominal: Array, motion: Motion) -> Mask:
+    """Samples of a force whose acceleration is less certain than elsewhere and than the instrument.
+
+    Parameters
+    ----------
+    measured, nominal : (n,) arrays
+        Tension or torque, and its prediction.
+    motion
+        Nominal motion along the run.
+
+    Returns
+    -------
+    (n,) array of bool
+        All false where no force follows from the acceleration of unevenly sampled angles.
+    """
+    load, std = motion.load, motion.load_std
+    if load is None or std is None or not std.any():
+        return np.zeros(len(measured), dtype=bool)
+    std = std * np.abs(nominal / np.where(load == 0.0, np.inf, load))
+    usual = np.hypot(_white(measured), np.median(std))
+    return np.asarray(std > _LEAST_TRANSIENT * usual)
 
 
 def with_neighbours(marked: Mask, time: Array) -> Mask:

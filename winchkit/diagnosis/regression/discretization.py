@@ -21,7 +21,6 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.effects.term import modifiers_of
-from winchkit.model.derivatives import is_smoother
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 
@@ -114,17 +113,13 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     """Denoised motion of a run, interpolated between its samples.
 
     None where the derivatives are not differences of these samples: they were taken before a long
-    run was decimated, or the drive's own velocity has less noise than the differences.
+    run was decimated, the drive's own velocity has less noise than the differences, or they are
+    those of a smoothing spline.
     """
     from scipy.interpolate import make_interp_spline  # Slow to import.
 
-    signals, smooth = recording.signals, recording.smooth
-    if recording.decimated:
-        return None
-    velocity = signals.motor_velocity
-    if velocity is not None and is_smoother(
-        velocity, np.gradient(signals.motor_angle, signals.time)
-    ):
+    signals, smooth, clock = recording.signals, recording.smooth, recording.raw.clock
+    if recording.decimated or clock.measured_rate is not None or clock.spline is not None:
         return None
     count = len(signals.time)
     here = np.arange(count, dtype=float)

@@ -141,6 +141,8 @@ def _corrected(motion: Motion, correction: float) -> Motion:
     load = motion.load + correction * motion.discretization
     # The error of a second difference over a span is span²/12 of the fourth derivative; that of a
     # simulation that differentiates twice over steps h is h²/3, the most that the line adds.
+    if motion.clock.spline is not None:
+        return replace(motion, at=replace(motion.at, tension=load), load=load)
     twice = 1 / (3 * motion.clock.reach**2)
     rounded = float(np.clip((correction + 1 / 12) / twice, 0.0, 1.0))
     return replace(motion, at=replace(motion.at, tension=load), load=load, rounded=rounded)

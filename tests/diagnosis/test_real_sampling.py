@@ -1,0 +1,61 @@
+"""Recordings of others with uneven stamps, gaps and few samples per cogging period.
+
+The data are no part of the project: they are looked for in the folder that WINCHKIT_REAL names, and
+beside the checkout in ``shared/data/real``; the tests are skipped where there are none.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.runs import read_run
+from winchkit.schema.read import read_profile
+
+VARIABLE = "WINCHKIT_REAL"
+
+
+def folder() -> Path | None:
+    """Where the data are, if they are anywhere."""
+    beside = [parent / "shared" / "data" / "real" for parent in Path(__file__).resolve().parents]
+    told = os.environ.get(VARIABLE)
+    for place in [Path(told)] if told else beside:
+        if (place / "openarm-j4" / "collect.csv").is_file():
+            return place
+    return None
+
+
+DATA = folder()
+pytestmark = pytest.mark.skipif(
+    DATA is None, reason=f"the recordings are not here; {VARIABLE} names the folder that has them"
+)
+
+
+def dataset(machine: str, pattern: str = "*.csv") -> Dataset:
+    assert DATA is not None
+    paths = sorted((DATA / machine).glob(pattern))
+    return prepare([read_run(p) for p in paths], read_profile(DATA / machine / "profile.toml"))
+
+
+@pytest.mark.parametrize(
+    ("machine", "pattern"),
+    [
+        ("openarm-j4", "*.csv"),
+        ("franka-q2", "*.csv"),
+        ("odrive-cogging", "map-*.csv"),
+        ("odrive-cogging", "slow2-*.csv"),
+    ],
+)
+def test_nine_tenths_of_the_samples_are_used(machine: str, pattern: str) -> None:
+    assert dataset(machine, pattern).used_share["motor_torque"] >= 0.9
+
+
+def test_all_orders_of_the_cogging_maps_are_within_the_band() -> None:
+    """84 periods per turn of 512 stations, 3 s each; a tenth of the rate is 51 periods."""
+    recording = dataset("odrive-cogging", "map-*.csv").recordings[0]
+    cut_off = recording.bands["motor_torque"].cut_off
+    assert cut_off is not None
+    assert cut_off > 84 / (512 * 3)

@@ -1,0 +1,100 @@
+"""The smoothing spline against closed-form motions and a dense solution."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from winchkit.arrays import Array
+from winchkit.model.derivatives import Clock
+from winchkit.model.smoothing_spline import SmoothingSpline
+
+RATE = 2 * np.pi / 5
+
+
+def jittered(seed: int, count: int = 600, step: float = 0.05) -> Array:
+    """Times whose steps vary by half, with gaps of half a second every five."""
+    random = np.random.default_rng(seed)
+    time = np.cumsum(step * random.uniform(0.5, 1.5, count))
+    return np.asarray(time[time % 5.0 > 0.5])
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 10_000), st.floats(-2.0, -1.0))
+def test_derivatives_of_a_sine_are_as_exact_as_it_says(seed: int, log_noise: float) -> None:
+    time, noise = jittered(seed), 10.0**log_noise
+    random = np.random.default_rng([seed, 1])
+    angle = 20 * np.sin(RATE * time) + noise * random.standard_normal(len(time))
+    spline = SmoothingSpline.fit(time, angle)
+    truth = {1: 20 * RATE * np.cos(RATE * time), 2: -20 * RATE**2 * np.sin(RATE * time)}
+    assert spline.noise == pytest.approx(noise, rel=0.25)
+    for order, exact in truth.items():
+        error = spline.smoothed(angle, order) - exact
+        std = spline.std(order)
+        # White jerk is a rougher motion than a sine, so that the claim is on the safe side.
+        assert 0.3 < np.sqrt(np.mean((error / std) ** 2)) < 1.3
+    differences = np.gradient(np.gradient(angle, time), time)
+    assert np.std(spline.smoothed(angle, 2) - truth[2]) < 0.5 * np.std(differences - truth[2])
+
+
+def test_a_parabola_is_kept_exactly() -> None:
+    time = jittered(3)
+    moved = 5.0 - 2.0 * time + 0.3 * time**2
+    spline = SmoothingSpline.fit(time, np.sin(time) + 0.1 * np.cos(40 * time))
+    assert spline.smoothed(moved) == pytest.approx(moved, abs=1e-6)
+    assert spline.smoothed(moved, 1) == pytest.approx(0.6 * time - 2.0, abs=1e-6)
+    assert spline.smoothed(moved, 2) == pytest.approx(np.full(len(time), 0.6), abs=1e-5)
+
+
+def test_its_deviations_are_those_of_the_whole_inverse() -> None:
+    """Ridge regression on scipy's B-splines, by dense matrices."""
+    from scipy.interpolate import BSpline
+
+    time = jittered(4, 60)
+    spline = SmoothingSpline.fit(time, np.sin(time) + 0.01 * np.cos(50 * time))
+    h, count = spline.spacing, int((time[-1] - time[0]) / spline.spacing) + 6
+    knots = time[0] + h * (np.arange(count + 6) - 5)
+    basis = BSpline(knots, np.eye(count), 5)
+    bent = np.diff(np.eye(count), 3, axis=0)
+    inverse = np.linalg.inv(basis(time).T @ basis(time) + spline.weight * bent.T @ bent)
+    for order in (0, 1, 2):
+        rows = basis(time, nu=order)
+        exact = spline.noise * np.sqrt(np.diag(rows @ inverse @ rows.T))
+        assert spline.std(order) == pytest.approx(exact, rel=1e-6)
+        smoothed = rows @ inverse @ basis(time).T @ time**3
+        assert spline.smoothed(time**3, order) == pytest.approx(smoothed, rel=1e-6, abs=1e-6)
+
+
+def test_a_rounded_angle_has_at_least_the_noise_of_its_rounding() -> None:
+    time = jittered(5)
+    step = 0.02
+    spline = SmoothingSpline.fit(time, step * np.round(np.sin(RATE * time) / step))
+    assert spline.noise >= step / np.sqrt(12) * 0.999
+    error = spline.smoothed(step * np.round(np.sin(RATE * time) / step), 1) - RATE * np.cos(
+        RATE * time
+    )
+    assert np.std(error) < 0.03 * RATE
+
+
+def test_even_samples_keep_their_differences() -> None:
+    time = np.arange(200) / 50
+    angle = np.sin(time) + 1e-3 * np.cos(100 * time)
+    clock = Clock(time, angle)
+    assert clock.spline is None
+    assert clock.acceleration_std is None
+    assert np.array_equal(clock.rate, np.gradient(angle, time))
+    assert np.array_equal(clock.acceleration, np.gradient(np.gradient(angle, time), time))
+
+
+def test_a_reported_velocity_takes_the_place_of_the_angle() -> None:
+    random, time = np.random.default_rng(6), jittered(6)
+    angle = np.sin(RATE * time) + 3e-3 * random.standard_normal(len(time))
+    velocity = RATE * np.cos(RATE * time) + 1e-4 * random.standard_normal(len(time))
+    clock = Clock(time, angle, velocity)
+    assert clock.measured_rate is velocity
+    exact = -(RATE**2) * np.sin(RATE * time)
+    assert np.std(clock.acceleration - exact) < 0.2 * np.std(
+        Clock(time, angle).acceleration - exact
+    )
