@@ -72,7 +72,7 @@ def test_differences_use_no_unknown_sample(unknown: set[int], reach: int) -> Non
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.integers(0, 10_000), st.floats(0.05, 0.45), st.floats(0.01, 0.2))
+@given(st.integers(0, 10_000), st.floats(0.05, 0.4), st.floats(0.01, 0.2))
 def test_stamps_that_jitter_about_even_instants_are_mended(
     seed: int, jitter: float, step: float
 ) -> None:

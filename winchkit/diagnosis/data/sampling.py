@@ -105,6 +105,8 @@ def _nearest_even(time: Array) -> Array | None:
     best = int(np.argmax(np.abs(sums)))
     frequency, phase = near[best], np.angle(sums[best]) / (2 * np.pi)
     number = np.round(time * frequency - phase)
+    step, start = np.polyfit(number, time, 1)
+    number = np.round((time - start) / step)
     if np.any(np.diff(number) < 1):
         return None
     step, start = np.polyfit(number, time, 1)
