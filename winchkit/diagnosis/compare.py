@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.data.spectrum import WHOLE_TRANSITION
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import replicate_rms
@@ -87,10 +89,13 @@ def compared(
     start = initial_hypothesis(profile, catalogue, regression)
     residual = regression.residual(start)
     offset = None
-    if regression.fits_offset:
-        column = regression.nuisance_columns[:, 0]
-        offset = float(column @ residual / (column @ column))
-        residual = residual - offset * column
+    offsets = regression.n_run_offsets + int(regression.fits_offset)
+    if offsets:
+        columns = regression.nuisance_columns[:, :offsets]
+        fitted = np.linalg.lstsq(columns, residual, rcond=None)[0]
+        residual = residual - columns @ fitted
+        lengths = _of_length(regression, columns)
+        offset = float(np.mean(fitted[lengths])) if lengths.any() else None
     shares, orders = attributions(regression, residual), harmonics(regression, residual)
     noise = replicate_rms(regression, residual)
     outputs = {}
@@ -111,7 +116,15 @@ def compared(
         )
     maps = tuple(residual_maps(regression, residual))
     dataset = regression.dataset
-    comparison = Comparison(outputs, offset, dataset.notes, maps, used_share=dataset.used_share)
+    comparison = Comparison(
+        outputs,
+        offset,
+        dataset.notes,
+        maps,
+        sanity=dataset.sanity,
+        used_share=dataset.used_share,
+        caveats=caveats(dataset.sanity),
+    )
     return Compared(regression, residual, comparison)
 
 
@@ -123,6 +136,14 @@ def initial_hypothesis(
     for term in terms_of(profile, catalogue):
         hypothesis = hypothesis.with_term(term, regression.n_runs)
     return hypothesis
+
+
+def _of_length(regression: TimeSeriesRegression, columns: Array) -> NDArray[np.bool_]:
+    """Offset columns of the length instrument."""
+    rows = np.zeros(regression.n_rows, dtype=bool)
+    for segment in regression.segments:
+        rows[segment.rows] = segment.output == "cable_length"
+    return np.asarray(np.any(columns[rows] != 0, axis=0))
 
 
 def _order(found: Attribution) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
@@ -28,9 +29,13 @@ from winchkit.diagnosis.results import (
     Where,
 )
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
+from winchkit.diagnosis.selection.stepwise import (
+    SelectionResult,
+    initial_result,
+    stepwise_selection,
+)
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.verdict.decision import Judgement, reweighted_judgement
+from winchkit.diagnosis.verdict.decision import Judgement, reweighted_judgement, withheld
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -52,6 +57,10 @@ __all__ = [
 ]
 
 _WHERE = 6
+_UNSEARCHED = (
+    "no effect was looked for, since a sign or unit looks wrong: correct the file, or confirm it "
+    "with --as-recorded"
+)
 _LOCATED = ("unknown", "partly")
 
 
@@ -130,6 +139,7 @@ def diagnose(
     band: float | None = None,
     *,
     decimate: bool = True,
+    as_recorded: bool = False,
     progress: ProgressCallback = no_progress,
 ) -> WinchAnswer:
     """Find the effects that a winch's profile lacks on its runs.
@@ -146,6 +156,8 @@ def diagnose(
         Cut-off frequency of the torque's low-pass filter, Hz; by default chosen from the sampling.
     decimate
         Decimate long runs as far as their signals allow.
+    as_recorded
+        Look for effects although a sign or unit looks wrong.
     progress
         Called with the present step and the share of the work done, 0 to 1.
 
@@ -166,6 +178,9 @@ def diagnose(
     dataset = prepare(runs, profile, band, decimate=decimate)
     progress("drawing the candidates", 0.2)
     engine = selection_engine(dataset, catalogue)
+    doubts = caveats(dataset.sanity)
+    if doubts and not as_recorded:
+        return _unsearched(engine, doubts)
     progress("searching", 0.4)
     result = stepwise_selection(engine)
     reduced = without_impacts(dataset, result.last_model)
@@ -175,6 +190,28 @@ def diagnose(
         result = stepwise_selection(engine)
     progress("naming", 0.8)
     return _answer(engine, result)
+
+
+def _unsearched(engine: TimeSeriesSelection, doubts: tuple[str, ...]) -> WinchAnswer:
+    """Verdict ``unknown`` for runs with a wrong sign or unit: no effect must explain that."""
+    result = initial_result(engine)
+    judgement = withheld(engine, result, 1.0, _UNSEARCHED)
+    dataset = engine.regression.dataset
+    diagnosis = Diagnosis(
+        verdict=judgement.verdict,
+        outputs=judgement.outputs,
+        steps=(),
+        candidates=(),
+        detectable=(),
+        unexplained_share=judgement.share,
+        where=(),
+        next_runs=(),
+        notes=(*dataset.notes, *judgement.notes),
+        sanity=dataset.sanity,
+        used_share=dataset.used_share,
+        caveats=doubts,
+    )
+    return WinchAnswer(engine, judgement.reported, diagnosis)
 
 
 def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
@@ -203,7 +240,9 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
             *missing_excitation(engine.regression),
             *judgement.notes,
         ),
+        sanity=engine.regression.dataset.sanity,
         used_share=engine.regression.dataset.used_share,
+        caveats=caveats(engine.regression.dataset.sanity),
     )
     return WinchAnswer(engine, reported, diagnosis, sets, pairs)
 

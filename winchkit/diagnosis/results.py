@@ -63,7 +63,7 @@ class Comparison:
 
     outputs: Mapping[str, OutputError]
     offset: float | None
-    """Fitted offset of the length instrument, m."""
+    """Fitted offset of the length instrument, m; the mean over the runs with an offset each."""
     notes: tuple[str, ...] = ()
     maps: tuple[ResidualMap, ...] = field(default=(), compare=False)
     """Mean errors over two variables; per output the largest share first."""

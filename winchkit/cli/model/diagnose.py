@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,10 +38,19 @@ __all__ = ["command"]
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
 @model_options
 @click.option("--every-sample", is_flag=True, help="Do not thin long runs out.")
+@click.option(
+    "--as-recorded", is_flag=True, help="Look for effects although a sign or unit looks wrong."
+)
 @json_option
 @html_option
 def command(
-    runs: Sequence[str], asked: Asked, every_sample: bool, as_json: bool, html: str | None
+    *,
+    runs: Sequence[str],
+    asked: Asked,
+    every_sample: bool,
+    as_recorded: bool,
+    as_json: bool,
+    html: str | None,
 ) -> None:
     """Name the physical effect that the model lacks, with its size and what it would buy.
 
@@ -52,21 +61,22 @@ def command(
     from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.schema.profiles.robot import RobotProfile
 
-    declared, thin = declared_profile(asked.source), not every_sample
+    declared = declared_profile(asked.source)
+    how = {"decimate": not every_sample, "as_recorded": as_recorded}
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band, asked.winch)
         _tell_robot(runs, declared, asked, as_json, html)
     elif asked.each:
-        _tell_each(runs, declared, asked, thin, as_json, html)
+        _tell_each(runs, declared, asked, how, as_json, html)
     else:
-        _tell_one(runs, declared, asked, thin, as_json, html)
+        _tell_one(runs, declared, asked, how, as_json, html)
 
 
 def _tell_one(
     runs: Sequence[str],
     declared: WinchProfile,
     asked: Asked,
-    thin: bool,
+    how: Mapping[str, bool],
     as_json: bool,
     html: str | None,
 ) -> None:
@@ -75,7 +85,7 @@ def _tell_one(
 
     with progress_bar() as progress:
         own, catalogue = asked.runs(runs), asked.catalogue
-        answer = diagnose(own, declared, catalogue, asked.band, decimate=thin, progress=progress)
+        answer = diagnose(own, declared, catalogue, asked.band, **how, progress=progress)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         write_page(html, _page(answer, page_title(declared.name, runs), asked))
@@ -85,7 +95,7 @@ def _tell_each(
     runs: Sequence[str],
     declared: WinchProfile,
     asked: Asked,
-    thin: bool,
+    how: Mapping[str, bool],
     as_json: bool,
     html: str | None,
 ) -> None:
@@ -101,9 +111,7 @@ def _tell_each(
     with threads_abandoned(), progress_bar() as progress:
         winches = read_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
-        each = diagnose_each(
-            winches, declared, catalogue, asked.band, decimate=thin, progress=progress
-        )
+        each = diagnose_each(winches, declared, catalogue, asked.band, **how, progress=progress)
         for name, answer in each:
             found[name], said[name] = answer.diagnosis, _said(answer, as_json)
             present[name] = answer.result.lack_of_fit_test.p_value

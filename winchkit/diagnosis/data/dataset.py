@@ -7,24 +7,27 @@ derivatives and effects with memory stay defined; the interpolated samples are n
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
-from winchkit.diagnosis.data.input_denoising import denoised_motions
+from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, even_instants
+from winchkit.diagnosis.data.sanity import findings, resolutions, without_outliers
 from winchkit.diagnosis.data.spectrum import Band, torque_cut_off
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs
+from winchkit.diagnosis.data.zeroing import zeroed_anew
 from winchkit.errors import UsageError
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUTS, At, Signals
 from winchkit.runs.run import Run
+from winchkit.runs.sanity.finding import Finding
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -43,6 +46,12 @@ class Filtering:
     """Coefficients are kept up to this many cut-offs."""
     decimation: Decimation | None = None
     """Decimation of long runs; None for none."""
+
+
+_ZEROED = ("cable_length", "tension")
+"""Outputs whose instrument may be zeroed before a run."""
+_EQUAL_TEMPERATURE = 0.5
+"""Difference of mean temperatures above which repeats may differ by a thermal effect, K."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,14 @@ class Dataset:
     recordings: tuple[Recording, ...]
     repeats: tuple[Repeats, ...]
     notes: tuple[str, ...] = ()
+    sanity: tuple[Finding, ...] = ()
+    """Findings on the runs as recorded."""
+    resolution: Mapping[str, float] = field(default_factory=dict)
+    """Resolution (quantisation step) of every output at the full rate, rms over the runs, SI."""
+    zeroed_anew: frozenset[str] = frozenset()
+    """Outputs whose instrument has another offset in every run."""
+    decimation_factor: int = 1
+    """Samples of the recording per sample of the data set."""
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -139,13 +156,47 @@ def prepare(
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
     notes = validate_runs(runs, profile)
-    runs, mended = evenly_stamped(runs)
+    sanity = findings(runs, profile)
+    resolution = resolutions(runs)
+    runs, mended = evenly_stamped([without_outliers(run) for run in runs])
     notes += mended
     decimation = decimation_for(runs) if decimate else None
     if decimation is not None:
         notes.append(decimation.words)
     filtering = Filtering(band, kept_cut_offs, decimation)
-    return replace(assemble(runs, profile, filtering), notes=tuple(notes))
+    dataset = assemble(runs, profile, filtering)
+    anew = [zeroed_anew(output, _repeat_differences(dataset, output)) for output in _ZEROED]
+    zeroed = [finding for finding in anew if finding is not None]
+    factor = 1 if decimation is None else decimation.factor
+    return replace(
+        dataset,
+        notes=tuple(notes),
+        sanity=(*sanity, *zeroed),
+        zeroed_anew=frozenset(finding.channel for finding in zeroed),
+        resolution=resolution,
+        decimation_factor=factor,
+    )
+
+
+def _repeat_differences(dataset: Dataset, output: str) -> list[Array]:
+    """Contrasts of the residuals of repeats; none of repeats at different temperatures."""
+    out: list[Array] = []
+    for group in dataset.repeated:
+        own = [dataset.recordings[run] for run in group.runs]
+        if not all(output in r.measured for r in own):
+            continue
+        if output == "cable_length" and any(r.zeroed for r in own):
+            continue
+        known = [r.signals.temperature for r in own]
+        warmth = [float(np.mean(values)) for values in known if values is not None]
+        if warmth and np.ptp(warmth) > _EQUAL_TEMPERATURE:
+            continue
+        errors = [
+            np.where(r.valid[output], r.measured[output] - r.nominal[output], np.nan)[rows]
+            for r, rows in zip(own, group.rows, strict=True)
+        ]
+        out += list(contrasts(np.array(errors))[1])
+    return out
 
 
 def assemble(

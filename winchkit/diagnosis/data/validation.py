@@ -6,9 +6,12 @@ Every fault is reported with its file and column.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.sign_and_scale import length_words
 from winchkit.errors import Fault, RunError
 from winchkit.model.line import Line
 from winchkit.model.stages import OUTPUTS, Signals
@@ -20,6 +23,8 @@ __all__ = ["validate_runs"]
 _LEAST_SAMPLES = 50
 _SLOPE_RANGE = 0.75, 1.3333
 _LEAST_FINITE_SHARE = 0.5
+_LEAST_TRAVEL = 0.01
+_LEAST_CORRELATION = 0.5
 _MOST_SAMPLES = 20_000
 """Samples on which the slope of the measured over the predicted length is fitted."""
 
@@ -120,17 +125,30 @@ def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
     signals = Signals(run.time[few], run["motor_angle"][few])
     predicted = line.predict(line.motion(signals))["cable_length"]
     measured = run["cable_length"][few]
-    if np.ptp(predicted) < 0.01 * max(profile.drum.winding_radius, np.ptp(measured)):
+    if np.ptp(predicted) < _LEAST_TRAVEL * profile.drum.winding_radius or not np.ptp(measured):
         return []
-    slope = float(np.polyfit(predicted - predicted.mean(), measured, 1)[0])
+    if np.corrcoef(predicted, measured)[0, 1] ** 2 < _LEAST_CORRELATION:
+        return []  # no motion beside the noise or drift of the instrument
+    slope = _slope(predicted, measured)
     if _SLOPE_RANGE[0] < slope < _SLOPE_RANGE[1]:
         return []
+
+    def slope_at(factor: float) -> float:
+        scaled = replace(signals, motor_angle=signals.motor_angle * factor)
+        return _slope(line.predict(line.motion(scaled))["cable_length"], measured)
+
+    known = length_words(slope, slope_at)
+    why = f"{known}, or " if known else ""
     message = (
-        f"changes by {slope:.3g} times what profile '{profile.name}' predicts; this is another "
-        "winch, another ratio or another direction: check gearbox.ratio, gearbox.direction and "
-        "drum.winding_radius"
+        f"changes by {slope:.3g} times what profile '{profile.name}' predicts; this is {why}"
+        "another winch, another ratio or another direction: check gearbox.ratio, "
+        "gearbox.direction and drum.winding_radius"
     )
     return [Fault(message, where, key="column 'cable_length'")]
+
+
+def _slope(predicted: Array, measured: Array) -> float:
+    return float(np.polyfit(predicted - predicted.mean(), measured, 1)[0])
 
 
 def _notes(run: Run, profile: WinchProfile) -> list[str]:

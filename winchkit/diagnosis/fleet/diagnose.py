@@ -24,6 +24,7 @@ def diagnose_each(
     band: float | None = None,
     *,
     decimate: bool = True,
+    as_recorded: bool = False,
     progress: ProgressCallback = no_progress,
 ) -> Iterator[tuple[str, WinchAnswer]]:
     """Name and answer of every winch, in order, all compared with one profile.
@@ -40,6 +41,8 @@ def diagnose_each(
         Cut-off of the torque's low-pass, Hz; None for the default.
     decimate
         Whether long runs are decimated.
+    as_recorded
+        Look for effects although a sign or unit looks wrong.
     progress
         Progress callback: text and share of the work done.
 
@@ -57,7 +60,13 @@ def diagnose_each(
             progress(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
 
         answer = diagnose(
-            winches[name], profile, catalogue, band, decimate=decimate, progress=report_progress
+            winches[name],
+            profile,
+            catalogue,
+            band,
+            decimate=decimate,
+            as_recorded=as_recorded,
+            progress=report_progress,
         )
         report_progress("done", 1.0)
         return answer

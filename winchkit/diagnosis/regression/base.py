@@ -66,7 +66,12 @@ class Regression(ABC):
     nuisance_columns : ndarray of shape (n_rows, n_nuisances)
         Regressor columns of the nuisance parameters, which are linear.
     fits_offset : bool
-        Whether the first nuisance parameter is the offset of the length instrument.
+        Whether the first nuisance parameter is the offset of the length instrument, one of all
+        runs.
+    n_run_offsets : int
+        Number of the first nuisance parameters that are offsets of single runs, of instruments that
+        were zeroed anew before each run. As initial states, they keep their run's values whatever
+        is held out.
     fits_discretization : bool
         Whether the last nuisance parameter is a correction of the discretisation error, which
         acts through the effects too.
@@ -83,6 +88,7 @@ class Regression(ABC):
     nominal_residual: Array
     nuisance_columns: Array
     fits_offset: bool = False
+    n_run_offsets: int = 0
     fits_discretization: bool = False
     has_known_loads: bool = True
 

@@ -56,7 +56,7 @@ def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) 
     Computed per output in its unit: noise that is strongest at low frequencies makes an offset or a
     drift, which the other folds must determine, less certain than the whitened rows show.
     """
-    shared = _shared(fit)
+    shared = _shared(regression, fit)
     columns = _in_time(regression, shared * noise.inverse_sigma(regression)[:, None])
     plain = _in_time(regression, shared)
     fold = np.concatenate(folds.of)
@@ -88,7 +88,7 @@ def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Ar
     """
     inverse_sigma = noise.inverse_sigma(regression)
     residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
-    columns = _in_time(regression, _shared(fit) * inverse_sigma[:, None])
+    columns = _in_time(regression, _shared(regression, fit) * inverse_sigma[:, None])
     fold = np.concatenate(folds.of)
     left = _left_out(residual, columns, fold, folds.count)
     return np.asarray(np.bincount(fold, weights=left**2, minlength=folds.count), dtype=float)
@@ -111,7 +111,7 @@ def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -
     """Held-out rms error per output, SI."""
     inverse_sigma = noise.inverse_sigma(regression)
     white = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
-    shared = _shared(fit)
+    shared = _shared(regression, fit)
     columns = _in_time(regression, shared * inverse_sigma[:, None])
     steps = _steps(white, columns, np.concatenate(folds.of), folds.count)
     plain = np.concatenate(regression.in_time(fit.residual))
@@ -173,10 +173,10 @@ def _signed_rank_tail(differences: Array) -> float:
     return float(ndtr((n * (n + 1) / 4 - rank_sum) / np.sqrt(variance)))
 
 
-def _shared(fit: Fit) -> Array:
-    """Derivatives by the unknowns that all runs share, without the initial states."""
+def _shared(regression: Regression, fit: Fit) -> Array:
+    """Derivatives by the unknowns of all runs, without offsets and states of single runs."""
     states = sum(len(start) for start in fit.hypothesis.starts)
-    return fit.jacobian[:, : fit.jacobian.shape[1] - states]
+    return fit.jacobian[:, regression.n_run_offsets : fit.jacobian.shape[1] - states]
 
 
 def _in_time(regression: Regression, columns: Array) -> Array:

@@ -1,8 +1,9 @@
 """Regression problem of a winch's runs: spectral coefficients of every output of every run.
 
 Rows are the discrete cosine transform (DCT-II, orthonormal) of measured minus predicted, within
-each output's band. Nuisance parameters are the offset of the length instrument and, where a known
-weight is the load, the correction of its acceleration's discretisation error.
+each output's band. Nuisance parameters are the offset of the length instrument (one of all runs, or
+one per run of an instrument that was zeroed anew before each) and, where a known weight is the
+load, the correction of its acceleration's discretisation error.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from winchkit.diagnosis.regression.prediction_cache import Predictor, masked
 from winchkit.effects.effect import Effect
 from winchkit.model.line import Line
 from winchkit.model.stages import At, Stage
+from winchkit.runs.sanity.quantisation import quantisation_noise
 
 __all__ = ["TimeSeriesRegression"]
 
@@ -52,10 +54,12 @@ class TimeSeriesRegression(Regression):
         self.dataset = dataset
         self._predictors = [Predictor(dataset.profile, r) for r in dataset.recordings]
         self.nominal_residual = self._nominal_residual()
-        offset, discretization = self._offset_column(), self._discretization_column()
+        run_offsets, offset = self._run_offset_columns(), self._offset_column()
+        discretization = self._discretization_column()
+        self.n_run_offsets = len(run_offsets)
         self.fits_offset = bool(np.any(offset))
         self.fits_discretization = bool(np.any(discretization))
-        present = [column for column in (offset, discretization) if np.any(column)]
+        present = [c for c in (*run_offsets, offset, discretization) if np.any(c)]
         self.nuisance_columns = np.array(present).reshape(len(present), self.n_rows).T
 
     @property
@@ -75,7 +79,11 @@ class TimeSeriesRegression(Regression):
 
     @cached_property
     def power_floor(self) -> Array:
-        """Lower limit of the noise variance: (10⁻⁸ of the output's standard deviation)²."""
+        """Lower limit of the noise variance.
+
+        The larger of (10⁻⁸ of the output's standard deviation)² and the quantisation noise: white
+        noise of variance step²/12 at the full rate, through the low-pass of the output.
+        """
         size = {
             output: max(
                 float(np.std(r.measured[output]))
@@ -84,7 +92,22 @@ class TimeSeriesRegression(Regression):
             )
             for output in self.outputs
         }
-        return np.array([(1e-8 * size[output]) ** 2 or 1e-300 for output, _, _ in self.bands])
+        least = np.array([(1e-8 * size[output]) ** 2 or 1e-300 for output, _, _ in self.bands])
+        return np.asarray(np.maximum(least, self._quantisation_power))
+
+    @cached_property
+    def _quantisation_power(self) -> Array:
+        """Variance of a spectral coefficient by quantisation, mean over every band."""
+        power = np.zeros(len(self.bands))
+        count = np.zeros(len(self.bands))
+        for segment in self.segments:
+            variance = quantisation_noise(self.dataset.resolution.get(segment.output, 0.0)) ** 2
+            valid = self.dataset.recordings[segment.run].valid[segment.output]
+            variance *= float(np.mean(valid)) / self.dataset.decimation_factor
+            bands = self.band_of_row[segment.rows]
+            np.add.at(power, bands, variance * segment.band.gain**2)
+            np.add.at(count, bands, 1.0)
+        return power / np.maximum(count, 1.0)
 
     @property
     def n_observations(self) -> int:
@@ -198,8 +221,22 @@ class TimeSeriesRegression(Regression):
             out[segment.rows] = self._masked(segment, error)
         return out
 
+    def _run_offset_columns(self) -> list[Array]:
+        """An offset per run of every instrument that was zeroed anew."""
+        out = []
+        for segment in self.segments:
+            recording = self.dataset.recordings[segment.run]
+            zeroed = recording.zeroed and segment.output == "cable_length"
+            if segment.output in self.dataset.zeroed_anew and not zeroed:
+                column = np.zeros(self.n_rows)
+                column[segment.rows] = self._masked(segment, np.ones(segment.band.count))
+                out.append(column)
+        return out
+
     def _offset_column(self) -> Array:
         out = np.zeros(self.n_rows)
+        if "cable_length" in self.dataset.zeroed_anew:
+            return out
         for segment in self.segments:
             recording = self.dataset.recordings[segment.run]
             if segment.output == "cable_length" and not recording.zeroed:

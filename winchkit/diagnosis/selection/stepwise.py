@@ -28,7 +28,13 @@ from winchkit.diagnosis.selection.scores import Score, null_maxima
 from winchkit.diagnosis.selection.starting_values import other_grid_point
 from winchkit.effects.term import Term
 
-__all__ = ["SelectionResult", "stepwise_selection", "with_pair", "without_term"]
+__all__ = [
+    "SelectionResult",
+    "initial_result",
+    "stepwise_selection",
+    "with_pair",
+    "without_term",
+]
 
 _MOST_STEPS = 6
 _SHORT_LIST = 5
@@ -117,6 +123,26 @@ def stepwise_selection(engine: SelectionEngine) -> SelectionResult:
         scores=tuple(initial_scores),
         tried=tried if lack_of_fit_at_start else (),
         threshold=threshold,
+    )
+
+
+def initial_result(engine: SelectionEngine) -> SelectionResult:
+    """Result of the initial model without a search, for data that must not be explained."""
+    initial_model, initial_noise = engine.fit_with_noise(engine.initial_model)
+    lack_of_fit_test = engine.lack_of_fit_test(initial_model, initial_noise)
+    return SelectionResult(
+        initial_model=initial_model,
+        initial_noise=initial_noise,
+        initial_lack_of_fit_test=lack_of_fit_test,
+        lack_of_fit_at_start=True,
+        last_model=initial_model.hypothesis,
+        final=initial_model,
+        noise=initial_noise,
+        lack_of_fit_test=lack_of_fit_test,
+        lack_of_fit=True,
+        scores=tuple(engine.scores(initial_model, initial_noise)),
+        tried=(),
+        threshold=_threshold(engine, initial_model, initial_noise),
     )
 
 

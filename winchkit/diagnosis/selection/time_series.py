@@ -49,7 +49,8 @@ class TimeSeriesSelection(SelectionEngine):
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Noise from the contrasts of repeats; without repeats from the saturated model."""
         if self.regression.replicates:
-            own = jacobian[:, jacobian.shape[1] - states :]
+            offsets = jacobian[:, : self.regression.n_run_offsets]
+            own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
             return noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
         columns = np.hstack([jacobian, self.signatures.columns])
         return noise_saturated(self.regression, residual, columns)

@@ -10,7 +10,10 @@ from winchkit.runs.sanity.finding import Finding
 
 __all__ = ["caveat_text", "finding_texts", "used_text"]
 
-_CAVEATS: dict[str, str] = {}
+_CAVEATS = {
+    "inverted-sign": "the sign of a channel looks inverted: no effect is named with it",
+    "wrong-factor": "the unit or factor of a channel looks wrong: no effect is named with it",
+}
 """Sentence, without a full stop, of every code of ``caveats``."""
 _SHOWN = 4
 

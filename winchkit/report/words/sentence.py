@@ -68,6 +68,8 @@ def sentence(diagnosis: Diagnosis) -> str:
     str
         Plain text.
     """
+    if diagnosis.verdict == "unknown" and (doubts := _doubts(diagnosis)):
+        return doubts
     if diagnosis.verdict == "adequate":
         return _adequate(diagnosis)
     if diagnosis.steps:
@@ -89,6 +91,11 @@ def changes_text(diagnosis: Diagnosis) -> str:
         return (
             f"This result would be refuted by {words['more']} with a residual above the noise "
             "floor."
+        )
+    if diagnosis.verdict == "unknown" and _doubts(diagnosis):
+        return (
+            f"This result would change with {words['one']} in the right unit and sign, or with the "
+            "confirmation that these are right."
         )
     if not diagnosis.steps:
         return (
@@ -201,6 +208,13 @@ def still_text(outputs: Mapping[str, OutputFit]) -> str:
         if ratio > _ABOVE
     ]
     return f"Still above the noise floor: {listed(texts)}." if texts else ""
+
+
+def _doubts(diagnosis: Diagnosis) -> str:
+    """Wrong signs and units, with which no effect is looked for; empty without any."""
+    found = [f for f in diagnosis.sanity if f.code in diagnosis.caveats]
+    texts = list(dict.fromkeys(f"{f.channel}: {f.text}" for f in found))
+    return f"No effect is named with a wrong channel: {'; '.join(texts)}." if texts else ""
 
 
 def _adequate(diagnosis: Diagnosis) -> str:

@@ -1,0 +1,168 @@
+"""A wrong sign or unit of a channel is named as such; effects and clean runs are not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from diagnosis_runs import GROOVED, SPIRAL, Ride, made, recorded, term, with_channel, without
+from winchkit.diagnosis.compare import compare
+from winchkit.diagnosis.data.sign_and_scale import sign_and_scale
+from winchkit.diagnosis.data.validation import validate_runs
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.errors import RunError
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import EffectTable, WinchProfile
+
+FACTORS = {
+    1000.0: "power of ten",
+    1e-3: "power of ten",
+    100.0: "power of ten",
+    9.80665: "kilograms",
+    1 / 9.80665: "kilograms",
+    2 * pi: "2π",
+    180 / pi: "degrees",
+    60.0: "60",
+    25.4: "inches",
+    4.4482: "pounds-force",
+    2.0**15: "counts",
+}
+OUTPUTS = ("tension", "motor_torque")
+
+
+def scaled(run: Run, name: str, factor: float) -> Run:
+    return with_channel(run, name, run[name] * factor, run.channels[name].unit)
+
+
+def codes(runs: Sequence[Run], profile: WinchProfile = GROOVED) -> list[tuple[str, str]]:
+    return [(finding.channel, finding.code) for finding in sign_and_scale(runs, profile)]
+
+
+@given(
+    st.integers(0, 2**31), st.floats(2.0, 60.0), st.floats(20.0, 500.0), st.sampled_from(OUTPUTS)
+)
+@settings(max_examples=40, deadline=None)
+def test_an_inverted_sign_is_named(seed: int, mass: float, stroke: float, name: str) -> None:
+    run = made(seed, SPIRAL, load_mass=mass, ride=Ride(stroke=stroke))
+    assert codes([run], SPIRAL) == []
+    assert codes([scaled(run, name, -1.0)], SPIRAL) == [(name, "inverted-sign")]
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+@pytest.mark.parametrize(("factor", "words"), FACTORS.items())
+def test_a_wrong_unit_is_named(name: str, factor: float, words: str) -> None:
+    (finding,) = sign_and_scale([scaled(made(3), name, factor)], GROOVED)
+    assert (finding.channel, finding.code) == (name, "wrong-factor")
+    assert finding.value == pytest.approx(factor, rel=0.02)
+    assert words in finding.text
+
+
+def test_a_factor_that_no_constant_is_near() -> None:
+    (finding,) = sign_and_scale([scaled(made(3), "tension", 3.6)], GROOVED)
+    assert "no known constant" in finding.text
+
+
+def test_both_a_wrong_sign_and_a_wrong_unit() -> None:
+    (finding,) = sign_and_scale([scaled(made(3), "motor_torque", -1000.0)], GROOVED)
+    assert finding.code == "inverted-sign"
+    assert "power of ten" in finding.text
+
+
+@pytest.mark.parametrize(("factor", "words"), [(-1.0, "inverted"), (1 / 9.80665, "kilograms")])
+def test_a_wrong_load_is_blamed_once(factor: float, words: str) -> None:
+    run = made(3)
+    run = with_channel(run, "load", np.full(len(run), 98.0665 * factor))
+    (finding,) = sign_and_scale([run], GROOVED)
+    assert finding.channel == "load"
+    assert finding.value == pytest.approx(factor, rel=0.02)
+    assert words in finding.text
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("torque-constant", {"relative_error": 0.3}),
+        ("motor-coulomb", {"torque": 0.3}),
+        ("motor-viscous", {"viscosity": 3e-3}),
+        ("rotor-inertia", {"inertia": 1e-3}),
+        ("cell-gain", {"relative_error": -0.25}),
+        ("cell-offset", {"offset": 40.0}),
+        ("cable-weight", {"mass_per_length": 0.5}),
+    ],
+)
+def test_a_large_effect_is_no_wrong_unit(effect: str, values: dict[str, float]) -> None:
+    assert codes([made(seed, GROOVED, [term(effect, **values)]) for seed in range(4)]) == []
+
+
+def test_a_cell_that_was_tared_under_the_load_has_no_wrong_unit() -> None:
+    run = made(3)
+    assert codes([with_channel(run, "tension", run["tension"] - 98.0665)]) == []
+
+
+def joint(seed: int, sign: float) -> tuple[Run, WinchProfile]:
+    """A joint without a load: inertia, friction, gravity over its angle, an offset."""
+    random = np.random.default_rng(seed)
+    time = np.arange(4000) / 100
+    angle = 1.2 * np.sin(0.9 * time) + 0.4 * np.sin(2.3 * time + 1)
+    rate, bend = np.gradient(angle, time), np.gradient(np.gradient(angle, time), time)
+    torque = 0.4 * bend + 0.3 * rate + 0.5 * np.sign(rate) + 4 * np.cos(angle) + 1
+    torque += random.normal(0, 0.3, len(time))
+    run = made(0, load_mass=None)
+    run = replace(run, time=time, metadata={"load_mass": "0 kg"}, channels={})
+    run = with_channel(run, "motor_angle", angle, "rad")
+    return with_channel(run, "motor_torque", sign * torque, "N m"), GROOVED
+
+
+@given(st.integers(0, 2**31))
+@settings(max_examples=20, deadline=None)
+def test_friction_and_inertia_determine_the_sign_without_a_load(seed: int) -> None:
+    assert codes([joint(seed, 1.0)[0]]) == []
+    assert codes([joint(seed, -1.0)[0]]) == [("motor_torque", "inverted-sign")]
+
+
+def test_the_inertia_in_the_profile_is_a_prediction() -> None:
+    heavy = replace(GROOVED, effect=(EffectTable("rotor-inertia", {"inertia": "0.4 kg m^2"}),))
+    assert codes([joint(1, 1.0)[0]], heavy) == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(-1.0, "inverted sign"), (1000.0, "power of ten"), (180 / pi, "degrees")],
+)
+def test_a_length_of_another_unit_is_refused_with_its_name(factor: float, words: str) -> None:
+    with pytest.raises(RunError, match=words):
+        validate_runs([scaled(made(3), "cable_length", factor)], GROOVED)
+
+
+@pytest.mark.parametrize("factor", [180 / pi, 360.0, 1 / (2 * pi), 4096.0])
+def test_an_angle_of_another_unit_on_a_layered_drum(factor: float) -> None:
+    """The length is not proportional to the angle there."""
+    run = scaled(recorded()[0], "motor_angle", factor)
+    with pytest.raises(RunError, match=r"wrong factor or unit of .*'motor_angle'"):
+        validate_runs([run], replace(SPIRAL, name="bench-spiral"))
+
+
+def test_no_effect_explains_an_inverted_torque() -> None:
+    runs = [scaled(run, "motor_torque", -1.0) for run in recorded()[:4]]
+    profile = replace(SPIRAL, name="bench-spiral")
+    said = diagnose(runs, profile).diagnosis
+    assert (said.verdict, said.steps, said.caveats) == ("unknown", (), ("inverted-sign",))
+    assert {f.channel for f in said.sanity} == {"motor_torque"}
+    assert compare(runs, profile).caveats == ("inverted-sign",)
+
+
+def test_a_clean_recording_has_no_finding_and_uses_nearly_all_samples() -> None:
+    said = compare(recorded()[:4], replace(SPIRAL, name="bench-spiral"))
+    assert said.sanity == () == said.caveats
+    assert min(said.used_share.values()) > 0.9
+
+
+def test_a_torque_alone() -> None:
+    run = without(made(3), "tension", "cable_length")
+    assert codes([scaled(run, "motor_torque", -1.0)]) == [("motor_torque", "inverted-sign")]

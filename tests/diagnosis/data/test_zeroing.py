@@ -1,0 +1,80 @@
+"""Instruments that were zeroed anew: found between repeats, fitted per run, never on clean runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import ttest_1samp
+
+from diagnosis_runs import GROOVED, SPIRAL, Ride, made, recorded, term, with_channel
+from winchkit.diagnosis.compare import compare
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.zeroing import zeroed_anew
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.runs.run import Run
+
+
+def shifted(run: Run, name: str, offset: float) -> Run:
+    return with_channel(run, name, run[name] + offset, run.channels[name].unit)
+
+
+def test_white_noise_is_flagged_at_the_level_of_the_test() -> None:
+    """2000 draws of the null at a level of 10⁻⁴: more than two occur in 1 of 900 cases."""
+    random = np.random.default_rng(4)
+    found = [zeroed_anew("tension", [random.normal(0, 1, 400)]) for _ in range(2000)]
+    assert sum(one is not None for one in found) <= 2
+
+
+def test_one_difference_is_a_t_test_of_batch_means() -> None:
+    random = np.random.default_rng(1)
+    values = 0.5 + random.normal(0, 1, 800)
+    found = zeroed_anew("tension", [values])
+    assert found is not None
+    p_value = ttest_1samp(values.reshape(8, 100).mean(axis=1), 0).pvalue
+    assert f"p = {p_value:.1g}" in found.text
+
+
+def test_a_wander_is_no_new_zero() -> None:
+    random = np.random.default_rng(2)
+    for _ in range(100):
+        wander = np.cumsum(random.normal(0, 1, 400))
+        assert zeroed_anew("cable_length", [wander, np.cumsum(random.normal(0, 1, 400))]) is None
+
+
+@pytest.mark.parametrize(("name", "size"), [("cable_length", 0.002), ("tension", 3.0)])
+def test_an_offset_per_run_does_not_hide_an_effect(name: str, size: float) -> None:
+    """A larger drum is named with and without offsets, with the same radius."""
+    hidden = [term("drum-radius", radius_error=0.3e-3)]
+    clean = [
+        made(10 * i + k, GROOVED, hidden, load_mass=mass, ride=Ride(samples=800))
+        for i, mass in enumerate((10.0, 25.0))
+        for k in range(2)
+    ]
+    random = np.random.default_rng(5)
+    moved = [shifted(run, name, size * random.normal()) for run in clean]
+    before, after = compare(clean, GROOVED), compare(moved, GROOVED)
+    assert [f.code for f in before.sanity] == []
+    assert [(f.code, f.channel) for f in after.sanity] == [("zeroed-anew", name)]
+    assert after.outputs[name].rms == pytest.approx(before.outputs[name].rms, rel=0.05)
+    found = diagnose(moved, GROOVED).diagnosis
+    assert found.verdict == "explained"
+    values = {n: v for step in found.steps for n, v in step.parameters.items()}
+    assert values["drum-radius"]["radius_error"].value == pytest.approx(0.3e-3, abs=0.02e-3)
+
+
+def test_every_run_has_a_column_of_its_own() -> None:
+    runs = [made(k, load_mass=10.0) for k in range(3)]
+    runs = [shifted(run, "cable_length", 0.01 * k) for k, run in enumerate(runs)]
+    regression = TimeSeriesRegression(prepare(runs, GROOVED))
+    assert (regression.n_run_offsets, regression.fits_offset) == (3, False)
+    offsets, *_ = np.linalg.lstsq(
+        regression.nuisance_columns, regression.nominal_residual, rcond=None
+    )
+    assert np.diff(offsets[:3]) == pytest.approx([0.01, 0.01], abs=1e-4)
+
+
+def test_recorded_repeats_share_one_zero() -> None:
+    assert compare(recorded(), replace(SPIRAL, name="bench-spiral")).sanity == ()

@@ -1,0 +1,225 @@
+"""Findings on channels: a fault of random size is found, a clean channel has none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from winchkit.runs.run import Channel, Run
+from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.inspection import inspect_run
+from winchkit.runs.sanity.local_noise import local_noise
+from winchkit.runs.sanity.outliers import outlier_mask
+from winchkit.runs.sanity.quantisation import resolution
+from winchkit.runs.sanity.sampling import increasing_rows
+
+Array = NDArray[np.float64]
+SEEDS = st.integers(0, 2**31)
+COUNT = 1500
+RATE = 50.0
+
+
+def tension(seed: int, noise: float = 0.8) -> Array:
+    """A force with ramps, steps and white noise."""
+    random = np.random.default_rng(seed)
+    time = np.arange(COUNT) / RATE
+    signal = 150 + 40 * np.sin(2 * np.pi * time / random.uniform(3, 12))
+    signal += random.uniform(5, 20) * np.sign(np.sin(2 * np.pi * time / random.uniform(4, 9)))
+    return np.asarray(signal + random.normal(0, noise, COUNT))
+
+
+def run_of(values: Array, name: str = "tension", unit: str = "N") -> Run:
+    time = np.arange(len(values)) / RATE
+    angle = 40 * np.sin(2 * np.pi * time / 7)
+    channels = {"motor_angle": Channel(angle, "rad"), name: Channel(values, unit)}
+    return Run("r", time, channels)
+
+
+def found(run: Run, code: str) -> list[Finding]:
+    return [finding for finding in inspect_run(run) if finding.code == code]
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_a_clean_channel_has_no_finding(seed: int) -> None:
+    assert inspect_run(run_of(tension(seed))) == []
+
+
+@given(SEEDS, st.floats(0.1, 10.0))
+@settings(max_examples=40, deadline=None)
+def test_the_local_noise_is_that_of_the_samples(seed: int, noise: float) -> None:
+    random = np.random.default_rng(seed)
+    time = np.arange(COUNT) / RATE
+    values = 50 * np.sin(time) + random.normal(0, noise, COUNT)
+    assert local_noise(values) == pytest.approx(noise, rel=0.12)
+
+
+@given(SEEDS, st.floats(1e-4, 20.0), st.integers(4, 9))
+@settings(max_examples=80, deadline=None)
+def test_the_resolution_is_the_step(seed: int, step: float, digits: int) -> None:
+    """Also where printing rounds to a few digits, in another unit."""
+    random = np.random.default_rng(seed)
+    time = np.arange(COUNT) / RATE
+    noise = random.uniform(0.0, 1.0) * step
+    signal = random.uniform(20, 300) * step * np.sin(time) + random.normal(0, 1, COUNT) * noise
+    values = step * np.round(signal / step)
+    largest = 10.0 ** np.floor(np.log10(np.abs(values).max()))
+    printed = np.round(values / largest, digits) * largest
+    rounding = largest * 10.0**-digits
+    if rounding > 0.01 * step:
+        return
+    assert resolution(printed) == pytest.approx(step, rel=0.01)
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_a_continuous_channel_has_no_resolution(seed: int) -> None:
+    assert resolution(tension(seed)) == 0.0
+
+
+@given(SEEDS, st.integers(7, 40), st.floats(1e-3, 0.3))
+@settings(max_examples=80, deadline=None)
+def test_a_wave_with_few_samples_a_period_is_not_quantised(
+    seed: int, samples: int, noise: float
+) -> None:
+    """Its differences have few values, whose common step is none of an instrument."""
+    random = np.random.default_rng(seed)
+    phase = 2 * np.pi * np.arange(COUNT) / samples + random.uniform(0, 6)
+    values = 10 * np.sin(phase) + random.normal(0, noise, COUNT)
+    assert not found(run_of(values), "quantised")
+
+
+@given(SEEDS, st.floats(1.5, 30.0))
+@settings(max_examples=40, deadline=None)
+def test_a_coarse_cell_is_quantised(seed: int, step: float) -> None:
+    values = step * np.round(tension(seed) / step)
+    (finding,) = found(run_of(values), "quantised")
+    assert finding.value == pytest.approx(step, rel=0.01)
+
+
+@given(SEEDS, st.integers(1, 12), st.floats(20.0, 1e4))
+@settings(max_examples=60, deadline=None)
+def test_spikes_are_outliers_and_nothing_else_is(seed: int, count: int, size: float) -> None:
+    random = np.random.default_rng(seed)
+    values = tension(seed)
+    places = np.sort(random.choice(np.arange(3, COUNT - 3, 7), count, replace=False))
+    spiked = values.copy()
+    spiked[places] += size * 2.5 * random.choice([-1, 1], count)
+    mask = outlier_mask(spiked)
+    assert not np.any(np.delete(mask, places))
+    # A spike on the flank of a step is a part of the step.
+    assert np.count_nonzero(mask[places]) >= 0.6 * count - 1
+
+
+@given(SEEDS, st.floats(0.55, 0.95), st.booleans())
+@settings(max_examples=40, deadline=None)
+def test_a_limit_of_the_instrument_is_saturation(seed: int, share: float, low: bool) -> None:
+    values = tension(seed)
+    limit = float(np.quantile(values, 1 - share if low else share))
+    cut = np.maximum(values, limit) if low else np.minimum(values, limit)
+    (finding,) = found(run_of(cut), "saturated")
+    assert finding.value == pytest.approx(1 - share, abs=0.01)
+
+
+@given(SEEDS, st.floats(0.55, 0.9), st.floats(0.2, 2.0))
+@settings(max_examples=40, deadline=None)
+def test_a_coarse_cell_saturates_too(seed: int, share: float, step: float) -> None:
+    values = tension(seed)
+    limit = step * round(float(np.quantile(values, share)) / step)
+    (finding,) = found(run_of(np.minimum(step * np.round(values / step), limit)), "saturated")
+    assert finding.value == pytest.approx(1 - share, abs=0.1)
+
+
+@given(SEEDS, st.floats(0.2, 20.0))
+@settings(max_examples=60, deadline=None)
+def test_a_coarse_cell_that_does_not_saturate(seed: int, step: float) -> None:
+    assert not found(run_of(step * np.round(tension(seed) / step)), "saturated")
+
+
+def test_a_smooth_signal_is_cut_off_at_a_slope() -> None:
+    time = np.arange(COUNT) / RATE
+    assert found(run_of(np.minimum(100 * np.sin(time), 60.0)), "saturated")
+
+
+def test_rest_at_the_end_of_a_smooth_travel_is_no_saturation() -> None:
+    phase = np.clip(np.arange(COUNT) / RATE - 5, 0, np.pi)
+    assert not found(run_of(2 - np.cos(phase), "cable_length", "m"), "saturated")
+
+
+@given(SEEDS, st.integers(2, 20))
+@settings(max_examples=40, deadline=None)
+def test_held_values_are_those_of_a_slower_instrument(seed: int, held: int) -> None:
+    values = np.repeat(tension(seed)[: COUNT // held], held)
+    (finding,) = found(run_of(values), "repeated-values")
+    assert finding.value == pytest.approx(1 - 1 / held, abs=0.02)
+    rate = float(finding.text.partition("about ")[2].partition(" Hz")[0])
+    assert rate == pytest.approx(RATE / held, rel=0.02)
+
+
+def test_a_slow_channel_of_coarse_resolution_is_not_held() -> None:
+    time = np.arange(COUNT) / RATE
+    values = np.round(40 * np.sin(2 * np.pi * time / 15))
+    assert not found(run_of(values), "repeated-values")
+
+
+def test_a_constant_channel() -> None:
+    (finding,) = found(run_of(np.full(COUNT, 26.0), "temperature", "degC"), "constant")
+    assert finding.value == 26.0
+
+
+@given(SEEDS, st.floats(0.1, 0.45))
+@settings(max_examples=30, deadline=None)
+def test_jitter_of_the_clock(seed: int, jitter: float) -> None:
+    random = np.random.default_rng(seed)
+    time = np.cumsum((1 + random.uniform(-1, 1, COUNT) * np.sqrt(3) * jitter) / RATE)
+    run = Run("r", time, {"tension": Channel(tension(seed), "N")})
+    (finding,) = found(run, "clock-jitter")
+    assert finding.value == pytest.approx(jitter, rel=0.1)
+
+
+def test_gaps_are_counted_with_what_they_lose() -> None:
+    time = np.arange(COUNT) / RATE
+    time[500:] += 2.0
+    time[900:] += 0.5
+    (finding,) = found(Run("r", time, {"tension": Channel(tension(1), "N")}), "gap")
+    assert finding.value == pytest.approx(2.5)
+    assert "2 gaps" in finding.text
+
+
+@given(st.lists(st.integers(0, 60), min_size=2, max_size=60))
+def test_rows_are_kept_in_order_of_time(stamps: list[int]) -> None:
+    time = np.array(stamps, dtype=np.float64)
+    rows, findings = increasing_rows(time, "r")
+    assert np.all(np.diff(time[rows]) > 0)
+    left_out = sum(finding.value for finding in findings)
+    assert len(rows) + left_out == len(time)
+    assert time[rows[-1]] == time.max()
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "word"),
+    [
+        (lambda v: -v, "inverted-sign", "inverted"),
+        (lambda v: v * 60 / (2 * np.pi), "wrong-factor", "rpm"),
+        (np.degrees, "wrong-factor", "degrees"),
+        (lambda v: v / (2 * np.pi), "wrong-factor", "turns"),
+        (lambda v: v * 1000, "wrong-factor", "power of ten"),
+        (lambda v: v, "", ""),
+    ],
+)
+def test_velocity_against_angle(change: Callable[[Array], Array], code: str, word: str) -> None:
+    time = np.arange(COUNT) / RATE
+    angle, velocity = 40 * np.sin(time), 40 * np.cos(time)
+    velocity = velocity + np.random.default_rng(2).normal(0, 1.0, COUNT)
+    channels = {
+        "motor_angle": Channel(angle, "rad"),
+        "motor_velocity": Channel(change(velocity), "rad/s"),
+    }
+    findings = [f for f in inspect_run(Run("r", time, channels)) if f.channel == "motor_velocity"]
+    assert [f.code for f in findings] == ([code] if code else [])
+    assert all(word in f.text for f in findings)

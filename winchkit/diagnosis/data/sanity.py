@@ -1,0 +1,56 @@
+"""Sanity of the runs of a comparison: findings, resolutions, and spikes that are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from winchkit.diagnosis.data.sign_and_scale import sign_and_scale
+from winchkit.model.stages import OUTPUTS
+from winchkit.runs.run import Channel, Run
+from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.inspection import inspect_run
+from winchkit.runs.sanity.outliers import outlier_mask
+from winchkit.runs.sanity.quantisation import resolution
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["ALARMING", "caveats", "findings", "resolutions", "without_outliers"]
+
+ALARMING = frozenset({"inverted-sign", "wrong-factor"})
+"""Codes of findings with which effects of a winch are not looked for."""
+_CHANNELS = ("motor_angle", "motor_velocity", "load", *OUTPUTS)
+
+
+def findings(runs: Sequence[Run], profile: WinchProfile) -> tuple[Finding, ...]:
+    """Findings on runs: sign and scale against the profile first, then of every channel."""
+    found = sign_and_scale(runs, profile)
+    return (*found, *(finding for run in runs for finding in inspect_run(run)))
+
+
+def caveats(found: Sequence[Finding]) -> tuple[str, ...]:
+    """Codes of the findings with which no effect is named, each once."""
+    return tuple(dict.fromkeys(f.code for f in found if f.code in ALARMING))
+
+
+def resolutions(runs: Sequence[Run]) -> dict[str, float]:
+    """Resolution of every output, rms over the runs that have it, SI."""
+    out = {}
+    for output in OUTPUTS:
+        squares = [resolution(run[output]) ** 2 for run in runs if output in run]
+        if squares:
+            out[output] = float(np.sqrt(np.mean(squares)))
+    return out
+
+
+def without_outliers(run: Run) -> Run:
+    """The run with NaN in place of single spikes, so that these are not compared."""
+    spikes = {name: outlier_mask(run[name]) for name in _CHANNELS if name in run}
+    hit = {name: mask for name, mask in spikes.items() if mask.any()}
+    if not hit:
+        return run
+    channels: dict[str, Channel] = dict(run.channels)
+    for name, mask in hit.items():
+        channels[name] = replace(channels[name], values=np.where(mask, np.nan, run[name]))
+    return replace(run, channels=channels)

@@ -1,0 +1,242 @@
+"""Sign and scale of measured channels against the prediction of a profile.
+
+Every run's tension and torque are regressed on their prediction; a slope far from one is no effect
+of a winch, but a wrong unit, factor or sign of a channel. The standard deviation of the slope is
+that of a block jackknife. Friction and inertia, which the profile may lack, are fitted beside.
+Without a load the prediction of the torque may vanish: then the work of its dissipative part must
+not be negative (passivity).
+
+References
+----------
+Künsch, H. R. (1989). Ann. Statist. 17, 1217-1241.
+Willems, J. C. (1972). Dissipative dynamical systems. Arch. Ration. Mech. Anal. 45, 321-351.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.sampling import bridged
+from winchkit.effects.bind import line_of
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
+from winchkit.runs.run import Run
+from winchkit.runs.sanity.factors import KNOWN_FACTORS, Slope, named_factor, slope_text
+from winchkit.runs.sanity.finding import Finding
+from winchkit.schema.profiles.axis import AxisProfile
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["length_words", "sign_and_scale"]
+
+_LARGEST = 1.8
+_BLOCKS = 8
+_SIGMAS = 5.0
+_MOST_SAMPLES = 20_000
+_EQUAL = 1.1
+_LEAST_SAMPLES = 50
+_NEAR = 0.05
+
+
+def sign_and_scale(runs: Sequence[Run], profile: WinchProfile) -> list[Finding]:
+    """Findings ``inverted-sign`` and ``wrong-factor`` of tension, torque and load.
+
+    Parameters
+    ----------
+    runs
+        Validated runs.
+    profile
+        Winch profile.
+
+    Returns
+    -------
+    list of Finding
+        Value: slope of measured over predicted. Where tension and torque of a run are wrong by the
+        same factor, the load is.
+    """
+    wrong: dict[tuple[str, str, str], list[tuple[str, Slope]]] = {}
+    for run in runs:
+        for channel, slope in _suspects(_slopes(run, profile)).items():
+            code = "inverted-sign" if slope.value < 0 else "wrong-factor"
+            known = named_factor(slope) if _outside(abs(slope.value)) else ""
+            wrong.setdefault((channel, code, known), []).append((run.name, slope))
+    out = []
+    for (channel, code, known), found in wrong.items():
+        text = _text(channel, code, known, _mean([slope for _, slope in found]))
+        out += [Finding(code, name, channel, slope.value, text) for name, slope in found]
+    for run in runs:
+        out += _passivity(run, profile)
+    return out
+
+
+def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
+    """What explains a wrong slope of the cable length over its prediction, in words.
+
+    Parameters
+    ----------
+    slope
+        Measured over predicted.
+    slope_at
+        The same with the motor angle multiplied by a factor: a drum that winds in layers is not
+        linear.
+
+    Returns
+    -------
+    str
+        ``inverted sign of 'cable_length' or 'motor_angle'``; empty where nothing known explains it.
+    """
+    either = "'cable_length' or 'motor_angle'"
+    if slope < 0 and not _outside(abs(slope)):
+        return f"inverted sign of {either}"
+    if known := named_factor(Slope(slope, 0.0)):
+        sign = "inverted sign and " if slope < 0 else ""
+        return f"{sign}wrong factor or unit of {either}, {known}"
+    for factor in KNOWN_FACTORS:
+        if abs(slope_at(factor) - 1) < _NEAR:
+            known = named_factor(Slope(factor, 0.0))
+            return f"wrong factor or unit of 'motor_angle', {known}"
+    return ""
+
+
+def _outside(size: float) -> bool:
+    return not 1 / _LARGEST < size < _LARGEST
+
+
+def _slopes(run: Run, profile: WinchProfile) -> dict[str, Slope]:
+    """Slopes of measured over predicted outputs, where the run determines them."""
+    signals = _signals(run, profile)
+    nominal = Line(profile)
+    motion = nominal.motion(signals)
+    predicted = dict(nominal.predict(motion))
+    at = motion.at
+    beside = [at.motor_rate, np.sign(at.motor_rate), at.motor_acceleration]
+    outputs = {"tension": beside[:2], "motor_torque": beside}
+    if not np.any(predicted["motor_torque"]):
+        # Without a load the profile's own inertia and friction are the prediction.
+        predicted["motor_torque"] = line_of(profile).predict(motion)["motor_torque"]
+        outputs["motor_torque"] = [np.ones(len(signals.time))]
+    out = {}
+    for name, columns in outputs.items():
+        if name in run and name in predicted and np.any(predicted[name]):
+            slope = _slope(run[name], np.column_stack([predicted[name], *columns]))
+            if slope is not None and abs(slope.value) > _SIGMAS * slope.std:
+                out[name] = slope
+    return out
+
+
+def _suspects(slopes: Mapping[str, Slope]) -> dict[str, Slope]:
+    """Channels with a wrong sign or scale; the load where tension and torque agree on one."""
+    wrong = {name: s for name, s in slopes.items() if _is_wrong(s)}
+    if len(wrong) == 2:
+        tension, torque = wrong["tension"], wrong["motor_torque"]
+        ratio = tension.value / torque.value
+        if 1 / _EQUAL < ratio < _EQUAL:
+            size = tension.value**2
+            return {"load": Slope(1 / tension.value, tension.std / size)}
+    return wrong
+
+
+def _is_wrong(slope: Slope) -> bool:
+    """Whether a slope is negative or outside the range of effects, beyond its uncertainty."""
+    low, high = abs(slope.value) - _SIGMAS * slope.std, abs(slope.value) + _SIGMAS * slope.std
+    return slope.value < 0 or low > _LARGEST or high < 1 / _LARGEST
+
+
+def _slope(measured: Array, columns: Array) -> Slope | None:
+    """Coefficient of the first column by least squares, with its block jackknife."""
+    rows = np.flatnonzero(np.isfinite(measured) & np.all(np.isfinite(columns), axis=1))
+    rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
+    if len(rows) < _LEAST_SAMPLES:
+        return None
+    x, y = columns[rows], measured[rows]
+    x = x / np.maximum(np.sqrt(np.mean(x**2, axis=0)), 1e-300)
+    scale = float(np.sqrt(np.mean(columns[rows, 0] ** 2)))
+    without = _jackknifed(x, y)[:, 0] / scale
+    value = float(np.linalg.lstsq(x, y, rcond=None)[0][0]) / scale
+    return Slope(value, _jackknife_std(without))
+
+
+def _jackknifed(x: Array, y: Array) -> Array:
+    """Coefficients without one block of time each, shape (blocks, columns)."""
+    edges = np.linspace(0, len(y), _BLOCKS + 1).astype(int)
+    products = [(x[a:b].T @ x[a:b], x[a:b].T @ y[a:b]) for a, b in pairwise(edges)]
+    gram = np.sum([p for p, _ in products], axis=0)
+    right = np.sum([r for _, r in products], axis=0)
+    return np.array([np.linalg.lstsq(gram - p, right - r, rcond=1e-10)[0] for p, r in products])
+
+
+def _jackknife_std(without: Array) -> float:
+    count = len(without)
+    return float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
+
+
+def _passivity(run: Run, profile: WinchProfile) -> Iterator[Finding]:
+    """A torque whose dissipative part does negative work although no load is known."""
+    if "motor_torque" not in run:
+        return
+    motion = Line(profile).motion(_signals(run, profile))
+    if motion.load is not None and np.any(motion.load):
+        return
+    if motion.load is None and motion.drum_tension is not None:
+        return
+    at = motion.at
+    angle = at.motor_angle - at.motor_angle.mean()
+    shape = angle / max(float(np.abs(angle).max()), 1e-300)
+    conservative = [np.ones_like(shape), shape, shape**2, shape**3, np.sin(at.motor_angle)]
+    conservative += [np.cos(at.motor_angle), at.motor_acceleration]
+    columns = np.column_stack([np.sign(at.motor_rate), at.motor_rate, *conservative])
+    measured = run["motor_torque"]
+    rows = np.flatnonzero(np.isfinite(measured) & np.all(np.isfinite(columns), axis=1))
+    rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
+    if len(rows) < _LEAST_SAMPLES or not np.any(at.motor_rate):
+        return
+    x = columns[rows]
+    scale = np.maximum(np.sqrt(np.mean(x**2, axis=0)), 1e-300)
+    without = _jackknifed(x / scale, measured[rows]) / scale
+    rate = at.motor_rate[rows]
+    power = without[:, 0] * np.mean(np.abs(rate)) + without[:, 1] * np.mean(rate**2)
+    mean, std = float(power.mean()), _jackknife_std(power)
+    if mean < -_SIGMAS * std and float(without[:, 8].mean()) <= 0:
+        text = (
+            f"the sign looks inverted: friction would do work on the motor, {mean:.2g} ± "
+            f"{std:.1g} W, and the inertia is negative"
+        )
+        yield Finding("inverted-sign", run.name, "motor_torque", mean, text)
+
+
+def _signals(run: Run, profile: WinchProfile) -> Signals:
+    has_cable = not isinstance(profile, AxisProfile)
+
+    def channel(name: str) -> Array | None:
+        return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
+
+    return Signals(
+        time=run.time,
+        motor_angle=bridged(run["motor_angle"]),
+        load=channel("load") if has_cable else None,
+        load_mass=run.load_mass if has_cable else None,
+        tension=channel("tension") if has_cable else None,
+    )
+
+
+def _mean(slopes: Sequence[Slope]) -> Slope:
+    values = np.array([slope.value for slope in slopes])
+    stds = np.array([slope.std for slope in slopes])
+    return Slope(float(values.mean()), float(np.sqrt(np.mean(stds**2) / len(stds))))
+
+
+def _text(channel: str, code: str, known: str, slope: Slope) -> str:
+    what = (
+        "its slope over that which tension and torque need"
+        if channel == "load"
+        else ("the slope over the prediction")
+    )
+    beside = f"{what} is {slope_text(slope)}"
+    if code == "inverted-sign":
+        unit = f", and the unit wrong by {known}" if known else ""
+        return f"the sign looks inverted{unit}: {beside}"
+    why = f"that is {known}" if known else "no known constant explains it"
+    return f"the unit or factor looks wrong: {beside}; {why}"

@@ -1,0 +1,91 @@
+"""Instruments that were zeroed anew before each run: an offset that differs between repeats.
+
+Repeats have equal predictions, so that their difference is noise, and a constant where the
+instrument was zeroed in between. The mean of every difference is tested against its variation over
+blocks of time (batch means, one F test per output), and its first block against the change from
+block to block, so that a slow wander of the instrument is none.
+
+References
+----------
+Schmeiser, B. (1982). Batch size effects in the analysis of simulation output. Oper. Res. 30,
+556-568.
+von Neumann, J. (1941). Distribution of the ratio of the mean square successive difference to the
+variance. Ann. Math. Statist. 12, 367-395.
+Draper, N. R., Smith, H. (1998). Applied Regression Analysis, 3rd ed., ch. 2 (pure error).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import fdtrc
+
+from winchkit.arrays import Array
+from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.text import size
+
+__all__ = ["zeroed_anew"]
+
+_BLOCKS = 8
+_LEAST_SAMPLES = 64
+_LEVEL = 1e-4
+_LEVEL_OF_WANDER = 0.01
+
+
+def zeroed_anew(output: str, differences: Sequence[Array]) -> Finding | None:
+    """Finding ``zeroed-anew``; value: standard deviation of the offset between repeats, SI.
+
+    Parameters
+    ----------
+    output
+        Output of the instrument.
+    differences
+        Contrasts of the residuals of repeats, each with the variance of one run's noise; NaN where
+        a sample is not compared.
+
+    Returns
+    -------
+    Finding or None
+        None where the means of the differences are within their variation over eight blocks of
+        time.
+    """
+    known = [difference[np.isfinite(difference)] for difference in differences]
+    means = np.array(
+        [
+            [float(part.mean()) for part in np.array_split(own, _BLOCKS)]
+            for own in known
+            if len(own) >= _LEAST_SAMPLES
+        ]
+    )
+    if len(means) == 0:
+        return None
+    between = _BLOCKS * float(np.mean(means.mean(axis=1) ** 2))
+    within = float(np.mean(means.var(axis=1, ddof=1)))
+    if within == 0:
+        return None
+    freedom = len(means), (_BLOCKS - 1) * len(means)
+    p_value = float(fdtrc(*freedom, between / within))
+    if p_value >= _LEVEL or _wanders(means):
+        return None
+    spread = float(np.sqrt((between - within) / _BLOCKS))
+    text = (
+        f"the offset differs between repeats by {size(spread, OUTPUT_UNITS[output])} (standard "
+        f"deviation, F test p = {p_value:.1g}): the instrument was zeroed anew before each run, "
+        "and an offset per run is fitted"
+    )
+    return Finding("zeroed-anew", "", output, spread, text)
+
+
+def _wanders(means: Array) -> bool:
+    """Whether the first blocks are no larger than a random walk makes them.
+
+    Half the mean square successive difference of block means (von Neumann) is their variance under
+    white noise, and that of the first block of a random walk that starts at zero; its degrees of
+    freedom are 2 (b − 1)²/(3 b − 4) per difference.
+    """
+    first = float(np.mean(means[:, 0] ** 2))
+    half = float(np.mean(np.diff(means, axis=1) ** 2)) / 2
+    freedom = 2 * (_BLOCKS - 1) ** 2 / (3 * _BLOCKS - 4) * len(means)
+    return float(fdtrc(len(means), freedom, first / half)) >= _LEVEL_OF_WANDER

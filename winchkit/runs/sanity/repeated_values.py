@@ -1,0 +1,59 @@
+"""Values that repeat: channels that are constant, and channels of a slower instrument.
+
+A logger that is faster than an instrument writes its last value again (sample and hold). A coarse
+resolution repeats values too, but then changes by single steps; held values change by more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from winchkit.runs.run import Run
+from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.quantisation import resolution
+from winchkit.runs.sanity.text import share, size
+
+__all__ = ["constant", "repeated_values"]
+
+_LEAST_SHARE = 0.2
+_LEAST_CHANGES = 20
+_LONG = 3
+"""Intervals between changes, in median ones, above which the instrument is at rest and not held."""
+_STEPS = 2.0
+
+
+def constant(run: Run, name: str) -> Iterator[Finding]:
+    """A channel with one value only; value: that value."""
+    values = run[name]
+    values = values[np.isfinite(values)]
+    if len(values) > 1 and np.ptp(values) == 0:
+        text = f"constant at {size(float(values[0]), run.channels[name].unit)} in all samples"
+        yield Finding("constant", run.name, name, float(values[0]), text)
+
+
+def repeated_values(run: Run, name: str) -> Iterator[Finding]:
+    """A channel whose values are held over several samples; value: share of repetitions."""
+    values = run[name]
+    values = values[np.isfinite(values)]
+    changes = np.flatnonzero(np.diff(values) != 0)
+    if len(changes) < _LEAST_CHANGES:
+        return
+    lengths = np.diff(changes)
+    moving = lengths[lengths <= _LONG * np.median(lengths)]
+    repeated = 1 - len(moving) / float(np.sum(moving))
+    if repeated < _LEAST_SHARE:
+        return
+    step = resolution(values)
+    if step and float(np.median(np.abs(np.diff(values)[changes]))) < _STEPS * step:
+        return
+    rate = 1 / (run.interval * float(np.mean(moving)))
+    yield Finding(
+        "repeated-values",
+        run.name,
+        name,
+        repeated,
+        f"{share(repeated)} of the samples repeat the one before: the instrument has about "
+        f"{rate:.3g} Hz, the run {1 / run.interval:.3g} Hz",
+    )

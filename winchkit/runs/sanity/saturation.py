@@ -1,0 +1,86 @@
+"""Saturation: values of an instrument that are cut off at the end of its range."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.runs.run import Run
+from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.text import share, size
+
+__all__ = ["saturated"]
+
+_LEAST_SAMPLES = 5
+_TIES = 0.01
+"""Share of equal neighbours below which a channel has continuous values."""
+_ALTERNATING = 0.2
+"""Share of changes in opposite direction to the one before from which a channel has noise: white
+noise has two thirds, a smooth signal few."""
+_LONGEST = 10
+_TIMES = 3
+_OVERSHOOT = 3.0
+_BEFORE = 6
+
+
+def saturated(run: Run, name: str) -> Iterator[Finding]:
+    """An extreme at which values are cut off; value: share of the samples there.
+
+    Notes
+    -----
+    Continuous noise has no two equal values: an extreme that repeats is a limit. Values of a coarse
+    resolution repeat, but three times as long as elsewhere only at a limit. A channel without
+    noise may rest at its extreme, but then approaches it slowly: there, the linear extrapolation of
+    the two samples before must exceed the extreme by three times the second differences before it.
+    An extreme of zero is that of an instrument at rest.
+    """
+    values = run[name]
+    values = values[np.isfinite(values)]
+    if len(values) < _LEAST_SAMPLES or np.ptp(values) == 0:
+        return
+    for sign, word in ((1.0, "largest"), (-1.0, "smallest")):
+        signal = sign * values
+        level = float(signal.max())
+        at = signal >= level - 1e-9 * float(np.ptp(values))
+        count = int(np.count_nonzero(at))
+        if count < _LEAST_SAMPLES or level == 0 or not _is_cut_off(signal, at, level):
+            continue
+        limit = size(sign * level, run.channels[name].unit)
+        text = (
+            f"{share(count / len(values))} of the samples are at the {word} value, {limit}: the "
+            "instrument or the logger saturates; larger errors there are no effect of the winch"
+        )
+        yield Finding("saturated", run.name, name, count / len(values), text)
+
+
+def _is_cut_off(signal: Array, at: NDArray[np.bool_], level: float) -> bool:
+    steps = np.diff(signal)
+    between = at[1:] & at[:-1]
+    opposite = signal == signal.min()
+    elsewhere = (steps == 0) & ~between & ~(opposite[1:] & opposite[:-1])
+    changing = steps[steps != 0]
+    alternating = np.count_nonzero(changing[1:] * changing[:-1] < 0)
+    if alternating > _ALTERNATING * len(changing):
+        if np.count_nonzero(elsewhere) < _TIES * len(signal):
+            return True
+        return _longest(between) > max(_LONGEST, _TIMES * _longest(elsewhere))
+    begins = np.flatnonzero(between & ~np.append(False, between[:-1]))
+    beyond = [_overshoot(signal, int(begin), level) for begin in begins if begin >= _BEFORE]
+    return len(beyond) > 0 and float(np.median(beyond)) > _OVERSHOOT
+
+
+def _longest(flags: NDArray[np.bool_]) -> int:
+    """Length of the longest sequence of true flags."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))
+
+
+def _overshoot(signal: Array, begin: int, level: float) -> float:
+    """Extrapolation beyond the extreme, in the largest second difference just before it."""
+    before = signal[begin - _BEFORE : begin]
+    usual = float(np.abs(np.diff(before, 2)).max())
+    beyond = float(2 * before[-1] - before[-2] - level)
+    return beyond / usual if usual > 0 else (np.inf if beyond > 0 else 0.0)

@@ -1,0 +1,20 @@
+"""Numbers with units in the texts of findings."""
+
+from __future__ import annotations
+
+__all__ = ["counted", "share", "size"]
+
+
+def size(value: float, unit: str) -> str:
+    """A value with three digits and its unit: ``0.0238 N m``."""
+    return f"{value:.3g}" + ("" if unit in {"", "1"} else f" {unit}")
+
+
+def share(part: float) -> str:
+    """A share in per cent with two digits."""
+    return f"{100 * part:.2g} %"
+
+
+def counted(count: int, noun: str) -> str:
+    """``1 gap``, ``3 gaps``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
