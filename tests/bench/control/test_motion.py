@@ -205,6 +205,44 @@ def test_a_run_down_with_stale_feedback_becomes_a_quick_stop(moment: float) -> N
     assert not {0x06, 0x07, 0x0F} & set(axis.words[before:])
 
 
+@pytest.mark.parametrize("late", [0, 1, 3])
+@pytest.mark.parametrize("speed", [0.02, 0.5])
+@pytest.mark.parametrize("joins", [True, False])
+def test_a_command_after_a_ramp_that_became_a_quick_stop_waits_for_the_stop(
+    joins: bool, speed: float, late: int
+) -> None:
+    """A winch that is taken over answers late: the quick stop is the bench's own, and ends first.
+
+    The drive receives the quick stop, and its answers are lost for ``late`` cycles more.
+    """
+    rig = Rig(LIMITS)
+    jog(rig, speed, hold=1.0)
+    rig.run(0.9)
+    axis = rig.axes["A"]
+    axis.alive = False
+    rig.controller().run_down()
+    rig.step(7)
+    assert axis.words[-1] == 0x02
+    axis.state = State.QUICK_STOP_ACTIVE
+    before = len(axis.words)
+    length = rig.cable().at(axis.angle)[0]
+    if joins:
+        jog(rig, -0.1, hold=30.0)
+    else:
+        rig.controller().begin(Move(rig.cable(), rig.limits, length=length + 0.05, speed=0.1))
+    rig.step(late)
+    axis.alive = True
+    rig.run(8.0)
+    assert not rig.supervisor.tripped
+    words = axis.words[before:]
+    assert 0x06 in words, "it is disabled and enabled again"
+    assert 0x0F not in words[: words.index(0x06)], "no quick stop is revoked"
+    if joins:
+        assert rig.speeds[-1] == pytest.approx(-0.1), "the new command is carried out"
+    else:
+        assert rig.cable().at(axis.angle)[0] == pytest.approx(length + 0.05, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

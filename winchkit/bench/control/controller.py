@@ -303,6 +303,8 @@ class Controller:
     def _take(self, wanted: _Order, now: float) -> bool:
         """Start a source now where that is smooth, else get ready for it; whether it is taken."""
         feedback = self.axis.feedback
+        if self.phase is Phase.RUN_DOWN and not _keeps_enabled(self._word):
+            return False  # the ramp became a quick stop, which ends before anything moves again
         if feedback is not None and self.phase in (Phase.MOVING, Phase.RUN_DOWN):
             if wanted.source.joins or self.commanded == 0.0:
                 if not wanted.may_start(self._time):
