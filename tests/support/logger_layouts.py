@@ -515,4 +515,52 @@ def _layouts() -> list[Layout]:
     ]  # fmt: skip
 
 
-LAYOUTS: list[Layout] = _layouts()
+def _unusual() -> list[Layout]:
+    """Layouts of no certain program: what people and scripts write."""
+    m = motion()
+    deg_rpm = _standard((1, _DEG, _RPM, 1, 1))
+    minutes = [f"{int(t // 60):02d}:{t % 60:06.3f}" for t in m.time]
+    epoch = [f"{START.timestamp() + t:.6f}" for t in m.time]
+    joint = "/joint_states/winch/"
+    axis = "Axis1."
+    quoted = [",".join(f'"{v:.10g}"'.replace(".", ",") for v in row)
+              for row in zip(*deg_rpm, strict=True)]  # fmt: skip
+    backwards = [column[::-1] for column in deg_rpm]
+    return [
+        Layout("greek-letters", ".csv", _text(_standard(), [
+            "t(s),θ (rad),ω (rad/s),τ (Nm),F_cable (N)"])),
+        Layout("plotjuggler", ".csv", _text([epoch, *_standard()[1:]], [
+            f"__time,{joint}position,{joint}velocity,{joint}effort,/cell/wrench/force/z"])),
+        Layout("units-behind-a-blank", ".txt", _text(deg_rpm, [
+            "Time (s)   Angle (deg)   Speed (rpm)  Torque (Nm)  Force (N)"], "   ")),
+        Layout("index-without-name", ".csv", _text([np.arange(float(ROWS)), *deg_rpm], [
+            ",time_s,pos_deg,vel_rpm,torque_Nm,force_N"])),
+        Layout("minutes-and-seconds", ".csv", _text([minutes, *deg_rpm[1:]], [
+            "Time;Angle (deg);Speed (rpm);Torque (Nm);Force (N)"], ";")),
+        Layout("latest-row-first", ".csv", _text(backwards, [
+            "time [s],angle [deg],speed [rpm],torque [Nm],force [N]"])),
+        Layout("set-points-beside", ".csv", _text(
+            [m.time * 1e3, m.angle * _DEG + 1, m.angle * _DEG, 0 * m.time + 1, m.velocity * _DEG,
+             m.torque, m.tension],
+            [f"time [ms];{axis}SetPos [°];{axis}ActPos [°];{axis}PosDiff [°];{axis}ActVelo [°/s];"
+             f"{axis}ActTorque [Nm];Cell [N]"], ";", ",")),
+        Layout("quoted-decimal-commas", ".csv", lambda path: path.write_text(
+            '"Zeit [s]","Winkel [°]","Drehzahl [1/min]","Drehmoment [Nm]","Kraft [N]"\n'
+            + "\n".join(quoted) + "\n", encoding="utf-8") and None),
+        Layout("interval-above-and-no-times", ".csv", _text(
+            [np.arange(float(ROWS)), *deg_rpm[1:]],
+            ["Recorder;X1", "Sampling period;10 ms", "",
+             "Index;Position [deg];Velocity [rpm];Torque [Nm];Force [N]"], ";")),
+        Layout("row-of-types", ".csv", _text(deg_rpm, [
+            "Time,Pos,Vel,Trq,Frc", "REAL,LREAL,LREAL,REAL,REAL", "s,°,1/min,Nm,N"])),
+        Layout("markdown", ".md", lambda path: path.write_text(
+            "| t [s] | pos [deg] | vel [rpm] | torque [Nm] | force [N] |\n|---|---|---|---|---|\n"
+            + "".join(f"| {line} |\n" for line in _rows(deg_rpm, " | ")), encoding="utf-8")
+            and None),
+        Layout("text-columns-beside", ".csv", _text(
+            [m.time, ["RUN"] * ROWS, *deg_rpm[1:], ["ok, fine"] * ROWS],
+            ["time [s];state;angle [deg];speed [rpm];torque [Nm];force [N];message"], ";")),
+    ]  # fmt: skip
+
+
+LAYOUTS: list[Layout] = [*_layouts(), *_unusual()]

@@ -110,17 +110,6 @@ def test_what_forbids_a_motion_is_shown_and_the_hand_stays(
     assert "tension is too high" in capsys.readouterr().err
 
 
-def test_a_latched_trip_is_shown_before_any_key(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    station = Station()
-    press(monkeypatch, station, [(0.0, [])])
-    assert "tripped" not in capsys.readouterr().err
-    station.shown = {**STATUS, "tripped": ["winch A: the tension is too high"]}
-    press(monkeypatch, station, [(0.0, [])])
-    assert "disabled  tripped: r resets  [hold" in capsys.readouterr().err
-
-
 def test_a_lost_owner_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ConnectionLost):
         press(monkeypatch, Station(ConnectionLost("gone")), [(0.0, ["up"])])

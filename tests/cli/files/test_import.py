@@ -107,6 +107,19 @@ def test_json_is_complete(tmp_path: Path) -> None:
     assert question["options"][0] == '--rated-torque "2.4 N m"'
 
 
+def test_findings_on_the_runs_are_reported(tmp_path: Path) -> None:
+    m = motion()
+    path = tmp_path / "log.csv"
+    kept = [k for k in range(len(m.time)) if not 100 <= k < 150]
+    rows = (f"{m.time[k]:.4f},{m.angle[k]:.6f},{m.tension[k]:.6f}\n" for k in kept)
+    path.write_text("t [s],angle [rad],force [N]\n" + "".join(rows))
+    result = command(path, "-o", tmp_path / "runs", "--json")
+    assert result.exit_code == 0, result.output
+    found = {item["code"]: item for item in json.loads(result.stdout)["sanity"]}
+    assert found["gap"]["channel"] == "time"
+    assert found["gap"]["text"] in result.stderr
+
+
 def test_a_drive_and_a_cell_with_clocks_of_their_own_become_one_run(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     t, u = np.arange(0, 30, 0.004), np.arange(0, 25, 0.02)

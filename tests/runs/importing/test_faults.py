@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from winchkit.errors import RunError, UsageError
+from winchkit.runs.importing.answers import Answers
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.formats import source
 from winchkit.runs.importing.formats.source import read_table
@@ -59,6 +60,15 @@ def test_times_that_stand_still_have_their_lines(tmp_path: Path) -> None:
         run(tmp_path / "log.csv", lines)
     assert [fault.line for fault in caught.value.faults] == [11, 21]
     assert "stands still at 0.06 s" in caught.value.faults[0].message
+
+
+def test_a_clock_coarser_than_the_sampling_is_named_with_its_option(tmp_path: Path) -> None:
+    lines = [HEAD, *(f"{k // 10 / 10:.1f};{k};1" for k in range(100))]
+    with pytest.raises(RunError, match=r"90 of 100 time stamps repeat.*--sample-rate \"110 Hz\""):
+        run(tmp_path / "log.csv", lines)
+    guess = guess_columns(read_table(tmp_path / "log.csv"), Answers(sample_rate=100.0))
+    found = run_of(streams_of(guess), {})
+    assert found.time == pytest.approx(np.arange(100) / 100)
 
 
 def test_faults_of_unused_columns_do_not_matter(tmp_path: Path) -> None:

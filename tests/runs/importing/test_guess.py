@@ -261,6 +261,21 @@ def test_the_motor_is_preferred_to_the_output_and_set_points_are_left_out(tmp_pa
     assert of(found, "motor_torque").source == "torque"
 
 
+def test_numbered_columns_are_winches_and_their_cells_too(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"t [s]": m.time, "Axis1.ActPos [deg]": m.angle, "Axis2.ActPos [deg]": -m.angle,
+               "Axis1.ActTorque [Nm]": m.torque, "Axis2.ActTorque [Nm]": m.torque,
+               "Cell 1 [N]": m.tension, "Cell 2 [N]": m.tension}  # fmt: skip
+    found = guess(tmp_path / "log.csv", columns)
+    assert not found.questions
+    bases = ("motor_angle", "motor_torque", "tension")
+    assert {item.channel for item in found.used} == {
+        "time",
+        *(f"{n}.{base}" for n in "12" for base in bases),
+    }
+    assert of(found, "2.motor_angle").source == "Axis2.ActPos"
+
+
 def test_columns_of_the_user_have_precedence() -> None:
     given = read_column("motor_torque=vir*35.15 [N m]")
     assert (given.channel, given.source, given.factor, given.unit) == (

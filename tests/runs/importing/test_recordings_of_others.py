@@ -7,6 +7,7 @@ them. WINCHKIT_EMPS and WINCHKIT_REAL name the folders, else ``shared/data`` bes
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +77,7 @@ def test_recordings_in_another_layout_are_the_same_run(
     path: Path, form: str, tmp_path: Path
 ) -> None:
     """Real stamps (jitter, gaps) and quantised signals, written as two other programs do."""
-    known = read_run(path)
+    known = _beginning(read_run(path))
     units = {
         "motor_angle": "°",
         "motor_velocity": "1/min",
@@ -100,6 +101,14 @@ def test_recordings_in_another_layout_are_the_same_run(
     assert all(item.confidence == "named" for item in guess.used)
     run = run_of(streams_of(guess), {})
     _equal(run, known)
+
+
+def _beginning(run: Run, rows: int = 4000) -> Run:
+    channels = {
+        name: replace(channel, values=channel.values[:rows])
+        for name, channel in run.channels.items()
+    }
+    return replace(run, time=run.time[:rows], channels=channels)
 
 
 def _equal(run: Run, known: Run) -> None:

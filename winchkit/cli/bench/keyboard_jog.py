@@ -174,19 +174,13 @@ class KeyboardJog:
                         click.echo("\nstopped", err=True)
                         return
                     self.press(key)
-                line = printable(self._shown())
+                line = printable(status_line(self._station.status()))
                 click.echo(f"\r{line}  [{self.mode}]\x1b[K", nl=False, file=screen())
             except ConnectionLost:
                 click.echo("\r\x1b[K", nl=False, file=screen())
                 raise
             except OSError:  # the terminal was closed, and shows nothing any more
                 raise Terminated from None
-
-    def _shown(self) -> str:
-        """Where the bench stands, and whether a trip refuses every key."""
-        status = self._station.status()
-        tripped = "  tripped: r resets" if status.get("tripped") else ""
-        return f"{status_line(status)}{tripped}"
 
     def press(self, key: str) -> None:
         """Do what a key says; what forbids it is shown, and the operator decides."""

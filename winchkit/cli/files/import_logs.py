@@ -434,8 +434,11 @@ def _runs(
 
 
 def _inspected(runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """Findings on what came in."""
-    return []
+    """Findings on what came in; rows of poses without times have none."""
+    from winchkit.runs.sanity.inspection import inspect_run
+
+    timed = [run for run in runs if run.metadata.get("time") != "row number"]
+    return [finding.to_json() for run in timed for finding in inspect_run(run)]
 
 
 def _written(

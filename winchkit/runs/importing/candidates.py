@@ -68,6 +68,7 @@ _PREFERRED = {
     "estimate",
 }
 _AVOIDED = {"output", "abtrieb", "raw", "filtered", "filt", "error", "gear", "phase", "bus", "dc"}
+_SIDES = ({"left", "right"}, {"links", "rechts"}, {"gauche", "droite"}, {"front", "rear"})
 _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
 _SINGLE = ("motor_angle", "motor_torque", "tension", "cable_length", "load")
 """Channels whose column is asked for where several fit equally well; others are left out."""
@@ -213,9 +214,12 @@ def _of_text(column: Column) -> Candidate:
 
 
 def _is_clock(column: Column) -> bool:
-    """Whether values increase, apart from a few returns and repeated values."""
+    """Whether values increase, apart from a few returns and repeated values, or only decrease."""
     steps = np.diff(column.values[np.isfinite(column.values)])
-    return len(steps) > 0 and float(np.mean(steps < 0)) < 0.05 and bool(np.any(steps > 0))
+    if not len(steps):
+        return False
+    increases = float(np.mean(steps < 0)) < 0.05 and bool(np.any(steps > 0))
+    return increases or bool(np.all(steps < 0))
 
 
 def _choose_times(table: Table, times: Sequence[Candidate], choice: Choice) -> None:
@@ -339,6 +343,9 @@ def _winch_labels(others: Sequence[Candidate]) -> tuple[str, ...]:
         items = sorted((i for i in others if i.channel == channel), key=lambda i: i.order)
         best = [item for item in items if item.order == items[0].order]
         if len(best) < 2:
+            # Cells of one winch are no winches.
+            if channel == "motor_angle" and best:
+                return ()
             continue
         words = [_words(item) for item in best]
         if len({len(item) for item in words}) != 1:
@@ -356,7 +363,7 @@ def _is_series(labels: Sequence[str]) -> bool:
     """Whether labels are numbered or lettered, and not ``motor`` and ``load``."""
     stems = {label.rstrip("0123456789") for label in labels}
     numbered = len(stems) == 1 and all(label[-1:].isdecimal() for label in labels)
-    return numbered or all(len(label) == 1 for label in labels)
+    return numbered or all(len(label) == 1 for label in labels) or set(labels) in _SIDES
 
 
 def _words(item: Candidate) -> list[str]:

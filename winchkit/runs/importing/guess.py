@@ -333,7 +333,9 @@ def _by_convention(work: _Work) -> None:
         elif words in {"pos estimate", "vel estimate"}:
             turn = "turn" if words == "pos estimate" else "turn/s"
             item.settle(_TURN, turn, "assumed", "ODrive counts in turns")
-        elif _is_si(work.table, words) and not (item.base == "motor_angle" and _is_counted(item)):
+        elif _is_si(work.table, item.column.name) and not (
+            item.base == "motor_angle" and _is_counted(item)
+        ):
             dimension = column_dimension(item.base)
             if dimension is not None:
                 unit = next(iter(UNITS[dimension]))
@@ -354,8 +356,10 @@ def _declared(table: Table, dimension: str | None) -> SpelledUnit | None:
     return None
 
 
-def _is_si(table: Table, words: str) -> bool:
-    return table.layout in _SI_LAYOUTS or bool(set(words.split()) & _SI_WORDS)
+def _is_si(table: Table, name: str) -> bool:
+    """Whether a name or a format has SI units by convention; names with slashes are of ROS."""
+    words = words_of(name).split()
+    return table.layout in _SI_LAYOUTS or name.startswith("/") or bool(set(words) & _SI_WORDS)
 
 
 def _is_in_seconds(values: Array) -> bool:

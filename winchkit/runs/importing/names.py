@@ -36,14 +36,15 @@ class Meaning:
 _RULES: tuple[tuple[str, int, str], ...] = (
     # Set points, errors, states and counters.
     (
-        r"\b(soll\w*|\w+soll|target|set ?points?|sp|cmd|commande?d?|demand(ed)?|desired|des|"
+        r"\b(soll\w*|\w+soll|target|set ?points?|set (?=pos|vel|tor|cur|ang|spe)|"
+        r"sp|cmd|commande?d?|demand(ed)?|desired|des|"
         r"reference|ref|consigne|consigna|goal|planned|vorgabe|fuhrungs\w*|profile|offset|"
         r"limit\w*)\b",
         1,
         IGNORED,
     ),
     (
-        r"\b(error|err|fehler|regelabweichung|schlepp\w*|following|erreur|deviation|abweichung|"
+        r"\b(error|err|diff|difference|fehler|regelabweichung|schlepp\w*|following|erreur|deviation|abweichung|"
         r"residual|mean error|std|stddev|variance|covariance)\b",
         1,
         IGNORED,
@@ -121,7 +122,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     ),
     # Motor: velocity and torque before position, whose words are the most general.
     (
-        r"\b(velocity|velocities|velocite|vel|speeds?|drehzahl\w*|\w+drehzahl|geschwindigkeit\w*|"
+        r"\b(velocity|velocities|velocite|velo?|speeds?|drehzahl\w*|\w+drehzahl|geschwindigkeit\w*|"
         r"\w+geschwindigkeit|winkelgeschwindigkeit|omega|vitesse|velocidad|velocita|dq|qd|qdot|"
         r"dtheta|thetadot|rpm|n ist|nist|v ist|vist|vx|angular rate|rotational speed|w)\b",
         1,
@@ -153,7 +154,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         "motor_angle",
     ),
     (
-        r"\b(forces?|kraft\w*|\w+kraft|fuerza|forza|effort de traction|f|fz|cell|zelle|cellule)\b",
+        r"\b(forces?|frc|kraft\w*|\w+kraft|fuerza|forza|effort de traction|f|fz|cell|"
+        r"zelle|cellule)\b",
         2,
         "tension",
     ),
@@ -168,6 +170,10 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     (r"\bswivel\b|\bschwenkwinkel\b", 1, "swivel"),
 )
 _COMPILED = tuple((re.compile(pattern), rank, channel) for pattern, rank, channel in _RULES)
+_GREEK = {
+    **{"ß": "ss", "θ": " theta ", "ϑ": " theta ", "φ": " phi ", "ϕ": " phi ", "α": " angle "},
+    **{"ω": " omega ", "Ω": " omega ", "τ": " tau ", "Θ": " theta ", "Φ": " phi "},
+}
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)")
 _MATRIX = re.compile(r"^(?:.* )?(?:r|rot|m|matrix|t) ?([123]) ?([1234])$")
 
@@ -186,7 +192,7 @@ def words_of(name: str) -> str:
     str
         ``MotorPos_ist2`` becomes ``motor pos ist 2``.
     """
-    text = _CAMEL.sub(" ", name.replace("ß", "ss"))
+    text = _CAMEL.sub(" ", "".join(_GREEK.get(char, char) for char in name))
     text = unicodedata.normalize("NFKD", text)
     text = "".join(char for char in text if not unicodedata.combining(char)).lower()
     return " ".join(re.split(r"[^a-z0-9]+", text)).strip()

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from winchkit.errors import Fault
+from winchkit.arrays import Array
+from winchkit.errors import Fault, RunError
 from winchkit.runs.assemble import Recording, assemble, refuse
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.assignment import Guess
@@ -134,7 +135,26 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     def line_of(row: int) -> int | None:
         return streams.line_of(int(rows[row])) if rows is not None else None
 
-    return assemble(Recording(streams.path, header, columns, line_of, texts, notes=streams.notes))
+    recording = Recording(streams.path, header, columns, line_of, texts, notes=streams.notes)
+    try:
+        return assemble(recording)
+    except RunError as error:
+        if streams.has_time and (advice := _coarse_clock(time)):
+            raise RunError([Fault(advice, streams.path), *error.faults]) from None
+        raise
+
+
+def _coarse_clock(time: Array) -> str:
+    """Advice for stamps that repeat because their resolution is coarser than the sampling."""
+    steps = np.diff(time[np.isfinite(time)])
+    repeated = int(np.count_nonzero(steps == 0))
+    if len(steps) < 10 or repeated < 0.05 * len(steps) or np.any(steps < 0):
+        return ""
+    rate = len(steps) / float(np.sum(steps)) if np.sum(steps) > 0 else float("nan")
+    return (
+        f"{repeated} of {len(steps) + 1} time stamps repeat the one before: the clock is coarser "
+        f'than the sampling. --sample-rate "{rate:.4g} Hz" gives equal steps in place of them'
+    )
 
 
 def _time_faults(streams: Streams, stream: Stream) -> Sequence[Fault]:

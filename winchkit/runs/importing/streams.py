@@ -119,7 +119,7 @@ def streams_of(guess: Guess) -> Streams:
         else:
             time = time + (first - origin)
         stream = Stream(time, _with_quaternion(channels), np.arange(count))
-        stream, note = _without_copies(stream)
+        stream, note = _without_copies(_forward(stream))
         notes += note
         streams += _by_rate(stream)
     is_absolute = bool(absolute) and len(absolute) == len(read)
@@ -192,6 +192,15 @@ def _with_quaternion(channels: dict[str, Array]) -> dict[str, Array]:
     quaternion = np.full((len(matrix), 4), np.nan)
     quaternion[known] = quaternion_of(matrix[known])
     return {**others, **dict(zip(_QUATERNION, quaternion.T, strict=True))}
+
+
+def _forward(stream: Stream) -> Stream:
+    """The latest row last, in a file that has it first."""
+    steps = np.diff(stream.time)
+    if not len(steps) or not np.all(steps < 0):
+        return stream
+    channels = {name: values[::-1] for name, values in stream.channels.items()}
+    return Stream(stream.time[::-1], channels, stream.rows[::-1])
 
 
 def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:

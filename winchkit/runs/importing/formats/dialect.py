@@ -93,15 +93,19 @@ def split_line(line: str, delimiter: str) -> list[str]:
     list of str
         Cells without blanks at their ends.
     """
+    if '"' not in line:
+        return line.split() if delimiter == BLANKS else _cells(line, delimiter)
     if delimiter == BLANKS:
-        if '"' not in line:
-            return line.split()
         line = " ".join(line.split())
     try:
         cells = next(csv.reader([line], delimiter=delimiter), [])
     except csv.Error:
         cells = line.split(delimiter)
     return [cell.strip() for cell in cells]
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    return [cell.strip() for cell in line.split(delimiter)]
 
 
 def find_dialect(lines: Sequence[str]) -> Dialect | None:
@@ -125,7 +129,7 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
     for delimiter in _DELIMITERS:
         split = [split_line(line, delimiter) for line in sample]
         for decimal in ".,":
-            if decimal == delimiter:
+            if decimal == delimiter and not any('"' in line for line in sample):
                 continue
             candidate = _rated(split, delimiter, decimal)
             if candidate is not None and (best is None or candidate[0] > best[0]):

@@ -19,6 +19,7 @@ __all__ = ["Header", "read_header"]
 Row = tuple[int, list[str]]
 """Line number and cells."""
 _COMMENT = re.compile(r"^\s*[#%!;*/]+\s*")
+_RULE = re.compile(r":?[-=_+]{2,}:?")
 _ROW_LABELS = {"type", "name", "id", "parent", "unit", "units", "description", "channel"}
 _IDENTIFIER = re.compile(r"[0-9A-Fa-f]{8,}(-[0-9A-Fa-f]{4,})*|\d+")
 _RATE_KEYS = re.compile(
@@ -68,11 +69,15 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     Header
         Names are empty where the file has none.
     """
-    cut = _start_of_block(rows, width, decimal)
+    cut = _start_of_block(rows, width, decimal, is_blank=is_blank)
     if is_blank:
         cut = _start_of_names(rows, cut)
     above = [cells for _, cells in rows[:cut]]
-    block = [_uncommented(cells, width) for _, cells in rows[cut:] if any(cells)]
+    block = [
+        _uncommented(cells, width) for _, cells in rows[cut:] if any(cells) and not _is_rule(cells)
+    ]
+    if is_blank:
+        block = [_with_brackets(cells, width) for cells in block]
     header = _pairs(block, width) or _stacked(block, width)
     header.metadata.update(_metadata([[" ".join(c)] if is_blank else c for c in above]))
     header.rows = tuple(tuple(cells) for _, cells in rows[cut:] if any(cells))
@@ -80,19 +85,23 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     return header
 
 
-def _start_of_block(rows: Sequence[Row], width: int, decimal: str) -> int:
+def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool) -> int:
     """Index of the first row that belongs to the columns."""
     cut = len(rows)
     while cut and not any(rows[cut - 1][1]):
         cut -= 1
     end = cut
     while cut:
+        if _is_rule(rows[cut - 1][1]):
+            cut -= 1
+            continue
         cells = _uncommented(rows[cut - 1][1], width)
         given = [cell for cell in cells if cell]
         texts = [cell for cell in given if number(cell, decimal) is None]
         spread = cells and not cells[0] and len(given) >= 1 and end > cut
         is_comment = bool(_COMMENT.match(rows[cut - 1][1][0])) if rows[cut - 1][1] else False
         fits = (len(cells) <= width + 1 and not is_comment) or len(cells) == width
+        fits = fits or (is_blank and len([c for c in cells if c[:1] not in "(["]) == width)
         fits = fits and (spread or 2 * len(given) >= width)
         if not given or not fits or (not texts and not spread):
             break
@@ -102,6 +111,12 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str) -> int:
             break
         cut -= 1
     return cut
+
+
+def _is_rule(cells: Sequence[str]) -> bool:
+    """Whether a row is a line of dashes below the names."""
+    given = [cell for cell in cells if cell]
+    return bool(given) and all(_RULE.fullmatch(cell) for cell in given)
 
 
 def _start_of_names(rows: Sequence[Row], cut: int) -> int:
@@ -122,6 +137,17 @@ def _uncommented(cells: list[str], width: int) -> list[str]:
     first = _COMMENT.sub("", cells[0])
     # A sign that stands alone before the names is a cell too many.
     return cells[1:] if not first and len(cells) > width else [first, *cells[1:]]
+
+
+def _with_brackets(cells: list[str], width: int) -> list[str]:
+    """Names and units in brackets that a blank separates: ``Angle (deg)`` is one cell."""
+    found: list[str] = []
+    for cell in cells:
+        if found and cell[:1] in {"(", "["} and len(cells) > width:
+            found[-1] += f" {cell}"
+        else:
+            found.append(cell)
+    return found
 
 
 def _padded(cells: Sequence[str], width: int) -> list[str]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.errors import Fault, RunError, UsageError
+from winchkit.errors import Fault, RunError, UsageError, WinchkitError, one_line
 from winchkit.runs.importing.table import Column, Table, named_apart
 
 __all__ = ["read_messages"]
@@ -45,34 +45,47 @@ def read_messages(path: str, data: bytes) -> Table:
     RunError
         For an invalid file, and one without numbers in a known encoding.
     """
-    from mcap.exceptions import McapError
-    from mcap.reader import make_reader
+    from mcap.reader import NonSeekingReader
 
     rows: dict[str, list[tuple[int, dict[str, float]]]] = {}
-    skipped: dict[str, str] = {}
+    notes: list[str] = []
     decoders: dict[int, Any] = {}
     try:
-        for schema, channel, message in make_reader(io.BytesIO(data)).iter_messages():
-            encoding = channel.message_encoding
-            if encoding == "json":
-                value = json.loads(message.data)
-            elif encoding == "cdr" and schema is not None and schema.encoding == "ros2msg":
-                if schema.id not in decoders:
-                    decoders[schema.id] = _ros2(path, schema)
-                value = decoders[schema.id](message.data)
+        messages = NonSeekingReader(io.BytesIO(data)).iter_messages(log_time_order=False)
+        for schema, channel, message in messages:
+            found = _decoded(path, schema, channel, message.data, decoders)
+            if found is not None:
+                numbers = dict(_numbers("", found, 0))
+                rows.setdefault(channel.topic, []).append((message.log_time, numbers))
             else:
-                skipped[channel.topic] = encoding
-                continue
-            numbers = dict(_numbers("", value, 0))
-            rows.setdefault(channel.topic, []).append((message.log_time, numbers))
-    except (McapError, ValueError, RecursionError, KeyError, AttributeError) as error:
-        raise RunError(Fault(f"is not a readable MCAP file: {error}", path)) from None
+                encoding = one_line(channel.message_encoding)
+                notes.append(f"topic {channel.topic} is in '{encoding}' and left out")
+    except WinchkitError:
+        raise
+    except Exception as error:  # noqa: BLE001 - readers and decoders raise many kinds
+        if not rows:
+            raise RunError(Fault(f"is not a readable MCAP file: {error}", path)) from None
+        count = sum(map(len, rows.values()))
+        notes.append(
+            f"the file is damaged or cut off ({error}); its first {count} messages are read"
+        )
     columns = [c for topic, found in rows.items() for c in _columns(topic, found)]
-    notes = [f"topic {topic} is in '{name}' and left out" for topic, name in skipped.items()]
+    notes = list(dict.fromkeys(notes))
     if not columns:
         text = "has no messages with numbers in JSON or ROS 2"
         raise RunError(Fault("; ".join([text, *notes]), path))
     return Table(path, "MCAP", named_apart(columns), notes=tuple(notes))
+
+
+def _decoded(path: str, schema: Any, channel: Any, data: bytes, decoders: dict[int, Any]) -> Any:
+    """A message as mappings, lists and numbers; None in an unknown encoding."""
+    if channel.message_encoding == "json":
+        return json.loads(data)
+    if channel.message_encoding != "cdr" or schema is None or schema.encoding != "ros2msg":
+        return None
+    if schema.id not in decoders:
+        decoders[schema.id] = _ros2(path, schema)
+    return decoders[schema.id](data)
 
 
 def _ros2(path: str, schema: Any) -> Any:

@@ -29,6 +29,7 @@ _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?"
 _PATTERNS = (
     re.compile(rf"{_DAY}[T\s,;_]+{_CLOCK}{_ZONE}"),
     re.compile(rf"{_CLOCK}{_ZONE}"),
+    re.compile(r"(?P<minute>\d{1,3}):(?P<second>\d{2})[.,](?P<fraction>\d{1,12})"),
     re.compile(_DAY),
 )
 _NAMED = re.compile(r"[A-Za-z]{3,9}\.?,?\s+")
@@ -84,7 +85,7 @@ def read_stamps(cells: Sequence[str]) -> Stamps:
             wrong.append(row)
             continue
         has_date |= bool(_group(match, "year") or _group(match, "first"))
-        has_clock |= bool(_group(match, "hour"))
+        has_clock |= bool(_group(match, "minute"))
     if has_clock and not has_date:
         values = _over_midnight(values)
     return Stamps(values, tuple(wrong), has_date, has_clock)
@@ -134,6 +135,9 @@ def _group(match: re.Match[str], name: str) -> str:
 
 def _seconds(match: re.Match[str], *, day_first: bool) -> float:
     clock = 0.0
+    if _group(match, "minute") and not _group(match, "hour"):
+        seconds = float(f"{match['second']}.{match['fraction']}")
+        return 60.0 * int(match["minute"]) + seconds
     if hour := _group(match, "hour"):
         hours = int(hour)
         if half := _group(match, "half").lower():

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import islice
+from typing import overload
 
 import numpy as np
 
+from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.formats.cells import is_missing, number, numbers
 from winchkit.runs.importing.formats.dialect import (
@@ -23,6 +26,7 @@ from winchkit.runs.importing.table import Column, Table, named_apart
 __all__ = ["read_text_table", "table_of_rows"]
 
 _AHEAD = 3
+_BLOCK = 4096
 _TEXT_SHARE = 0.2
 """Share of texts above which a column is one of text, and not one of numbers with faults."""
 
@@ -53,7 +57,7 @@ def read_text_table(path: str, data: bytes) -> Table:
         shown = next((line for line in lines if line.strip()), "")[:60]
         message = f"has no rows of numbers; its first line is {shown!r}"
         raise RunError(Fault(message, path))
-    rows = [(n, split_line(line, dialect.delimiter)) for n, line in enumerate(lines, start=1)]
+    rows = _SplitLines(lines, dialect.delimiter)
     is_ended = data[-1:] in b"\r\n" or data[-2:] in (b"\n\0", b"\0\n")
     table = table_of_rows(path, rows, dialect, is_ended=is_ended)
     layout = f"text in {encoding}, {dialect.text}" if encoding else f"text, {dialect.text}"
@@ -69,14 +73,92 @@ def read_text_table(path: str, data: bytes) -> Table:
     )
 
 
+class _SplitLines(Sequence[Row]):
+    """Lines with their number, split when they are read: the cells of a long file are not kept."""
+
+    def __init__(self, lines: Sequence[str], delimiter: str) -> None:
+        self._lines, self._delimiter = lines, delimiter
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    @overload
+    def __getitem__(self, index: int) -> Row: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Row]: ...
+
+    def __getitem__(self, index: int | slice) -> Row | list[Row]:
+        if isinstance(index, slice):
+            return [self[n] for n in range(*index.indices(len(self)))]
+        number = index if index >= 0 else len(self) + index
+        return number + 1, split_line(self._lines[number], self._delimiter)
+
+
+@dataclass
+class _Cells:
+    """Values of one column, block by block; the text is kept where it has no numbers."""
+
+    decimal: str
+    pieces: list[Array] = field(default_factory=list)
+    wrong: list[tuple[int, str]] = field(default_factory=list)
+    texts: list[str] | None = None
+    given: int = 0
+    count: int = 0
+
+    def add(self, cells: Sequence[str]) -> None:
+        """Take the next cells."""
+        values, wrong = numbers(cells, self.decimal)
+        given = len(cells) - cells.count("")
+        # Text from the first block with any cell on: of stamps, or of words.
+        if not self.given and len(wrong) > _TEXT_SHARE * given:
+            self.texts = [""] * self.count
+        if self.texts is not None:
+            self.texts += cells
+        else:
+            self.wrong += [(self.count + row, cells[row]) for row in wrong]
+        self.pieces.append(values)
+        self.given += given
+        self.count += len(cells)
+
+    def column(self, header: Header, index: int) -> Column:
+        """The column of the header's names; without a name where nothing is in it."""
+        name, unit = header.names[index], header.units[index]
+        if not name and not self.given:
+            return Column("", np.empty(0))
+        values = np.concatenate([np.empty(0), *self.pieces])
+        name, labels = name or str(index + 1), header.labels[index]
+        if self.texts is None and len(self.wrong) > _TEXT_SHARE * self.given:
+            texts = [""] * self.count
+            for row, text in self.wrong:
+                texts[row] = text
+            return Column(name, values, unit, labels, texts=texts)
+        wrong = tuple(self.wrong)
+        return Column(name, values, unit, labels, texts=self.texts, wrong=wrong)
+
+
 @dataclass
 class _Rows:
-    """Rows of numbers, and what was left out or is wrong."""
+    """Columns of the rows of numbers, and what was left out or is wrong."""
 
-    cells: list[list[str]] = field(default_factory=list)
+    columns: list[_Cells]
     lines: list[int] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    block: list[list[str]] = field(default_factory=list)
+
+    def add(self, line: int, cells: list[str]) -> None:
+        """Take a row."""
+        self.lines.append(line)
+        self.block.append(cells)
+        if len(self.block) == _BLOCK:
+            self.finish()
+
+    def finish(self) -> None:
+        """Convert the rows of the present block."""
+        for column, cells in zip(self.columns, zip(*self.block, strict=True), strict=False):
+            column.add(cells)
+        self.block.clear()
 
 
 def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended: bool) -> Table:
@@ -104,13 +186,13 @@ def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended:
     header = read_header(
         rows[:first], dialect.width, dialect.decimal, is_blank=dialect.delimiter == BLANKS
     )
-    found = _kept(path, rows[first:], header, dialect, is_ended=is_ended)
-    columns = _columns(header, found, dialect)
+    found = _kept(path, rows, first, header, dialect, is_ended=is_ended)
+    columns = named_apart([c.column(header, n) for n, c in enumerate(found.columns)])
     lines = np.array(found.lines, dtype=np.intp)
     return Table(
         path,
         dialect.text,
-        columns,
+        tuple(item for item in columns if item.name),
         lambda row: int(lines[row]) if -len(lines) <= row < len(lines) else None,
         header.metadata,
         faults=tuple(found.faults),
@@ -141,20 +223,28 @@ def _first_of_numbers(rows: Sequence[Row], dialect: Dialect) -> int | None:
 
 
 def _kept(
-    path: str, rows: Sequence[Row], header: Header, dialect: Dialect, *, is_ended: bool
+    path: str,
+    rows: Sequence[Row],
+    first: int,
+    header: Header,
+    dialect: Dialect,
+    *,
+    is_ended: bool,
 ) -> _Rows:
     """Rows of numbers without blank lines, comments and repeated headers."""
-    found, repeated, comments = _Rows(), 0, 0
-    last = next((n for n, cells in reversed(rows) if any(cells)), 0)
     width = dialect.width
-    for line, given in rows:
+    found = _Rows([_Cells(dialect.decimal) for _ in range(width)])
+    repeated, comments = 0, 0
+    last = next((n for n, cells in reversed(rows) if any(cells)), 0)
+    titles = {row[0] for row in header.rows}
+    for line, given in islice(rows, first, None):
         if not any(given):
             continue
         cells = given[:-1] if len(given) == width + 1 and not given[-1] else given
-        if len(cells) == width and not _is_title(cells, header):
-            found.cells.append(cells)
-            found.lines.append(line)
-        elif _is_title(cells, header):
+        is_title = cells[0] in titles and tuple(cells) in header.rows
+        if len(cells) == width and not is_title:
+            found.add(line, cells)
+        elif is_title:
             repeated += 1
         elif cells[0].startswith(("#", "%")) or cells[0].upper() in {"EOF", "END"}:
             comments += 1
@@ -167,33 +257,9 @@ def _kept(
             message = f"{len(cells)} cells in this row, {width} in the others"
             cut = "; is the file cut off?" if line == last and len(cells) < width else ""
             found.faults.append(Fault(message + cut, path, line))
+    found.finish()
     if repeated:
         found.notes.append(f"{repeated} repeated lines of the header are left out")
     if comments:
         found.notes.append(f"{comments} comments between the rows are left out")
     return found
-
-
-def _is_title(cells: Sequence[str], header: Header) -> bool:
-    """Whether a row repeats one of the header."""
-    return any(tuple(cells) == row for row in header.rows)
-
-
-def _columns(header: Header, found: _Rows, dialect: Dialect) -> tuple[Column, ...]:
-    columns = []
-    for index, cells in enumerate(zip(*found.cells, strict=True)):
-        empty = Column("", np.empty(0))
-        has_any = header.names[index] or any(cells)
-        columns.append(_column(header, index, cells, dialect) if has_any else empty)
-    return tuple(item for item in named_apart(columns) if item.name)
-
-
-def _column(header: Header, index: int, cells: Sequence[str], dialect: Dialect) -> Column:
-    values, wrong = numbers(cells, dialect.decimal)
-    name, unit, labels = header.names[index], header.units[index], header.labels[index]
-    name = name or str(index + 1)
-    given = sum(1 for cell in cells if cell)
-    stamps = wrong and sum(is_stamp(cells[row]) for row in wrong) > 0.5 * len(wrong)
-    if stamps or len(wrong) > _TEXT_SHARE * given:
-        return Column(name, values, unit, labels, texts=cells)
-    return Column(name, values, unit, labels, wrong=tuple((row, cells[row]) for row in wrong))
