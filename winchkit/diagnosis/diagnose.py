@@ -35,7 +35,12 @@ from winchkit.diagnosis.selection.stepwise import (
     stepwise_selection,
 )
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.verdict.decision import Judgement, reweighted_judgement, withheld
+from winchkit.diagnosis.verdict.decision import (
+    Judgement,
+    output_fits,
+    reweighted_judgement,
+    withheld,
+)
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -66,6 +71,10 @@ _LOCATED = ("unknown", "partly")
 
 ProgressCallback = Callable[[str, float], None]
 """Called with the present step and the share of the work done, 0 to 1."""
+
+_USUAL_TRIALS = 25.0
+_SEARCH = (0.3, 0.8)
+_NAMING = (0.8, 1.0)
 
 
 class Answer:
@@ -141,6 +150,7 @@ def diagnose(
     decimate: bool = True,
     as_recorded: bool = False,
     progress: ProgressCallback = no_progress,
+    interrupted: Callable[[WinchAnswer], None] | None = None,
 ) -> WinchAnswer:
     """Find the effects that a winch's profile lacks on its runs.
 
@@ -159,7 +169,11 @@ def diagnose(
     as_recorded
         Look for effects although a sign or unit looks wrong.
     progress
-        Called with the present step and the share of the work done, 0 to 1.
+        Called with the present step and the share of the work done, 0 to 1. How many candidates
+        will be fitted is not known: the share approaches that of the step as they are.
+    interrupted
+        Called when a KeyboardInterrupt ends the search, with the errors of the profile and the
+        scores of the candidates, and before the exception goes on.
 
     Returns
     -------
@@ -175,21 +189,62 @@ def diagnose(
     """
     catalogue = catalogue or load_catalogue()
     progress("reading the signals", 0.0)
-    dataset = prepare(runs, profile, band, decimate=decimate)
-    progress("drawing the candidates", 0.2)
+    dataset = prepare(runs, profile, band, decimate=decimate, fast=True)
+    progress("drawing the candidates", 0.1)
     engine = selection_engine(dataset, catalogue)
     doubts = caveats(dataset.sanity)
     if doubts and not as_recorded:
         return _unsearched(engine, doubts)
-    progress("searching", 0.4)
-    result = stepwise_selection(engine)
-    reduced = without_impacts(dataset, result.last_model)
-    if reduced is not None:
-        progress("searching again without impacts", 0.6)
-        engine = selection_engine(reduced, catalogue)
-        result = stepwise_selection(engine)
-    progress("naming", 0.8)
-    return _answer(engine, result)
+    known: list[SelectionResult] = []
+    try:
+        engine.on_trial = _Trials(progress, "fitting", _SEARCH)
+        result = stepwise_selection(engine, known.append)
+        reduced = without_impacts(dataset, result.last_model)
+        if reduced is not None:
+            engine = selection_engine(reduced, catalogue)
+            engine.on_trial = _Trials(progress, "without impacts, fitting", _SEARCH)
+            result = stepwise_selection(engine)
+        engine.on_trial = _Trials(progress, "naming, compared with", _NAMING)
+        return _answer(engine, result)
+    except KeyboardInterrupt:
+        if interrupted is not None and known:
+            interrupted(_known_at_interrupt(engine, known[0]))
+        raise
+
+
+class _Trials:
+    """Reports the progress of a step by the number of candidates that were fitted."""
+
+    def __init__(self, progress: ProgressCallback, what: str, ends: tuple[float, float]) -> None:
+        self._progress, self._what, self._ends, self._count = progress, what, ends, 0
+        progress(what.partition(",")[0], ends[0])
+
+    def __call__(self, effect: str) -> None:
+        low, high = self._ends
+        self._count += 1
+        left = np.exp(-self._count / _USUAL_TRIALS)
+        self._progress(f"{self._what} {effect}", float(high - (high - low) * left))
+
+
+def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> WinchAnswer:
+    """Errors of the profile and scores of the candidates, without a verdict."""
+    before = start.initial_model, start.initial_noise
+    diagnosis = Diagnosis(
+        verdict="unknown",
+        outputs=output_fits(engine, before, before),
+        steps=(),
+        candidates=candidates_of(engine, start),
+        detectable=(),
+        unexplained_share=float("nan"),
+        where=(),
+        next_runs=(),
+        notes=engine.regression.dataset.notes,
+        sanity=engine.regression.dataset.sanity,
+        used_share=engine.regression.dataset.used_share,
+        caveats=caveats(engine.regression.dataset.sanity),
+        interrupted=True,
+    )
+    return WinchAnswer(engine, start, diagnosis)
 
 
 def _unsearched(engine: TimeSeriesSelection, doubts: tuple[str, ...]) -> WinchAnswer:

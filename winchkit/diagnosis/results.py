@@ -210,6 +210,8 @@ class Diagnosis:
     """Share of the measured samples that is compared, by output."""
     caveats: tuple[str, ...] = ()
     """Codes of what these runs cannot exclude; the verdict is one of four with or without them."""
+    interrupted: bool = False
+    """Whether the search was interrupted: errors and candidates are known, the verdict is not."""
 
     @property
     def empirical(self) -> tuple[str, ...]:
@@ -221,7 +223,8 @@ class Diagnosis:
         """Dictionary that ``winchkit diagnose --json`` prints."""
         return {
             "schema": 1,
-            "verdict": self.verdict,
+            "verdict": None if self.interrupted else self.verdict,
+            "interrupted": self.interrupted,
             "outputs": {name: vars(output) for name, output in self.outputs.items()},
             "steps": [step.to_json() for step in self.steps],
             "candidates": [vars(c) | {"heldout_rms": dict(c.heldout_rms)} for c in self.candidates],

@@ -296,18 +296,21 @@ class Line:
         """Cable wound in per motor angle, signed by the gearbox's direction, m/rad."""
         return float(self.way(self._at_rest(motor_angle, 0.0)).arm[0])
 
+    def nominal_motor_angle(self, cable_length: Array) -> Array:
+        """Motor angles of the nominal line at cable lengths (m), any shape, rad."""
+        profile, phi = self.profile, self._reference_wound
+        wound = (profile.reference.cable_length or 0.0) - cable_length
+        total = self._drum.angle(self._drum.wound(np.asarray(phi)) + wound)
+        gear = profile.gearbox
+        turned = gear.direction * gear.ratio * (total - phi)
+        return np.asarray(profile.reference.motor_angle + turned)
+
     def motor_angle(self, cable_length: float, tension: float = 0.0) -> float:
         """Motor angle at a cable length (m) under a tension (N), rad.
 
         Closed form for the nominal line; with effects, Newton's method starting from it.
         """
-        profile = self.profile
-        phi = self._reference_wound
-        wound = (profile.reference.cable_length or 0.0) - cable_length
-        total = self._drum.angle(self._drum.wound(np.asarray(phi)) + wound)
-        gear = profile.gearbox
-        turned = gear.direction * gear.ratio * (float(total) - phi)
-        angle = profile.reference.motor_angle + turned
+        angle = float(self.nominal_motor_angle(np.asarray(cable_length)))
         for _ in range(_NEWTON_STEPS if self.modifiers else 0):
             excess = self.cable_length(angle, tension) - cable_length
             angle += excess / self.arm(angle)

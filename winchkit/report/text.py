@@ -60,13 +60,13 @@ def report_text(answer: Answer) -> str:
     """
     diagnosis = answer.diagnosis
     blocks = [
-        [VERDICT_NAMES[diagnosis.verdict].upper(), *paragraph(sentence(diagnosis))],
+        [_head(diagnosis), *paragraph(sentence(diagnosis))],
         _errors(diagnosis.outputs, grown=bool(diagnosis.steps), data=diagnosis.data),
         _ladder(answer),
         _confusion(diagnosis),
         _places(answer),
         _next(diagnosis),
-        paragraph(changes_text(diagnosis)),
+        paragraph(changes_text(diagnosis)) if not diagnosis.interrupted else [],
         _shown(answer),
         _candidates(answer),
         *_data(diagnosis),
@@ -76,6 +76,10 @@ def report_text(answer: Answer) -> str:
     if len(lines) > _MOST_LINES:
         lines = [*lines[: _MOST_LINES - 1], "… more in --json and --html"]
     return "\n".join(lines)
+
+
+def _head(diagnosis: Diagnosis) -> str:
+    return "INTERRUPTED" if diagnosis.interrupted else VERDICT_NAMES[diagnosis.verdict].upper()
 
 
 def compare_text(comparison: Comparison) -> str:

@@ -11,6 +11,7 @@ from scipy.signal import butter, sosfiltfilt
 from winchkit.diagnosis.data.spectrum import (
     Band,
     band_edges,
+    fast_count,
     low_pass,
     to_frequency,
     to_time,
@@ -100,3 +101,17 @@ def test_noise_alone_raises_the_cut_off_in_few_of_many_cases() -> None:
     random = np.random.default_rng(2)
     raised = [torque_cut_off(list(random.standard_normal((4, 1500))), 20.0) for _ in range(300)]
     assert np.count_nonzero(np.array(raised) > 2.0) <= 12
+
+
+@given(st.integers(1, 200_000))
+def test_a_fast_length_has_small_factors_only_and_leaves_little_out(count: int) -> None:
+    fast = fast_count(count)
+    assert fast <= count
+    if count < 4000:
+        assert fast == count
+        return
+    assert count - fast <= 0.002 * count + 30
+    for factor in (2, 3, 5, 7, 11, 13, 17, 19, 23):
+        while fast % factor == 0:
+            fast //= factor
+    assert fast == 1

@@ -6,10 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 
 from diagnosis_runs import GROOVED, Array, Ride, made, term
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.regression.discretization import without_discretization_error
+from winchkit.diagnosis.regression.discretization import (
+    interpolated,
+    without_discretization_error,
+)
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
@@ -107,3 +111,11 @@ def test_no_effect_gives_no_discretisation_error() -> None:
     assert without_discretization_error(
         regression, found, noise.inverse_sigma(regression)
     ) == pytest.approx(found.residual)
+
+
+@pytest.mark.parametrize("count", [56, 57, 1000])
+def test_the_interpolation_is_scipys_cubic_spline(count: int) -> None:
+    values = np.cumsum(np.random.default_rng(count).standard_normal(count))
+    there = np.arange(4 * (count - 1) + 1) / 4
+    wanted = make_interp_spline(np.arange(count), values, k=3)(there)
+    assert interpolated(values) == pytest.approx(wanted, abs=1e-12 * np.ptp(values))

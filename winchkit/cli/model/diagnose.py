@@ -55,6 +55,7 @@ def command(
     """Name the physical effect that the model lacks, with its size and what it would buy.
 
     Two runs of one programme and load are the measure of the noise: record everything twice.
+    Ctrl-C prints the errors and the candidates so far, without a verdict.
     Long runs are decimated as far as their signals allow; --winch all diagnoses each by
     itself and reports what they have in common.
     """
@@ -85,10 +86,26 @@ def _tell_one(
 
     with progress_bar() as progress:
         own, catalogue = asked.runs(runs), asked.catalogue
-        answer = diagnose(own, declared, catalogue, asked.band, **how, progress=progress)
+        answer = diagnose(
+            own,
+            declared,
+            catalogue,
+            asked.band,
+            **how,
+            progress=progress,
+            interrupted=lambda known: _tell_known(known, as_json),
+        )
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         write_page(html, _page(answer, page_title(declared.name, runs), asked))
+
+
+def _tell_known(known: WinchAnswer, as_json: bool) -> None:
+    """What is known of a search that Ctrl-C ended: errors and candidates, no verdict."""
+    if as_json:
+        echo_json(known.diagnosis.to_json())
+    else:
+        click.echo(_said(known, as_json))
 
 
 def _tell_each(

@@ -18,7 +18,7 @@ from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, even_instants
 from winchkit.diagnosis.data.sanity import findings, resolutions, without_outliers
-from winchkit.diagnosis.data.spectrum import Band, torque_cut_off
+from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs
 from winchkit.diagnosis.data.zeroing import zeroed_anew
@@ -129,6 +129,7 @@ def prepare(
     kept_cut_offs: float = 1.0,
     *,
     decimate: bool = False,
+    fast: bool = False,
 ) -> Dataset:
     """Validate runs and build their data set.
 
@@ -145,6 +146,8 @@ def prepare(
         signal, to which the transition band contributes.
     decimate
         Whether long runs are decimated as far as their signals allow.
+    fast
+        Whether a few samples at the end of a run are left out, so that its transforms are fast.
 
     Raises
     ------
@@ -163,6 +166,8 @@ def prepare(
     decimation = decimation_for(runs) if decimate else None
     if decimation is not None:
         notes.append(decimation.words)
+    if fast:
+        runs = [_of_fast_count(run, decimation.factor if decimation else 1) for run in runs]
     filtering = Filtering(band, kept_cut_offs, decimation)
     dataset = assemble(runs, profile, filtering)
     anew = [zeroed_anew(output, _repeat_differences(dataset, output)) for output in _ZEROED]
@@ -257,6 +262,16 @@ def evenly_stamped(runs: Sequence[Run]) -> tuple[list[Run], list[str]]:
             )
         out.append(run if instants is None else replace(run, time=instants))
     return out, notes
+
+
+def _of_fast_count(run: Run, factor: int) -> Run:
+    """The run without its last samples, so that every ``factor``-th are of a fast number."""
+    rows = factor * fast_count(-(-len(run) // factor))
+    channels = {
+        name: replace(channel, values=channel.values[:rows])
+        for name, channel in run.channels.items()
+    }
+    return replace(run, time=run.time[:rows], channels=channels)
 
 
 def _clock(run: Run) -> Clock:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.spectrum import fast_count
 from winchkit.model.line import GRAVITY
 from winchkit.model.stages import Signals
 
@@ -134,6 +135,7 @@ def _aligned(members: list[int], shifts: list[float], signals: list[Signals]) ->
     low, high = max(c[0] for c in clocks), min(c[-1] for c in clocks)
     half = float(np.median(np.diff(clocks[0]))) / 2
     common = clocks[0][(clocks[0] >= low - half) & (clocks[0] <= high + half)]
+    common = common[: fast_count(len(common))]
     return Repeats(tuple(members), tuple(_nearest(clock, common) for clock in clocks))
 
 

@@ -23,6 +23,7 @@ __all__ = [
     "WHOLE_TRANSITION",
     "Band",
     "band_edges",
+    "fast_count",
     "highest_frequency",
     "low_pass",
     "narrow_edges",
@@ -39,6 +40,8 @@ _NARROW = 24
 _CURVATURE_STD = 0.25
 _ITERATIONS = 25
 _LEAST_COEFFICIENTS = 8
+_LARGEST_FACTOR = 23
+_LEAST_CUT = 4000
 WHOLE_TRANSITION = 3.0
 """In units of the cut-off: beyond it the low-pass passes about 10⁻⁴ of the amplitude."""
 
@@ -192,6 +195,30 @@ def to_frequency(signal: Array, band: Band) -> Array:
     full: Array = np.asarray(dct(signal, type=2, norm="ortho"))
     gain = band.gain
     return full[..., : len(gain)] * gain
+
+
+def fast_count(count: int) -> int:
+    """Largest number of samples, at most ``count``, whose transform is fast.
+
+    A transform of n samples takes a time in proportion to the prime factors of n: one of 8998 =
+    2·11·409 samples takes ten times as long as one of 8993 = 17·23². Of some thousand samples at
+    most a few at the end of a run are left out; shorter runs are kept whole.
+    """
+    if count < _LEAST_CUT:
+        return count
+    while _largest_factor(count) > _LARGEST_FACTOR:
+        count -= 1
+    return count
+
+
+def _largest_factor(count: int) -> int:
+    """Largest prime factor up to 23 of a number, or what is left without these."""
+    largest = 1
+    for factor in range(2, _LARGEST_FACTOR + 1):
+        while count % factor == 0:
+            count //= factor
+            largest = factor
+    return max(largest, count)
 
 
 def to_time(coefficients: Array, band: Band) -> Array:

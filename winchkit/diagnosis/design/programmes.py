@@ -168,8 +168,7 @@ def _run(
         at = target
     length = np.concatenate(pieces)
     time = np.arange(len(length)) / _RATE
-    line = Line(dataset.profile)
-    angle = np.array([line.motor_angle(float(x)) for x in length])
+    angle = Line(dataset.profile).nominal_motor_angle(length)
     temperatures = None if temperature is None else np.full_like(time, temperature)
     return _as_run(dataset, time, angle, mass, temperatures)
 

@@ -25,7 +25,7 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.model.stages import At, Stage
 
-__all__ = ["Folds", "Regression", "Segment"]
+__all__ = ["Coarse", "Folds", "Regression", "Segment"]
 
 
 @dataclass(frozen=True)
@@ -305,3 +305,24 @@ class Regression(ABC):
                     difference[segment.rows] / steps[segment.run]
                 )
             first += len(start)
+
+
+class Coarse(ABC):
+    """A regression on few samples, on which fits from several starting values begin.
+
+    Parameters
+    ----------
+    regression
+        The coarse regression.
+    """
+
+    def __init__(self, regression: Regression) -> None:
+        self.regression = regression
+
+    @abstractmethod
+    def reduced(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Hypothesis of the coarse regression for one of the whole regression."""
+
+    @abstractmethod
+    def extended(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Hypothesis of the whole regression for one of the coarse regression."""

@@ -21,10 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.base import Coarse, Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 
-__all__ = ["Fit", "fit", "fit_from"]
+__all__ = ["CoarseProblem", "Fit", "Target", "fit", "fit_from", "starts_from_coarse_fits"]
 
 _ITERATIONS = 15
 _ITERATIONS_OF_PRODUCTS = 40
@@ -32,6 +32,11 @@ _LEAST_DECREASE = 0.02
 _LEAST_EIGENVALUE = 1e-9
 _FIRST_ITERATIONS = 8
 _KEPT_STARTS = 2
+_TOLERANCE = 1e-5
+_DISTINCT = 0.02
+_AMBIGUOUS = 4.0
+_SHARE_LEFT = 0.1
+_PER_UNKNOWN = 40.0
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,8 @@ class Fit:
         Sum of squared whitened residuals.
     n_unknowns : int
         Number of unknowns.
+    abandoned : bool
+        Whether the fit was given up far from its target: then it has no Jacobian.
     """
 
     hypothesis: Hypothesis
@@ -60,6 +67,7 @@ class Fit:
     jacobian: Array
     chi_square: float
     n_unknowns: int
+    abandoned: bool = False
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -68,7 +76,11 @@ class Fit:
 
 
 def fit(
-    regression: Regression, start: Hypothesis, inverse_sigma: Array, most: int | None = None
+    regression: Regression,
+    start: Hypothesis,
+    inverse_sigma: Array,
+    most: int | None = None,
+    tolerance: float = 0.0,
 ) -> Fit:
     """Fit all unknowns within their bounds.
 
@@ -83,6 +95,9 @@ def fit(
     most
         Maximum number of iterations; by default 15, or 40 for an effect whose parameters act by
         their product.
+    tolerance
+        Share of χ² beyond the number of rows whose decrease ends the iteration, where that is more
+        than 0.02: a model that misses by thousands is not fitted to the last hundredth.
 
     Returns
     -------
@@ -100,7 +115,8 @@ def fit(
         step, expected_decrease = _step(
             jacobian * inverse_sigma[:, None], residual * inverse_sigma, damping, x, (low, high)
         )
-        if expected_decrease < _LEAST_DECREASE:
+        least = max(_LEAST_DECREASE, tolerance * (chi_square - regression.n_rows))
+        if expected_decrease < least:
             break
         trial = np.clip(x + step, low, high)
         residual_there = regression.residual(regression.hypothesis(trial, start))
@@ -109,7 +125,7 @@ def fit(
             decrease = chi_square - new
             x, residual, chi_square, damping = trial, residual_there, new, damping / 10
             jacobian = regression.jacobian(x, start)
-            if decrease < _LEAST_DECREASE:
+            if decrease < least:
                 break
         else:
             damping = max(damping * 100, 1e-4)
@@ -119,7 +135,78 @@ def fit(
     return Fit(fitted, x, residual, jacobian, chi_square, len(x))
 
 
-def fit_from(regression: Regression, starts: Sequence[Hypothesis], inverse_sigma: Array) -> Fit:
+@dataclass(frozen=True)
+class Target:
+    """A χ² that a fit has to reach to be of use."""
+
+    chi_square: float
+    before: float
+    """χ² before the effect was added."""
+
+    def is_out_of_reach(self, chi_square: float, n_unknowns: int) -> bool:
+        """Whether a fit that starts at the optimum of the coarse regression is abandoned.
+
+        It has to miss by more than a tenth of the χ² explained so far, and by 40 per unknown: the
+        optimum of a twentieth of the data is off by a χ² of twenty per unknown on average.
+        """
+        gained = max(0.0, self.before - chi_square)
+        return chi_square - self.chi_square > _SHARE_LEFT * gained + _PER_UNKNOWN * n_unknowns
+
+
+@dataclass(frozen=True)
+class CoarseProblem:
+    """A coarse regression with its weights."""
+
+    coarse: Coarse
+    inverse_sigma: Array
+    """1/σ of every row of the coarse regression."""
+
+
+def starts_from_coarse_fits(
+    regression: Regression,
+    starts: Sequence[Hypothesis],
+    inverse_sigma: Array,
+    problem: CoarseProblem,
+) -> list[Hypothesis] | None:
+    """Optima of the coarse regression as starting values, best first, two at most.
+
+    None where one of the given starting values has a smaller χ² on all samples.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    starts
+        Hypotheses of the same effects at several starting values.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+    problem
+        The coarse regression.
+    """
+    coarse = problem.coarse
+    reduced = [coarse.reduced(start) for start in starts]
+    fits = _first_fits(coarse.regression, reduced, problem.inverse_sigma, _ITERATIONS)
+    best = fits[0]
+    near = [
+        fitted
+        for fitted in fits[1:]
+        if _DISTINCT < fitted.chi_square - best.chi_square < _AMBIGUOUS
+    ]
+    out = [coarse.extended(fitted.hypothesis) for fitted in (best, *near[:1])]
+
+    def chi_square(hypothesis: Hypothesis) -> float:
+        return _chi_square(regression.residual(hypothesis), inverse_sigma)
+
+    return out if chi_square(out[0]) <= min(map(chi_square, starts)) else None
+
+
+def fit_from(
+    regression: Regression,
+    starts: Sequence[Hypothesis],
+    inverse_sigma: Array,
+    problem: CoarseProblem | None = None,
+    target: Target | None = None,
+) -> Fit:
     """Fit from several starting values and keep the smallest χ².
 
     Of more than two starts only the two best after eight iterations are fitted to the end.
@@ -132,15 +219,54 @@ def fit_from(regression: Regression, starts: Sequence[Hypothesis], inverse_sigma
         Hypotheses of the same effects at several starting values.
     inverse_sigma
         1/σ of every row, shape (n_rows,).
+    problem
+        Coarse regression, on which the best starting values are found; None for none.
+    target
+        The fit is abandoned at the optimum of the coarse regression, or at the only starting
+        values where there is no such regression, if this χ² is out of reach; None: never.
     """
+    found = list(starts) if problem is None and len(starts) == 1 else None
+    if problem is not None:
+        found = starts_from_coarse_fits(regression, starts, inverse_sigma, problem)
+    if found is not None and target is not None:
+        first = _at(regression, found[0], inverse_sigma)
+        if target.is_out_of_reach(first.chi_square, first.n_unknowns):
+            return first
+    if found is not None and problem is not None:
+        return _best(regression, found, inverse_sigma, _ITERATIONS)[0]
+    return _first_fits(regression, starts, inverse_sigma)[0]
+
+
+def _at(regression: Regression, hypothesis: Hypothesis, inverse_sigma: Array) -> Fit:
+    """A hypothesis at its values, without Jacobian."""
+    residual, vector = regression.residual(hypothesis), regression.vector(hypothesis)
+    nothing = np.zeros((regression.n_rows, 0))
+    chi_square = _chi_square(residual, inverse_sigma)
+    return Fit(hypothesis, vector, residual, nothing, chi_square, len(vector), abandoned=True)
+
+
+def _first_fits(
+    regression: Regression,
+    starts: Sequence[Hypothesis],
+    inverse_sigma: Array,
+    most: int | None = None,
+) -> list[Fit]:
+    """Fits from the best starting values, smallest χ² first."""
     if len(starts) > _KEPT_STARTS:
-        first_fits = [fit(regression, start, inverse_sigma, _FIRST_ITERATIONS) for start in starts]
-        first_fits.sort(key=lambda fitted: fitted.chi_square)
+        first_fits = _best(regression, starts, inverse_sigma, _FIRST_ITERATIONS)
         starts = [fitted.hypothesis for fitted in first_fits[:_KEPT_STARTS]]
-    return min(
-        (fit(regression, start, inverse_sigma) for start in starts),
-        key=lambda fitted: fitted.chi_square,
-    )
+    return _best(regression, starts, inverse_sigma, most)
+
+
+def _best(
+    regression: Regression,
+    starts: Sequence[Hypothesis],
+    inverse_sigma: Array,
+    most: int | None = None,
+) -> list[Fit]:
+    """Fits from every starting value, smallest χ² first."""
+    fits = [fit(regression, start, inverse_sigma, most, _TOLERANCE) for start in starts]
+    return sorted(fits, key=lambda fitted: fitted.chi_square)
 
 
 def _iterations(start: Hypothesis) -> int:

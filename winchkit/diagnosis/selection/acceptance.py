@@ -35,6 +35,8 @@ def best_accepted(
     """Fit of the best trial that is accepted; None where none is."""
     before = engine.criterion(present)
     for trial in sorted(trials, key=lambda t: t.criterion):
+        if trial.fit.abandoned:
+            continue
         if trial.criterion < before - MIN_GAIN and is_accepted(engine, present, trial.fit, noise):
             return trial.fit
     return None

@@ -9,7 +9,7 @@ are :class:`~winchkit.diagnosis.selection.time_series.TimeSeriesSelection` for a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds, Regression
-from winchkit.diagnosis.regression.gls import Fit, fit, fit_from
+from winchkit.diagnosis.regression.gls import CoarseProblem, Fit, Target, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
@@ -104,6 +104,8 @@ class LastValue(Generic[Answer]):
         return self._kept[2]
 
 
+_KEPT_REFITS = 4
+"""Fits of models without one of their effects, which elimination and exchange have in common."""
 _WHOLE_CORRECTION = 1.0
 """In units of the theoretical correction: a larger one is not a discretisation error."""
 
@@ -124,6 +126,15 @@ class Trial:
     criterion: float
 
 
+def _key(hypothesis: Hypothesis, law: Effect, item: Score) -> Hashable:
+    """What a candidate's optimum is kept by: effects beside it, its free unknowns, its shape."""
+    orders = [
+        (t.effect.id, *(t.values[p.name] for p in t.effect.parameters if p.whole))
+        for t in hypothesis.terms
+    ]
+    return (*orders, law.id, Coordinates(law).names, *item.candidate.shape.items())
+
+
 class SelectionEngine(ABC):
     """Candidates, signatures and comparisons that stay the same through a selection.
 
@@ -135,6 +146,11 @@ class SelectionEngine(ABC):
         Initial model: the profile's own effects.
     candidates
         Effects that may be added.
+
+    Attributes
+    ----------
+    on_trial : callable
+        Called with the id of every candidate before it is fitted.
     """
 
     regression: Regression
@@ -149,6 +165,9 @@ class SelectionEngine(ABC):
         self._last_folds: LastValue[Folds] = LastValue()
         self._last_lack_of_fit_test: LastValue[LackOfFitTest] = LastValue()
         self._last_projected: LastValue[Projected] = LastValue()
+        self.on_trial: Callable[[str], None] = lambda effect: None
+        self._optima: dict[Hashable, Hypothesis] = {}
+        self._refits: list[tuple[Hypothesis, Noise, Fit]] = []
         self.signatures = self._signatures(initial_model)
 
     @abstractmethod
@@ -176,6 +195,15 @@ class SelectionEngine(ABC):
     @abstractmethod
     def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
         """F test of the residual against the noise, band by band."""
+
+    def coarse_problem(self, noise: Noise) -> CoarseProblem | None:
+        """Coarse regression for first fits; None where there is none."""
+        return None
+
+    def _coarse_problem(self, starts: Sequence[Hypothesis], noise: Noise) -> CoarseProblem | None:
+        """The coarse regression where a fit from these starting values takes many iterations."""
+        nonlinear = any(Coordinates(term.effect).shapes for term in starts[0].terms)
+        return self.coarse_problem(noise) if nonlinear or len(starts) > 1 else None
 
     def folds(self, fitted: Fit, noise: Noise) -> Folds:
         """Folds for leave-group-out cross-validation of a fit; the last answer is kept."""
@@ -279,10 +307,20 @@ class SelectionEngine(ABC):
         states = sum(len(start) for start in fitted.hypothesis.starts[self.n_initial_terms :])
         return fitted.chi_square + self.penalty_per_parameter * (n_parameters + states)
 
-    def trial(self, present: Fit, item: Score, noise: Noise) -> Trial:
+    def trial(
+        self,
+        present: Fit,
+        item: Score,
+        noise: Noise,
+        *,
+        anew: bool = False,
+        target: float | None = None,
+    ) -> Trial:
         """Fit a candidate beside the present effects, without those that it contains.
 
         Of a series law one coefficient after another is added as long as the criterion decreases.
+        A candidate that was fitted beside the same effects before, under another noise estimate,
+        starts from the values found then.
 
         Parameters
         ----------
@@ -292,7 +330,13 @@ class SelectionEngine(ABC):
             Score of the candidate, with its starting amplitudes.
         noise
             Noise variance.
+        anew
+            Whether to search from all starting values in any case.
+        target
+            χ² that the trial has to reach: its fit is abandoned where that is out of reach.
         """
+        goal = None if target is None else Target(target, present.chi_square)
+        self.on_trial(item.candidate.effect.id)
         effect, inverse_sigma = item.candidate.effect, noise.inverse_sigma(self.regression)
         hypothesis = present.hypothesis
         for index in reversed(range(self.n_initial_terms, len(hypothesis.terms))):
@@ -300,20 +344,38 @@ class SelectionEngine(ABC):
                 hypothesis = hypothesis.without(index)
         best: Trial | None = None
         for law in truncated_series(effect):
-            if best is None:
-                own = replace(item, candidate=item.candidate.with_law(law))
-                places = starting_points(self.regression, hypothesis, present, own, inverse_sigma)
-                terms = [Term(law, values) for values in places]
-                starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
-                starts += [anew for start in starts for anew in self._without_discretization(start)]
+            key = _key(hypothesis, law, item)
+            if not anew and key in self._optima:
+                fitted = fit_from(self.regression, [self._optima[key]], inverse_sigma, target=goal)
             else:
-                starts = [best.fit.hypothesis.with_law(law)]
-            fitted = fit_from(self.regression, starts, inverse_sigma)
+                if best is None:
+                    own = replace(item, candidate=item.candidate.with_law(law))
+                    starts = self._starts(hypothesis, present, own, inverse_sigma)
+                else:
+                    starts = [best.fit.hypothesis.with_law(law)]
+                fitted = fit_from(
+                    self.regression,
+                    starts,
+                    inverse_sigma,
+                    self._coarse_problem(starts, noise),
+                    goal,
+                )
+            if not anew:
+                self._optima[key] = fitted.hypothesis
             longer = Trial(fitted, self._criterion_of_trial(fitted, hypothesis, present, noise))
             if best is not None and not longer.criterion < best.criterion:
                 break
             best = longer if np.isfinite(longer.criterion) else best
         return best or longer
+
+    def _starts(
+        self, hypothesis: Hypothesis, present: Fit, item: Score, inverse_sigma: Array
+    ) -> list[Hypothesis]:
+        """Starting values of a hypothesis with a candidate added."""
+        places = starting_points(self.regression, hypothesis, present, item, inverse_sigma)
+        terms = [Term(item.candidate.effect, values) for values in places]
+        starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
+        return starts + [anew for start in starts for anew in self._without_discretization(start)]
 
     def _without_discretization(self, start: Hypothesis) -> list[Hypothesis]:
         """The same start with a zero discretisation correction, where hysteresis is added.
@@ -335,6 +397,8 @@ class SelectionEngine(ABC):
     ) -> float:
         """Criterion of a trial; infinite where its last effect has degenerated to another."""
         criterion = self.criterion(fitted)
+        if fitted.abandoned:
+            return criterion
         if shape_at_bound(fitted.hypothesis.terms[-1]) or (
             criterion < self.criterion(present)
             and self._explained_by_initial_states(without, fitted, noise)
@@ -356,8 +420,15 @@ class SelectionEngine(ABC):
         )
 
     def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
-        """Fit a hypothesis under a given noise."""
-        return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression))
+        """Fit a hypothesis under a given noise; the last answers are kept."""
+        inverse_sigma = noise.inverse_sigma(self.regression)
+        for known, under, fitted in self._refits:
+            if under is noise and known == hypothesis:
+                return fitted
+        problem = self._coarse_problem([hypothesis], noise)
+        fitted = fit_from(self.regression, [hypothesis], inverse_sigma, problem)
+        self._refits = [(hypothesis, noise, fitted), *self._refits[: _KEPT_REFITS - 1]]
+        return fitted
 
     def fixed(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
         """A hypothesis at its values, with residual and Jacobian but without iteration."""

@@ -71,21 +71,22 @@ class Exchange:
         scores = self._engine.scores(held, self._noise)
         return held, least, {item.candidate.effect.id: item for item in scores}
 
-    def trial(self, rival: Score, target: float) -> Trial:
+    def trial(self, rival: Score, target: float, least: float) -> Trial:
         """Fit a rival in the effect's place.
 
-        It is fitted again from the others' present values where its χ² is above ``enough`` and
-        would nearly reach that value by linear prediction.
+        It is fitted again from the others' present values where its χ² is above ``target`` and
+        would nearly reach that value by linear prediction. It is abandoned where even the larger
+        χ² ``least`` is out of reach.
         """
-        first_trial = self._engine.trial(self.base, rival, self._noise)
+        first_trial = self._engine.trial(self.base, rival, self._noise, target=least)
         if first_trial.fit.chi_square < target or not self._others.terms:
             return first_trial
-        held, least, scores = self._held
+        held, least_held, scores = self._held
         rival_beside = scores.get(rival.candidate.effect.id)
         limit = target + _MARGIN * (self.base.chi_square - target)
-        if rival_beside is None or least - rival_beside.explained_ss > limit:
+        if rival_beside is None or least_held - rival_beside.explained_ss > limit:
             return first_trial
-        second_trial = self._engine.trial(held, rival_beside, self._noise)
+        second_trial = self._engine.trial(held, rival_beside, self._noise, anew=True)
         return min(
             first_trial, second_trial, key=lambda trial: (trial.criterion, trial.fit.chi_square)
         )
@@ -139,7 +140,9 @@ def _better(
     for pair in candidates[:tried]:
         # New effects first: one that explained both would keep its old values.
         first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in removed)
-        trial = engine.trial(engine.trial(base, first, noise).fit, second, noise)
+        trial = engine.trial(
+            engine.trial(base, first, noise).fit, second, noise, target=present.chi_square
+        )
         if trial.criterion < engine.criterion(present) - MIN_GAIN:
             return trial.fit
     return None

@@ -13,6 +13,7 @@ Miller, A. (2002). Subset Selection in Regression, 2nd ed. Chapman & Hall.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,36 +94,39 @@ class SelectionResult:
     threshold: float
 
 
-def stepwise_selection(engine: SelectionEngine) -> SelectionResult:
-    """Select effects for a model as long as it has a lack of fit and candidates are accepted."""
-    initial_model, initial_noise = engine.fit_with_noise(engine.initial_model)
-    initial_lack_of_fit_test = engine.lack_of_fit_test(initial_model, initial_noise)
-    initial_scores = engine.scores(initial_model, initial_noise)
-    threshold = _threshold(engine, initial_model, initial_noise)
-    last_model, noise, tried = _forward_selection(
-        engine, initial_model, initial_noise, initial_scores, threshold
-    )
+def stepwise_selection(
+    engine: SelectionEngine, known: Callable[[SelectionResult], None] = lambda result: None
+) -> SelectionResult:
+    """Select effects for a model as long as it has a lack of fit and candidates are accepted.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    known
+        Called before the search with the result of a search that ends there.
+    """
+    first = initial_result(engine)
+    lacking = _has_lack_of_fit(first.lack_of_fit_test, list(first.scores), first.threshold)
+    start = replace(first, lack_of_fit_at_start=lacking, lack_of_fit=lacking)
+    known(start)
+    initial, scores, threshold = (start.final, start.noise), list(start.scores), start.threshold
+    last_model, noise, tried = _forward_selection(engine, *initial, scores, threshold)
     final, noise = _without_minor_terms(engine, last_model, noise)
     lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
-    lack_of_fit_at_start = grew or _has_lack_of_fit(
-        initial_lack_of_fit_test, initial_scores, threshold
-    )
+    lack_of_fit_at_start = grew or lacking
     if lack_of_fit_at_start and not tried:
-        tried = _fits(_short_list(engine, initial_model, initial_noise, initial_scores))
-    return SelectionResult(
-        initial_model=initial_model,
-        initial_noise=initial_noise,
-        initial_lack_of_fit_test=initial_lack_of_fit_test,
+        tried = _fits(_short_list(engine, *initial, scores))
+    return replace(
+        start,
         lack_of_fit_at_start=lack_of_fit_at_start,
         last_model=last_model.hypothesis,
         final=final,
         noise=noise,
         lack_of_fit_test=lack_of_fit_test,
         lack_of_fit=_has_lack_of_fit(lack_of_fit_test, engine.scores(final, noise), threshold),
-        scores=tuple(initial_scores),
         tried=tried if lack_of_fit_at_start else (),
-        threshold=threshold,
     )
 
 
@@ -154,9 +158,13 @@ def _forward_selection(
     for _ in range(_MOST_STEPS):
         grown = None
         if scores and scores[0].net_gain > threshold:
-            trials = _short_list(engine, present, noise, scores)
-            tried = tried or _fits(trials)
+            first = not tried
+            trials = _short_list(engine, present, noise, scores, complete=first)
             grown = best_accepted(engine, present, noise, trials)
+            if grown is None and any(trial.fit.abandoned for trial in trials):
+                trials = _short_list(engine, present, noise, scores)
+                grown = best_accepted(engine, present, noise, trials)
+            tried = tried or _fits(trials)
         grown = grown or _best_pair(engine, present, noise)
         if grown is None:
             break
@@ -217,11 +225,22 @@ def _has_lack_of_fit(
 
 
 def _short_list(
-    engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score]
+    engine: SelectionEngine,
+    present: Fit,
+    noise: Noise,
+    scores: list[Score],
+    *,
+    complete: bool = True,
 ) -> list[Trial]:
-    """Trials of the five candidates with the largest scores, in their order."""
-    listed = [item for item in scores if item.net_gain > 0][:_SHORT_LIST]
-    return [engine.trial(present, item, noise) for item in listed]
+    """Trials of the five candidates with the largest scores, in their order.
+
+    Unless ``complete``, a trial is abandoned where the best one before is out of reach.
+    """
+    trials: list[Trial] = []
+    for item in [item for item in scores if item.net_gain > 0][:_SHORT_LIST]:
+        best = min((trial.fit.chi_square for trial in trials), default=None)
+        trials.append(engine.trial(present, item, noise, target=None if complete else best))
+    return trials
 
 
 def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
@@ -304,7 +323,7 @@ def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit
         own = present.hypothesis.terms[index]
         base = engine.refit(present.hypothesis.without(index), noise)
         rivals = _rivals_of(own, engine.scores(base, noise))
-        trials = [engine.trial(base, item, noise) for item in rivals]
+        trials = [engine.trial(base, item, noise, target=present.chi_square) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
         if best is not None and best.criterion < engine.criterion(present) - MIN_GAIN:
             present = best.fit

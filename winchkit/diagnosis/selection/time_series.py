@@ -8,9 +8,10 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
+from winchkit.diagnosis.regression.coarse import coarse_regression
 from winchkit.diagnosis.regression.cross_validation import extrapolation, held_out_rms
 from winchkit.diagnosis.regression.discretization import without_discretization_error
-from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.gls import CoarseProblem, Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
 from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
@@ -45,6 +46,7 @@ class TimeSeriesSelection(SelectionEngine):
         candidates: Iterable[Effect],
     ) -> None:
         super().__init__(regression, initial_model, candidates)
+        self._coarse = coarse_regression(regression)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Noise from the contrasts of repeats; without repeats from the saturated model."""
@@ -54,6 +56,12 @@ class TimeSeriesSelection(SelectionEngine):
             return noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
         columns = np.hstack([jacobian, self.signatures.columns])
         return noise_saturated(self.regression, residual, columns)
+
+    def coarse_problem(self, noise: Noise) -> CoarseProblem | None:
+        """Every k-th sample of one run of each set of repeats, under this noise."""
+        if self._coarse is None:
+            return None
+        return CoarseProblem(self._coarse, self._coarse.inverse_sigma(noise))
 
     def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
         """Held-out rms error of every output, SI."""

@@ -161,14 +161,13 @@ def equivalence_set(
     blocks = engine.regression.blocks
     own_losses = held_out(engine.regression, final, noise, blocks)
     members: list[tuple[int, float, Term]] = [(n_parameters, final.chi_square, own)]
+    least = base.chi_square - _LEAST_SHARE * (base.chi_square - final.chi_square)
     for rival in rivals:
-        trial = exchange.trial(rival, final.chi_square + _DELTA_CHI_SQUARE)
+        trial = exchange.trial(rival, final.chi_square + _DELTA_CHI_SQUARE, least)
         fitted = trial.fit
         if not np.isfinite(trial.criterion):
             continue
-        if base.chi_square - fitted.chi_square < _LEAST_SHARE * (
-            base.chi_square - final.chi_square
-        ):
+        if fitted.chi_square > least:
             continue
         term = fitted.hypothesis.terms[-1]
         n_rival_parameters = Coordinates(term.effect).n_parameters

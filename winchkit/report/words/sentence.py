@@ -68,6 +68,8 @@ def sentence(diagnosis: Diagnosis) -> str:
     str
         Plain text.
     """
+    if diagnosis.interrupted:
+        return "Interrupted before a verdict: errors of the profile, and candidates by evidence."
     if diagnosis.verdict == "unknown" and (doubts := _doubts(diagnosis)):
         return doubts
     if diagnosis.verdict == "adequate":

@@ -1,0 +1,148 @@
+"""Coarse regression: every k-th sample of one run of each set of repeats.
+
+A fit from several starting values is first made on the coarse regression, whose predictions cost a
+tenth, and then, from its best points, on all samples. Samples are taken without a low-pass: the
+model is evaluated at the same instants as the measurement, so that neither loses a frequency to
+which an effect belongs. The coarse fit only chooses starting values; its own deviation, that of
+differences over longer steps included, is removed by the fit on all samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.data.repeats import Repeats
+from winchkit.diagnosis.data.spectrum import Band
+from winchkit.diagnosis.regression.base import Coarse
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.model.derivatives import Clock
+from winchkit.model.line import Motion
+
+__all__ = ["CoarseTimeSeries", "coarse_regression"]
+
+_SAMPLES = 4000
+"""Samples of all runs that are aimed at."""
+_LEAST_SAMPLES = 400
+"""Samples that a run keeps at least."""
+
+Sampled = TypeVar("Sampled")
+
+
+def coarse_regression(regression: TimeSeriesRegression) -> CoarseTimeSeries | None:
+    """Coarse regression of a regression; None where the runs are short already."""
+    dataset = regression.dataset
+    chosen = sorted(group.runs[0] for group in dataset.repeats)
+    counts = [len(dataset.recordings[run].signals.time) for run in chosen]
+    step = min(sum(counts) // _SAMPLES, min(counts) // _LEAST_SAMPLES)
+    if step < 2:
+        return None
+    recordings = tuple(_thinned(dataset.recordings[run], step) for run in chosen)
+    repeats = tuple(
+        Repeats((index,), (np.arange(len(recording.signals.time)),))
+        for index, recording in enumerate(recordings)
+    )
+    coarse = TimeSeriesRegression(replace(dataset, recordings=recordings, repeats=repeats))
+    alike = coarse.nuisance_columns.shape[1] == regression.nuisance_columns.shape[1]
+    return CoarseTimeSeries(regression, coarse, chosen) if alike else None
+
+
+class CoarseTimeSeries(Coarse):
+    """Coarse regression of a winch's runs.
+
+    Parameters
+    ----------
+    whole
+        Regression of all samples.
+    regression
+        The coarse one.
+    chosen
+        Run of ``whole`` behind every run of the coarse regression.
+    """
+
+    regression: TimeSeriesRegression
+
+    def __init__(
+        self, whole: TimeSeriesRegression, regression: TimeSeriesRegression, chosen: list[int]
+    ) -> None:
+        super().__init__(regression)
+        self._whole, self._chosen = whole, chosen
+        first = {run: group.runs[0] for group in whole.dataset.repeats for run in group.runs}
+        self._place = [chosen.index(first[run]) for run in range(whole.n_runs)]
+        self._band_of_row = self._bands_of_whole()
+
+    def reduced(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis with the initial states of the chosen runs."""
+        return replace(
+            hypothesis,
+            starts=tuple(
+                tuple(s[run] for run in self._chosen) if s else () for s in hypothesis.starts
+            ),
+        )
+
+    def extended(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis with the initial states of all runs, repeats alike."""
+        return replace(
+            hypothesis,
+            starts=tuple(tuple(s[i] for i in self._place) if s else () for s in hypothesis.starts),
+        )
+
+    def inverse_sigma(self, noise: Noise) -> Array:
+        """1/σ of every row of the coarse regression, from the whole one's bands."""
+        return np.asarray(1 / np.sqrt(noise.power[self._band_of_row]))
+
+    def _bands_of_whole(self) -> Any:
+        """Band of the whole regression that holds the frequency of every coarse row."""
+        ids = np.zeros(self.regression.n_rows, dtype=np.intp)
+        bands = self._whole.bands
+        for segment in self.regression.segments:
+            own = [index for index, band in enumerate(bands) if band[0] == segment.output]
+            edges = [bands[index][1] for index in own[1:]]
+            ids[segment.rows] = own[0] + np.searchsorted(
+                edges, segment.band.frequency, side="right"
+            )
+        return ids
+
+
+def _thinned(recording: Recording, step: int) -> Recording:
+    """Every ``step``-th sample of a run."""
+
+    def each(values: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: np.ascontiguousarray(own[::step]) for name, own in values.items()}
+
+    return replace(
+        recording,
+        signals=_every(recording.signals, step),
+        measured=each(recording.measured),
+        valid=each(recording.valid),
+        bands={
+            output: Band(-(-band.count // step), band.rate / step, band.cut_off)
+            for output, band in recording.bands.items()
+        },
+        raw=_thinned_motion(recording.raw, step),
+        smooth=_thinned_motion(recording.smooth, step),
+        nominal=each(recording.nominal),
+        nominal_smooth=each(recording.nominal_smooth),
+    )
+
+
+def _thinned_motion(motion: Motion, step: int) -> Motion:
+    at = _every(motion.at, step)
+    return replace(_every(motion, step), at=at, clock=Clock(at.time))
+
+
+def _every(signals: Sampled, step: int) -> Sampled:
+    """The same dataclass with every ``step``-th sample of its arrays."""
+    arrays = {
+        field.name: np.ascontiguousarray(value[::step])
+        for field in fields(signals)  # type: ignore[arg-type]
+        if isinstance(value := getattr(signals, field.name), np.ndarray)
+    }
+    return replace(signals, **arrays)  # type: ignore[type-var]
