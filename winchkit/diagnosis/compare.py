@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.data.spectrum import WHOLE_TRANSITION
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import replicate_rms
@@ -123,7 +122,7 @@ def compared(
         maps,
         sanity=dataset.sanity,
         used_share=dataset.used_share,
-        caveats=caveats(dataset.sanity),
+        caveats=dataset.caveats,
     )
     return Compared(regression, residual, comparison)
 

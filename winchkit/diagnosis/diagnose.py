@@ -192,9 +192,8 @@ def diagnose(
     dataset = prepare(runs, profile, band, decimate=decimate, fast=True)
     progress("drawing the candidates", 0.1)
     engine = selection_engine(dataset, catalogue)
-    doubts = caveats(dataset.sanity)
-    if doubts and not as_recorded:
-        return _unsearched(engine, doubts)
+    if caveats(dataset.sanity) and not as_recorded:
+        return _unsearched(engine)
     known: list[SelectionResult] = []
     try:
         engine.on_trial = _Trials(progress, "fitting", _SEARCH)
@@ -241,13 +240,13 @@ def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> 
         notes=engine.regression.dataset.notes,
         sanity=engine.regression.dataset.sanity,
         used_share=engine.regression.dataset.used_share,
-        caveats=caveats(engine.regression.dataset.sanity),
+        caveats=engine.regression.dataset.caveats,
         interrupted=True,
     )
     return WinchAnswer(engine, start, diagnosis)
 
 
-def _unsearched(engine: TimeSeriesSelection, doubts: tuple[str, ...]) -> WinchAnswer:
+def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
     """Verdict ``unknown`` for runs with a wrong sign or unit: no effect must explain that."""
     result = initial_result(engine)
     judgement = withheld(engine, result, 1.0, _UNSEARCHED)
@@ -264,7 +263,7 @@ def _unsearched(engine: TimeSeriesSelection, doubts: tuple[str, ...]) -> WinchAn
         notes=(*dataset.notes, *judgement.notes),
         sanity=dataset.sanity,
         used_share=dataset.used_share,
-        caveats=doubts,
+        caveats=dataset.caveats,
     )
     return WinchAnswer(engine, judgement.reported, diagnosis)
 
@@ -297,7 +296,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
         ),
         sanity=engine.regression.dataset.sanity,
         used_share=engine.regression.dataset.used_share,
-        caveats=caveats(engine.regression.dataset.sanity),
+        caveats=engine.regression.dataset.caveats,
     )
     return WinchAnswer(engine, reported, diagnosis, sets, pairs)
 

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.copies import COPIES, without_copies
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
 from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, even_instants
-from winchkit.diagnosis.data.sanity import findings, resolutions, without_outliers
+from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, without_outliers
 from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs
@@ -25,9 +26,11 @@ from winchkit.diagnosis.data.zeroing import zeroed_anew
 from winchkit.errors import UsageError
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Line, Motion
-from winchkit.model.stages import OUTPUTS, At, Signals
+from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS, At, Signals
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.quantisation import quantisation_noise
+from winchkit.runs.sanity.text import size
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -48,6 +51,8 @@ class Filtering:
     """Decimation of long runs; None for none."""
 
 
+NO_REPEATS = "no-repeats"
+ROUNDED_ALIKE = "noise-floor-implausible"
 _ZEROED = ("cable_length", "tension")
 """Outputs whose instrument may be zeroed before a run."""
 _EQUAL_TEMPERATURE = 0.5
@@ -117,6 +122,16 @@ class Dataset:
         return out
 
     @property
+    def caveats(self) -> tuple[str, ...]:
+        """Codes of what these runs cannot exclude: suspect channels first, then their repeats."""
+        limits = [f.code for f in self.sanity if f.code in (COPIES, ROUNDED_ALIKE)]
+        return tuple(
+            dict.fromkeys(
+                [*caveats(self.sanity), *limits, *([] if self.repeated else [NO_REPEATS])]
+            )
+        )
+
+    @property
     def repeated(self) -> tuple[Repeats, ...]:
         """Sets of at least two repeats."""
         return tuple(group for group in self.repeats if len(group.runs) > 1)
@@ -159,6 +174,7 @@ def prepare(
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
     notes = validate_runs(runs, profile)
+    runs, copied = without_copies(runs, profile)
     sanity = findings(runs, profile)
     resolution = resolutions(runs)
     runs, mended = evenly_stamped([without_outliers(run) for run in runs])
@@ -176,11 +192,34 @@ def prepare(
     return replace(
         dataset,
         notes=tuple(notes),
-        sanity=(*sanity, *zeroed),
+        sanity=(*copied, *sanity, *zeroed, *rounded_alike(dataset, resolution)),
         zeroed_anew=frozenset(finding.channel for finding in zeroed),
         resolution=resolution,
         decimation_factor=factor,
     )
+
+
+def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Finding]:
+    """Findings on outputs whose repeats agree to better than their resolution allows.
+
+    Repeats that are rounded alike show no noise. That of their rounding, q/√12 for a resolution q,
+    is the least noise of every frequency band; an output of which nothing else is known gets it.
+    """
+    out = []
+    for output in dataset.outputs:
+        least = quantisation_noise(resolution.get(output, 0.0))
+        parts = _repeat_differences(dataset, output)
+        if not parts or not least:
+            continue
+        rms = float(np.sqrt(np.nanmean(np.concatenate(parts) ** 2)))
+        if rms < least:
+            unit = OUTPUT_UNITS[output]
+            text = (
+                f"repeats agree to {size(rms, unit)} rms, less than the {size(least, unit)} of its "
+                "resolution: they are rounded alike, and the noise of the resolution is used"
+            )
+            out.append(Finding(ROUNDED_ALIKE, "", output, rms, text))
+    return out
 
 
 def _repeat_differences(dataset: Dataset, output: str) -> list[Array]:

@@ -13,6 +13,11 @@ __all__ = ["caveat_text", "finding_texts", "used_text"]
 _CAVEATS = {
     "inverted-sign": "the sign of a channel looks inverted: no effect is named with it",
     "wrong-factor": "the unit or factor of a channel looks wrong: no effect is named with it",
+    "no-repeats": "no run repeats another: an effect outside the catalogue counts as noise and "
+    "cannot be excluded",
+    "repeats-are-copies": "a run is a copy of another one and shows no noise: it was left out",
+    "noise-floor-implausible": "repeats agree to better than the resolution of an instrument: "
+    "errors below the noise of its rounding cannot be excluded",
 }
 """Sentence, without a full stop, of every code of ``caveats``."""
 _SHOWN = 4

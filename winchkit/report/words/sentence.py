@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from winchkit.diagnosis.data.sanity import ALARMING
 from winchkit.diagnosis.results import Diagnosis, OutputFit, Step, Where
 from winchkit.report.words.numbers import percent, quantity, significant
 from winchkit.report.words.vocabulary import (
@@ -214,7 +215,7 @@ def still_text(outputs: Mapping[str, OutputFit]) -> str:
 
 def _doubts(diagnosis: Diagnosis) -> str:
     """Wrong signs and units, with which no effect is looked for; empty without any."""
-    found = [f for f in diagnosis.sanity if f.code in diagnosis.caveats]
+    found = [f for f in diagnosis.sanity if f.code in ALARMING]
     texts = list(dict.fromkeys(f"{f.channel}: {f.text}" for f in found))
     return f"No effect is named with a wrong channel: {'; '.join(texts)}." if texts else ""
 
