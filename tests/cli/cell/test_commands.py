@@ -188,6 +188,20 @@ def test_a_calibration_that_is_not_accepted_writes_nothing(cell: Served, tmp_pat
     assert read_calibration(tmp_path / "A-cell.toml").device == "laumas-tlb"
 
 
+def test_points_need_neither_a_cell_nor_a_bench(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    points = tmp_path / "points.csv"
+    rows = [f"{m},{1.02 * 9.80665 * m + 3:.4f},{s}" for s in (1, 2) for m in (0, 2, 5, 10, 15)]
+    points.write_text("\n".join(["load [kg],reading [N],series", *rows]) + "\n")
+    found = told("calibrate", "--points", points, "--yes")
+    effects = {e["effect"]: e["value"] for e in found["diagnosis"]["effects"]}
+    assert effects == pytest.approx({"cell-offset": 3.0, "cell-gain": 0.02}, abs=1e-4)
+    calibration = read_calibration(tmp_path / "points-calibration.toml")
+    assert calibration.coefficients[1] == pytest.approx(1 / 1.02, rel=1e-5)
+
+
 def test_a_serial_number_can_be_given_and_weights_need_no_points(
     cell: Served, tmp_path: Path
 ) -> None:

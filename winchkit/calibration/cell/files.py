@@ -111,9 +111,9 @@ def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
     Parameters
     ----------
     path
-        File with the columns ``load [kg]`` or ``load [N]`` and ``indicated [N]``; optional ``std
-        [N]``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the direction
-        follows from the order of the loads.
+        File with the columns ``load [kg]`` or ``load [N]`` and ``indicated [N]`` (or ``reading``);
+        optional ``std [N]``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the
+        direction follows from the order of the loads.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def _columns(header: list[str], path: str) -> dict[str, tuple[int, str]]:
     found: dict[str, tuple[int, str]] = {}
     for place, title in enumerate(header):
         name, _, unit = title.strip().partition("[")
-        key = name.strip()
+        key = "indicated" if name.strip() == "reading" else name.strip()
         if key not in _COLUMNS:
             raise FileError(
                 Fault(

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from winchkit.cli.core.options import bench_option, complete_winch
+from winchkit.cli.core.options import bench_by_default, complete_bench, complete_winch
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import Cells
     from winchkit.calibration.cell.fit import CellFit
+    from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
 
 __all__ = ["command"]
@@ -23,12 +24,28 @@ _AT_REST = 4.0
 """The spread of a mean over what white noise would make of it; more is a load that moves."""
 
 
+def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """The bench file; none is needed for points without the name of a cell."""
+    if value is None and ctx.params.get("points") and not ctx.params.get("cell"):
+        return None
+    return bench_by_default(ctx, param, value)
+
+
 @click.command()
-@click.argument("cell", required=False, shell_complete=complete_winch)
-@bench_option
+@click.argument("cell", required=False, shell_complete=complete_winch, is_eager=True)
+@click.option(
+    "-b",
+    "--bench",
+    metavar="FILE",
+    shell_complete=complete_bench,
+    callback=_bench,
+    help="Bench file; not needed with --points.  [default: the only one of this folder]",
+)
 @click.option("--weights", help='Weights in rising order, e.g. "0 2 5 10 15 20 kg"; or N.')
 @click.option("--series", default=3, show_default=True, help="Times up and down.")
-@click.option("--points", metavar="CSV", help="Fit these points instead of measuring.")
+@click.option(
+    "--points", metavar="CSV", is_eager=True, help="Fit these points instead of measuring."
+)
 @click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
 @click.option("--for", "duration", default="3 s", show_default=True, help="Averaged per weight.")
 @click.option("--settle", default="2 s", show_default=True, help="Waited after a weight is hung.")
@@ -48,7 +65,7 @@ _AT_REST = 4.0
 @click.option("--json", "as_json", is_flag=True, help="Print the fit as JSON.")
 def command(
     cell: str | None,
-    bench: str,
+    bench: str | None,
     points: str | None,
     order: Literal["linear", "quadratic"],
     serial: str | None,
@@ -64,27 +81,33 @@ def command(
     """Calibrate the load cell CELL with known weights, and write the calibration beside the bench.
 
     The device is not changed. Name the file in the wiring: cell = { …, calibration = "FILE" }.
+    Points from a file need neither CELL nor a bench.
     """
     from winchkit.calibration.cell.files import calibration_toml, write_text
     from winchkit.calibration.cell.fit import fit_cell
+    from winchkit.calibration.cell.static_effects import static_effects
     from winchkit.cli.core.quantities import optional
-    from winchkit.report.pages.cell_calibration import report_lines
+    from winchkit.report.pages.cell_calibration import effect_lines, report_lines
 
     degrees = optional(temperature, "temperature")
-    found = _found(_force_cell(cell, bench), bench, points, serial, guided)
-    fit = fit_cell(found.points, order)
-    target = Path(output or Path(bench).parent / f"{found.name.replace('.', '-')}.toml")
+    found = _found(cell, bench, points, serial, guided)
+    fit, needed = fit_cell(found.points, order), static_effects(found.points)
+    beside = Path(bench or points or "").parent
+    target = Path(output or beside / f"{found.name.replace('.', '-')}.toml")
     calibration = _calibration(target.stem, fit, found, degrees, direction)
-    for line in report_lines(fit, found.points):
+    for line in [*report_lines(fit, found.points), *effect_lines(needed)]:
         click.echo(line, err=as_json)
     if html is not None:
-        _write_page(html, calibration, fit)
+        _write_page(html, calibration, fit, needed)
     if not yes:
         click.confirm(f"Accept, and write {target}?", abort=True, err=True)
     write_text(target, calibration_toml(calibration))
     click.echo(f"written: {target}", err=True)
     if as_json:
-        echo_json({"schema": 1, "file": str(target), "fit": fit, "points": found.points})
+        echo_json(
+            {"schema": 1, "file": str(target), "fit": fit, "points": found.points}
+            | {"diagnosis": needed}
+        )
 
 
 @dataclass(frozen=True)
@@ -98,20 +121,30 @@ class _Measured:
 
 
 def _found(
-    name: str, bench: str, points: str | None, serial: str | None, guided: dict[str, Any]
+    cell: str | None,
+    bench: str | None,
+    points: str | None,
+    serial: str | None,
+    guided: dict[str, Any],
 ) -> _Measured:
     """Points from a file or from the bench."""
     if points and guided["weights"]:
         raise click.UsageError("'--points' measures nothing, so '--weights' has no place there.")
-    found = _from_file(name, bench, points) if points else _measure(name, bench, **guided)
+    if bench is None:
+        found = _from_file_alone(str(points))
+    else:
+        name = _force_cell(cell, bench)
+        found = _from_file(name, bench, points) if points else _measure(name, bench, **guided)
     return found if serial is None else replace(found, serial=serial)
 
 
-def _write_page(path: str, calibration: CellCalibration, fit: CellFit) -> None:
+def _write_page(
+    path: str, calibration: CellCalibration, fit: CellFit, needed: StaticDiagnosis
+) -> None:
     from winchkit.cli.model.options import write_page
     from winchkit.report.pages.cell_calibration import report_page
 
-    write_page(path, report_page(calibration, fit))
+    write_page(path, report_page(calibration, fit, needed))
 
 
 def _calibration(
@@ -164,6 +197,13 @@ def _from_file(name: str, bench: str, points: str) -> _Measured:
     winch, _, role = name.rpartition(".")
     device = device_of(spec, refs_of(spec)[winch, role]).name
     return _Measured(name, device, "", read_points(points))
+
+
+def _from_file_alone(points: str) -> _Measured:
+    """Points of a CSV file for a cell of no bench, named as the file."""
+    from winchkit.calibration.cell.files import read_points
+
+    return _Measured(f"{Path(points).stem}-calibration", "", "", read_points(points))
 
 
 def _measure(

@@ -12,10 +12,12 @@ from winchkit.report.html.page import page
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.fit import CellFit, Figure
+    from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration
 
 __all__ = [
     "NAMES",
+    "effect_lines",
     "figures",
     "report_lines",
     "report_page",
@@ -52,6 +54,27 @@ def report_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
     lines += ["  residuals (true less fitted), ^ going up, v going down:"]
     lines += [f"  {line}" for line in _residual_lines(fit, points)]
     return lines + [f"  ! {warning}" for warning in fit.warnings]
+
+
+def effect_lines(needed: StaticDiagnosis) -> list[str]:
+    """Effects of the cell that the points need, and what they leave, as lines of text."""
+    error = f"reading less load: {needed.before:.3g} N rms"
+    if not needed.effects:
+        return [f"effects of the cell: none is needed ({error})"]
+    lines = [f"effects of the cell (least BIC; {error}, {needed.after:.3g} N beside them):"]
+    lines += [f"  {' '.join(row)}" for row in _effect_rows(needed)]
+    if not math.isnan(needed.p_value):
+        lines.append(
+            f"  lack of fit: p = {needed.p_value:.2g}; repeatability {needed.repeatability:.3g} N"
+        )
+    return lines
+
+
+def _effect_rows(needed: StaticDiagnosis) -> list[tuple[str, str, str]]:
+    return [
+        (e.effect, e.parameter, f"{e.value:+.4g} ± {e.std:.2g}" + ("" if e.unit == "1" else " N"))
+        for e in needed.effects
+    ]
 
 
 def figures(fit: CellFit) -> list[tuple[str, str]]:
@@ -94,7 +117,9 @@ _SPAN = "Figures of merit; the span is from the smallest to the largest load."
 _TONES = {"up": "above", "down": "below"}
 
 
-def report_page(calibration: CellCalibration, fit: CellFit) -> str:
+def report_page(
+    calibration: CellCalibration, fit: CellFit, needed: StaticDiagnosis | None = None
+) -> str:
     """Page with the load cell, the fit, the residuals and the points.
 
     Parameters
@@ -103,6 +128,8 @@ def report_page(calibration: CellCalibration, fit: CellFit) -> str:
         The calibration as filed.
     fit : CellFit
         The fit.
+    needed : StaticDiagnosis, optional
+        Effects of the cell that the points need.
 
     Returns
     -------
@@ -128,9 +155,19 @@ def report_page(calibration: CellCalibration, fit: CellFit) -> str:
             ),
             join(element("p", warning) for warning in fit.warnings),
         ),
+        section("effects", "Effects of the cell", _effects(needed)),
         section("residuals", "Residuals", _drawing(fit, calibration.point)),
         section("points", "Points", _points(calibration.point, fit)),
     )
+
+
+def _effects(needed: StaticDiagnosis | None) -> Markup:
+    if needed is None:
+        return Markup("")
+    if not needed.effects:
+        return element("p", *effect_lines(needed))
+    caption = effect_lines(needed)[0].removesuffix(":")
+    return table(caption, ("effect", "parameter", "value"), _effect_rows(needed), words=2)
 
 
 def _about(calibration: CellCalibration) -> Markup:

@@ -1,0 +1,120 @@
+"""Effects of a cell from points at rest, against numpy and against the laws of the catalogue."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from winchkit.calibration.cell.static_effects import static_effects
+from winchkit.effects.catalogue import load_catalogue
+from winchkit.schema.calibration import CalibrationPoint
+
+LOADS = (0.0, 20.0, 50.0, 100.0, 150.0, 200.0)
+
+
+def weighed(
+    seed: int,
+    offset: float = 0.0,
+    gain: float = 0.0,
+    bow: float = 0.0,
+    loop: float = 0.0,
+    noise: float = 0.02,
+    series: int = 3,
+) -> list[CalibrationPoint]:
+    """Readings of a cell with known errors, up and down."""
+    random, out = np.random.default_rng(seed), []
+    for number in range(1, series + 1):
+        steps: tuple[tuple[Literal["up", "down"], tuple[float, ...]], ...] = (
+            ("up", LOADS),
+            ("down", LOADS[-2::-1]),
+        )
+        for going, loads in steps:
+            sign = -1 if going == "up" else 1
+            for load in loads:
+                error = offset + gain * load + bow * (load / 500) ** 2 + sign * loop * load
+                read = load + error + random.normal(0, noise)
+                out.append(CalibrationPoint(load, read, 0.0, going, number))
+    return out
+
+
+@given(
+    st.integers(0, 2**31),
+    st.sampled_from((0.0, 0.5, -3.0)),
+    st.sampled_from((0.0, 0.02, -0.005)),
+    st.sampled_from((0.0, 4.0, -9.0)),
+    st.sampled_from((0.0, 2e-3)),
+)
+@settings(max_examples=80, deadline=None)
+def test_the_effects_of_a_cell_are_named(
+    seed: int, offset: float, gain: float, bow: float, loop: float
+) -> None:
+    wanted = {
+        "cell-offset": offset,
+        "cell-gain": gain,
+        "cell-nonlinearity": bow,
+        "cell-hysteresis": loop,
+    }
+    found = static_effects(weighed(seed, offset, gain, bow, loop))
+    values = {e.effect: e for e in found.effects}
+    assert {name for name, size in wanted.items() if size} <= set(values)
+    for name, effect in values.items():
+        assert abs(effect.value - wanted[name]) < 5 * effect.std
+
+
+def test_false_effects_are_as_rare_as_bic_makes_them() -> None:
+    """Of four terms each enters by chance with P(chi² > ln 33) = 6.1 %: 22 % together at most."""
+    found = [static_effects(weighed(seed)) for seed in range(400)]
+    assert sum(bool(one.effects) for one in found) < 400 * 0.27
+
+
+def test_values_and_uncertainties_agree_with_numpy() -> None:
+    points = weighed(1, 0.5, 0.02)
+    found = static_effects(points)
+    load = np.array([p.load for p in points])
+    error = np.array([p.indicated for p in points]) - load
+    values, covariance = np.polyfit(load, error, 1, cov=True)
+    assert [e.effect for e in found.effects] == ["cell-offset", "cell-gain"]
+    assert [e.value for e in found.effects] == pytest.approx(values[::-1])
+    assert [e.std for e in found.effects] == pytest.approx(np.sqrt(np.diag(covariance))[::-1])
+
+
+def test_the_terms_are_those_of_the_catalogue() -> None:
+    catalogue = load_catalogue()
+    points = weighed(1, 0.5, 0.02, 4.0, 2e-3)
+    for effect in static_effects(points).effects:
+        declared = catalogue[effect.effect].parameter(effect.parameter)
+        assert declared.unit == effect.unit
+
+
+def test_repeatability_is_the_pooled_standard_deviation() -> None:
+    points = weighed(2, 0.5, series=4, noise=0.1)
+    groups: dict[tuple[float, str], list[float]] = {}
+    for p in points:
+        groups.setdefault((p.load, p.going), []).append(p.indicated)
+    pooled = np.sqrt(np.mean([np.var(g, ddof=1) for g in groups.values()]))
+    assert static_effects(points).repeatability == pytest.approx(pooled)
+
+
+def test_a_shape_outside_the_catalogue_is_a_lack_of_fit() -> None:
+    points = weighed(3, 0.5, noise=0.01)
+    bent = [
+        CalibrationPoint(p.load, p.indicated + 0.3 * np.sin(p.load / 15), 0.0, p.going, p.series)
+        for p in points
+    ]
+    assert static_effects(points).p_value > 0.01
+    assert static_effects(bent).p_value < 1e-6
+
+
+def test_one_direction_leaves_hysteresis_open() -> None:
+    found = static_effects([p for p in weighed(4, 0.5, loop=0.01) if p.going == "up"])
+    assert "cell-hysteresis" not in {e.effect for e in found.effects}
+
+
+def test_exact_points_need_no_noise() -> None:
+    assert static_effects(weighed(0, noise=0.0)).effects == ()
+    (effect,) = static_effects(weighed(0, gain=0.01, noise=0.0)).effects
+    assert (effect.effect, effect.value) == ("cell-gain", pytest.approx(0.01))

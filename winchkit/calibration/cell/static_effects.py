@@ -1,0 +1,151 @@
+"""Effects of a load cell that points at rest determine: zero, span, curvature, hysteresis.
+
+The difference of reading and load is a linear model of up to four columns; all subsets are fitted
+by least squares, and that of least BIC is kept. Its terms are those of the effects ``cell-offset``,
+``cell-gain``, ``cell-nonlinearity`` and ``cell-hysteresis``, so that the values go into a profile.
+Series that repeat each other give the pure error, with which the lack of fit of the kept model is
+tested.
+
+References
+----------
+Draper, N. R., Smith, H. (1998). Applied Regression Analysis, 3rd ed., ch. 2 and 15. Wiley.
+ISO 376:2011, Calibration of force-proving instruments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.special import fdtrc, stdtr
+
+from winchkit.arrays import Array
+from winchkit.schema.calibration import CalibrationPoint
+
+__all__ = ["StaticDiagnosis", "StaticEffect", "static_effects"]
+
+_TERMS = (
+    ("cell-offset", "offset", "N"),
+    ("cell-gain", "gain_error", "1"),
+    ("cell-nonlinearity", "quadratic", "N"),
+    ("cell-hysteresis", "fraction", "1"),
+)
+_HYSTERESIS = 3
+"""Term that needs loads in both directions."""
+_UNIT_TENSION = 500.0
+"""As in the effect ``cell-nonlinearity``: q (T/500 N)²."""
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class StaticEffect:
+    """One effect with its value, SI."""
+
+    effect: str
+    parameter: str
+    value: float
+    std: float
+    unit: str
+    p_value: float
+    """Of the t test that it is zero, two-sided."""
+
+
+@dataclass(frozen=True)
+class StaticDiagnosis:
+    """Effects that points at rest need, and what they leave."""
+
+    effects: tuple[StaticEffect, ...]
+    before: float
+    """Rms of reading less load, N."""
+    after: float
+    """Residual standard deviation beside the effects, N."""
+    repeatability: float
+    """Pure error: standard deviation at the same load and direction, N; NaN without series."""
+    p_value: float
+    """Of the F test of the lack of fit; NaN without series."""
+
+
+def static_effects(points: Sequence[CalibrationPoint]) -> StaticDiagnosis:
+    """Effects of a cell that explain the differences of its readings and the loads.
+
+    Parameters
+    ----------
+    points : sequence of CalibrationPoint
+        Known loads with indicated forces.
+
+    Returns
+    -------
+    StaticDiagnosis
+        An effect that the points do not determine, such as hysteresis with loads in one direction
+        only, is not among them.
+    """
+    load = np.array([point.load for point in points])
+    error = np.array([point.indicated for point in points]) - load
+    up = np.array([1.0 if point.going == "up" else -1.0 for point in points])
+    columns = np.column_stack([np.ones_like(load), load, (load / _UNIT_TENSION) ** 2, -up * load])
+    offered = [k for k in range(len(_TERMS)) if k != _HYSTERESIS or len(set(up)) > 1]
+    able = [k for k in offered if _determines(columns, k, offered)]
+    subsets = [s for n in range(len(able) + 1) for s in combinations(able, n)]
+    floor = (_ROUNDING * float(np.max(np.abs(load), initial=1.0))) ** 2 * len(load)
+    fits = [_fit(columns[:, s], error) for s in subsets if len(s) < len(load)]
+    bic = [
+        len(load) * np.log(max(square, floor) / len(load)) + len(values) * np.log(len(load))
+        for values, _, square in fits
+    ]
+    best = int(np.argmin(bic))
+    kept, (values, inverse, square) = subsets[best], fits[best]
+    free = len(load) - len(kept)
+    variance = square / free
+    stds = np.sqrt(variance * np.diag(inverse))
+    effects = [
+        StaticEffect(
+            *_TERMS[k][:2], float(value), float(std), _TERMS[k][2], _two_sided(value, std, free)
+        )
+        for k, value, std in zip(kept, values, stds, strict=True)
+    ]
+    pure, degrees = _pure_error(points, error)
+    lack = free - degrees
+    p_value = float("nan")
+    if degrees > 0 and lack > 0 and pure > 0:
+        p_value = float(fdtrc(lack, degrees, max(square - pure, 0.0) / lack / (pure / degrees)))
+    return StaticDiagnosis(
+        tuple(effects),
+        float(np.sqrt(np.mean(error**2))),
+        float(np.sqrt(variance)),
+        float(np.sqrt(pure / degrees)) if degrees > 0 else float("nan"),
+        p_value,
+    )
+
+
+def _determines(columns: Array, index: int, offered: Sequence[int]) -> bool:
+    """Whether a column is independent of the others that are offered."""
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    rest = scaled[:, [k for k in offered if k != index]]
+    own = scaled[:, index]
+    left = own - rest @ np.linalg.lstsq(rest, own, rcond=None)[0]
+    return bool(np.linalg.norm(left) > _ROUNDING)
+
+
+def _fit(columns: Array, error: Array) -> tuple[Array, Array, float]:
+    """Coefficients, (XᵀX)⁻¹ and sum of squares of the residual."""
+    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    x = columns / scale
+    inverse = np.linalg.pinv(x.T @ x)
+    values = inverse @ x.T @ error
+    left = error - x @ values
+    return values / scale, inverse / np.outer(scale, scale), float(left @ left)
+
+
+def _two_sided(value: float, std: float, free: int) -> float:
+    return 2 * float(stdtr(free, -abs(value) / std)) if std > 0 else 0.0
+
+
+def _pure_error(points: Sequence[CalibrationPoint], error: Array) -> tuple[float, int]:
+    """Sum of squares within equal loads and directions, and its degrees of freedom."""
+    groups: dict[tuple[float, str], list[float]] = {}
+    for point, value in zip(points, error, strict=True):
+        groups.setdefault((round(point.load, 6), point.going), []).append(float(value))
+    square = sum(float(np.sum((np.array(g) - np.mean(g)) ** 2)) for g in groups.values())
+    return square, sum(len(group) - 1 for group in groups.values())
