@@ -20,6 +20,7 @@ from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, even_instants
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, without_outliers
 from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
+from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs
 from winchkit.diagnosis.data.zeroing import zeroed_anew
@@ -173,7 +174,8 @@ def prepare(
     """
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
-    notes = validate_runs(runs, profile)
+    runs, at_rest = prepared_statics(runs, profile)
+    notes = [*at_rest, *validate_runs(runs, profile)]
     runs, copied = without_copies(runs, profile)
     sanity = findings(runs, profile)
     resolution = resolutions(runs)

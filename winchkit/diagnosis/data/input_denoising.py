@@ -138,12 +138,17 @@ def denoised_motions(
     -----
     The acceleration of the cable is the part that repeats share. A measured force is its regression
     on that acceleration plus the part of the remainder that repeats share; the force of a known
-    weight follows the acceleration alone. The error of finite differences in the acceleration is
+    weight follows the acceleration alone; known weights on a winch at rest are used as they are,
+    since a filter would smooth their steps. The error of finite differences in the acceleration is
     estimated from a measured force; with a known weight it is a nuisance parameter of the fit.
     """
     out = list(motions)
     for group in repeats:
         own = [signals[index] for index in group.runs]
+        if not any(np.ptp(s.motor_angle) for s in own):
+            for index in group.runs:
+                out[index] = _at_rest(motions[index], signals[index])
+            continue
         units = [_unit_weight(line, s) for s in own]
         unit_force = _denoised([load for load, _ in units], group)
         discretization = _denoised([discretization for _, discretization in units], group)
@@ -155,6 +160,12 @@ def denoised_motions(
         ):
             out[index] = _with(out[index], force, r, signals[index].temperature)
     return out
+
+
+def _at_rest(motion: Motion, signals: Signals) -> Motion:
+    if signals.temperature is None:
+        return motion
+    return replace(motion, at=replace(motion.at, temperature=wiener_filtered(signals.temperature)))
 
 
 def _unit_weight(line: Line, signals: Signals) -> tuple[Array, Array]:

@@ -25,8 +25,9 @@ _CHANNELS = ("motor_angle", "motor_velocity", "load", *OUTPUTS)
 
 def findings(runs: Sequence[Run], profile: WinchProfile) -> tuple[Finding, ...]:
     """Findings on runs: sign and scale against the profile first, then of every channel."""
-    found = sign_and_scale(runs, profile)
-    return (*found, *(finding for run in runs for finding in inspect_run(run)))
+    found = [*sign_and_scale(runs, profile), *(f for run in runs for f in inspect_run(run))]
+    # A constant angle is that of a run at rest, which has a note.
+    return tuple(f for f in found if (f.code, f.channel) != ("constant", "motor_angle"))
 
 
 def caveats(found: Sequence[Finding]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.sign_and_scale import length_words
+from winchkit.diagnosis.data.statics import is_at_rest
 from winchkit.errors import Fault, RunError
 from winchkit.model.line import Line
 from winchkit.model.stages import OUTPUTS, Signals
@@ -52,7 +53,7 @@ def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     """
     if not runs:
         raise RunError("no run given")
-    faults = [fault for run in runs for fault in _faults(run)] + _duplicates(runs)
+    faults = [fault for run in runs for fault in _faults(run, profile)] + _duplicates(runs)
     if not faults:
         faults = [fault for run in runs for fault in _other_winch(run, profile)]
     if faults:
@@ -60,7 +61,7 @@ def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     return [note for run in runs for note in _notes(run, profile)]
 
 
-def _faults(run: Run) -> list[Fault]:
+def _faults(run: Run, profile: WinchProfile) -> list[Fault]:
     where = run.path or run.name
     faults = []
     if "motor_angle" not in run:
@@ -85,7 +86,12 @@ def _faults(run: Run) -> list[Fault]:
             faults.append(Fault(message, where, key=key))
         elif np.ptp(finite) == 0:
             if name == "motor_angle":
-                message = f"constant at {finite[0]:g} rad: nothing moves in this run"
+                if is_at_rest(run, profile):
+                    continue
+                message = (
+                    f"constant at {finite[0]:g} rad: nothing moves in this run; "
+                    "a run at rest needs a tension and a load (column 'load' or load_mass)"
+                )
             elif name == "load":
                 continue
             else:

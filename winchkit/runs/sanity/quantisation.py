@@ -148,7 +148,10 @@ def _steps_are_multiples(values: Array, step: float) -> bool:
     Those of a wave with few samples a period have few values, which may be so by chance.
     """
     steps = np.abs(np.diff(values))
-    near = steps[np.isfinite(steps) & (steps < _NEAR * step) & (steps > step / 2)]
+    steps = steps[np.isfinite(steps) & (steps > step / 2)]
+    if len(steps) < _LEAST_DIFFERENCES:
+        return False
+    near = steps[steps < _NEAR * step]
     return len(near) < _LEAST_DIFFERENCES or bool(
         np.mean(np.cos(2 * np.pi * near / step)) >= _COHERENCE - _TIE
     )
