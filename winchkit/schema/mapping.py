@@ -11,7 +11,16 @@ from winchkit.schema.quantity import Frequency, Number
 from winchkit.schema.table import Rule, Table
 from winchkit.units import UNITS, dimension_of
 
-__all__ = ["DATE", "EXCEL", "MATRIX", "STAMP", "ImportMapping", "MappedColumn", "MappedLog"]
+__all__ = [
+    "CHANNELS",
+    "DATE",
+    "EXCEL",
+    "MATRIX",
+    "STAMP",
+    "ImportMapping",
+    "MappedColumn",
+    "MappedLog",
+]
 
 STAMP, EXCEL = "stamp", "excel"
 """Units of a time: text with a date or a time of day; days since 1899-12-30."""
@@ -20,17 +29,22 @@ DATE = "date"
 MATRIX = tuple(f"platform_r{row}{column}" for row in "123" for column in "123")
 """Elements of a platform's rotation matrix, which become its quaternion."""
 
-_OF_A_WINCH = (
-    *("motor_angle", "motor_velocity", "motor_torque", "tension", "tension_gross", "load"),
-    *("load_gross", "cable_length", "cable_length_gross", "temperature", "swivel"),
-)
-_OF_A_PLATFORM = (
-    *("platform_x", "platform_y", "platform_z"),
-    *("platform_qw", "platform_qx", "platform_qy", "platform_qz"),
-    *("platform_roll", "platform_pitch", "platform_yaw"),
-    *MATRIX,
-)
-CHANNELS = ("time", DATE, *_OF_A_WINCH, *_OF_A_PLATFORM)
+_OF_A_WINCH = {
+    **{"motor_angle": "angle", "motor_velocity": "angular speed", "motor_torque": "torque"},
+    **dict.fromkeys(("tension", "tension_gross", "load", "load_gross"), "force"),
+    **{"cable_length": "length", "cable_length_gross": "length"},
+    **{"temperature": "temperature", "swivel": "angle"},
+}
+CHANNELS: dict[str, str] = {
+    "time": "time",
+    DATE: "time",
+    **_OF_A_WINCH,
+    **dict.fromkeys(("platform_x", "platform_y", "platform_z"), "length"),
+    **dict.fromkeys(("platform_qw", "platform_qx", "platform_qy", "platform_qz"), "ratio"),
+    **dict.fromkeys(("platform_roll", "platform_pitch", "platform_yaw"), "angle"),
+    **dict.fromkeys(MATRIX, "ratio"),
+}
+"""Dimension of every channel that a column may be."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +68,15 @@ class MappedColumn(Table):
         if name not in CHANNELS or (name != self.channel and name not in _OF_A_WINCH):
             message = f"'{self.channel}' is no channel of a run; use one of {', '.join(CHANNELS)}"
             yield "channel", message + suggest(name, list(CHANNELS))
+        dimension = CHANNELS.get(name)
+        if self.factor is None and self.si is not None and dimension is not None:
+            is_stamp = self.unit in {STAMP, EXCEL} and dimension == "time"
+            if not is_stamp and self.unit not in UNITS[dimension]:
+                yield (
+                    "unit",
+                    f"'{self.unit}' is not a unit of {dimension}; use one of "
+                    f"{', '.join(UNITS[dimension])}, or give `factor`",
+                )
         if self.factor is None and self.si is None:
             yield "unit", f"'{self.unit}' has no known SI value; give `factor`, the SI value of 1"
         if self.factor is not None and (self.factor == 0 or not math.isfinite(self.factor)):

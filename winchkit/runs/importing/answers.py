@@ -7,17 +7,50 @@ from dataclasses import dataclass
 
 from winchkit.errors import UsageError
 from winchkit.runs.columns import column_dimension
-from winchkit.runs.importing.unit_spelling import read_unit
+from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE, read_unit
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
 from winchkit.units import UNITS, suggest
 
-__all__ = ["Answers", "ColumnAnswer", "read_column"]
+__all__ = ["Answers", "ColumnAnswer", "permitted", "read_column"]
 
 _COLUMN = re.compile(
     r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<source>.*?)\s*"
     r"(?:\*\s*(?:(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
     r"(?:\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
 )
+
+
+_PERMITTED: dict[str, tuple[str, ...]] = {
+    "time": ("time",),
+    "motor_angle": ("angle", COUNTS),
+    "motor_velocity": ("angular speed", COUNT_RATE),
+    "motor_torque": ("torque", "current", SHARE),
+    "tension": ("force", "mass", BRIDGE),
+    "load": ("force", "mass", BRIDGE),
+}
+"""Dimensions that a column of a channel may have, where they are not that of the channel alone."""
+
+
+def permitted(channel: str) -> tuple[str, ...]:
+    """Dimensions of the columns that a channel may have.
+
+    Parameters
+    ----------
+    channel : str
+        Channel, with or without a winch's name.
+
+    Returns
+    -------
+    tuple of str
+        Empty for a channel without a dimension.
+    """
+    base = channel.rpartition(".")[2]
+    dimension = column_dimension(base)
+    return _PERMITTED.get(base, () if dimension is None else (dimension,))
+
+
+def _fits(channel: str, dimension: str) -> bool:
+    return dimension in permitted(channel) or column_dimension(channel) in {"ratio", None}
 
 
 @dataclass(frozen=True)
@@ -84,5 +117,10 @@ def read_column(text: str) -> ColumnAnswer:
     if unit and unit not in {STAMP, EXCEL} and spelled is None:
         units = ", ".join(UNITS[dimension]) if dimension else "1"
         raise UsageError(f"'{unit}' in '{text}' is no known unit; use one of {units}")
+    if spelled is not None and not _fits(channel, spelled.dimension):
+        raise UsageError(
+            f"'{unit}' in '{text}' is a unit of {spelled.dimension}, not of {dimension}; use "
+            + ", ".join(UNITS[dimension or "ratio"])
+        )
     factor = float(found["factor"]) if found["factor"] else None
     return ColumnAnswer(channel, found["source"], unit, factor, found["constant"] or "")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from winchkit.runs.columns import POSE_DIMENSIONS, column_dimension
+from winchkit.runs.importing.answers import permitted
 from winchkit.runs.importing.assignment import Question
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of, words_of
@@ -20,9 +21,7 @@ from winchkit.runs.importing.pose_columns import (
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
-    COUNT_RATE,
     COUNTS,
-    SHARE,
     SpelledUnit,
     read_unit,
 )
@@ -30,18 +29,6 @@ from winchkit.schema.mapping import DATE, MATRIX
 
 __all__ = ["Candidate", "Choice", "choose"]
 
-_PERMITTED: dict[str, tuple[str, ...]] = {
-    "time": ("time",),
-    "motor_angle": ("angle", COUNTS),
-    "motor_velocity": ("angular speed", COUNT_RATE),
-    "motor_torque": ("torque", "current", SHARE),
-    "tension": ("force", "mass", BRIDGE),
-    "load": ("force", "mass", BRIDGE),
-    "cable_length": ("length",),
-    "temperature": ("temperature",),
-    "swivel": ("angle",),
-}
-"""Dimensions that a column of a channel may have."""
 _BY_DIMENSION = {
     "time": "time",
     "angle": "motor_angle",
@@ -183,8 +170,7 @@ def _by_name(column: Column, meaning: Meaning, unit: SpelledUnit | None) -> Cand
         base, unit = "motor_torque", unit or read_unit("A")
     channel = base if meaning.channel == CURRENT else meaning.channel
     dimension = column_dimension(base)
-    permitted = _PERMITTED.get(base, () if dimension is None else (dimension,))
-    fits = unit is None or unit.dimension in permitted or dimension == "ratio"
+    fits = unit is None or unit.dimension in permitted(base) or dimension == "ratio"
     if base == "time" and not _is_clock(column):
         return Candidate(column, "", reason=f"'{meaning.text}', and no clock")
     if fits:

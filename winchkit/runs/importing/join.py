@@ -209,7 +209,7 @@ def _correlated(one: _Signal, two: _Signal) -> Agreement | None:
     drift, drift_std = math.nan, math.nan
     if known:
         drift, drift_std, lag, spread, middle = _drift(one, two, lag, interval, middle)
-        std = max(std, spread)
+        std = spread or std
     return Agreement(
         (one.channel, two.channel),
         lag,
@@ -300,13 +300,22 @@ def _residual(a: Array, b: Array, lag: int) -> Array:
 
 
 def _independent(a: Array, b: Array, lag: int) -> float:
-    """Number of independent samples of the residual, from its autocorrelation (first order)."""
-    rest = _residual(a, b, lag)
+    """Number of independent samples of the residual at a lag."""
+    return _effective_count(_residual(a, b, lag))
+
+
+def _effective_count(rest: Array) -> float:
+    """n / (1 + 2 Σ ρ_k), the autocorrelation ρ summed to its first zero; at least 4."""
+    n = len(rest)
     power = float(np.sum(rest**2))
-    if power == 0 or len(rest) < 8:
-        return float(len(rest))
-    rho = min(max(float(np.sum(rest[1:] * rest[:-1])) / power, 0.0), 0.9999)
-    return max(4.0, len(rest) * (1 - rho) / (1 + rho))
+    if power == 0 or n < 8:
+        return float(n)
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.abs(np.fft.rfft(rest, size)) ** 2
+    rho = np.fft.irfft(spectrum, size)[:n] / power
+    negative = np.flatnonzero(rho <= 0)
+    end = int(negative[0]) if len(negative) else n
+    return max(4.0, n / (1 + 2 * float(np.sum(rho[1:end]))))
 
 
 def _is_better(best: float, rival: float, independent: float) -> bool:
@@ -392,8 +401,7 @@ def _local_lag(
         change = -float(solved[2] / scale[2])
         rest = a - (matrix / scale) @ solved
         power = float(np.mean(rest**2))
-        rho = float(np.sum(rest[1:] * rest[:-1])) / max(float(np.sum(rest**2)), 1e-300)
-        independent = max(4.0, len(rest) * (1 - max(rho, 0)) / (1 + max(rho, 0)))
+        independent = _effective_count(rest)
         sharp = float(np.mean((slope - slope.mean()) ** 2))
         if sharp == 0:
             return None

@@ -170,6 +170,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     (r"\bswivel\b|\bschwenkwinkel\b", 1, "swivel"),
 )
 _COMPILED = tuple((re.compile(pattern), rank, channel) for pattern, rank, channel in _RULES)
+_LONGEST = 300
+"""Characters of a name that are read."""
 _GREEK = {
     **{"ß": "ss", "θ": " theta ", "ϑ": " theta ", "φ": " phi ", "ϕ": " phi ", "α": " angle "},
     **{"ω": " omega ", "Ω": " omega ", "τ": " tau ", "Θ": " theta ", "Φ": " phi "},
@@ -192,7 +194,7 @@ def words_of(name: str) -> str:
     str
         ``MotorPos_ist2`` becomes ``motor pos ist 2``.
     """
-    text = _CAMEL.sub(" ", "".join(_GREEK.get(char, char) for char in name))
+    text = _CAMEL.sub(" ", "".join(_GREEK.get(char, char) for char in name[:_LONGEST]))
     text = unicodedata.normalize("NFKD", text)
     text = "".join(char for char in text if not unicodedata.combining(char)).lower()
     return " ".join(re.split(r"[^a-z0-9]+", text)).strip()

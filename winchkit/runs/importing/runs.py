@@ -117,6 +117,12 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     faults = list(streams.faults)
     if len(streams.streams) > 1:
         faults += [fault for item in streams.streams for fault in _time_faults(streams, item)]
+    if streams.streams and not has_angle(streams):
+        message = (
+            f"has no motor angle (it has {', '.join(streams.channels)}); import it together with "
+            "the file that has it, which joins the two, or name its column by --column"
+        )
+        faults.append(Fault(message, streams.path))
     if not streams.streams:
         faults.append(Fault("has no channel of a run", streams.path))
     refuse(sorted(faults, key=lambda fault: fault.line or 0))

@@ -10,7 +10,7 @@ from winchkit.errors import Fault, RunError
 
 __all__ = ["LARGEST", "Column", "Table", "named_apart", "refuse_size"]
 
-LARGEST = 2 << 30
+LARGEST = 1 << 30
 """Largest size of a file, of its unpacked content and of its numbers, bytes."""
 
 

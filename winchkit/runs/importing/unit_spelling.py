@@ -121,6 +121,8 @@ _OTHER_OFFSET = {
     "K": SpelledUnit("K", "temperature", 1.0, -273.15),
 }
 _DROPPED = re.compile(r"[\s·⋅*×•^_.]")
+_LONGEST = 200
+"""Longest name with a unit, characters."""
 _PER_SECOND = re.compile(r"/\s*(sec|second|seconds|Sek|Sekunde)$")
 _BRACKETED = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\})\s*")
 _NO_UNIT = {"", "-", "--", "none", "n/a", "1", "/", "[]", "()", "bool", "no unit", "unitless"}
@@ -213,6 +215,8 @@ def split_unit(text: str) -> tuple[str, str]:
             return found[1].strip(), "" if unit.lower() in _NO_UNIT else unit
     plain = text.strip()
     best = plain, ""
+    if len(plain) > _LONGEST:
+        return best
     for mark in (r"\s*/\s*", r"\s+in\s+", r"\s*,\s*", r"_", r"\s+", r"\."):
         for cut in re.finditer(rf"(?<=[^\s/]){mark}", plain):
             unit = plain[cut.end() :]
